@@ -8,7 +8,7 @@ import json
 import re
 import tomllib
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date, time
 from pathlib import Path
 from types import UnionType
@@ -154,6 +154,16 @@ def parts(path: str) -> list[str]:
     if '"' not in path:
         return path.split(".")
     return [quoted or bare for quoted, bare in re.findall(r'"([^"]*)"|([^."]+)', path)]
+
+
+def short_names(paths: Sequence[str]) -> tuple[str, ...]:
+    """Name of each dotted path: its last part, with the one before it where it is one letter (`K_T.J`).
+
+    Where that is not unique it is the whole path.
+    """
+    split = [path.split(".") for path in paths]
+    last = [".".join(part[-1 if len(part[-1]) > 1 else -2 :]) for part in split]
+    return tuple(name if last.count(name) == 1 else path for name, path in zip(last, paths, strict=True))
 
 
 def place_of(entries: list[Any], part: str) -> int:

@@ -216,3 +216,10 @@ def test_a_public_model_takes_what_is_right() -> None:
     family = Family.model_validate({"name": "a", "base": "mariner"})
     assert Family.model_validate(family) is family
     assert Family.model_validate(family.model_dump()) == family
+
+
+def test_names_are_as_short_as_is_clear() -> None:
+    one_letter = ["inertia.m", "thruster.port.K_T.J", "hull.mmg.R_0"]
+    assert documents.short_names(one_letter) == ("inertia.m", "K_T.J", "R_0")
+    two_of_a_name = ["hull.derivatives.Y_v", "port.D_p", "starboard.D_p"]
+    assert documents.short_names(two_of_a_name) == ("Y_v", "port.D_p", "starboard.D_p")

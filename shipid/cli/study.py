@@ -127,7 +127,7 @@ def _factors(row: dict[str, Any]) -> list[str]:
     """A foundation as words: its accuracy, how many numbers are changed, and by which factors."""
     if row["identified"]:
         return [row["foundation"], "-", "-", "identified from the runs of each cell, so A differs by cell"]
-    from shipid.identification.collinearity import short as short_names
+    from shipid.document import short_names
 
     words = [f"x{factor:.2f}" if abs(factor) >= 0.01 else f"x{factor:.2g}" for factor in row["factors"].values()]
     words = [word if factor else "removed" for word, factor in zip(words, row["factors"].values(), strict=True)]

@@ -19,8 +19,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from shipid.document import short_names
 from shipid.errors import DataError, ShipidError
-from shipid.identification.collinearity import digits, listed, short
+from shipid.identification.collinearity import digits, listed
 from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution
 from shipid.identification.statistics import Statistics
@@ -66,7 +67,7 @@ def refusal(solution: Solution, judged: Statistics, spacing: float) -> str:
         return f"the standard errors are not to be trusted: {best.reason if best else 'no factor is free'}"
     open_ = [path for path, error in zip(solution.paths, judged.errors, strict=True) if np.isinf(error)]
     if open_:
-        return f"the data do not determine {listed(short(open_))}: give priors, or fix some"
+        return f"the data do not determine {listed(short_names(open_))}: give priors, or fix some"
     return ""
 
 

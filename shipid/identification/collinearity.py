@@ -22,6 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.document import short_names
+
 Array = NDArray[np.float64]
 
 MOST_COLLINEAR = 15.0  # Brun et al.: "critical" from 10 to 15 on
@@ -50,16 +52,6 @@ class Combination:
             return f"{self.names[0]} has no effect on these data"
         moves = [f"{digits(10 * w, 2, '+')} % of {name}" for w, name in zip(self.weights, self.names, strict=True)]
         return f"only {listed(self.names)} together; {' with '.join(moves)} has no effect on these data"
-
-
-def short(paths: Sequence[str]) -> tuple[str, ...]:
-    """Short names: the last part of each dotted path, with the one before it where it is one letter (`K_T.J`).
-
-    Where that is not unique it is the whole path.
-    """
-    parts = [path.split(".") for path in paths]
-    last = [".".join(part[-1 if len(part[-1]) > 1 else -2 :]) for part in parts]
-    return tuple(name if last.count(name) == 1 else path for name, path in zip(last, paths, strict=True))
 
 
 def digits(value: float, most: int = 3, sign: str = "") -> str:
@@ -131,7 +123,7 @@ def combinations(jacobian: Array, paths: Sequence[str], most: float = MOST_COLLI
     """
     lengths = np.sqrt((jacobian**2).sum(axis=0))
     silent = np.flatnonzero(lengths <= np.sqrt(UNSEEN) * lengths.max(initial=0.0)).tolist()
-    names = short(paths)
+    names = short_names(paths)
     result = [Combination((paths[j],), (names[j],), (1.0,), float("inf")) for j in silent]
     gram = _gram(jacobian)
     left = [j for j in range(len(paths)) if j not in silent]

@@ -16,11 +16,12 @@ from pydantic import BaseModel, ConfigDict
 from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.data.outputs import common_outputs, compare_outputs
+from shipid.document import short_names
 from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.files import write_new
 from shipid.identification import design
 from shipid.identification.bands import LONG, Measure, bands, check_level, refusal
-from shipid.identification.collinearity import digits, listed, short
+from shipid.identification.collinearity import digits, listed
 from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
 from shipid.identification.plausible import verdict
@@ -361,7 +362,7 @@ def write_patch(outcome: Identified, file: Path) -> Path:
 def _estimates(vessel: Vessel, solution: Solution, judged: Statistics) -> pd.DataFrame:
     unknown = unknowns(solution.vessel, solution.settings)
     rows = []
-    parts = zip(unknown.groups, unknown.scale, short(unknown.paths), strict=True)
+    parts = zip(unknown.groups, unknown.scale, short_names(unknown.paths), strict=True)
     for j, (group, scales, name) in enumerate(parts):
         path, scale = group[0], scales[0]
         low, high = sorted((scale * judged.low[j], scale * judged.high[j]))

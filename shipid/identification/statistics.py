@@ -32,8 +32,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from shipid.document import short_names
 from shipid.errors import ShipidError
-from shipid.identification.collinearity import Collinearity, collinearity, digits, listed, short
+from shipid.identification.collinearity import Collinearity, collinearity, digits, listed
 from shipid.identification.covariance import inverted
 
 if TYPE_CHECKING:
@@ -469,7 +470,7 @@ def _sentences(
 ) -> tuple[str, ...]:
     """One sentence for each factor: its interval, or the reason why it has none."""
     free, sentences = _free_places(fit), list[str]()
-    for j, (path, name) in enumerate(zip(fit.paths, short(fit.paths), strict=True)):
+    for j, (path, name) in enumerate(zip(fit.paths, short_names(fit.paths), strict=True)):
         together = next((combination for combination in seen.combinations if path in combination.paths), None)
         known = f"{name} is known to +-{digits(100 * half[j], 2)} % of its base value"
         if path in fit.dropped:

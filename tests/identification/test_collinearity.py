@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.identification.collinearity import collinearity, combinations, index_of, listed, short
+from shipid.identification.collinearity import collinearity, combinations, index_of, listed
 
 RNG = np.random.default_rng(0)
 FREE = np.linalg.qr(RNG.normal(size=(200, 6)))[0]
@@ -65,9 +65,7 @@ def test_columns_at_right_angles_have_no_set_and_each_silent_one_has_one() -> No
     assert collinearity(silent, "abc").gamma == pytest.approx(1)
 
 
-def test_names_are_as_short_as_is_clear() -> None:
-    assert short(["inertia.m", "thruster.port.K_T.J", "hull.mmg.R_0"]) == ("inertia.m", "K_T.J", "R_0")
-    assert short(["hull.derivatives.Y_v", "port.D_p", "starboard.D_p"]) == ("Y_v", "port.D_p", "starboard.D_p")
+def test_a_pair_is_named_in_one_sentence() -> None:
     assert [listed(list("abc")[:count]) for count in (1, 2, 3)] == ["a", "a and b", "a, b and c"]
     (pair,) = combinations(correlated(0.9999) * [1.0, 2.0], ["hull.Y_v", "hull.Y_ur"])
     assert pair.sentence() == "only Y_v and Y_ur together; +10 % of Y_v with -5 % of Y_ur has no effect on these data"
