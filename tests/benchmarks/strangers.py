@@ -174,7 +174,8 @@ def _studied(ship: RawStranger, desk: Desk, times: int, stage: str) -> dict[str,
     prediction = document["prediction"]
     changes: dict[str, Any] = {
         "prediction.commands": "known", "prediction.ahead": times * prediction["ahead"],
-        "prediction.interval": FEWER * prediction["interval"], "grid.N_D": [1], "grid.seeds": [0],
+        "prediction.interval": FEWER * prediction["interval"], "grid.N_D": document["grid"]["N_D"][:1],
+        "grid.seeds": [0],
     }  # fmt: skip
     plan = read_plan(str(desk.folder / "study.toml"), changes)
     left = len(partition(plan, obtain(plan))[0].spans)  # fewer at a longer horizon, if some runs are short
