@@ -135,6 +135,16 @@ def test_the_error_of_the_course_is_the_angle_between_tracks(angle: float, speed
     np.testing.assert_allclose(metrics.course_over_horizon(turned, true, 2.0), abs(angle), atol=1e-9)
 
 
+@pytest.mark.parametrize("step", [0.1, 1.0, 10.0])
+def test_how_fast_a_ship_is_decides_whether_she_has_a_course_and_not_the_step(step: float) -> None:
+    """One ship at 1.5 SLOW, predicted a right angle off, and one at half of SLOW: only the first one counts."""
+    ahead = metrics.SLOW * step * np.outer(np.arange(1.0, 5.0), [1.5, 0.5])
+    true = np.stack([ahead, np.zeros_like(ahead)], axis=-1)
+    predicted = np.stack([np.zeros_like(ahead), ahead], axis=-1)
+    predicted[:, 1] = true[:, 1]
+    np.testing.assert_allclose(metrics.course_over_horizon(predicted, true, step), np.pi / 2)
+
+
 def test_a_ship_that_hardly_moves_has_no_course() -> None:
     true = np.zeros((3, 2, 2))
     assert np.isnan(metrics.course_over_horizon(true + 1.0, true, 1.0)).all()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from typing import Literal
 
 import casadi as ca
 import numpy as np
@@ -12,8 +13,11 @@ from casadi import SX
 
 from shipid.data.causal import causal_columns, last_known
 from shipid.data.dataset import Dataset
+from shipid.data.windows import Instants
 from shipid.errors import DocumentError
+from shipid.hybrid.physics import Physics
 from shipid.observer import (
+    COLUMNS,
     LOW,
     MEASURED,
     STATES,
@@ -23,6 +27,7 @@ from shipid.observer import (
     bank,
     begin,
     observe,
+    observed_paths,
     observer_function,
     tau_extra,
     tune_observer,
@@ -161,6 +166,27 @@ def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
     gained = np.array(model.rates(*inputs, tau[0, 0])) - np.array(model.rates(*inputs, np.zeros(3)))
     now = np.exp(-0.5 / filters.fade) * np.array([0.01, -0.02, 0.001])
     np.testing.assert_allclose(gained[3:, 0], now, rtol=1e-9)
+
+
+@pytest.mark.parametrize("path", ["position", "velocity"])
+def test_tuning_judges_the_paths_of_a_prediction(path: Literal["position", "velocity"]) -> None:
+    """With `velocity` a path starts where the ship is; with `position`, where the observer believes her to be."""
+    vessel, rng, count = load_vessel("gunnerus-28.9"), np.random.default_rng(4), 3
+    motion = {
+        name: rng.uniform(low, low + 0.05, count) for name, low in zip(MEASURED, (-9, 4, 1, 3, 0, 0), strict=True)
+    }
+    columns = motion | {name: rng.uniform(0.2, 0.5, count) for name in dynamics(vessel).commands}
+    columns |= {"V_w": np.full(count, 5.0), "beta_w": rng.uniform(0, 6, count)}
+    seen = {f"observer.{name}": motion.get(name, 0.0) + rng.normal(0, 1e-4, count) for name in COLUMNS}
+    seen["observer.north"] = seen["observer.north"] + 2.0
+    ours, _ = observed_paths(bank(vessel), columns | seen, 20, 1.0, path=path)
+    known = Instants(columns, estimates=seen)
+    np.testing.assert_allclose(ours, Physics(vessel, 20, 1.0, observer=Observer(), path=path).paths(known), atol=1e-9)
+    shifted, _ = observed_paths(
+        bank(vessel), columns | seen | {"observer.north": seen["observer.north"] + 3.0}, 20, 1.0, path=path
+    )
+    moved = np.hypot(*(shifted - ours).T)
+    np.testing.assert_allclose(moved, 3.0 if path == "position" else 0.0, atol=1e-6)
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ from shipid.vessel.schema import (
     vessel_model,
 )
 
-MOST_RADIANS = 7.0  # more than a full circle: angles that stay below are no degrees of a wind table
+MOST_RADIANS = 7.0  # more than a full turn: a larger limit of an actuator is in degrees
 LONGEST_CHAIN = 20  # documents that extend or patch one another
 LEAST_BLOCK, MOST_BLOCK = 0.05, 2.0  # m / (rho L_pp B T): far beyond any ship and its degraded models
 
@@ -248,21 +248,12 @@ def check_vessel(document: Document, file: str) -> Vessel:
             raise DocumentError(message, file=file, path=path)
         paths[name] = path
         _check_lengths(path, block, file)
-        _check_degrees(path, block, file)
         if TABLE in block:
             _check_wave_table(f"{path}.{TABLE}", block[TABLE], TABLES[key], file)
     _check_behind(vessel)
     _check_units(vessel)
     _check_numbers(vessel)
     return vessel
-
-
-def _check_degrees(path: str, block: Mapping[str, Any], file: str) -> None:
-    """Refuse a wind table whose directions end at pi: they are in degrees."""
-    angles = block.get("gamma_deg")
-    if isinstance(angles, list) and len(angles) > 1 and 0 < max(angles) < MOST_RADIANS:
-        message = f"ends at {max(angles):.4g}: directions are in degrees, 0 (head wind) to 180; are these radians?"
-        raise DocumentError(message, file=file, path=f"{path}.gamma_deg")
 
 
 def _check_numbers(vessel: Vessel) -> None:

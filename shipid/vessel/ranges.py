@@ -86,9 +86,13 @@ def out_of_range(
         least, most = limits.least(size), limits.most(size)
         if not least <= abs(value) <= most and not _is_meant(path, meant):
             return path, f"{value:g}: expected {limits.words} ({least:.3g} to {most:.3g}); {_remedy(path)}"
-    for path in {path.rsplit(".", 1)[0] for path, unit in units.items() if unit == "deg"}:
-        angles = [abs(value) for name, value in values.items() if name.rsplit(".", 1)[0] == path]
-        if len(angles) > 2 and max(angles) <= TURN and not _is_meant(path, meant):
+    tables: dict[str, list[float]] = {}
+    for name, unit in units.items():
+        path, _, place = name.rpartition(".")
+        if unit == "deg" and place.isdecimal():
+            tables.setdefault(path, []).append(abs(values[name]))
+    for path, angles in tables.items():
+        if len(angles) > 1 and max(angles) <= TURN and not _is_meant(path, meant):
             return path, f"angles up to {max(angles):.3g}: expected degrees, are these radians? {_remedy(path)}"
     return None
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from shipid.data.kinematics import STATES, Noise, smooth
+from shipid.data.kinematics import STATES, Noise, _move, _transition, smooth
 from tests.logs.conftest import turning
 
 T = np.arange(0.0, 120.0, 1.0)
@@ -63,6 +63,15 @@ def test_errors_are_as_large_as_it_says(logged: tuple[str, ...]) -> None:
     low, high = chi2.ppf([0.001, 0.999], 3 * 120) / 120
     assert low < np.mean(nees) < high
     assert np.mean(consistency) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("dt", [0.1, 1.0, 5.0])
+def test_the_transition_is_the_slope_of_the_motion(dt: float) -> None:
+    """By central differences, of ships that drift and turn fast."""
+    rng = np.random.default_rng(5)
+    for x in rng.uniform([-50, -50, -4, -2, -2, -0.2], [50, 50, 4, 9, 2, 0.2], (5, 6)):
+        slopes = [(_move(x + 1e-5 * e, dt) - _move(x - 1e-5 * e, dt)) / 2e-5 for e in np.eye(6)]
+        np.testing.assert_allclose(_transition(x, dt), np.transpose(slopes), atol=1e-6)
 
 
 def test_wrong_noise_is_reported() -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import f_oneway
 
-from shipid.hybrid.calibration import _fitted, _runs, calibrated, radii
+from shipid.hybrid.calibration import _alike, _fitted, _runs, calibrated, radii
 from tests.hybrid.runs import NAMES, made, runs
 
 AT = [49, 79, 89]  # 50, 80, 90 %
@@ -24,6 +25,16 @@ def test_radii_hold_their_share_of_new_runs(count: int, alike: float) -> None:
         held.append([(scores[count:] <= one).mean() for one in radius])
     np.testing.assert_allclose(np.mean(held, axis=0), [0.5, 0.8, 0.9], atol=0.03)
     assert np.mean(held, axis=0)[2] > 0.885  # rather more than less
+
+
+@pytest.mark.parametrize(("count", "windows"), [(3, 2), (4, 12), (9, 5)])
+def test_how_alike_windows_are_is_the_intraclass_correlation(count: int, windows: int) -> None:
+    """Of runs of equal length, by the analysis of variance: (F - 1) / (F - 1 + windows)."""
+    rng = np.random.default_rng(count)
+    values = 2.0 * rng.standard_normal((count, 1)) + rng.standard_normal((count, windows))
+    F = f_oneway(*values).statistic
+    alike = _alike(values.ravel(), _runs(np.repeat(np.arange(count), windows)))
+    assert alike == pytest.approx(max(F - 1, 0) / (F - 1 + windows))
 
 
 def test_one_window_a_run_is_the_order_statistic() -> None:

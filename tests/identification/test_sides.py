@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.identification.sides import HEADS, by_group, shown, uneven
+from shipid.identification.sides import HEADS, _ratio, by_group, shown, uneven
 from shipid.units import DEGREE
 from shipid.vessel.load import load_vessel
 
@@ -92,3 +92,12 @@ def test_the_error_of_the_yaw_rate_is_tested_too() -> None:
     assert uneven(groups) == ()
     sure = groups.assign(r_error=[0.001, 0.002])
     assert uneven(sure) == ("the error of the yaw rate is 2.5 times as large to port as to starboard",)
+
+
+@pytest.mark.parametrize("count", [2, 3, 8])
+def test_the_error_of_a_ratio_of_equal_pieces_is_that_of_a_mean(count: int) -> None:
+    values = np.random.default_rng(count).normal(1.0, 0.3, count)
+    share, error = _ratio(3.0 * values, np.full(count, 3.0))
+    assert share == pytest.approx(values.mean())
+    assert error == pytest.approx(values.std(ddof=1) / count**0.5)
+    assert np.isinf(_ratio(values[:1], np.ones(1))[1])

@@ -208,6 +208,18 @@ def test_blocks_cut_all_signals_at_the_same_times() -> None:
         assert (v == r).all()
 
 
+@pytest.mark.parametrize("thinned", SIGNALS)
+def test_a_block_holds_one_run_where_a_signal_has_fewer_rows(thinned: str) -> None:
+    fit = one()
+    kept = (np.array(NAMES) != thinned) | (np.arange(len(NAMES)) % 4 == 0)
+    signals = tuple(name for name, here in zip(NAMES, kept, strict=True) if here)
+    few = LinearFit(fit.paths, fit.factors, fit.residuals[kept], fit.jacobian[kept], CLUSTERS[kept], signals)
+    numbers = blocks(few, 20)
+    runs_of = [np.unique(few.clusters[numbers == number]) for number in np.unique(numbers)]
+    assert all(len(runs) == 1 for runs in runs_of)
+    assert len(runs_of) == RUNS * 4
+
+
 def test_fits_without_a_meaning_are_refused() -> None:
     fit = one()
     with pytest.raises(ShipidError, match="use more data"):

@@ -90,6 +90,17 @@ def test_numbers_outside_of_the_hull_stay_as_the_settings_say() -> None:
     assert rudder["actuator"] == before["actuator"]
 
 
+@pytest.mark.parametrize("name", list(STRUCTURES))
+def test_a_rudder_that_is_off_stays_off(name: str) -> None:
+    """No coefficient of it is free, it takes no order, and its block is as before."""
+    without = KVLCC2.with_values({"thruster.rudder.off": True})
+    data = log_of(KVLCC2)
+    exchanged = exchange(without, name, data, data.runs, Identify(parameters=["hull.*"]))
+    assert dynamics(exchanged.vessel).commands == dynamics(without).commands
+    assert not [path for path in exchanged.settings.parameters if path.startswith("thruster.rudder")]
+    assert exchanged.vessel.document["thruster"]["rudder"] == without.document["thruster"]["rudder"]
+
+
 def test_resistance_is_taken_over_once() -> None:
     data = trials(GUNNERUS, runs=2, steps=40)
     for name in STRUCTURES:

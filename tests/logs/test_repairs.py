@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.dataset import Dataset, flag_bit, pieces
+from shipid.data.dataset import BREAK, Dataset, flag_bit, pieces
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.repairs import Latency, apply_repairs
+from shipid.logs.repairs import FLAGS, Latency, apply_repairs
 from tests.logs.conftest import as_log, turning
 
 T = np.arange(0.0, 240.0, 0.5)
@@ -153,3 +153,20 @@ def test_what_came_late_is_taken_earlier(signal: str) -> None:
         np.testing.assert_allclose(mended[name], wanted[name], atol=2e-2, err_msg=name)
     assert len(mended) == len(t) - 4
     assert records[0]["kind"] == "latency"
+
+
+@pytest.mark.parametrize("signal", ["position", "velocity", "heading", "yaw rate"])
+@pytest.mark.parametrize("seconds", [0.6, -0.6])
+def test_a_late_signal_of_a_broken_log_is_mended_stretch_by_stretch(signal: str, seconds: float) -> None:
+    """Rows at the ends of each stretch go, and the break with them: the first row that is left has it."""
+    bit = 1 << FLAGS.index(BREAK)
+    rows = turning(np.arange(0.0, 30.0, 0.25)).assign(flags=0)
+    rows["t"] += np.where(np.arange(len(rows)) >= 50, 40.0, 0.0)
+    rows["north"] += np.where(np.arange(len(rows)) >= 50, 500.0, 0.0)
+    rows.loc[50, "flags"] = bit
+    repair = Latency(kind="latency", reason="seen", signal=signal, seconds=seconds, turn=True)
+    mended, _ = apply_repairs(rows, [repair])
+    alone = [apply_repairs(part.reset_index(drop=True), [repair])[0] for part in (rows[:50], rows[50:])]
+    values = mended.drop(columns="flags")
+    pd.testing.assert_frame_equal(values, pd.concat(alone, ignore_index=True).drop(columns="flags"))
+    assert np.flatnonzero(mended["flags"].to_numpy() & bit).tolist() == [len(alone[0])]

@@ -52,6 +52,12 @@ def test_a_zigzag() -> None:
     assert judged("zigzag", 200.0, helm=20 * DEGREE) == {}
 
 
+@pytest.mark.parametrize(("helm", "heading"), [(10, 5), (10, 20), (20, 10), (15, 15), (9, 10), (10, 11)])
+def test_a_zigzag_of_other_angles_is_not_judged(helm: float, heading: float) -> None:
+    """The standards are for 10/10 and 20/20: both angles count."""
+    assert judged("zigzag", 200.0, helm=helm * DEGREE, execute_heading=heading * DEGREE) == {}
+
+
 def test_a_stop() -> None:
     assert judged("stop", 100.0, track_reach=1500.0)["5.3.4"][2:] == (True, "")
     _, _, met, note = judged("stop", 100.0, track_reach=1600.0)["5.3.4"]

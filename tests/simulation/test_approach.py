@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
 
 from shipid.errors import DocumentError, ShipidError
 from shipid.simulation.approach import Controls, NotStraight, acceleration, helm_effect, steady, thrust_sharing
@@ -176,6 +177,26 @@ def test_a_helmsman_holds_what_does_not_go_straight(key: str, changes: dict[str,
         assert 0.001 < max(map(abs, helm.values())) < 0.3
     alone = steady(controls, np.array(n[:1]), held=True, **how)  # type: ignore[arg-type]
     assert alone.state["u"][0] == approach.state["u"][0]  # whatever the company
+
+
+def test_a_slow_ship_is_held_until_she_is_on_course() -> None:
+    """Her velocities change little long before: speed, drift and helm are those at which all accelerations are nil."""
+    n, vessel = 0.5, SHIP.with_values({"thruster.starboard.off": True})
+    controls, model = Controls.of(vessel), dynamics(vessel)
+    approach = steady(controls, np.array([n]), step=0.5, method="rk4", engine="casadi", held=True)
+    given = list(vessel.parameters.values()), np.zeros(model.num_dof)
+
+    def unbalanced(x: np.ndarray) -> np.ndarray:
+        orders = controls.orders(np.array([n]), x[2:])
+        commands = [orders[name][0] for name in model.commands]
+        state = [{"u": x[0], "v": x[1]}.get(name, 0.0) for name in model.state]
+        return np.array(model.rates(state, [], commands, np.zeros(len(model.environment)), *given)).ravel()[3:]
+
+    (helm,), sign = approach.helm.values(), next(iter(controls.helm.values()))
+    found = np.array([approach.state["u"][0], approach.state["v"][0], sign * helm[0]])
+    balanced = fsolve(unbalanced, found, xtol=1e-12)
+    np.testing.assert_allclose(unbalanced(balanced), 0.0, atol=1e-10)
+    np.testing.assert_allclose(found, balanced, rtol=0.02)
 
 
 def test_shares_give_the_acceleration_asked_for_and_the_bias_gives_none() -> None:

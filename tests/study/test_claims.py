@@ -66,6 +66,24 @@ def test_a_claim_of_another_machine_is_taken_over_when_it_is_late(tmp_path: Path
         assert mine.take("a")
 
 
+def test_the_number_of_a_process_says_nothing_on_another_system(tmp_path: Path) -> None:
+    """A container may have the name of this host and other numbers: its claim is late before it is taken over."""
+    process = os.fork()
+    if not process:
+        os._exit(0)
+    os.waitpid(process, 0)
+    (tmp_path / "claims").mkdir()
+    claim = tmp_path / "claims" / "a"
+    with Claims(tmp_path) as mine:
+        gone = {**json.loads(mine.holder.words), "process": process}
+        claim.write_text(json.dumps(gone | {"system": f"{gone['system']} other"}))
+        assert not mine.take("a")
+        claim.write_text(json.dumps(gone | {"host": "other"}))
+        assert not mine.take("a")
+        claim.write_text(json.dumps(gone))
+        assert mine.take("a")
+
+
 def test_a_claim_is_renewed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(claims, "RENEWED", 0.01)
     with Claims(tmp_path) as mine:

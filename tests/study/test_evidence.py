@@ -81,6 +81,20 @@ def test_intervals_of_manoeuvres_that_are_no_pairs_cover(runs: int, others: int)
     assert (contrast.high < 0).sum() <= limit
 
 
+@pytest.mark.parametrize(("runs", "others"), [(7, 60), (60, 7), (12, 25)])
+@pytest.mark.parametrize("ratio", [0.05, 1.0, 20.0])
+def test_welch_for_normal_errors_by_hand(runs: int, others: int, ratio: float) -> None:
+    """Sets of unequal number and spread, of the quantiles of a normal distribution: the interval is Welch's."""
+    one, other = (stats.norm.ppf((np.arange(n) + 0.5) / n) for n in (runs, others))
+    one, other = 3.0 + one, 1.0 + ratio * other
+    contrast = contrasts_apart(one[None], np.ones(runs), other[None], np.ones(others))
+    welch = stats.ttest_ind(one, other, equal_var=False).confidence_interval()
+    wide = (welch.high - welch.low) / 2
+    assert contrast.mean[0] == pytest.approx(2.0)
+    assert wide * (1 - 1e-6) <= contrast.mean[0] - contrast.low[0] <= 1.15 * wide
+    assert wide * (1 - 1e-6) <= contrast.high[0] - contrast.mean[0] <= 1.15 * wide
+
+
 def test_pairs_are_narrower_than_manoeuvres_apart() -> None:
     """What is hard in both runs cancels in pairs alone; the mean is the same, and turning round changes the sign."""
     rng = np.random.default_rng(5)

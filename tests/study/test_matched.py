@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.errors import DocumentError, ResultError, ShipidError
+from shipid.study.evidence import contrasts, training_noise
 from shipid.study.matched import _remedy, compare, compare_results
 from shipid.study.results import Results
 from tests.study.byhand import grid
@@ -79,6 +80,22 @@ def test_paired_differences_by_hand(made: Made) -> None:
     assert same["difference"] == pytest.approx(0)
     assert same["low"] < 0 < same["high"]
     assert comparison.loc[("bad", "alone", 0), ["low", "high"]].tolist() == [0, 0], "physics alone is not trained"
+
+
+def test_what_training_adds_falls_with_the_number_of_seeds(made: Made) -> None:
+    """Equal H of all seeds leave the noise of a training that is known beforehand; means of S seeds have less of it."""
+    hard = np.linspace(0.9, 1.1, 8)
+    for count in (1, 4):
+        cells = [
+            {("bad", 10, s): bad for s in range(count)} | {("none", 10, s): 5.0 for s in range(count)}
+            for bad in (2.0, 1.0)
+        ]
+        one, other = (made(mine, runs=8, alone={"bad": 6.0}, claims=None) for mine in cells)
+        frame = compare_results([placed(one, "a"), placed(other, "b")]).errors.set_index(["family", "N_D"])
+        noise = training_noise([np.full(count, 2.0)])
+        expected = contrasts(-hard[None], np.ones(8), np.hypot(2.0, 1.0) * noise / count**0.5)
+        row = frame.loc[("bad", 10)]
+        assert row[["low", "high"]].tolist() == pytest.approx([expected.low[0], expected.high[0]])
 
 
 def test_other_manoeuvres_are_no_pairs(made: Made) -> None:

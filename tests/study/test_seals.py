@@ -37,6 +37,17 @@ def test_the_usual_tool_reads_seals(folder: Path) -> None:
     assert done.returncode == 0
 
 
+def test_what_another_process_was_just_writing_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Damaged at the first look and whole at the second: nothing is removed."""
+    for name in ("dataset.parquet", "test.npz"):
+        (tmp_path / name).write_bytes(b"half")
+    looks = [[seals.Fault("dataset", "dataset.parquet", "damaged"), seals.Fault("common", "test.npz", "damaged")]]
+    looks.append(looks[0][1:])
+    monkeypatch.setattr(seals, "faults", lambda _: looks.pop(0))
+    assert list(seals.mend(tmp_path)) == ["test.npz damaged: computed again"]
+    assert [file.name for file in tmp_path.iterdir()] == ["dataset.parquet"]
+
+
 def test_files_that_never_agree_leave_no_seal(folder: Path) -> None:
     """A seal is compared with its files again; where they cannot agree, it ends instead of trying for ever."""
     with pytest.raises(ResultError, match="end the program that writes to it"):

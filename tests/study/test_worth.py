@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from shipid.study.error_table import ErrorTable
-from shipid.study.worth import break_even, runs_without_physics
+from shipid.study.worth import _estimate, break_even, runs_without_physics
 
 
 def table(
@@ -25,6 +26,16 @@ def table(
 
 
 A = {f"m{k}": 2.0**k for k in range(5)}
+
+
+@pytest.mark.parametrize("runs", [5, 8, 30])
+def test_of_normal_means_the_interval_is_students(runs: int) -> None:
+    """Resampled means scatter less than means do, by sqrt(1 - 1 / runs): the expansion makes up for it."""
+    error = 0.7
+    drawn = 4.0 + error * (1 - 1 / runs) ** 0.5 * stats.norm.ppf((np.arange(19999) + 0.5) / 19999)
+    estimate = _estimate(np.array([4.0]), drawn, runs, (0.0, 100.0))
+    wide = stats.t.ppf(0.975, runs - 1) * error
+    assert (estimate.low, estimate.high) == pytest.approx((4.0 - wide, 4.0 + wide), abs=0.02 * wide)
 
 
 def test_break_even_by_hand() -> None:
