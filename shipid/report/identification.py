@@ -73,7 +73,7 @@ class IdentificationContent(PageContent):
         known, count = int(self.estimates["identified"].sum()), len(self.estimates)
         sentences = [Sentence(f"{known} of {counted(count, 'parameter')} are identified by these runs.", "estimates")]
         sentences.append(Sentence(_bought(self), "free-runs"))
-        return [*sentences, Sentence(f"Careful: {'; '.join(self.warnings)}.")] if self.warnings else sentences
+        return [*sentences, *(Sentence(f"Careful: {warning}.") for warning in self.warnings)]
 
 
 def write_identification(content: IdentificationContent, file: Path) -> Path:

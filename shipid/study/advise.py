@@ -142,8 +142,8 @@ def answer(results: Results) -> list[tuple[str, str]]:
     judged = NO_MODEL in case.table.H
     if judged and (good := _good_enough(case)):
         sentences.append((good, chart))
-    if len(pure):
-        sentences.append((_enough_runs(case, pure.set_index("N_D")), chart))
+    if len(pure) and case.smallest < largest:
+        sentences.append((_enough_runs(case), chart))
     sentences.append((_headline(case), "gain"))
     learning = results.plan.learning
     if len(learning) > 1:
@@ -236,11 +236,9 @@ def _against_none(case: Case, amount: int) -> Sides:
     return case.sides(models, case.table.against(NO_MODEL, models, case.place(amount)))
 
 
-def _enough_runs(case: Case, pure: pd.DataFrame) -> str:
+def _enough_runs(case: Case) -> str:
     """Error of the best model with the fewest runs, and how many runs give the same error without physics."""
     fewest, largest, best = case.smallest, case.largest, case.best
-    if fewest == largest:
-        return f"Without physics the same runs give {metres(float(pure['H'].loc[fewest]))}."
     first = case.rows[(case.rows["model"] == best) & (case.rows["N_D"] == fewest)]
     if first.empty:
         return f"{best} has no result at {runs(fewest)}, so its worth in runs is unknown."

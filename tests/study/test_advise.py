@@ -82,7 +82,7 @@ def test_harm_is_reported_with_names(made: Any) -> None:
 
 def test_a_tie_is_no_help(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 3.0), "bad": (2.0, 2.0), "none": (4.0, 3.0)})))
-    assert "every physics model" not in advice
+    assert "with 30 runs every physics model" not in advice
 
 
 def test_data_that_did_not_help_is_reported(made: Any) -> None:
