@@ -63,7 +63,7 @@ def bound(text: str) -> str:
     """Write a sentence as a page sets it: signs, powers of ten, a space before %, none that breaks before a unit."""
     text = re.sub(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]\d+)(?!\w)", _power, text.replace("+-", "±"))
     text = re.sub(r"(?<=\d)%", " %", re.sub(r"(?<![^\s\[(])-(?=\d)", "−", text))
-    return re.sub(r"(?<=\d) (?=(?:m|km|s|min|deg|rpm)\b|%)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
+    return re.sub(r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:m|km|s|min|deg|rpm)\b|%)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
 
 
 def _power(match: re.Match[str]) -> str:
