@@ -46,7 +46,7 @@ def verdicts(frame: pd.DataFrame) -> list[str]:
         mine = frame[frame.condition.eq(condition) & frame.family.eq(EVERY)]
         ends = sorted({int(mine.N_D.min()), int(mine.N_D.max())}) if len(mine) else []
         if ends:
-            text = "; ".join(_verdict(mine[mine.N_D.eq(N_D)], N_D, first=N_D == ends[0]) for N_D in ends)
+            text = "; ".join(_verdict(mine[mine.N_D.eq(N_D)], N_D, first=ends[0] == N_D) for N_D in ends)
             sentences.append(f"{condition}: {text}." if condition else f"{text}.")
     return [sentence[0].upper() + sentence[1:] for sentence in sentences]
 

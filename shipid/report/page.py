@@ -27,7 +27,6 @@ from shipid.report.sections import SECTIONS
 from shipid.report.sketch import sketch
 from shipid.report.wording import bound, number
 
-
 LEAD = 3  # sentences of the answer that a reader sees; the others unfold
 
 

@@ -61,7 +61,8 @@ def listed(names: Sequence[str], limit: int = 4) -> str:
 
 def bound(text: str) -> str:
     """Write a sentence as a page sets it: signs, powers of ten, a space before %, none that breaks before a unit."""
-    text = re.sub(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]\d+)(?!\w)", _power, text.replace("+-", "±"))
+    text = re.sub(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]\d+)(?!\w)", _power, text.replace("+-", "±").replace("->", "→"))
+    text = re.sub(r"`([^`]+)`", r"“\1”", text)
     text = re.sub(r"(?<=\d)%", " %", re.sub(r"(?<![^\s\[(])-(?=\d)", "−", text))
     return re.sub(r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:m|km|s|min|deg|rpm)\b|%)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
 

@@ -17,7 +17,7 @@ from shipid.study.error_table import ALONE, PLAIN, ErrorTable, error_table
 from shipid.study.evidence import Contrasts, contrasts
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells, naive_summary
-from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, too_few, words
+from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, too_few
 from shipid.study.worth import FEWEST_MODELS, Estimate, break_even, runs_without_physics
 
 
@@ -193,6 +193,8 @@ def _good_enough(case: Case) -> str:
             parts.append(f"with {runs(amount)} {_limit(limit)}")
             limits = True
     begins = f"How good must the physics be, {_ahead(case)} ahead? " if limits else ""
+    if len(parts) == 2 and len({part.partition("runs ")[2] or part for part in parts}) == 1:
+        parts = [f"with {case.smallest} or {parts[1].removeprefix('with ')}"]
     return f"{begins}{parts[0][0].upper()}{'; '.join(parts)[1:]}."
 
 

@@ -43,7 +43,8 @@ class Comparison:
     documents : a row per value that differs: path, and a column of text per name.
     errors : a row per other folder, family, method and N_D: `cells` that match, `first` and `other` [m], mean H over
         them, `difference` other less first [m] with its 95 % interval `low` to `high`, `verdict` ("lower", "higher" or
-        empty, corrected for the number of rows; "identical" where every cell errs alike to the digit), `paired`, and `coverage_first`, `coverage_other` [1] of their bands.
+        empty, corrected for the number of rows; "identical" where every cell errs alike to the digit), `paired`, and
+        `coverage_first`, `coverage_other` [1] of their bands.
         N_D = 0 is A of the physics alone.
     notes : sentences about what could not be matched, and what the intervals rest on.
     """

@@ -395,7 +395,11 @@ class Plan:
         changes = (f"--set '{path}={json.dumps(value)}'" for path, value in self.changes.items())
         words = " ".join([self.program, "study run", name, *changes])
         missing = self.program != "shipid" and not _script()
-        return f"# {OWN_SCRIPT}: your script that puts the method into METHODS and calls main\n{words}" if missing else words
+        return (
+            f"# {OWN_SCRIPT}: your script that puts the method into METHODS and calls main\n{words}"
+            if missing
+            else words
+        )
 
     @property
     def digest_in_any_world(self) -> str:

@@ -74,10 +74,19 @@ def test_harm_is_reported_with_names(made: Any) -> None:
     """At 10 runs `bad` harms; at 30 it does not."""
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)})))
     assert "With 10 runs 1 of 2 physics models does better than no physics; bad does worse; " in advice
-    assert "with 30 runs every physics model with a result does better than no physics, even with an error A of 6.00 m." in advice
+    assert (
+        "with 30 runs every physics model with a result does better than no physics, even with an error A of 6.00 m."
+        in advice
+    )
     both = text(made(grid({"good": (1.5, 3.5), "bad": (5.0, 4.0), "none": (4.0, 3.0)})))
     assert "ith 30 runs none of 2 physics models does better than no physics; good, bad do worse." in both
     assert "every physics model" not in both
+
+
+def test_what_holds_at_both_ends_is_said_once(made: Any) -> None:
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
+    first = "With 10 or 30 runs every physics model with a result does better than no physics, even with an error A of"
+    assert advice.startswith(f"{first} 6.00 m.\n")
 
 
 def test_a_tie_is_no_help(made: Any) -> None:
