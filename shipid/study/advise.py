@@ -193,7 +193,7 @@ def _good_enough(case: Case) -> str:
             parts.append(f"with {runs(amount)} {_limit(limit)}")
             limits = True
     begins = f"How good must the physics be, {_ahead(case)} ahead? " if limits else ""
-    if len(parts) == 2 and len({part.partition("runs ")[2] or part for part in parts}) == 1:
+    if not limits and len(parts) == 2 and len({part.partition("runs ")[2] or part for part in parts}) == 1:
         parts = [f"with {case.smallest} or {parts[1].removeprefix('with ')}"]
     return f"{begins}{parts[0][0].upper()}{'; '.join(parts)[1:]}."
 
