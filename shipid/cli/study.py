@@ -374,7 +374,8 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
 
 def _difference(row: Mapping[Any, Any], banded: bool) -> list[str]:
     """One row of a comparison as words."""
-    interval = f" [{row['low']:+.3f}, {row['high']:+.3f}]" if row["low"] == row["low"] else ""
+    known = row["low"] == row["low"] and row["verdict"] != "identical"
+    interval = f" [{row['low']:+.3f}, {row['high']:+.3f}]" if known else ""
     amount = "A" if row["N_D"] == 0 else str(row["N_D"])
     shares = row["coverage_first"], row["coverage_other"]
     inside = ", ".join("-" if share != share else f"{share:.0%}" for share in shares)
@@ -441,7 +442,7 @@ def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, d
     from shipid.study.contents import ANSWER, share_pages
     from shipid.study.progress import Watch
 
-    resume = f"shipid study resume {folder}"
+    resume = f"{plan.program} study resume {folder}"
     try:
         events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, leave=leave)
         end = draw(events, Watch(plan, folder))

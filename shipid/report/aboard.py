@@ -58,6 +58,10 @@ class AboardContent(PageContent):
         return "band_along" in self.points
 
 
+AXES = {"band along": ("band_along", "dash"), "band across": ("band_across", "dot")}
+"""Half axes of the band in the figure over time: name -> column, dash."""
+
+
 def write_aboard(content: AboardContent, file: Path) -> Path:
     """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
     return write(page(content, SECTIONS, "aboard"), file)
@@ -138,8 +142,8 @@ def along(content: AboardContent) -> Figure:
         controls=[Control("Run", content.runs, _worst(content))],
         chips=[
             Chip(PATH, "error", COLOURS[PATH]),
-            *([Chip(BAND, "band along and across", COLOURS[BAND], "dot")] if content.banded else []),
-            Chip(ALARM, "alarm", COLOURS[ALARM]),
+            *(Chip(name, name, COLOURS[BAND], dash) for name, (_, dash) in AXES.items() if content.banded),
+            Chip(ALARM, "alarm", COLOURS[ALARM], "none", symbol="triangle-up"),
         ],
     )
 
@@ -150,9 +154,9 @@ def _history(content: AboardContent, run: str) -> Plot:
     traces = [line("error", t, mine["error"].to_numpy(), [PATH], line={"color": COLOURS[PATH], "width": 2})]
     if content.banded:
         last = content.points[(content.points["run"] == run)].groupby("t", sort=False).last()
-        for column in ("band_along", "band_across"):
-            look = {"color": COLOURS[BAND], "dash": "dot", "width": 1.4}
-            traces.append(line(column.replace("_", " "), t, last[column].to_numpy(), [BAND], line=look))
+        for name, (column, dash) in AXES.items():
+            look = {"color": COLOURS[BAND], "dash": dash, "width": 1.4}
+            traces.append(line(name, t, last[column].to_numpy(), [name], line=look))
     alarm = mine["outside"].to_numpy(dtype=bool)
     marks = {"color": COLOURS[ALARM], "size": 8, "symbol": "triangle-up"}
     traces.append(line(ALARM, t[alarm], np.zeros(alarm.sum()), [ALARM], mode="markers", marker=marks))

@@ -15,7 +15,7 @@ from shipid.report.page import page, write
 from shipid.report.palette import category
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table
-from shipid.report.wording import counted, listed
+from shipid.report.wording import bound, counted, listed, scientific, short
 
 POINTS = 600  # of one line: more than pixels are wide
 HEADING, RATE = 0, 1  # colours
@@ -72,14 +72,19 @@ def _table(checks: pd.DataFrame) -> Table:
             tables.text(row.run),
             tables.text(row.check),
             Cell("passed", "passed") if row.ok else Cell("failed", "failed", bad=True),
-            Cell(f"{float(str(row.value)):.3g} {row.unit}", float(str(row.value))),
-            Cell(f"{float(str(row.limit)):.3g}", float(str(row.limit))),
-            tables.text(row.sentence),
+            Cell(_amount(float(str(row.value)), str(row.unit)), float(str(row.value))),
+            Cell(scientific(float(str(row.limit)), 3), float(str(row.limit))),
+            tables.text(bound(str(row.sentence))),
         ]
         for row in ordered.itertuples()
     ]
     headings = ["run", "check", "result", "value", "limit", "what it says"]
     return Table("all-checks", "Every check", "", headings, [False, False, False, True, True, False], rows)
+
+
+def _amount(value: float, unit: str) -> str:
+    """Three digits and the unit, which a share or a ratio does not have."""
+    return scientific(value, 3) + (f" {unit}" if unit != "1" else "")
 
 
 def motion(series: pd.DataFrame) -> Figure | None:
@@ -92,7 +97,7 @@ def motion(series: pd.DataFrame) -> Figure | None:
     return Figure(
         id="motion-figure",
         title="Heading, yaw rate, position and velocity",
-        takeaway=f"Positions leave integrated velocities furthest in {worst.idxmax()}: {worst.max():.1f} m.",
+        takeaway=f"Positions leave integrated velocities furthest in {worst.idxmax()}: {short(float(worst.max()))} m.",
         how="Rate of the heading by central differences; distance between the position and integrated u, v, psi, which "
         "start together every 30 s.",
         alternative="Lines over time; the table below has the results of the checks.",

@@ -33,6 +33,11 @@ class Sentence:
     text: str
     figure: str = ""
 
+    @property
+    def warns(self) -> bool:
+        """Whether it must be seen, wherever it is."""
+        return self.text.startswith("Careful: ")
+
 
 @dataclass(frozen=True)
 class Finding:

@@ -40,28 +40,29 @@ class MethodsContent(PageContent):
 
 
 def verdicts(frame: pd.DataFrame) -> list[str]:
-    """Which method errs least with physics, by condition, at the smallest and the largest N_D."""
+    """Which method errs least with physics, at the smallest and the largest N_D: a sentence for each condition."""
     sentences = []
     for condition in _conditions(frame):
         mine = frame[frame.condition.eq(condition) & frame.family.eq(EVERY)]
         ends = sorted({int(mine.N_D.min()), int(mine.N_D.max())}) if len(mine) else []
-        sentences += [_verdict(mine[mine.N_D.eq(N_D)], condition, N_D) for N_D in ends]
-    return sentences
+        if ends:
+            text = "; ".join(_verdict(mine[mine.N_D.eq(N_D)], N_D, first=ends[0] == N_D) for N_D in ends)
+            sentences.append(f"{condition}: {text}." if condition else f"{text}.")
+    return [sentence[0].upper() + sentence[1:] for sentence in sentences]
 
 
-def _verdict(mine: pd.DataFrame, condition: str, N_D: int) -> str:
-    where = f"{condition[0].upper()}{condition[1:]}, " if condition else ""
-    where += f"N_D = {N_D}"
+def _verdict(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
+    """The best method at an amount of data; only the first says over what."""
     whole = mine[mine.failed.eq(0)].sort_values("H", kind="stable")
     if whole.empty:
-        return f"{where}: no method has a result in every cell with physics."
+        return f"with N_D = {N_D} no method has a result in every cell with physics"
     best = whole.iloc[0]
-    text = f"{where}: {best.method} errs least over all cells with physics, {number(best.H)} m"
+    over = " over all cells with physics" if first else ""
+    text = f"with N_D = {N_D} {best.method} errs least{over}, {number(best.H)} m"
     if best.method != best.reference and math.isfinite(best.low):
-        difference = _bracket(best.difference, best.low, best.high)
-        text += f"; its difference to {best.reference} is {difference}"
+        text += f" (its difference to {best.reference} is {_bracket(best.difference, best.low, best.high)})"
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in mine[mine.failed.gt(0)].itertuples()]
-    return text + (f"; without a result: {listed(failed)}." if failed else ".")
+    return text + (f", without a result: {listed(failed)}" if failed else "")
 
 
 def _bracket(value: float, low: float, high: float) -> str:
@@ -105,7 +106,7 @@ def methods(content: ReportContent | MethodsContent) -> Figure | None:
     return Figure(
         id="methods",
         title="Methods on the same cells",
-        takeaway=" ".join(verdicts(frame)[:2]) or "No method has physics to improve.",
+        takeaway="".join(verdicts(frame)[:1]) or "No method has physics to improve.",
         how="Methods are in the order of their mean H over all that is compared. "
         "All methods see the same windows, folds and known quantities. Left: H (15) of each family. Right: H less "
         f"that of {reference} over the cells in which both have a result, mean over members, seeds and "

@@ -27,6 +27,8 @@ from shipid.report.sections import SECTIONS
 from shipid.report.sketch import sketch
 from shipid.report.wording import bound, number
 
+LEAD = 3  # sentences of the answer that a reader sees; the others unfold
+
 
 class Shown(Protocol):
     """The parts of every page besides its sections."""
@@ -98,11 +100,14 @@ def page(
     titles = {"findings": "Findings", "provenance": "Provenance"}
     titles |= {item.id: item.title for section in parts for item in section.items}
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    sentences = list(content.answer)
     environment.filters |= {"number": number, "bound": bound, "glossed": glossed}
     template = environment.from_string(_resource("template.html.j2"))
     return template.render(
         content=content,
         kicker=kicker,
+        answer=sentences[:LEAD],
+        details=sentences[LEAD:],
         sections=parts,
         anchors=anchors,
         titles=titles,

@@ -65,7 +65,7 @@ def structures(content: StructuresContent) -> Table:
             figure(degrees(row["r"]), 3),
             figure(row["position"], places),
             figure(row["more"], places),
-            _between(row["low"], row["high"]),
+            _between(row["low"], row["high"], places),
             figure(row["test"], places),
             Cell("yes" if row["equal"] else "no", "yes" if row["equal"] else "no"),
             text(row["note"]),
@@ -80,10 +80,10 @@ def structures(content: StructuresContent) -> Table:
     return Table("structures", f"Free runs {length}, of runs that the fit has not seen", takeaway, head, numeric, rows)
 
 
-def _between(low: float, high: float) -> Cell:
+def _between(low: float, high: float, places: int) -> Cell:
     if low != low or high != high:
         return figure(float("nan"), 0)
-    return Cell(f"{low:.3g} … {high:.3g}".replace("-", "−"), float(low))
+    return Cell(f"{figure(low, places).text} … {figure(high, places).text}", float(low))
 
 
 def runs(content: StructuresContent) -> Table:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shipid.report import tables
-from shipid.report.content import ReportContent
-from shipid.report.page import write
+from shipid.report.content import ReportContent, Sentence
+from shipid.report.page import LEAD, write
 from shipid.report.wording import metres
 
 
@@ -18,7 +18,8 @@ def summary(content: ReportContent) -> str:
     findings = [[f.id, f.claim, f.verdict, f.evidence] for f in content.findings]
     parts = [
         f"# {_plain(content.title)}",
-        "\n".join(f"- {_plain(sentence.text)}" for sentence in content.answer),
+        _listed(content.answer[:LEAD]),
+        *(["## In detail", _listed(content.answer[LEAD:])] if content.answer[LEAD:] else []),
         *(["## Findings", _grid(["", "claim", "verdict", "evidence"], findings)] if findings else []),
         "## Naive floor",
         f"Constant surge, sway and yaw rate: mean {metres(naive['mean'])}, 90th percentile {metres(naive['p90'])}, "
@@ -36,6 +37,10 @@ def summary(content: ReportContent) -> str:
 def write_summary(content: ReportContent, file: Path) -> Path:
     """Write the summary as Markdown; returns the file. Raises ResultError if it cannot."""
     return write(summary(content), file)
+
+
+def _listed(sentences: Sequence[Sentence]) -> str:
+    return "\n".join(f"- {_plain(sentence.text)}" for sentence in sentences)
 
 
 def _grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

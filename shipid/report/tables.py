@@ -45,7 +45,7 @@ def figure(value: object, decimals: int) -> Cell:
     amount = math.nan if value is None or value is pd.NA else float(str(value))
     if not math.isfinite(amount):
         return Cell("–", MISSING)
-    return Cell(f"{amount:.{decimals}f}".replace("-", "−"), amount)
+    return Cell(f"{round(amount, decimals) + 0.0:.{decimals}f}".replace("-", "−"), amount)
 
 
 def decimals(values: pd.DataFrame | pd.Series[float]) -> int:

@@ -14,7 +14,7 @@ def number(value: float) -> str:
     if not math.isfinite(value):
         return "–"
     decimals = 2 if abs(value) < 9.995 else 1 if abs(value) < 99.95 else 0
-    return f"{value:.{decimals}f}".replace("-", "−")
+    return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
 
 def short(value: float) -> str:
@@ -60,10 +60,15 @@ def listed(names: Sequence[str], limit: int = 4) -> str:
 
 
 def bound(text: str) -> str:
-    """Write a sentence as a page sets it: signs, a space before %, and none that breaks before a unit."""
-    text = text.replace("+-", "±")
+    """Write a sentence as a page sets it: signs, powers of ten, a space before %, none that breaks before a unit."""
+    text = re.sub(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]\d+)(?!\w)", _power, text.replace("+-", "±").replace("->", "→"))
+    text = re.sub(r"`([^`]+)`", r"“\1”", text)
     text = re.sub(r"(?<=\d)%", " %", re.sub(r"(?<![^\s\[(])-(?=\d)", "−", text))
-    return re.sub(r"(?<=\d) (?=(?:m|km|s|min|deg|rpm)\b|%)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
+    return re.sub(r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:m|km|s|min|deg|rpm)\b|%)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
+
+
+def _power(match: re.Match[str]) -> str:
+    return f"{match[1]} × 10{str(int(match[2])).translate(RAISED)}"
 
 
 def counted(count: int, noun: str) -> str:

@@ -17,8 +17,8 @@ from shipid.study.error_table import ALONE, PLAIN, ErrorTable, error_table
 from shipid.study.evidence import Contrasts, contrasts
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells, naive_summary
-from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, too_few, words
-from shipid.study.worth import Estimate, break_even, runs_without_physics
+from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, too_few
+from shipid.study.worth import FEWEST_MODELS, Estimate, break_even, runs_without_physics
 
 
 def by_model(results: Results) -> pd.DataFrame:
@@ -104,8 +104,7 @@ class Case:
         """Interval of the H of a model; empty where there is none."""
         if model not in self.table.H:
             return ""
-        difference = self.table.compare([[(1.0, model, self.place(amount))]])
-        return interval(float(difference.low[0]), float(difference.high[0]))
+        return interval(*self.table.interval(model, self.place(amount)))
 
     def sides(self, models: Sequence[str], differences: Contrasts) -> Sides:
         """Models that are better (above 0) and worse; by sign alone where there are too few test manoeuvres."""
@@ -130,11 +129,8 @@ def answer(results: Results) -> list[tuple[str, str]]:
     """A few sentences built from the results, each with the anchor of the figure that carries it."""
     claims, every_model = results.plan.claims, by_model(results)
     rows = every_model[~every_model["family"].isin(results.plan.aside)]
-    sentences = [(text, "cells") for text in _caveats(results)]
-    learning = results.plan.learning
-    if len(learning) > 1:
-        spoken = f"The study has {len(learning)} methods that learn from data; these sentences speak of "
-        sentences.append((f"{spoken}{results.plan.judged!r}, the one that the study judges by.", "cells"))
+    caveats = _caveats(results)
+    sentences = [(f"{'; '.join(caveats)}.", "cells")] if caveats else []
     largest = int(rows["N_D"].max()) if len(rows) else 0
     best = best_model(results)
     if best is None:
@@ -146,9 +142,13 @@ def answer(results: Results) -> list[tuple[str, str]]:
     judged = NO_MODEL in case.table.H
     if judged and (good := _good_enough(case)):
         sentences.append((good, chart))
-    if len(pure):
-        sentences.append((_enough_runs(case, pure.set_index("N_D")), chart))
+    if len(pure) and case.smallest < largest:
+        sentences.append((_enough_runs(case), chart))
     sentences.append((_headline(case), "gain"))
+    learning = results.plan.learning
+    if len(learning) > 1:
+        spoken = f"The study has {len(learning)} methods that learn from data; the answer speaks of "
+        sentences.append((f"{spoken}{results.plan.judged!r}, the one that the study judges by.", "cells"))
     sentences += [(text, chart) for text in _physics_or_none(case, judged)]
     known = case.at(largest)
     known = known[known["A"] > 0]  # an exact model has no error that could be left
@@ -188,12 +188,21 @@ def _good_enough(case: Case) -> str:
         if not sides.better and not sides.worse:
             parts.append(f"with {runs(amount)} the test cannot tell {_any(len(sides.open))} from no physics")
         elif limit is None:
-            parts.append(f"with {runs(amount)} {_counted(sides, 'no physics')}")
+            parts.append(f"with {runs(amount)} {_uncrossed(case, sides)}")
         else:
             parts.append(f"with {runs(amount)} {_limit(limit)}")
             limits = True
     begins = f"How good must the physics be, {_ahead(case)} ahead? " if limits else ""
+    if not limits and len(parts) == 2 and len({part.partition("runs ")[2] or part for part in parts}) == 1:
+        parts = [f"with {case.smallest} or {parts[1].removeprefix('with ')}"]
     return f"{begins}{parts[0][0].upper()}{'; '.join(parts)[1:]}."
+
+
+def _uncrossed(case: Case, sides: Sides) -> str:
+    """What is known at an amount where too few models are known for a limit of A: who pays, up to which A."""
+    worst = max((case.table.mean(model, ALONE) for model in case.fixed), default=0.0)
+    paying = not sides.worse and not sides.open and worst > 0
+    return _counted(sides, "no physics") + (f", even with an error A of {metres(worst)}" if paying else "")
 
 
 def _any(count: int) -> str:
@@ -229,11 +238,9 @@ def _against_none(case: Case, amount: int) -> Sides:
     return case.sides(models, case.table.against(NO_MODEL, models, case.place(amount)))
 
 
-def _enough_runs(case: Case, pure: pd.DataFrame) -> str:
+def _enough_runs(case: Case) -> str:
     """Error of the best model with the fewest runs, and how many runs give the same error without physics."""
     fewest, largest, best = case.smallest, case.largest, case.best
-    if fewest == largest:
-        return f"Without physics the same runs give {metres(float(pure['H'].loc[fewest]))}."
     first = case.rows[(case.rows["model"] == best) & (case.rows["N_D"] == fewest)]
     if first.empty:
         return f"{best} has no result at {runs(fewest)}, so its worth in runs is unknown."
@@ -285,13 +292,12 @@ def _caveats(results: Results) -> list[str]:
     sentences, cells = [], results.cells
     if not results.complete:
         missing = results.plan.cells - len(cells)
-        sentences.append(f"{missing} of {results.plan.cells} cells are not finished: what follows is provisional.")
+        sentences.append(f"{missing} of {results.plan.cells} cells are not finished: what follows is provisional")
     failed = cells[cells["status"] != "ok"]
     if len(failed):
-        why = "; ".join(
-            f"{words(str(row.model))}: {row.sentence}" for row in failed.drop_duplicates("model").itertuples()
-        )
-        sentences.append(f"{len(failed)} of {len(cells)} cells have no result ({why}).")
+        by_reason = failed.drop_duplicates("model").groupby("sentence", sort=False)["model"]
+        why = "; ".join(f"{named(map(str, models))}: {reason}" for reason, models in by_reason)
+        sentences.append(f"{len(failed)} of {len(cells)} cells have no result ({why})")
     return sentences
 
 
@@ -301,6 +307,8 @@ def _physics_or_none(case: Case, judged: bool) -> list[str]:
         where = runs(case.largest)
         return [f"There is no result without physics in every cell, so it is unknown whether physics harms at {where}."]
     every = {amount: _against_none(case, amount) for amount in dict.fromkeys((case.smallest, case.largest))}
+    if len(case.fixed) < FEWEST_MODELS:
+        return []  # no limit of A is known, so the first sentence names them
     decided = {amount: sides for amount, sides in every.items() if sides.better or sides.worse}
     return [f"At {runs(amount)} {_counted(sides, 'no physics')}." for amount, sides in decided.items()]
 

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.metrics import position_error
-from shipid.study.evidence import Contrasts, contrasts, training_noise
+from shipid.study.evidence import Contrasts, contrasts, mean_errors, training_noise
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 
@@ -65,6 +65,13 @@ class ErrorTable:
     def mean(self, model: str, place: int) -> float:
         """Error [m] of a model at an amount, mean over seeds and windows, or of its physics alone."""
         return float(self.by_run(model, place) @ self.weights)
+
+    def interval(self, model: str, place: int) -> tuple[float, float]:
+        """95 % interval [m] of the error of a model at an amount, mean over seeds and windows."""
+        judged = mean_errors(
+            self.by_run(model, place)[None], self.counts, self.mean(model, place) * float(self.noise[place])
+        )
+        return float(judged.low[0]), float(judged.high[0])
 
     def compare(self, differences: Sequence[Sequence[Term]]) -> Contrasts:
         """Judge sums of errors, each with its factor: `[(1, "none", 0), (-1, "good", 0)]` is what physics saves."""
@@ -126,7 +133,7 @@ def intervals_frame(results: Results) -> pd.DataFrame:
         means = np.stack([each.mean(axis=0) for each in errors.values()])
         noise = training_noise([each @ weights for each in errors.values()])
         seeds = np.array([len(each) for each in errors.values()])
-        judged = contrasts(means, counts.astype(float), noise * (means @ weights) / np.sqrt(seeds))
+        judged = mean_errors(means, counts.astype(float), noise * (means @ weights) / np.sqrt(seeds))
         parts.append(pd.DataFrame({"model": list(errors), "N_D": N_D, "low": judged.low, "high": judged.high}))
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["model", "N_D", "low", "high"])
 

@@ -10,7 +10,7 @@ averages this part out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -59,6 +59,15 @@ def contrasts(differences: Array, counts: Array, training: Array | float = 0.0) 
         return Contrasts(mean, blank, blank, blank, blank)
     away, spreads, spread = _bootstrap(differences, weights)
     return _judged(mean, _distances(away, spreads, spread), np.hypot(spread, training), len(counts) - 1)
+
+
+def mean_errors(errors: Array, counts: Array, training: Array | float = 0.0) -> Contrasts:
+    """Mean errors over test manoeuvres with intervals that end at 0, as for `contrasts`: an error is never negative.
+
+    What is below 0 is cut off, which costs no coverage. errors : (J, R) mean error in each test manoeuvre [m].
+    """
+    judged = contrasts(errors, counts, training)
+    return replace(judged, low=np.maximum(judged.low, 0.0))
 
 
 def contrasts_apart(

@@ -27,8 +27,8 @@ from shipid.study.verdict import manoeuvres, shown, too_few
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-ALONE = "alone"
-"""Method of the rows of A, which no data improve; their N_D is 0."""
+ALONE, IDENTICAL = "alone", "identical"
+"""Method of the rows of A, which no data improve, whose N_D is 0; verdict on cells that err alike to the digit."""
 KEYS = ["family", "member", "method", "N_D", "seed"]
 GROUP = ["family", "method", "N_D"]
 GRID = {"N_D": "grid.N_D", "seed": "grid.seeds"}  # what two runs must share: key -> where the study says it
@@ -43,7 +43,8 @@ class Comparison:
     documents : a row per value that differs: path, and a column of text per name.
     errors : a row per other folder, family, method and N_D: `cells` that match, `first` and `other` [m], mean H over
         them, `difference` other less first [m] with its 95 % interval `low` to `high`, `verdict` ("lower", "higher" or
-        empty, corrected for the number of rows), `paired`, and `coverage_first`, `coverage_other` [1] of their bands.
+        empty, corrected for the number of rows; "identical" where every cell errs alike to the digit), `paired`, and
+        `coverage_first`, `coverage_other` [1] of their bands.
         N_D = 0 is A of the physics alone.
     notes : sentences about what could not be matched, and what the intervals rest on.
     """
@@ -141,12 +142,15 @@ def _beside(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[p
     groups = [part for _, part in both.groupby(GROUP, sort=False)]
     one = _side(first, groups, "first", here)
     two = _side(other, groups, "other", there)
-    training = np.hypot(one.training, two.training)
+    alike = [paired & (a == b).all(axis=1) for a, b in zip(one.cells, two.cells, strict=True)]
+    training = np.hypot(*(_training(groups, side, alike) for side in ("first", "other")))
     rows = (
         contrasts(two.errors - one.errors, one.counts, training)
         if paired
         else contrasts_apart(two.errors, two.counts, one.errors, one.counts, training)
     )
+    if same := sum(one.all() for one in alike):
+        notes.append(f"{same} of {len(alike)} rows are identical to the digit: no training sets them apart")
     few = too_few(min(len(one.counts), len(two.counts)))
     if few:
         notes.append(few)
@@ -158,7 +162,7 @@ def _beside(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[p
             "first": one.errors @ (one.counts / one.counts.sum()),
             "other": two.errors @ (two.counts / two.counts.sum()),
             **{"difference": rows.mean, "low": rows.low, "high": rows.high},
-            "verdict": _verdicts(rows),
+            "verdict": np.where([same.all() for same in alike], IDENTICAL, _verdicts(rows)),
             "paired": paired,
             **{f"coverage_{side}": [part[f"coverage_{side}"].mean() for part in groups] for side in ("first", "other")},
         }
@@ -254,15 +258,19 @@ def _same_draws(one: Plan, two: Plan) -> bool:
 
 @dataclass(frozen=True)
 class _Side:
-    """One run's part: errors (J, R) [m] by group and manoeuvre, windows (R,), standard errors of training (J,) [m]."""
+    """One run's part: errors (cells, R) [m] of each group by cell and manoeuvre, and windows (R,)."""
 
-    errors: Array
+    cells: list[Array]
     counts: Array
-    training: Array
+
+    @property
+    def errors(self) -> Array:
+        """(J, R) mean error of each group in each manoeuvre [m]."""
+        return np.stack([errors.mean(axis=0) for errors in self.cells])
 
 
 def _side(results: Results, groups: Sequence[pd.DataFrame], side: str, windows: Index) -> _Side:
-    """Mean error of each group of cells in every test manoeuvre, on some windows."""
+    """Errors of each group of cells in every test manoeuvre, on some windows."""
     test = results.test
     order, place, counts = np.unique(test.run[windows], return_inverse=True, return_counts=True)
     future = test.future[:, windows]
@@ -271,19 +279,26 @@ def _side(results: Results, groups: Sequence[pd.DataFrame], side: str, windows: 
         error = over_time(position_error(path[:, windows], future))
         return np.bincount(place, weights=error, minlength=len(order)) / counts
 
-    errors, training = np.zeros((len(groups), len(order))), np.zeros(len(groups))
-    for row, part in enumerate(groups):
-        cells = part.rename(columns={f"{name}_{side}": name for name in ("cell", "foundation", "H", "trained")})
-        paths = (
-            results.physics[str(r.foundation)] if r.N_D == 0 else results.paths[str(r.cell)] for r in cells.itertuples()
-        )
-        errors[row] = np.mean([by_run(path) for path in paths], axis=0)
-        if not cells["trained"].all():
+    errors = []
+    for part in groups:
+        cells = zip(part["N_D"], part[f"cell_{side}"], part[f"foundation_{side}"], strict=True)
+        paths = (results.physics[str(name)] if N_D == 0 else results.paths[str(cell)] for N_D, cell, name in cells)
+        errors.append(np.stack([by_run(path) for path in paths]))
+    return _Side(errors, counts.astype(float))
+
+
+def _training(groups: Sequence[pd.DataFrame], side: str, alike: Sequence[NDArray[np.bool_]]) -> Array:
+    """(J,) standard error [m] that training alone gives a difference; cells that are alike in both runs add nothing."""
+    training = np.zeros(len(groups))
+    for row, (part, same) in enumerate(zip(groups, alike, strict=True)):
+        if not part[f"trained_{side}"].all():
             continue
-        by_seed = [np.asarray(one["H"], dtype=float) for _, one in cells.groupby("foundation", sort=False)]
-        noise = training_noise(by_seed)
-        training[row] = noise * np.sqrt(sum((H.mean() / len(by_seed)) ** 2 / len(H) for H in by_seed))
-    return _Side(errors, counts.astype(float), training)
+        cells = part.assign(H=part[f"H_{side}"].astype(float), differs=~same)
+        models = [one for _, one in cells.groupby(f"foundation_{side}", sort=False)]
+        noise = training_noise([one["H"].to_numpy() for one in models])
+        shares = sum((one["H"].mean() / len(models) / len(one)) ** 2 * one["differs"].sum() for one in models)
+        training[row] = noise * np.sqrt(shares)
+    return training
 
 
 def _verdicts(compared: Contrasts) -> list[str]:

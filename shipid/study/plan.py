@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -36,6 +38,7 @@ WITH = "+"  # between a foundation and a method
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
 OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
 IDENTIFIED, OBSERVED = "identified from the runs of each cell", "with an observer"
+OWN_SCRIPT = "my.py"  # a user's script with a method, where its name is unknown
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 FEEDBACK = ("zigzag", "reverse_spiral", "station_keeping")  # kinds of manoeuvres whose orders react to the ship
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
@@ -47,6 +50,11 @@ def published_keys() -> dict[str, tuple[str, float]]:
     read = {name: SIGNALS[name] for name in names if SIGNALS[name].shown}
     in_words = {f"{name}_{row.read_in.partition('/')[0]}": (name, row.factor) for name, row in read.items()}
     return {name: (name, 1.0) for name in names} | in_words
+
+
+def _script() -> str:
+    """The user's script that is the command line of this process; empty for another command line, or none."""
+    return sys.argv[0] if sys.argv[0].endswith(".py") and sys.argv[1:2] == ["study"] else ""
 
 
 class Strict(BaseModel):
@@ -372,11 +380,26 @@ class Plan:
         return Path("results") / f"{self.name}-{self.digest[:8]}"
 
     @property
+    def program(self) -> str:
+        """The command line that knows the methods: `shipid`, or the user's script where one of them is the user's."""
+        known = all(type(way.method).__module__.partition(".")[0] == "shipid" for way in self.methods)
+        return "shipid" if known else shlex.join(["python", _script() or OWN_SCRIPT])
+
+    @property
     def command(self) -> str:
-        """The command that runs this study, with its changes: by name if bundled, else by its file."""
-        name = self.name if documents.bundled("studies").get(self.name) == Path(self.file) else self.file
+        """The command that runs this study, with its changes: by name if bundled, else by its file.
+
+        A line before it says what the script is where a method is the user's and no script has started this process.
+        """
+        name = self.name if documents.bundled("studies").get(self.name) == Path(self.file) else shlex.quote(self.file)
         changes = (f"--set '{path}={json.dumps(value)}'" for path, value in self.changes.items())
-        return " ".join(["shipid study run", name, *changes])
+        words = " ".join([self.program, "study run", name, *changes])
+        missing = self.program != "shipid" and not _script()
+        return (
+            f"# {OWN_SCRIPT}: your script that puts the method into METHODS and calls main\n{words}"
+            if missing
+            else words
+        )
 
     @property
     def digest_in_any_world(self) -> str:

@@ -159,6 +159,20 @@ def test_sentences_link_to_what_is_there(page):
     assert declared(able) - set(ids) - set(lacking) == (set() if content.cells.N_D.nunique() > 1 else {"map"})
 
 
+def test_three_sentences_come_before_the_details_and_warnings_are_open(plain):
+    for texts, summary in (
+        (["One.", "Two.", "Three."], ""),
+        (["One.", "Two.", "Three.", "Four."], '<details class="more">\n<summary>In detail (1 more sentence)'),
+        (["One.", "Two.", "Three.", "Careful: x."], '<details class="more" open>'),
+    ):
+        header = render(replace(plain, answer=[Sentence(text) for text in texts])).partition("<nav")[0]
+        lead, _, rest = header.partition("<details")
+        assert [text in lead for text in texts] == [i < 3 for i in range(len(texts))]
+        assert all(text in header for text in texts)
+        assert summary in header
+        assert bool(rest) == bool(summary)
+
+
 def test_a_link_to_a_figure_without_data_is_left_out(plain):
     linked = replace(plain, answer=[Sentence("Errors grow.", "horizon")])
     assert "#horizon" in [a["href"] for a, _ in Page(render(linked)).all("a")]

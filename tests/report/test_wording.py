@@ -13,6 +13,7 @@ def test_three_digits():
         "131",
     ]
     assert number(-1.5) == "−1.50"
+    assert number(-0.001) == "0.00"
     assert number(math.nan) == number(math.inf) == "–"
     assert metres(0.5) == "0.50 m"
     assert distance(963.2) == "963 m"
@@ -54,4 +55,6 @@ def test_a_long_name_loses_its_middle() -> None:
 
 
 def test_a_sentence_is_set_with_signs_and_spaces() -> None:
+    assert bound("1.32 m -> 0.93 m: `shipid study rotate`") == "1.32\u00a0m → 0.93\u00a0m: “shipid study rotate”"
+    assert bound("by 1.4e-11 % or 2e+05, not 4b7ce53e-0c") == "by 1.4 × 10⁻¹¹\u00a0% or 2 × 10⁵, not 4b7ce53e-0c"
     assert bound("90% of +-2 m [-0.2, 3-4], N-2") == "90\u00a0% of ±2\u00a0m [−0.2, 3-4], N-2"

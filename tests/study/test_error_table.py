@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,18 @@ def test_physics_alone_has_no_noise_of_training(made: Any) -> None:
     trained = table.compare([[(1.0, "bad", 0), (-1.0, "good", 0)]])
     relative = [(interval.high - interval.low)[0] / interval.mean[0] for interval in (alone, trained)]
     assert relative[0] < relative[1]
+
+
+def test_an_interval_of_an_error_is_that_of_its_difference_to_0_without_what_is_below_0(made: Any) -> None:
+    results = made(grid(H), runs=8)
+    table, frame = error_table(results, ["good", "bad"]), intervals_frame(results).set_index(["model", "N_D"])
+    unbound = table.compare([[(1.0, "bad", 1)]])
+    assert table.interval("bad", 1) == pytest.approx((unbound.low[0], unbound.high[0]), rel=1e-12)
+    assert table.interval("bad", 1) == pytest.approx(frame.loc[("bad", 30), ["low", "high"]].tolist(), rel=1e-12)
+    skewed = replace(table, H={**table.H, "bad": table.H["bad"] * np.array([0.01] * 7 + [9.0])})
+    assert skewed.compare([[(1.0, "bad", 1)]]).low[0] < 0, "most of the error is in one manoeuvre"
+    low, high = skewed.interval("bad", 1)
+    assert low == 0 < skewed.mean("bad", 1) < high
 
 
 def test_intervals_are_about_the_mean_over_seeds_and_more_seeds_narrow_them(made: Any) -> None:

@@ -15,6 +15,7 @@ from shipid.study.evidence import (
     contrasts,
     contrasts_apart,
     holm,
+    mean_errors,
     over_worlds,
     resampled_means,
     training_noise,
@@ -35,6 +36,20 @@ def test_intervals_cover(runs: int, tail: str) -> None:
     limit = stats.binom.ppf(0.999, 400, 0.05)
     assert (contrast.low > 0).sum() <= limit
     assert (contrast.high < 0).sum() <= limit
+
+
+@pytest.mark.parametrize("runs", [5, 12])
+@pytest.mark.parametrize("spread", [0.3, 0.6, 1.0])
+def test_intervals_of_errors_are_never_below_0_and_cover_as_before(runs: int, spread: float) -> None:
+    """2,000 sets of errors with the mean 1, the more skewed the larger `spread`: no interval that held 1 loses it."""
+    errors = np.random.default_rng(runs).lognormal(-(spread**2) / 2, spread, (2000, runs))
+    before, cut = contrasts(errors, np.ones(runs)), mean_errors(errors, np.ones(runs))
+    assert (cut.low >= 0).all()
+    if (runs, spread) == (5, 1.0):
+        assert (before.low < 0).mean() > 0.5, "there is something to cut off"
+    held = (cut.low <= 1) & (cut.high >= 1)
+    np.testing.assert_array_equal(held, (before.low <= 1) & (before.high >= 1))
+    assert held.mean() > {0.3: 0.94, 0.6: 0.92, 1.0: 0.88}[spread], "of 95 %: few skewed errors hide their mean"
 
 
 def test_an_interval_free_of_0_and_a_small_p_value_are_the_same() -> None:

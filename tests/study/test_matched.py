@@ -62,13 +62,15 @@ def test_a_run_and_itself_differ_in_nothing(made: Made) -> None:
     comparison = compare_results([placed(one, "a"), placed(one, "b")])
     assert comparison.documents.empty
     assert (comparison.errors["difference"] == 0).all()
-    assert set(comparison.errors["verdict"]) == {""}
+    assert set(comparison.errors["verdict"]) == {"identical"}
+    assert (comparison.errors[["low", "high"]] == 0).all(axis=None), "no training sets equal cells apart"
+    assert "8 of 8 rows are identical to the digit" in comparison.notes[-1]
     assert comparison.errors["N_D"].tolist() == [0, 0, 10, 10, 10, 30, 30, 30]
 
 
 def test_paired_differences_by_hand(made: Made) -> None:
     """Errors are hard * H with hard 0.9 to 1.1 over manoeuvres: a difference of means, and what training adds."""
-    one, other = (made(grid({**H, "bad": (bad, 1.5)}), runs=8) for bad in (2.0, 1.0))
+    one, other = (made(grid({**H, "bad": bad}), runs=8) for bad in ((2.0, 1.5), (1.0, 1.5 + 1e-6)))
     comparison = compare_results([placed(one, "a"), placed(other, "b")]).errors.set_index(["family", "method", "N_D"])
     row = comparison.loc[("bad", "drawn", 10)]
     assert row[["first", "other", "difference"]].tolist() == pytest.approx([2.0, 1.0, -1.0])
@@ -77,8 +79,9 @@ def test_paired_differences_by_hand(made: Made) -> None:
     noise = 0.03 * 5**0.5  # of one seed each, and no other knowledge: 3 % of 2 m and of 1 m
     assert row["high"] - row["low"] > 2 * 2.3 * noise
     same = comparison.loc[("bad", "drawn", 30)]
-    assert same["difference"] == pytest.approx(0)
-    assert same["low"] < 0 < same["high"]
+    assert same["difference"] == pytest.approx(0, abs=1e-5)
+    assert same["low"] < 0 < same["high"], "alike, but trained apart: only what is equal to the digit is identical"
+    assert same["verdict"] == ""
     assert comparison.loc[("bad", "alone", 0), ["low", "high"]].tolist() == [0, 0], "physics alone is not trained"
 
 
@@ -96,6 +99,20 @@ def test_what_training_adds_falls_with_the_number_of_seeds(made: Made) -> None:
         expected = contrasts(-hard[None], np.ones(8), np.hypot(2.0, 1.0) * noise / count**0.5)
         row = frame.loc[("bad", 10)]
         assert row[["low", "high"]].tolist() == pytest.approx([expected.low[0], expected.high[0]])
+
+
+def test_only_seeds_that_differ_bring_noise_of_training(made: Made) -> None:
+    """One of two seeds is identical: the noise of the other alone, a half of its weight, is in the interval."""
+    seeds = {(name, N_D, seed): error for (name, N_D, _), error in grid(H).items() for seed in (0, 1)}
+    one = made(seeds, runs=8)
+    half, whole = ({**seeds, **{("bad", 10, seed): 2.0 + 1e-9 for seed in apart}} for apart in ((1,), (0, 1)))
+    widths = []
+    for cells in (half, whole):
+        row = compare_results([placed(one, "a"), placed(made(cells, runs=8), "b")]).errors.query("family == 'bad'")
+        row = row[row["N_D"] == 10].iloc[0]
+        assert row["verdict"] == ""
+        widths.append(row["high"] - row["low"])
+    assert widths[1] / widths[0] == pytest.approx(2**0.5, rel=1e-3)
 
 
 def test_other_manoeuvres_are_no_pairs(made: Made) -> None:

@@ -12,6 +12,7 @@ import pytest
 from shipid.document import bundled, bundled_folder
 from shipid.errors import DocumentError
 from shipid.hybrid.features import Memory
+from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.study.plan import NO_MODEL, build_plan, read_plan
@@ -228,6 +229,21 @@ def test_changes_that_reach_nothing_are_reported(tmp_path: Path, changes: dict[s
     with pytest.raises(DocumentError, match="--set") as caught:
         tiny_plan(tmp_path, changes)
     assert caught.value.path == path
+
+
+def test_the_command_of_a_users_method_names_the_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Mine(PathDrawn):
+        """Of a user: no class of shipid."""
+
+    assert tiny_plan(tmp_path).command.startswith("shipid study run ")
+    monkeypatch.setitem(METHODS, "mine", Mine)
+    plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine", "trials": 1, "units": 8, "terms": 4}]})
+    monkeypatch.setattr("sys.argv", ["my scripts/own.py", "study", "run", "tiny.toml"])
+    assert plan.command.startswith(f"python 'my scripts/own.py' study run {tmp_path}/tiny.toml --set ")
+    monkeypatch.setattr("sys.argv", ["notebook_kernel.py", "-f", "key"])
+    note, command = plan.command.splitlines()
+    assert note.startswith("# my.py: your script ")
+    assert command.startswith("python my.py study run ")
 
 
 def test_digest_follows_the_document(tmp_path: Path) -> None:
