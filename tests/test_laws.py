@@ -25,7 +25,7 @@ from shipid.vessel.bindings import bindings
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.perturb import uniform
-from shipid.vessel.schema import SHARED, parameters, signals, structural, term_blocks
+from shipid.vessel.schema import SHARED, parameters, signals, structural, term_blocks, term_parameters
 
 ALL = pytest.mark.parametrize("key", list(TERMS))
 DRAWN = settings(max_examples=40, deadline=None, derandomize=True, database=None)
@@ -244,8 +244,9 @@ def output(key: str, name: str, drawn: Mapping[str, Any], mirrored: bool = False
     """What an instrument shows, in drawn signals; mirrored: with numbers of the two sides exchanged."""
     vessel, path = _with_term(key)
     numbers = {p: ca.SX(vessel.parameters[p]) for p in vessel.parameters}
-    function, taken = TERMS[key].gives[name], {p.name for p in parameters(TERMS[key].gives[name])}
-    keywords = {k: _symbols(v, numbers) for k, v in bindings(vessel.document)[path].items() if k in taken}
+    function = TERMS[key].gives[name]
+    others = {p.name for p in term_parameters(TERMS[key])} - {p.name for p in parameters(function)}
+    keywords = {k: _symbols(v, numbers) for k, v in bindings(vessel.document)[path].items() if k not in others}
     if mirrored:
         plus = {k: v for k, v in keywords.items() if k.endswith(("_plus", "_minus"))}
         keywords |= {
@@ -263,7 +264,8 @@ def output(key: str, name: str, drawn: Mapping[str, Any], mirrored: bool = False
 @pytest.mark.parametrize("seed", range(3))
 def test_an_output_is_mirrored_as_its_row_says(key: str, name: str, seed: int) -> None:
     drawn = random_signals(example(key), seed)
-    mirrored = {signal: value * MIRROR.get(signal, 1) for signal, value in drawn.items()}
+    signs = {**MIRROR, **MIRROR_OF_A_TERM.get(key, {})}
+    mirrored = {signal: value * signs.get(signal, 1) for signal, value in drawn.items()}
     value = output(key, name, drawn)
     if value is None:
         assert name == "torque"  # no bundled vessel has K_Q
@@ -274,7 +276,10 @@ def test_an_output_is_mirrored_as_its_row_says(key: str, name: str, seed: int) -
 
 @pytest.mark.parametrize(("key", "name"), OUTPUTS)
 def test_the_force_on_the_ship_is_that_of_the_output_less_what_the_hull_takes(key: str, name: str) -> None:
-    """X = (1 - t_P) T of a screw ahead; Y = -(1 + a_H) F_N cos(delta) of a rudder (MMG eqs. 12, 18)."""
+    """X = (1 - t_P) T of a screw ahead; Y of a tunnel; Y = -(1 + a_H) F_N cos(delta) of a rudder (MMG eqs. 12, 18).
+
+    Of a rudder by coefficients F_N is the force across the blade, X and Y together.
+    """
     found = example(key)
     drawn = random_signals(found, 7) | {"n": 2.0} if "n" in found.signals else random_signals(found, 7)
     value, wrench, (vessel, path) = output(key, name, drawn), found.wrench(drawn), _with_term(key)
@@ -284,6 +289,12 @@ def test_the_force_on_the_ship_is_that_of_the_output_less_what_the_hull_takes(ke
         t_P = vessel.parameters.get(f"{path}.t_P", 0.0)
         turn = drawn.get("alpha", 0.0)
         assert wrench[0] * np.cos(turn) + wrench[1] * np.sin(turn) == pytest.approx((1 - t_P) * value, rel=1e-9)
+    elif name == "side_force":
+        assert wrench[1] == pytest.approx(value, rel=1e-9)
+        assert wrench[5] == pytest.approx(vessel.parameters[f"{path}.x"] * value, rel=1e-9)
+    elif key == "thruster.rudder_coefficients":
+        across = np.array([np.sin(drawn["delta"]), np.cos(drawn["delta"])])
+        assert across @ wrench[:2] == pytest.approx(-value, rel=1e-9)
     else:
         a_H = vessel.parameters[f"{path}.a_H"]
         assert wrench[1] == pytest.approx(-(1 + a_H) * value * np.cos(drawn["delta"]), rel=1e-9)
@@ -299,6 +310,31 @@ def test_torque_is_the_coefficient_times_its_unit() -> None:
         D_p, rho = ship.parameters["thruster.propeller.D_p"], ship.parameters["constants.rho"]
         assert shown["propeller.torque"] == pytest.approx(rho * n * abs(n) * D_p**5 * 0.04)
         assert shown["propeller.thrust"] != 0
+
+
+def test_outputs_of_a_whole_ship_are_the_forces_in_her_equations() -> None:
+    """What the tunnel and the two rudders of CyberShip II show moves her as an outside force of that size does."""
+    ship = load_vessel("cybership2")
+    model, values, rng = dynamics(ship), list(ship.parameters.values()), np.random.default_rng(11)
+    lever = ship.parameters["thruster.bow.x"]
+    for _ in range(20):
+        state = [*np.zeros(3), *rng.uniform([0.1, -0.3, -0.5], [1.2, 0.3, 0.5])]
+        orders = {
+            name: rng.uniform(5, 30) if name.endswith(".n") else rng.uniform(-0.6, 0.6) for name in model.commands
+        }
+        shown = np.array(model.measured(state, [orders[k] for k in model.memory], list(orders.values()), [], values))
+        of = dict(zip(model.outputs, shown.ravel(), strict=True))
+        side = {"bow": (of["bow.side_force"], lever)}
+        for rudder in ("port_rudder", "starboard_rudder"):
+            side[rudder] = (-of[f"{rudder}.normal_force"] / np.cos(orders[f"{rudder}.delta"]), -0.549)
+        tau = [0.0, sum(Y for Y, _ in side.values()), sum(Y * x for Y, x in side.values())]
+        still = orders | {"bow.n": 0.0, "port_rudder.delta": 0.0, "starboard_rudder.delta": 0.0}
+        driven, pushed = (
+            np.array(model.rates(state, [given[k] for k in model.memory], list(given.values()), [], values, outside))
+            for given, outside in ((orders, [0.0] * 3), (still, tau))
+        )
+        assert np.abs(tau).min(where=[False, True, True], initial=1) > 0
+        np.testing.assert_allclose(pushed, driven, rtol=1e-9, atol=1e-12)
 
 
 CALM = pytest.mark.parametrize("key", [key for key in TERMS if key not in DRAWN_COMPONENTS])

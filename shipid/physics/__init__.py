@@ -90,7 +90,7 @@ TERMS: dict[str, Term] = {
     "wind.table": Term(wind.table),
     "wind.blendermann": Term(wind.blendermann),
     "thruster.azimuth": Term(thruster.azimuth, gives={"thrust": thruster.azimuth_thrust}),
-    "thruster.tunnel": Term(thruster.tunnel),
+    "thruster.tunnel": Term(thruster.tunnel, gives={"side_force": thruster.tunnel_side_force}),
     "thruster.propeller": Term(
         propeller.propeller,
         gives={"wash": propeller.wash, "thrust": propeller.propeller_thrust, "torque": propeller.propeller_torque},
@@ -111,7 +111,9 @@ TERMS: dict[str, Term] = {
     "thruster.rudder_polynomial": Term(
         rudder.rudder_polynomial, gives={"normal_force": rudder.polynomial_normal_force}
     ),
-    "thruster.rudder_coefficients": Term(rudder.rudder_coefficients),
+    "thruster.rudder_coefficients": Term(
+        rudder.rudder_coefficients, gives={"normal_force": rudder.coefficients_normal_force}
+    ),
     "thruster.rudder_derivatives": Term(rudder.rudder_derivatives),
 }
 

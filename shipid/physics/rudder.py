@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated
+from functools import wraps
+from typing import Annotated, Any
 
 import casadi as ca
 from casadi import SX
@@ -201,6 +202,16 @@ def rudder_coefficients(
         lever = 1 if formula.axis in "XYZ" else L_pp
         wrench[axis] = wrench[axis] + rho / 2 * L_pp**2 * lever * value * formula.value(factors)
     return ca.vertcat(*wrench)
+
+
+@wraps(rudder_coefficients, assigned=("__annotations__",))
+def coefficients_normal_force(nu_r: SX, delta: SX, wash: SX, **numbers: Any) -> SX:
+    """Force [N] of `rudder_coefficients` across the blade, > 0 turns the ship to starboard.
+
+    The coefficients are of the ship with her rudder: the share that the rudder induces on the hull is in it.
+    """
+    force = rudder_coefficients(nu_r, delta, wash, **numbers)
+    return -ca.sin(delta) * force[0] - ca.cos(delta) * force[1]
 
 
 def rudder_derivatives(

@@ -267,6 +267,14 @@ SIGNALS: dict[str, Signal] = {
         names=r"(rudder_)?normal_?force\w*|f_?n|rudder_force",
         component="rudder",
     ),
+    "side_force": Signal(  # > 0 to starboard
+        "output",
+        "N",
+        "side force",
+        mirror=-1,
+        names=r"((bow|stern)_?)?(tunnel|thruster|tunnel_?thruster)_?(side_?)?force|(bow|stern)_?(side_?)?force",
+        component="bow",
+    ),
 }
 """Name -> row. Columns of datasets and messages list signals in the order of this table."""
 

@@ -88,8 +88,18 @@ def tunnel(
     F_3: Annotated[SX, "N s^3"],
 ) -> SX:
     """Wrench (6) of a transverse tunnel thruster at zero ship speed: Y = F_1 n + F_2 n|n| + F_3 n^3, n [rev/s]."""
-    F_y = n * (F_1 + ca.fabs(n) * (F_2 + ca.fabs(n) * F_3))
-    return force_at(SX(x), SX(1, 1), SX(z), SX(1, 1), F_y)
+    return force_at(SX(x), SX(1, 1), SX(z), SX(1, 1), tunnel_side_force(n, F_1=F_1, F_2=F_2, F_3=F_3))
+
+
+def tunnel_side_force(
+    n: SX,
+    *,
+    F_1: Annotated[SX, "N s"],
+    F_2: Annotated[SX, "N s^2"],
+    F_3: Annotated[SX, "N s^3"],
+) -> SX:
+    """Force [N] of `tunnel`, > 0 to starboard."""
+    return n * (F_1 + ca.fabs(n) * (F_2 + ca.fabs(n) * F_3))
 
 
 def bounded(value: SX, low: SX | float, high: SX | float) -> SX:

@@ -30,7 +30,7 @@ from shipid.data.dataset import Dataset
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.study.plan import Plan, read_plan
-from shipid.study.prepare import constant_motion, partition, path_of, window_memory
+from shipid.study.prepare import constant_motion, obtain, partition, path_of, window_memory
 from shipid.study.results import judged_cells, read_results
 from shipid.vessel.load import load_vessel
 from tests.logs.judged_raw import judge_raw
@@ -42,6 +42,7 @@ GOAL, NEAR = 0.25, 1.3  # of constant u, v, r; of the true vessel, where that is
 FEWER = 3  # times as long between instants of prediction as in the study
 OFF = 2.0  # times the error of the corrected vessel: a guess that is wrong
 STAGES = ("vessel", "draft", "import", "check", "study", "report")
+WHOLE = "the study as written"  # a further stage, if asked for
 HORIZONS = {"1x": 1, "2x": 2}
 FRAMES = {"xy": "ned", "ned": "ned", "enu": "enu", "zup": "zup", "ros": "ros"}  # of a team -> what it answers
 TEN = 10.0  # s between rows, at most, where runs are compared
@@ -86,7 +87,7 @@ def run(ships: int = SHIPS, first: int = FIRST, whole: bool = False, folder: Pat
     for seed in range(first, first + ships):
         with tempfile.TemporaryDirectory() as name:
             outcome = one(seed, (folder or Path(name)) / str(seed), whole=whole)
-        reports += outcome["stage"] == STAGES[-1]
+        reports += outcome["stage"] in (STAGES[-1], WHOLE)
         silent += len(outcome["silent"])
         for far in HORIZONS:
             passed[far] += outcome.get(far, {}).get("passed", False)
@@ -101,11 +102,12 @@ def run(ships: int = SHIPS, first: int = FIRST, whole: bool = False, folder: Pat
 def words_of(outcome: dict[str, Any]) -> dict[str, str]:
     """An outcome in words, for a table."""
     minutes = {key: value / 60 for key, value in outcome["seconds"].items()}
-    last = minutes.get(STAGES[-1], 0.0)
+    last, whole = minutes.pop(STAGES[-1], 0.0), minutes.pop(WHOLE, 0.0)
     words = {
         "": f"{outcome['words']}; {outcome['stage']}{': ' * bool(outcome['failed'])}{outcome['failed']}; "
         f"{len(outcome['commands'])} commands, {len(outcome['questions'])} questions, "
-        f"{sum(minutes.values()) - last:.1f} min to the study, {last:.1f} min for it",
+        f"{sum(minutes.values()):.1f} min to the study, {last:.1f} min for it"
+        f"{f', {whole:.1f} min as written' if whole else ''}",
         "wrong": f"said: {'; '.join(outcome['said']) or '-'} | silent: {'; '.join(outcome['silent']) or '-'}"[:600],
     }
     for far in HORIZONS:
@@ -131,7 +133,7 @@ def one(seed: int, folder: Path, whole: bool = False) -> dict[str, Any]:
         for far, times in HORIZONS.items():
             outcome[far] = _studied(ship, desk, times, STAGES[-1])
         if whole:
-            desk.type("whole", "study", "run", "study.toml", "--workers", "1")
+            desk.type(WHOLE, "study", "run", "study.toml", "--workers", "1")
         _judged(drafted, outcome["1x"], said, silent)
     except Stopped as error:
         outcome["failed"] = str(error)
@@ -174,9 +176,12 @@ def _studied(ship: RawStranger, desk: Desk, times: int, stage: str) -> dict[str,
     prediction = document["prediction"]
     changes: dict[str, Any] = {
         "prediction.commands": "known", "prediction.ahead": times * prediction["ahead"],
-        "prediction.interval": FEWER * prediction["interval"], "grid.N_D": [document["grid"]["N_D"][-1]],
+        "prediction.interval": FEWER * prediction["interval"], "grid.N_D": document["grid"]["N_D"][:1],
         "grid.seeds": [0],
     }  # fmt: skip
+    plan = read_plan(str(desk.folder / "study.toml"), changes)
+    left = len(partition(plan, obtain(plan))[0].spans)  # fewer at a longer horizon, if some runs are short
+    changes["grid.N_D"] = [min(left, document["grid"]["N_D"][-1])]
     words = [word for path, value in changes.items() for word in ("--set", f"{path}={json.dumps(value)}")]
     folder = desk.folder / f"results-{times}"
     plan = read_plan(str(desk.folder / "study.toml"), changes)

@@ -18,7 +18,7 @@ from shipid.simulation.perform import perform
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
-SHIPS = {"kvlcc2-l7": 600.0, "gunnerus-28.9-6dof": 150.0, "container-175": 100.0}
+SHIPS = {"kvlcc2-l7": 600.0, "gunnerus-28.9-6dof": 150.0, "container-175": 100.0, "cybership2": 900.0}
 OPEN_WATER = {"1": 0.03668, "J": -0.01298, "JJ": -0.02347}  # K_Q of HSVA's model, parabola up to J = 0.9
 
 

@@ -50,12 +50,13 @@ VESSELS = {
 
 
 def drawn(source: ModuleType, count: int) -> list[dict[str, float]]:
-    """Velocities, heel and orders by seed, where the source is defined."""
+    """Velocities, heel and orders by seed, where the source is defined; one in ten is at zero."""
     rng = np.random.default_rng(20)
     in_domain = getattr(source, "in_domain", lambda **_: True)
     result: list[dict[str, float]] = []
     while len(result) < count:
         one = {name: float(rng.uniform(*limits)) for name, limits in source.DRAWN.items()}
+        one |= {name: 0.0 for name, (low, high) in source.DRAWN.items() if low <= 0 <= high and rng.uniform() < 0.1}
         if in_domain(**one):
             result.append(one)
     return result

@@ -406,7 +406,7 @@ def fits(name: str) -> dict[str, float]:
     if "thruster" in parts and {"bow", "stern"} & set(parts):  # of a tunnel: nothing that moves with the ship
         if SHAFT_UNITS & {unit.strip().lower() for unit in units_in(name)}:
             meanings = {"n": 1.0}
-        return {meaning: fit for meaning, fit in meanings.items() if meaning in ("", "n", "pitch")}
+        return {meaning: fit for meaning, fit in meanings.items() if meaning in ("", "n", "pitch", "side_force")}
     return meanings
 
 
