@@ -6,7 +6,6 @@ CasADi differentiates rates and memories in reverse mode, once for each structur
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -21,23 +20,29 @@ from shipid.engine.integrate import Array, Batch, Job, Method, integrate
 from shipid.engine.native import (
     C,
     Parts,
-    address,
     compiled_for,
     longs,
     num_parts,
     packed_records,
     padded,
-    spread,
     target,
     width,
 )
 from shipid.engine.printing import STAGES, print_function
+from shipid.engine.threads import in_parallel, threaded
 from shipid.engine.vectors import Target, head
 from shipid.errors import ShipidError
 from shipid.vessel.dynamics import INPUTS, Dynamics
 
 Loss = Callable[[Array], tuple[Array, Array]]
 """Path (T + 1, S, C) of the kept channels -> the loss of each sample (S,), and its slope in the path (T + 1, S, C)."""
+
+_SIZES = ("parts", "stride", "steps", "num_rows")
+_ARRAYS = {
+    **dict.fromkeys(("lengths", "rows"), "const long"),
+    **dict.fromkeys(("numbers", "path", "commands", "environment", "extra", "slopes"), "double"),
+    **dict.fromkeys(("state_bar", "parameters_bar", "extra_bar"), "double"),
+}
 
 
 @dataclass(frozen=True)
@@ -214,20 +219,11 @@ static void advance_back({inputs}, double step, {saved}, {bars}) {{ const V dt[1
         model = self.model
         nx, nm, n = len(model.state) + len(model.hidden), len(model.memory), model.num_dof
         nc, ne, parameters, count = len(model.commands), len(model.environment), len(model.parameters), len(self.wanted)
-        return f"""{head(wanted)}
-{self.functions()}
-#define AT(array, row) ((U *)((array) + (row) * stride + g * W))
-#define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
-#define SLOPES(record) for (long i = 0; i < num_rows; ++i) {{ \\
-  V slope = *AT(slopes, (record) * num_rows + i); \\
-  if (rows[i] < {nx}) x_next[rows[i]] += slope; else m_next[rows[i] - {nx}] += slope; }}
-void run(long first, long last, long stride, long steps, const long *lengths, const double *numbers,
-         double *path, double *commands, double *environment, double *extra, double *slopes,
-         const long *rows, long num_rows, double *state_bar, double *parameters_bar, double *extra_bar) {{
-V parameters[{max(1, parameters)}], saved0[{self.total(0)}], saved1[{self.total(1)}];
+        task = f"""V parameters[{max(1, parameters)}], saved0[{self.total(0)}], saved1[{self.total(1)}];
 for (int i = 0; i < {parameters}; ++i) parameters[i] = K(numbers[i]);
 stage0(parameters, saved0);
-for (long g = first; g < last; ++g) {{
+const long groups = stride / W;
+for (long g = groups * number / parts; g < groups * (number + 1) / parts; ++g) {{
   V x_next[{nx}] = {{}}, m_next[{max(1, nm)}] = {{}}, grad[{max(1, count)}] = {{}}, tau[{n}];
   for (long k = steps - 1; k >= 0; --k) {{
     V x[{nx}], m[{max(1, nm)}], tau_bar[{n}] = {{}};
@@ -248,8 +244,15 @@ for (long g = first; g < last; ++g) {{
   SLOPES(0)
   for (int i = 0; i < {nx}; ++i) *AT(state_bar, i) = x_next[i];
   for (int i = 0; i < {count}; ++i) *AT(parameters_bar, i) = grad[i];
-}} }}
-"""
+}}"""
+        return f"""{head(wanted)}
+{self.functions()}
+#define AT(array, row) ((U *)((array) + (row) * stride + g * W))
+#define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
+#define SLOPES(record) for (long i = 0; i < num_rows; ++i) {{ \\
+  V slope = *AT(slopes, (record) * num_rows + i); \\
+  if (rows[i] < {nx}) x_next[rows[i]] += slope; else m_next[rows[i] - {nx}] += slope; }}
+{threaded(_SIZES, _ARRAYS, task)}"""
 
 
 @lru_cache(maxsize=32)
@@ -267,33 +270,17 @@ def gradient_native(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, 
     records, worst = packed_records(model, batch, replace(job, every=1, rows=tuple(range(nx + nm))))
     path = records[0][:, list(job.rows)].transpose(0, 2, 1)[:, :num_samples]
     values, slopes = checked_loss(loss, path)
-    run, lanes, n, num_steps = (
-        _library(model, wanted, job.step, job.method),
-        target().lanes,
-        model.num_dof,
-        job.num_steps,
-    )
     series = [padded(part, wide) for part in (batch.commands, batch.environment, batch.tau_extra)]
-    inputs = [*series, padded(slopes.transpose(0, 2, 1), wide)]
-    lengths = (ctypes.c_long * 3)(*(len(part) for part in series))
-    places = (ctypes.c_long * max(1, len(job.rows)))(*job.rows)
+    force = np.empty((job.num_steps, model.num_dof, wide))
+    state, slope = np.empty((nx, wide)), np.empty((len(wanted), wide))
     numbers = np.ascontiguousarray(batch.parameters[0], dtype=float)
-    state, force = np.empty((nx, wide)), np.empty((num_steps, n, wide))
-    slope = np.empty((len(wanted), wide))
+    given = [longs(len(part) for part in series), longs(job.rows), numbers, records, *series]
+    given.append(padded(slopes.transpose(0, 2, 1), wide))
     parts = num_parts(batch)
-    edges = np.linspace(0, wide // lanes, parts + 1).astype(int).tolist()
-
-    def work(part: int) -> None:
-        run(
-            *longs(edges[part], edges[part + 1], wide, num_steps),
-            lengths,
-            *(address(array) for array in (numbers, records[0], *inputs)),
-            places,
-            *longs(len(job.rows)),
-            *(address(array) for array in (state, slope, force)),
-        )
-
-    spread(work, ((part,) for part in range(parts)))
+    work = wide / target().lanes / parts * job.num_steps
+    sizes = parts, wide, job.num_steps, len(job.rows)
+    run = _library(model, wanted, job.step, job.method)
+    in_parallel(run, sizes, [*given, state, slope, force], parts, work)
     return Adjoint(
         values, path, worst[0, :num_samples], slope[:, :num_samples], force[:, :, :num_samples], state[:, :num_samples]
     )

@@ -6,20 +6,16 @@ in the user's cache (XDG_CACHE_HOME) under the digest of source, compiler and pr
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
 import logging
 import os
 import platform
 import shutil
 import tempfile
-from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache, lru_cache
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +26,14 @@ from shipid.engine import libraries
 from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
 from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_compiler
 from shipid.engine.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
+from shipid.engine.threads import in_parallel, threaded
 from shipid.engine.vectors import DOUBLE, SINGLE, Precision, Target, head
 from shipid.metrics import BINS, BINS_AN_OCTAVE, LEAST, OCTAVES, SHIFT
 from shipid.vessel.dynamics import Dynamics
 
 log = logging.getLogger(__name__)
 
-OPTIONS = ("-O3", "-fschedule-insns", "-fno-math-errno", "-fPIC", "-shared", "-w")  # of the C compiler
+OPTIONS = ("-O3", "-fschedule-insns", "-fno-math-errno", "-fPIC", "-shared", "-pthread", "-w")  # of the C compiler
 _CALLS = {
     ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_SQRT: "sqrt", ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan",
     ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh",
@@ -57,6 +54,13 @@ _OPERATIONS = {
 C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", lambda value: f"K({value!r})", "NUMBER({0})")
 _SUM_STAGES = (*STAGES, ("state", "memory"))  # what does not depend on the component is computed before the sum
 
+_SIZES = ("parts", "stride", "samples", "steps", "every", "num_rows")
+_ARRAYS = {
+    **dict.fromkeys(("lengths", "counts", "rows"), "const long"), "drawn": "const REAL *const",
+    **dict.fromkeys(("values", "start", "memory", "commands", "environment", "extra"), "REAL"), "goal": "const U",
+    **dict.fromkeys(("records", "sums", "worst"), "REAL"), "tally": "unsigned",
+}  # fmt: skip
+PARTS = 8  # tasks for each core at least: for an even load
 BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
 
 
@@ -281,23 +285,16 @@ const V dt[1] = {{ K(step) }};
         drawn = " ".join(
             f"components[{i}] = (const U *)drawn[{i}] + g * counts[{i}] * {w};" for i, w in enumerate(widths)
         )
-        return f"""{head(wanted)}
-{self.functions()}
-{_measure(wanted.precision)}
-#define AT(array, row) ((U *)((array) + (row) * stride + g * W))
-#define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
-#define ROW(i) (rows[i] < {nx} ? x[rows[i]] : m[rows[i] - {nx}])
-#define NOTE(record) for (long i = 0; i < num_rows; ++i) *AT(records, (record) * num_rows + i) = ROW(i);
-#define EACH_GROUP(end) for (long g = front, j = 0; g < end; ++g, ++j)
-void run(long first, long last, long stride, long samples, long steps, long every, const long *lengths,
-         const REAL *numbers, REAL *start, REAL *memory, REAL *commands, REAL *environment, REAL *extra,
-         const REAL *const *drawn, const long *counts, const long *rows, long num_rows, REAL *records,
-         const U *goal, REAL *sums, unsigned *tally, REAL *worst) {{
-V parameters[{max(1, parameters)}], saved0[{self.total(0)}], known[{block}][{self.total(1)}];
+        task = f"""V parameters[{max(1, parameters)}], saved0[{self.total(0)}], known[{block}][{self.total(1)}];
 V states[{block}][{nx}], memories[{block}][{max(1, nm)}], taus[{block}][{n}], greatest[{block}], distance[{block}];
-for (int i = 0; i < {parameters}; ++i) parameters[i] = K(numbers[i]);
+for (int i = 0; i < {parameters}; ++i) parameters[i] = K(values[number / parts * {parameters} + i]);
 stage0(parameters, saved0);
-for (long front = first; front < last; front += {block}) {{
+const long groups = stride / W, part = number % parts, last = groups * (part + 1) / parts;
+ONE_VARIANT(records, (steps / every + 1) * num_rows * stride)
+ONE_VARIANT(sums, stride)
+ONE_VARIANT(worst, stride)
+if (tally) tally += number * {BINS};
+for (long front = groups * part / parts; front < last; front += {block}) {{
   long end = front + {block} < last ? front + {block} : last;
   EACH_GROUP(end) {{
     V *x = states[j], *m = memories[j], sum = K(0);
@@ -336,8 +333,17 @@ for (long front = first; front < last; front += {block}) {{
     if (goal) *AT(sums, 0) = distance[j];
     *AT(worst, 0) = greatest[j];
   }}
-}} }}
-"""
+}}"""
+        return f"""{head(wanted)}
+{self.functions()}
+{_measure(wanted.precision)}
+#define AT(array, row) ((U *)((array) + (row) * stride + g * W))
+#define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
+#define ROW(i) (rows[i] < {nx} ? x[rows[i]] : m[rows[i] - {nx}])
+#define NOTE(record) for (long i = 0; i < num_rows; ++i) *AT(records, (record) * num_rows + i) = ROW(i);
+#define EACH_GROUP(end) for (long g = front, j = 0; g < end; ++g, ++j)
+#define ONE_VARIANT(array, size) if (array) array += number / parts * (size);
+{threaded(_SIZES, _ARRAYS, task)}"""
 
 
 @lru_cache(maxsize=64)
@@ -411,7 +417,7 @@ def packed_records(model: Dynamics, batch: Batch, job: Job, precision: Precision
     num_variants, wide = len(batch.parameters), width(batch, precision)
     records = np.empty((num_variants, job.num_steps // job.every + 1, len(job.rows), wide), precision.dtype)
     worst = np.empty((num_variants, wide), precision.dtype)
-    _run(model, batch, job, precision, worst, records=records)
+    _run(model, batch, job, precision, worst=worst, records=records)
     return records, worst
 
 
@@ -424,10 +430,10 @@ def measure_native(
     """
     num_samples, num_variants, wide = batch.state.shape[1], len(batch.parameters), width(batch, precision)
     sums, worst = (np.empty((num_variants, wide), precision.dtype) for _ in range(2))
-    tally = np.zeros((num_parts(batch, precision), num_variants, BINS), dtype=np.uint32)
+    tally = np.zeros((num_variants, num_parts(batch, precision), BINS), dtype=np.uint32)
     there = _packed(goal, target(precision).lanes, precision)
-    _run(model, batch, job, precision, worst, goal=there, sums=sums, tally=tally)
-    return sums[:, :num_samples].astype(float), tally.sum(axis=0, dtype=np.uint32), worst[:, :num_samples]
+    _run(model, batch, job, precision, worst=worst, goal=there, sums=sums, tally=tally)
+    return sums[:, :num_samples].astype(float), tally.sum(axis=1, dtype=np.uint32), worst[:, :num_samples]
 
 
 def run_single(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
@@ -448,65 +454,33 @@ def width(batch: Batch, precision: Precision = DOUBLE) -> int:
 
 
 def num_parts(batch: Batch, precision: Precision = DOUBLE) -> int:
-    """Number of parts of the samples for the threads: enough for an even load."""
-    num_variants, groups = len(batch.parameters), width(batch, precision) // target(precision).lanes
-    return min(-(-4 * cores() // num_variants), groups)
+    """Number of parts of the samples of a variant, each a task: enough for an even load on all cores."""
+    return min(PARTS * cores() // len(batch.parameters) + 1, width(batch, precision) // target(precision).lanes)
 
 
-def _run(model: Dynamics, batch: Batch, job: Job, precision: Precision, worst: Array, **wanted: Array) -> None:
-    """Run a job and fill `worst` and the arrays in `wanted`; parts of the samples run on threads."""
-    run, lanes = _library(model, job.step, job.method, precision), target(precision).lanes
-    wide, parts = width(batch, precision), num_parts(batch, precision)
-    series = [padded(part, wide, precision) for part in (batch.commands, batch.environment, batch.tau_extra)]
-    lengths = (ctypes.c_long * 3)(*(len(part) for part in series))
+def _run(model: Dynamics, batch: Batch, job: Job, precision: Precision, **wanted: Array) -> None:
+    """Run a job and fill the arrays in `wanted`: `worst`, and `records`, or `sums` and `tally` for a `goal`."""
+    lanes, wide, parts = target(precision).lanes, width(batch, precision), num_parts(batch, precision)
+    series = {name: padded(getattr(batch, name), wide, precision) for name in ("commands", "environment")}
+    series["extra"] = padded(batch.tau_extra, wide, precision)
     drawn = [_packed(part.transpose(2, 0, 1), lanes, precision) for part in batch.components]
-    counts = (ctypes.c_long * max(1, len(drawn)))(*(part.shape[1] for part in drawn))
-    pointers = (ctypes.c_void_p * max(1, len(drawn)))(*(part.ctypes.data for part in drawn))
-    places = (ctypes.c_long * len(job.rows))(*job.rows)
-    inputs = [padded(batch.state, wide, precision), padded(batch.memory, wide, precision), *series]
-    values = np.ascontiguousarray(batch.parameters, dtype=precision.dtype)
-    edges = np.linspace(0, wide // lanes, parts + 1).astype(int).tolist()
-    records, goal, sums, tally = (wanted.get(name) for name in ("records", "goal", "sums", "tally"))
-
-    def work(variant: int, part: int) -> None:
-        run(
-            *longs(edges[part], edges[part + 1], wide, batch.state.shape[1], job.num_steps, job.every),
-            lengths,
-            *(address(array) for array in (values[variant], *inputs)),
-            pointers,
-            counts,
-            places,
-            *longs(len(job.rows)),
-            *(address(records, variant), address(goal), address(sums, variant), address(tally, part, variant)),
-            address(worst, variant),
-        )
-
-    spread(work, product(range(len(values)), range(parts)))
+    arrays: dict[str, Array] = {
+        "lengths": longs(len(part) for part in series.values()),
+        "counts": longs(part.shape[1] for part in drawn),
+        "rows": longs(job.rows),
+        "drawn": np.array([part.ctypes.data for part in drawn], dtype=np.uintp),
+        "values": np.ascontiguousarray(batch.parameters, dtype=precision.dtype),
+        "start": padded(batch.state, wide, precision),
+        "memory": padded(batch.memory, wide, precision),
+        **series,
+        **wanted,
+    }
+    sizes = (parts, wide, batch.state.shape[1], job.num_steps, job.every, len(job.rows))
+    work = wide / lanes / parts * job.num_steps * (1 + sum(part.shape[1] for part in drawn))
+    run = _library(model, job.step, job.method, precision)
+    in_parallel(run, sizes, (arrays.get(name) for name in _ARRAYS), parts * len(batch.parameters), work)
 
 
-def longs(*numbers: int) -> list[Any]:
-    """Integers as C `long` arguments."""
-    return [ctypes.c_long(number) for number in numbers]
-
-
-def address(array: Array | None, *place: int) -> Any:
-    """C pointer to the entry of an array at an index; a null pointer for None."""
-    return ctypes.c_void_p(None if array is None else array[place].ctypes.data)
-
-
-def spread(work: Callable[..., None], tasks: Iterable[tuple[int, ...]]) -> None:
-    """Call `work` with each task, on as many threads as cores; after an interrupt no new task begins."""
-    waiting = iter(tasks)
-
-    def drain() -> None:
-        for task in waiting:
-            work(*task)
-
-    with ThreadPoolExecutor(max(1, cores() - 1)) as pool:
-        helpers = [pool.submit(drain) for _ in range(cores() - 1)]
-        try:
-            drain()
-        finally:
-            deque(waiting, maxlen=0)  # after an interrupt the others begin nothing new
-        for helper in helpers:
-            helper.result()
+def longs(numbers: Iterable[int]) -> Array:
+    """Integers as C `long`."""
+    return np.array(list(numbers), dtype=np.dtype("l"))

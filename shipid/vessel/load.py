@@ -30,9 +30,9 @@ from shipid.vessel.schema import (
     behind,
     components,
     kinds,
+    model_for,
     term_blocks,
     term_model,
-    vessel_model,
 )
 
 MOST_RADIANS = 7.0  # more than a full turn: a larger limit of an actuator is in degrees
@@ -90,7 +90,7 @@ class Vessel:
         document = documents.replace(self.document, values)
         if values.keys() <= self.units.keys():  # numbers alone: names and units are as they were
             try:
-                documents.parse(vessel_model(), document, self.file)
+                documents.parse(model_for(document), document, self.file)
             except DocumentError:
                 return check_vessel(document, self.file)
             vessel = Vessel(document, self.file, documents.digest(document))
@@ -238,7 +238,7 @@ def check_vessel(document: Document, file: str) -> Vessel:
     """Check a complete document; DocumentError with file, dotted path and remedy for the first problem."""
     for path, group, block in components(document):
         _check_component(path, group, block, file)
-    documents.parse(vessel_model(), document, file)
+    documents.parse(model_for(document), document, file)
     vessel = Vessel(document, file, documents.digest(document))
     paths: dict[str, str] = {}
     for path, key, block in term_blocks(document):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import GenericAlias
@@ -241,21 +241,38 @@ def _union(models: list[type[Block]]) -> Any:
 
 def kinds(group: str) -> list[str]:
     """Kinds of term in a group."""
-    return [key.split(".")[1] for key in TERMS if key.split(".")[0] == group]
+    return [key.split(".")[1] for key in _of_group(group)]
 
 
-def _named(group: str) -> Any:
-    return _union([term_model(f"{group}.{kind}") for kind in kinds(group)])
+def _of_group(group: str) -> list[str]:
+    return [key for key in TERMS if key.split(".")[0] == group]
 
 
-def _fixed(group: str) -> Any:
-    fields: dict[str, Any] = {kind: (term_model(f"{group}.{kind}") | None, None) for kind in kinds(group)}
+def _named(group: str, of: Collection[str]) -> Any:
+    models = [term_model(key) for key in _of_group(group) if key in of]
+    return _union(models) if models else Block
+
+
+def _fixed(group: str, of: Collection[str]) -> Any:
+    fields: dict[str, Any] = {
+        key.split(".")[1]: ((term_model(key) if key in of else Block) | None, None) for key in _of_group(group)
+    }
     return create_model(group, __base__=Block, **fields)
 
 
+def model_for(document: Mapping[str, Any]) -> type[BaseModel]:
+    """Pydantic model for one vessel document, with models of those terms alone that it has: others take their time."""
+    named = {name for off in (False, True) for path, key, _ in term_blocks(document, off) for name in (path, key)}
+    return vessel_model(frozenset(named & TERMS.keys()))
+
+
 @cache
-def vessel_model() -> type[BaseModel]:
-    """Pydantic model of a whole vessel document; its JSON schema serves editors."""
+def vessel_model(having: frozenset[str] | None = None) -> type[BaseModel]:
+    """Pydantic model of a whole vessel document; its JSON schema serves editors.
+
+    having : kinds of term that the document may have, as keys of TERMS, which are all by default.
+    """
+    of = TERMS.keys() if having is None else having
     current: dict[str, Any] = {"kind": (Literal["uniform"], ...)}
     fields: dict[str, Any] = {
         "name": (str, ...),
@@ -266,9 +283,9 @@ def vessel_model() -> type[BaseModel]:
         "constants": (_dimension_model("constants", CONSTANTS) | None, None),
         "inertia": (block_model("inertia", parameters(rigid_body), coriolis=(_TURNING, "full")), ...),
         "added_mass": (block_model("added_mass", parameters(added_mass), coriolis=(_CORIOLIS, "full")) | None, None),
-        **{group: (_fixed(group) | None, None) for group in FIXED},
-        "wind": (_named("wind") | None, None),
-        "thruster": (GenericAlias(dict, (str, _named("thruster"))), {}),
+        **{group: (_fixed(group, of) | None, None) for group in FIXED},
+        "wind": (_named("wind", of) | None, None),
+        "thruster": (GenericAlias(dict, (str, _named("thruster", of))), {}),
         "current": (create_model("current", __base__=Block, **current) | None, None),
     }
     return create_model("vessel", __base__=Block, **fields)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-QUICK = ("-O0", "-fPIC", "-shared", "-w")  # options of the C compiler where speed is not the point
+QUICK = ("-O0", "-fPIC", "-shared", "-pthread", "-w")  # options of the C compiler where speed is not the point
 
 
 @pytest.fixture(scope="session")

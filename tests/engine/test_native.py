@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -205,24 +204,3 @@ def test_one_divergence_harms_no_other_distance(draw_inputs: Callable[..., Any])
     assert (harmed.diverged[0] == ~others).all()
     np.testing.assert_array_equal(harmed.total[:, others], sound.total[:, others])
     assert harmed.tally.sum() == sound.tally.sum() == 55
-
-
-def test_an_interrupt_leaves_no_thread_at_work(
-    monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
-) -> None:
-    """What another thread has begun it ends; nothing new is begun."""
-    run = native._library(dynamics(SHIP), 1.0, "euler")
-    calls: list[int] = []
-
-    def interrupted(*arguments: Any) -> None:
-        calls.append(1)
-        if threading.current_thread() is threading.main_thread():
-            raise KeyboardInterrupt
-        run(*arguments)
-
-    parameters = np.tile(list(SHIP.parameters.values()), (5000, 1))
-    with monkeypatch.context() as patch:
-        patch.setattr(native, "_library", lambda *_: interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            rollout(SHIP, **draw_inputs(SHIP, 8), step=1.0, num_steps=2, parameters=parameters, engine="native")
-    assert len(calls) < 5000

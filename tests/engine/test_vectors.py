@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from shipid.engine import native
-from shipid.engine.native import address, compiled, compiler, longs, target
+from shipid.engine.native import compiled, compiler, target
+from shipid.engine.threads import in_parallel, threaded
 from shipid.engine.vectors import SINGLE, Target, head
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
@@ -48,14 +49,14 @@ def call(wanted: Target, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Array
 
     def called(name: str, *arguments: Array) -> Array:
         places = ", ".join(f"a[{k} * n + i]" for k in range(len(arguments)))
-        source = f"{head(wanted)}\nvoid run(long n, const U *a, U *out) {{"
-        source += f" for (long i = 0; i < n; ++i) out[i] = v_{name}({places}); }}"
+        task = f"for (long i = 0; i < n; ++i) out[i] = v_{name}({places});"
+        source = head(wanted) + threaded(["n"], {"a": "const U", "out": "U"}, task)
         size = len(arguments[0])
         groups = -(-size // wanted.lanes)
         given = np.zeros((len(arguments), groups * wanted.lanes), wanted.precision.dtype)
         given[:, :size] = arguments
         out = np.empty(groups * wanted.lanes, wanted.precision.dtype)
-        compiled(source)(*longs(groups), address(given), address(out))
+        in_parallel(compiled(source), [groups], [given, out], 1, 1.0)
         return out[:size]
 
     return called

@@ -6,12 +6,22 @@ from typing import Any
 import casadi as ca
 import pytest
 
-from shipid.document import bundled
+from shipid.document import bundled, parse, replace
+from shipid.errors import DocumentError
 from shipid.physics import ACTUATORS, GIVEN, MOTION, TERMS
 from shipid.physics.inertia import rigid_body
 from shipid.physics.signals import named
 from shipid.vessel.load import load_vessel
-from shipid.vessel.schema import kinds, parameters, signals, structural, term_blocks, term_parameters, vessel_model
+from shipid.vessel.schema import (
+    kinds,
+    model_for,
+    parameters,
+    signals,
+    structural,
+    term_blocks,
+    term_parameters,
+    vessel_model,
+)
 
 
 @pytest.mark.parametrize("key", list(TERMS))
@@ -122,3 +132,17 @@ def test_what_a_term_gives_has_its_parameters_in_the_same_block(key: str) -> Non
         assert {parameter.name for parameter in parameters(function)} <= set(names)
     if key == "thruster.quadratic":
         assert "c_uu" in set(names) - {parameter.name for parameter in parameters(term.function)}
+
+
+@pytest.mark.parametrize("name", list(bundled("models")))
+def test_a_model_for_one_document_says_what_the_whole_one_says(name: str) -> None:
+    """It knows the terms that the document has, and refuses an unknown key in each of them with the same words."""
+    document = load_vessel(name).document
+    assert model_for(document) is model_for(dict(document))
+    for path, _, _ in term_blocks(document):
+        spoilt = replace(document, {f"{path}.actuators": 1.0})
+        with pytest.raises(DocumentError) as whole:
+            parse(vessel_model(), spoilt, name)
+        with pytest.raises(DocumentError) as one:
+            parse(model_for(spoilt), spoilt, name)
+        assert str(one.value) == str(whole.value)
