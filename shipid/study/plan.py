@@ -38,7 +38,7 @@ WITH = "+"  # between a foundation and a method
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
 OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
 IDENTIFIED, OBSERVED = "identified from the runs of each cell", "with an observer"
-OWN_SCRIPT = "my.py"  # a user's script with a method, where its name is unknown
+USER_SCRIPT = "my.py"  # a user's script with a method, where its name is unknown
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 FEEDBACK = ("zigzag", "reverse_spiral", "station_keeping")  # kinds of manoeuvres whose orders react to the ship
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
@@ -383,7 +383,7 @@ class Plan:
     def program(self) -> str:
         """The command line that knows the methods: `shipid`, or the user's script where one of them is the user's."""
         known = all(type(way.method).__module__.partition(".")[0] == "shipid" for way in self.methods)
-        return "shipid" if known else shlex.join(["python", _script() or OWN_SCRIPT])
+        return "shipid" if known else shlex.join(["python", _script() or USER_SCRIPT])
 
     @property
     def command(self) -> str:
@@ -396,7 +396,7 @@ class Plan:
         words = " ".join([self.program, "study run", name, *changes])
         missing = self.program != "shipid" and not _script()
         return (
-            f"# {OWN_SCRIPT}: your script that puts the method into METHODS and calls main\n{words}"
+            f"# {USER_SCRIPT}: your script that puts the method into METHODS and calls main\n{words}"
             if missing
             else words
         )
