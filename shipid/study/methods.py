@@ -10,7 +10,7 @@ import pandas as pd
 from scipy import stats
 
 from shipid.metrics import over_time, position_error
-from shipid.study.evidence import contrasts
+from shipid.study.evidence import mean_errors
 from shipid.study.memory import paired_interval
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results
@@ -102,7 +102,7 @@ def _interval(mine: Mapping[Any, Mapping[str, Any]]) -> dict[str, float]:
         return {"H_low": np.nan, "H_high": np.nan}
     sums, counts = _by_run({key: (cell["sums"], cell["counts"]) for key, cell in mine.items()})
     values, weights = np.array(list(sums.values())), np.array(list(counts.values()), dtype=float)
-    judged = contrasts((values / weights)[None, :], weights)
+    judged = mean_errors((values / weights)[None, :], weights)
     return {"H_low": float(judged.low[0]), "H_high": float(judged.high[0])}
 
 

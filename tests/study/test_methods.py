@@ -63,6 +63,14 @@ def test_the_interval_of_H_holds_H_and_needs_five_runs() -> None:
     assert compared(cells(rng, 0.5, worlds=1, runs=4), "drawn")[["H_low", "H_high"]].isna().all(axis=None)
 
 
+def test_the_interval_of_H_ends_at_0() -> None:
+    made = cells(np.random.default_rng(5), 0.0, worlds=1, runs=6)
+    hard = {f"T{k}": 1e-3 if k else 10.0 for k in range(6)}  # one run has nearly all of the error
+    made["sums"] = [{name: hard[name] * count for name, count in counts.items()} for counts in made["counts"]]
+    made["H"] = [sum(row["sums"].values()) / sum(row["counts"].values()) for _, row in made.iterrows()]
+    assert (compared(made, "drawn")["H_low"] == 0).all()
+
+
 def test_methods_of_a_run_on_the_disk(tiny_run: Path) -> None:
     results = shipid.read_results(tiny_run)
     table = shipid.compare_methods(results)
