@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.report.content import PUBLISHED, ReportContent
-from shipid.report.wording import counted, listed, number
+from shipid.report.wording import counted, fixed, listed, number
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def figure(value: object, decimals: int) -> Cell:
     amount = math.nan if value is None or value is pd.NA else float(str(value))
     if not math.isfinite(amount):
         return Cell("–", MISSING)
-    return Cell(f"{round(amount, decimals) + 0.0:.{decimals}f}".replace("-", "−"), amount)
+    return Cell(fixed(amount, decimals), amount)
 
 
 def decimals(values: pd.DataFrame | pd.Series[float]) -> int:

@@ -14,6 +14,11 @@ def number(value: float) -> str:
     if not math.isfinite(value):
         return "–"
     decimals = 2 if abs(value) < 9.995 else 1 if abs(value) < 99.95 else 0
+    return fixed(value, decimals)
+
+
+def fixed(value: float, decimals: int) -> str:
+    """Write a finite number with so many decimals, a true minus sign and no minus zero."""
     return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
 
