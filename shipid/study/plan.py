@@ -392,7 +392,7 @@ class Plan:
         A line before it says what the script is where a method is the user's and no script has started this process.
         """
         name = self.name if documents.bundled("studies").get(self.name) == Path(self.file) else shlex.quote(self.file)
-        changes = (f"--set '{path}={json.dumps(value)}'" for path, value in self.changes.items())
+        changes = (f"--set {shlex.quote(f'{path}={json.dumps(value)}')}" for path, value in self.changes.items())
         words = " ".join([self.program, "study run", name, *changes])
         missing = self.program != "shipid" and not _script()
         return (

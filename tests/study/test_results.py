@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -123,6 +124,9 @@ def test_the_command_reproduces_the_study(read: Results) -> None:
     changed = replace(quick, provenance={"file": plan.file, "changes": {"grid.N_D": [10], "method.0.kind": "alone"}})
     expected = "shipid study run quick --set 'grid.N_D=[10]' --set 'method.0.kind=\"alone\"'"
     assert frames.reproducing_command(changed) == expected
+    asked = {"question": "How good is the captain's model?"}
+    words = shlex.split(frames.reproducing_command(replace(quick, provenance={"file": plan.file, "changes": asked})))
+    assert words[-1] == 'question="How good is the captain\'s model?"'
 
 
 def test_a_diverged_model_is_marked_and_left_out_of_curves(read: Results) -> None:
