@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
+from shipid.cli.data import data_import
 from shipid.data.dataset import read_dataset, write_dataset
+from shipid.logs.guess.pose import Frame
 from shipid.study.store import DATASET
 from tests.cli.running import BAD, output_of
 from tests.logs.simulated import as_bridge, si_log
@@ -66,3 +69,9 @@ def test_data_fetch_from_the_folder(shared_data: Path, monkeypatch: pytest.Monke
     file = Path(output_of("data", "fetch", "gunnerus-2022").strip())
     assert file.is_file()
     assert shared_data in file.parents
+
+
+def test_the_frames_of_the_command_are_those_of_the_draft() -> None:
+    """They are written twice: the help of the command does not load the draft."""
+    declared, _ = get_args(get_type_hints(data_import)["frame"])
+    assert get_args(declared) == get_args(Frame)
