@@ -50,7 +50,7 @@ class Counting(Searched):
     width: Scale = (1.0, 100.0)
 
     def fit(self, task):
-        raise NotImplementedError
+        return {}
 
 
 def test_counts_are_whole_and_linear_settings_evenly_spread():
