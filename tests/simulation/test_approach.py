@@ -193,10 +193,10 @@ def test_a_slow_ship_is_held_until_she_is_on_course() -> None:
         return np.array(model.rates(state, [], commands, np.zeros(len(model.environment)), *given)).ravel()[3:]
 
     (helm,), sign = approach.helm.values(), next(iter(controls.helm.values()))
-    found = np.array([approach.state["u"][0], approach.state["v"][0], sign * helm[0]])
-    balanced = fsolve(unbalanced, found, xtol=1e-12)
+    reached = np.array([approach.state["u"][0], approach.state["v"][0], sign * helm[0]])
+    balanced = fsolve(unbalanced, reached, xtol=1e-12)
     np.testing.assert_allclose(unbalanced(balanced), 0.0, atol=1e-10)
-    np.testing.assert_allclose(found, balanced, rtol=0.02)
+    np.testing.assert_allclose(reached, balanced, rtol=0.02)
 
 
 def test_shares_give_the_acceleration_asked_for_and_the_bias_gives_none() -> None:
