@@ -36,7 +36,7 @@ class Pose:
     """A hypothesis: columns of position and heading, and how course and heading agree.
 
     same, mirrored : mean of exp(i (course - psi)) and of exp(i (course + psi)). cost : misfit, less for fitting names.
-    settled : what shows the frame, a column of a course over ground or a person; empty where nothing does.
+    settled : what shows the frame: a column of a course or of a velocity, or a person; empty where nothing does.
     east_sign : -1 where the second axis is to the west. counts : sign of the heading that a person gave, else 0.
     """
 
@@ -93,6 +93,7 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         best = in_frame(best, frame, file)
     elif not best.on_globe and best.misfit <= POOR:
         best = _by_course(state, best)
+        best = best if best.settled else _by_velocities(state, best)
     _take(state, best, sure)
 
 
@@ -113,10 +114,7 @@ def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
     given = replace(best, settled=f"--frame {frame}", counts=1 if clockwise else -1)
     if frame == "ned":
         return given
-    same, mirrored = np.conj(best.mirrored), np.conj(best.same)
-    if frame == "zup":
-        return replace(given, east_sign=-1, same=same, mirrored=mirrored)
-    return replace(given, north=best.east, east=best.north, same=1j * same, mirrored=1j * mirrored)
+    return _y_is_west(given, given.settled) if frame == "zup" else _x_is_east(given, given.settled)
 
 
 def _by_course(state: State, best: Pose) -> Pose:
@@ -138,13 +136,58 @@ def _by_course(state: State, best: Pose) -> Pose:
         same, mirrored = (complex(np.sum(track * way)) / size for way in (np.conj(turned), turned))
         if spread < STRAIGHT or abs(mirrored) < 1.0 - POOR or (1.0 - abs(mirrored)) * MIRROR > 1.0 - abs(same):
             continue  # where it agrees as it is, it may be a course in the same local frame: that settles nothing
-        if abs(np.angle(mirrored * -1j)) < 0.3:  # x is east
-            turn = {"same": 1j * np.conj(best.mirrored), "mirrored": 1j * np.conj(best.same)}
-            return replace(best, north=best.east, east=best.north, settled=name, **turn)
-        if abs(np.angle(mirrored)) < 0.3:  # y is west
-            turn = {"same": np.conj(best.mirrored), "mirrored": np.conj(best.same)}
-            return replace(best, east_sign=-1, settled=name, **turn)
+        if abs(np.angle(mirrored * -1j)) < 0.3:
+            return _x_is_east(best, name)
+        if abs(np.angle(mirrored)) < 0.3:
+            return _y_is_west(best, name)
     return best
+
+
+def _by_velocities(state: State, best: Pose) -> Pose:
+    """Return the hypothesis in the frame of velocities named north and east, whose integral is the track.
+
+    Letters say less than these words: many teams write x0 for east. Where the integral is the track as it is, or fits
+    no frame, nothing is settled.
+    """
+    pairs = [
+        (north, east)
+        for north in state.called("velocity_north")
+        for east in state.called("velocity_east")
+        if not _lettered(north) and not _lettered(east) and _lettered(best.north) and _lettered(best.east)
+    ]
+    track = state.chosen.change(plane(state, best.north, best.east, on_globe=False))
+    for north, east in pairs:
+        path = evidence.integral(state.t, state.columns[north] + 1j * state.columns[east])
+        change = state.chosen.change(path)
+        frames = {"as it is": track, "east": 1j * np.conj(track), "west": np.conj(track)}
+        left = {way: _left(seen, change) for way, seen in frames.items()}
+        likely = min(left, key=left.__getitem__)
+        if left[likely] > POOR or left["as it is"] < MIRROR * POOR:
+            continue
+        return _x_is_east(best, north) if likely == "east" else _y_is_west(best, north)
+    return best
+
+
+def _lettered(name: str) -> bool:
+    """Whether a name says x or y, which each hand lays in another direction."""
+    return any(part.rstrip("0123456789") in ("x", "y") for part in parts_of(name))
+
+
+def _left(seen: Complex, integrated: Complex) -> float:
+    """Unexplained share of a track, outliers apart; 1 where the scale is negative."""
+    keep = evidence.robust(seen, integrated)
+    fit = evidence.fit(seen[keep], integrated[keep])
+    return fit.left if fit.scale > 0 else 1.0
+
+
+def _x_is_east(best: Pose, settled: str) -> Pose:
+    turn = {"same": 1j * np.conj(best.mirrored), "mirrored": 1j * np.conj(best.same)}
+    return replace(best, north=best.east, east=best.north, settled=settled, **turn)
+
+
+def _y_is_west(best: Pose, settled: str) -> Pose:
+    turn = {"same": np.conj(best.mirrored), "mirrored": np.conj(best.same)}
+    return replace(best, east_sign=-1, settled=settled, **turn)
 
 
 def _named_pairs(state: State) -> Iterator[tuple[str, str, bool, float]]:
@@ -283,10 +326,11 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
         mirrored = True
     if best.counts:
         mirrored, undecided = best.counts < 0, False
-    clear = best.on_globe or all(
-        fits(name).get(meaning, 0.0) > 0.9 for name, meaning in ((north, "north"), (east, "east"))
-    )
     compass = _is_compass(heading)
+    clear = best.on_globe or all(
+        fits(name).get(meaning, 0.0) > 0.9 and (compass or not _lettered(name))
+        for name, meaning in ((north, "north"), (east, "east"))
+    )
     phase = float(np.angle(best.mirrored if mirrored else best.same))
     quarter = round(phase / (np.pi / 2))
     sign, offset = 1, 0.0
@@ -326,10 +370,9 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
         more = {"sign": -1} if way < 0 else {}
         state.suggest(name, source, "deg" if best.on_globe else "m", confidence, why, **more)
     if best.settled in state.columns and (best.east_sign < 0 or sign < 0):
-        sentence = (
-            f"{best.settled!r} counts clockwise from north, and agrees with the track only with {north!r} as north"
-        )
-        state.find("frame by the course", (north, east), 0.9, sentence)
+        words = "counts clockwise from north" if fits(best.settled).get("course") else "is a speed to north"
+        sentence = f"{best.settled!r} {words}, and agrees with the track only with {north!r} as north"
+        state.find("frame by course or velocity", (north, east), 0.9, sentence)
     if false.any():
         across = "360" if unit == "deg" else "2 pi"
         sentence = f"{int(false.sum())} steps of {heading!r} lie between two headings across {across}"
@@ -365,7 +408,7 @@ def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: 
         )
     mirrored = best.misfit < POOR and abs(best.mirrored) > abs(best.same)
     unnamed = not compass and not set(parts_of(best.heading)) & YAW
-    lettered = all(part[:1] in ("x", "y") for name in (best.north, best.east) for part in parts_of(name)[:1])
+    lettered = _lettered(best.north) and _lettered(best.east)
     if (
         not best.on_globe
         and clear

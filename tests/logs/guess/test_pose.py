@@ -92,9 +92,39 @@ COURSE = np.degrees(np.unwrap(np.angle(np.gradient(NORTH) + 1j * np.gradient(EAS
 def test_a_course_over_ground_shows_the_frame(columns: dict[str, np.ndarray], signs: dict[str, int]) -> None:
     state = chosen(columns)
     assert {one.name: one.extra["sign"] for one in state.suggestions if "sign" in one.extra} == signs
-    assert ("frame by the course" in {finding.kind for finding in state.findings}) == bool(signs)
+    assert ("frame by course or velocity" in {finding.kind for finding in state.findings}) == bool(signs)
     assert bool(state.questions) != bool(signs)
     assert_motion(state)
+
+
+SPEEDS = {"v_north": np.gradient(NORTH, T), "v_east": np.gradient(EAST, T)}
+
+
+@pytest.mark.parametrize(
+    ("columns", "signs"),
+    [
+        ({"x0": EAST, "y0": NORTH, "yaw": (90.0 - DEG) % 360.0}, {"psi": -1}),
+        ({"pos_x": NORTH, "pos_y": -EAST, "yaw": -DEG % 360.0}, {"psi": -1, "east": -1}),
+        ({"x0": NORTH, "y0": EAST, "yaw": DEG}, {}),
+        ({"X": EAST, "Y": NORTH, "heading": DEG}, {}),
+    ],
+    ids=["x is east", "z is upwards", "z is downwards", "x is east, with a compass"],
+)
+@pytest.mark.parametrize("unit", [1.0, 3600.0 / 1852.0])
+def test_velocities_to_north_and_east_show_the_frame(
+    columns: dict[str, np.ndarray], signs: dict[str, int], unit: float
+) -> None:
+    """In whatever unit they are; letters of positions are another hand's."""
+    state = chosen(columns | {name: unit * speed for name, speed in SPEEDS.items()})
+    assert {one.name: one.extra["sign"] for one in state.suggestions if "sign" in one.extra} == signs
+    assert_motion(state)
+
+
+def test_velocities_of_another_frame_settle_nothing() -> None:
+    """A column named as a speed to north that is not the rate of the track in any frame."""
+    odd = {"v_north": np.gradient(EAST, T) - 3.0, "v_east": -np.gradient(NORTH, T)}
+    state = chosen({"x0": EAST, "y0": NORTH, "yaw": (90.0 - DEG) % 360.0} | odd)
+    assert [question.about for question in state.questions] == [("psi", "north", "east")]
 
 
 @pytest.mark.parametrize(("north", "asked"), [("x0_m", True), ("N", False)])
