@@ -272,10 +272,10 @@
     const headings = [...table.tHead.rows[0].cells];
     headings.forEach((heading, column) => heading.addEventListener("click", () => {
       const down = heading.getAttribute("aria-sort") === "ascending";
-      const numeric = heading.classList.contains("numeric");
+      const numeric = !heading.classList.contains("words");
       for (const other of headings) other.removeAttribute("aria-sort");
       heading.setAttribute("aria-sort", down ? "descending" : "ascending");
-      const key = (row) => row.cells[column].dataset.key;
+      const key = (row) => row.cells[column].dataset.key ?? row.cells[column].textContent.toLowerCase();
       const compare = (a, b) => {
         const [left, right] = [key(a), key(b)];
         if (!numeric) return (down ? -1 : 1) * left.localeCompare(right);

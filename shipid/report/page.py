@@ -25,6 +25,7 @@ from shipid.report.glossary import glossed
 from shipid.report.section import OF_EVERY_PAGE, Drawn, Section, declared, drawn
 from shipid.report.sections import SECTIONS
 from shipid.report.sketch import sketch
+from shipid.report.tables import cell_html
 from shipid.report.wording import bound, number
 
 LEAD = 3  # sentences of the answer that a reader sees; the others unfold
@@ -101,7 +102,7 @@ def page(
     titles |= {item.id: item.title for section in parts for item in section.items}
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     sentences = list(content.answer)
-    environment.filters |= {"number": number, "bound": bound, "glossed": glossed}
+    environment.filters |= {"number": number, "bound": bound, "glossed": glossed, "cell": cell_html}
     template = environment.from_string(_resource("template.html.j2"))
     return template.render(
         content=content,

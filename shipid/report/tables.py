@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from markupsafe import Markup
 
 from shipid.report.content import PUBLISHED, ReportContent
 from shipid.report.wording import counted, fixed, listed, number
@@ -32,6 +33,21 @@ class Table:
     columns: Sequence[str]
     numeric: Sequence[bool]
     rows: Sequence[Sequence[Cell]]
+
+
+LONG = 30  # characters that a column shows of a text
+
+
+def cell_html(cell: Cell, numeric: bool, first: bool) -> Markup:
+    """Write a cell as an element of HTML; its key is left out where page.js reads the same from the text."""
+    long = len(cell.text) > LONG
+    classes = " ".join(["words"] * (not numeric) + (["bad"] if cell.bad else ["long"] * long))
+    read, key = cell.text.lower(), f"{cell.key:.6g}" if isinstance(cell.key, float | int) else cell.key
+    given = {"scope": "row" if first else "", "class": classes, "data-key": "" if key == read else key}
+    given["title"] = cell.text if long else ""
+    attributes = Markup("").join(Markup(' {}="{}"').format(*pair) for pair in given.items() if pair[1])
+    tag = Markup("th" if first else "td")
+    return Markup("<{0}{1}>{2}</{0}>").format(tag, attributes, cell.text)
 
 
 def text(value: object) -> Cell:

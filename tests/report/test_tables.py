@@ -1,10 +1,13 @@
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from shipid.report.tables import cells, envelope, figure, models, repairs, text
+from shipid.report.tables import Cell, cell_html, cells, envelope, figure, models, repairs, text
 
 
 def test_numbers_align_and_what_is_missing_sorts_last():
@@ -62,3 +65,18 @@ def test_envelope_and_repairs_hold_their_numbers(full_scale):
     assert table.columns[0] == "set"
     assert table.rows[1][1].text == "0.00 / 2.30 / 5.88"
     assert repairs(full_scale).takeaway == "2 repairs: repeated samples and jump in position."
+
+
+WORDS = st.text(alphabet="aB é–1.<>&\"'", max_size=40)
+
+
+@given(WORDS, st.floats(allow_nan=False) | WORDS, st.booleans(), st.booleans())
+def test_a_cell_is_read_back_from_its_element(words, key, numeric, first):
+    """Text and key survive HTML; a key that is left out is the text in small letters, as page.js reads it."""
+    root = ElementTree.fromstring(cell_html(Cell(words, key), numeric, first))
+    assert (root.text or "") == words
+    read = root.get("data-key", words.lower())
+    expected = f"{key:.6g}" if isinstance(key, float) else key
+    assert read == (expected or words.lower())
+    assert ("words" in root.get("class", "").split()) != numeric
+    assert (root.tag, root.get("scope")) == (("th", "row") if first else ("td", None))

@@ -106,7 +106,9 @@ def _head(guess: Guess) -> Iterator[str]:
         yield from _lines({"runs": source.pattern})
         if source.skipped:
             yield from (f"# ! {name} is left out: {reason}" for name, reason in source.skipped.items())
-            yield from _lines({"skip": list(source.skipped)})
+            ending = source.pattern.rpartition("*")[2]
+            alike = [name for name in source.skipped if name.endswith(ending)]
+            yield from _lines({"skip": alike} if alike else {})
         if source.manoeuvres:
             yield "[source.manoeuvres]    # as the names of the files say"
             yield from (

@@ -28,7 +28,7 @@ class Source:
     """The files of a guess.
 
     path : the file, or the folder. pattern : key `runs` of [source]; None for a single file. files : run -> file.
-    skipped : files that are left out, with the reason. manoeuvres : run -> kind, as its name says.
+    skipped : files that may be logs and are left out, with the reason. manoeuvres : run -> kind, as its name says.
     parts : keys of [parts] where a file holds several runs; empty else. held : runs that this gives.
     sniffed : all rows, as of one log.
     """
@@ -50,21 +50,26 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> Source:
     ------
     DataError : the file, or every file of a folder, cannot be read as a log; each is named with its reason.
     """
-    folder, pattern = _pattern(path)
-    if pattern is None:
+    folder, patterns = _patterns(path)
+    if not patterns:
         log = sniff(path, names)
         parts, held = _parts({path: log}, by_pause=False)
         return Source(path, None, {path.stem: path}, {}, {}, parts, held, log)
-    files = sorted(file for file in folder.glob(pattern) if file.is_file())
-    if not files:
-        raise DataError(f"cannot be read: no file {pattern!r} with a log in this folder", file=folder)
     sniffed: dict[Path, Sniffed] = {}
     skipped: dict[str, str] = {}
-    for file in files:
-        try:
-            sniffed[file] = sniff(file, names)
-        except ShipidError as error:
-            skipped[file.relative_to(folder).as_posix()] = error.message
+    for pattern in patterns:  # a folder of one log and a readme has two endings: that of the log is taken
+        for file in sorted(file for file in folder.glob(pattern) if file.is_file()):
+            try:
+                sniffed[file] = sniff(file, names)
+            except ShipidError as error:
+                skipped[file.relative_to(folder).as_posix()] = error.message
+        if sniffed:
+            break
+    for other in patterns[patterns.index(pattern) + 1 :] if sniffed else ():
+        for file in sorted(folder.glob(other)):
+            skipped[file.relative_to(folder).as_posix()] = f"the logs are files {pattern!r}"
+    if not sniffed and not skipped:
+        raise DataError(f"cannot be read: no file {pattern!r} with a log in this folder", file=folder)
     if not sniffed:
         first = next(iter(skipped))
         more = f"; so are {len(skipped) - 1} others" if len(skipped) > 1 else ""
@@ -113,21 +118,24 @@ def _count(log: Sniffed, column: str | None, pause: float) -> int:
     return 1 + int(np.sum(new | (np.diff(log.columns[column]) != 0) if column is not None else new))
 
 
-def _pattern(path: Path) -> tuple[Path, str | None]:
-    """Return folder and pattern of a folder or glob; the path itself and None for a file."""
+def _patterns(path: Path) -> tuple[Path, list[str]]:
+    """Return folder and patterns of a folder or glob, that of most files first; a file has no pattern."""
     text = path.as_posix()
     if "*" in text and not path.exists():
         before = text[: text.index("*")]
         folder, slash, _ = before.rpartition("/")
-        return Path(folder or ("/" if slash else ".")), text[len(folder) + len(slash) :]
+        return Path(folder or ("/" if slash else ".")), [text[len(folder) + len(slash) :]]
     if not path.is_dir():
-        return path, None
-    files = [file for file in path.rglob("*") if file.is_file() and file.suffix.lower() in ENDINGS]
+        return path, []
+    files: dict[str, list[Path]] = {}
+    for file in path.rglob("*"):
+        if file.is_file() and file.suffix.lower() in ENDINGS:
+            files.setdefault(file.suffix, []).append(file)
     if not files:
         raise DataError(f"cannot be read: a folder without a log ({', '.join(ENDINGS)})", file=path)
-    ending = Counter(file.suffix for file in files).most_common(1)[0][0]
-    flat = all(file.parent == path for file in files if file.suffix == ending)
-    return path, f"*{ending}" if flat else f"**/*{ending}"
+    size = {ending: (len(some), sum(file.stat().st_size for file in some)) for ending, some in files.items()}
+    deep = {ending: "" if all(file.parent == path for file in some) else "**/" for ending, some in files.items()}
+    return path, [f"{deep[ending]}*{ending}" for ending in sorted(files, key=lambda ending: size[ending], reverse=True)]
 
 
 def _alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) -> dict[Path, Sniffed]:

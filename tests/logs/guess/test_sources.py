@@ -39,6 +39,20 @@ def test_a_folder_is_one_source_that_imports(tmp_path: Path) -> None:
     assert "notes.csv is left out" in mapping.read_text()
 
 
+@pytest.mark.parametrize("notes", [1, 2, 5])
+def test_notes_beside_a_log_are_named_and_the_log_is_read(notes: int, tmp_path: Path) -> None:
+    """However many notes there are, and whatever their names."""
+    logs = folder_of(tmp_path / "logs", "all.csv", "more.csv")
+    for number in range(notes):
+        (logs / f"{'az'[number % 2]}{number}.txt").write_text("Hull 12\nt in s\npsi in rad\n")
+    proposal = guess(logs)
+    assert proposal.source.pattern == "*.csv"
+    assert len(proposal.source.skipped) == notes
+    mapping = write_new(draft_mapping(proposal), tmp_path / "draft.toml")
+    assert mapping.read_text().count("is left out") == notes
+    assert import_log(read_mapping(mapping), logs).runs == ["all", "more"]
+
+
 def test_a_glob_takes_the_files_that_fit(tmp_path: Path) -> None:
     folder_of(tmp_path, "ZZ_1.csv", "ZZ_2.csv", "other.csv")
     source = read_source(tmp_path / "ZZ_*.csv")
