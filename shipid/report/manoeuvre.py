@@ -172,7 +172,7 @@ def histories(content: ManoeuvreContent) -> Figure:
     if np.ptp(off) < np.rad2deg(TOGETHER):
         panels = [_panel("heading, helm [deg]", [lines["heading"], lines["helm"]], content)]
     else:
-        panels = [_panel("heading [deg]", [lines["heading"]]), _panel("helm [deg]", [lines["helm"]])]
+        panels = [_panel("heading [deg]", [lines["heading"]], content), _panel("helm [deg]", [lines["helm"]])]
     panels += [_panel("speed [m/s]", [lines["u"], lines["v"]]), _panel("yaw rate [deg/s]", [lines["r"]])]
     shown = [key for key in lines if key != "shaft"]
     if np.ptp(log["shaft"].to_numpy()) > 0:

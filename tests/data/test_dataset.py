@@ -29,6 +29,28 @@ def test_round_trip(tmp_path: Path) -> None:
     assert [entry.name for entry in file.parent.iterdir()] == ["trial.parquet"]  # nothing temporary stays
 
 
+def test_the_digest_changes_with_everything_in_the_table_and_nothing_else(tmp_path: Path) -> None:
+    dataset = as_dataset(turning(T), turning(T, r=-0.02))
+    frame, metadata = dataset.frame, dataset.metadata
+    changed = [
+        frame.rename(columns={"port.n": "starboard.n"}),
+        frame.rename(columns={"u": "v", "v": "u"}),
+        frame.assign(u=frame["u"].where(frame["t"] != 3.0, np.nextafter(4.0, 5.0))),
+        frame.assign(run=frame["run"].replace("b", "c")),
+        frame.assign(run=np.where(frame.index < len(T) - 1, "a", "b")).assign(t=np.arange(len(frame)) * 0.5),
+        frame.assign(t=np.arange(len(frame)) * 0.5),
+        frame.assign(flags=frame["flags"].where(frame["t"] != 3.0, 1)),
+        frame.assign(std_r=0.01),
+        frame.iloc[:-1],
+        frame.iloc[np.r_[len(T) : len(frame), : len(T)]],
+    ]
+    digests = {dataset.digest, *(Dataset(other, metadata).digest for other in changed)}
+    assert len(digests) == 1 + len(changed)
+    again = Dataset(frame.copy().reset_index(drop=True), {**metadata, "source": "another file"})
+    assert again.digest == dataset.digest
+    assert read_dataset(write_dataset(dataset, tmp_path / "trial.parquet")).digest == dataset.digest
+
+
 def test_file_is_compressed_parquet_with_json_metadata(tmp_path: Path) -> None:
     file = write_dataset(as_dataset(turning(T), vessel="x"), tmp_path / "trial.parquet")
     stored = pyarrow.parquet.ParquetFile(file)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,7 @@ from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
 from shipid.export.blocks import Precision
 from shipid.export.c import c_name, predictor_files, vessel_files
+from shipid.export.casadi import predictor_function
 from shipid.export.equations import Equations
 from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
@@ -59,6 +61,26 @@ def test_every_method_on_strange_ships(kind, seed, tmp_path):
     exported = model(strange.predictor)
     loaded = library(predictor_files(exported, "odd", Precision()), tmp_path)
     agree(*paths(loaded, "odd", exported, strange.instants), strange)
+
+
+@pytest.mark.parametrize("constant", [-4.0, -0.2, 4.0])
+def test_factors_of_modules_stop_at_both_limits(constant):
+    """However far the networks go, the written equations take a factor no further from 1 than Python does."""
+    strange = drawn("modules", 5, count=4, vessel="mariner")
+    corrector = strange.predictor.corrector
+    weights = np.full_like(corrector.weights, 0.05)
+    weights[:, 0] = constant
+    corrector = replace(corrector, weights=weights)
+    predictor = replace(strange.predictor, corrector=corrector)
+    far = np.abs(corrector.factors(strange.instants) - 1).max()
+    assert far == pytest.approx(corrector.limit) if abs(constant) > 1 else 0.1 < far < corrector.limit
+    exported = model(predictor)
+    function, _ = predictor_function(exported, "odd")
+    given = exported.inputs(strange.instants)
+    expected = predictor.predict(strange.instants)
+    for i in range(4):
+        path = np.array(function(**{key: values[i] for key, values in given.items()})["path"])
+        np.testing.assert_allclose(path.T, expected[:, i], rtol=0, atol=1e-11)
 
 
 def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):

@@ -45,6 +45,29 @@ def test_the_error_of_the_turning_is_that_of_each_side() -> None:
     assert all(len(row) == len(HEADS) for row in shown(groups))
 
 
+@pytest.mark.parametrize("after", [0.0, 0.3, 0.999])
+@pytest.mark.parametrize("seed", range(3))
+def test_an_error_that_comes_with_a_helm_is_found_at_that_helm_alone(seed: int, after: float) -> None:
+    """Orders at drawn instants, rows at or after those of the log: an order holds until the next one."""
+    rng, t = np.random.default_rng(seed), STEP * np.arange(ROWS)
+    hard = np.cumsum(rng.random(ROWS) < 0.1) % 2 == 1
+    side = np.sign(np.sin(2 * np.pi * t / 50) + 1e-3)
+    r = 0.03 * side
+    motion = {"run": "A", "piece": (t // 20).astype(int), "t": t + after * STEP, "u": 1.0, "v": 0.0}
+    turns = {"measured": r, "after": r * np.where(hard, 1.2, 1.0)}
+    series = pd.concat([pd.DataFrame({**motion, "r": values, "model": name}) for name, values in turns.items()])
+    still = dict.fromkeys(("north", "east", "psi", "u", "v", "r"), 0.0)
+    helm = np.where(hard, 30.0, 10.0) * DEGREE * side
+    frame = pd.DataFrame({"run": "A", "t": t, **still, "rudder.delta": helm, "propeller.n": 10.0, "flags": 0})
+    groups = by_group(series, "after", SHIP, Dataset(frame, {"clock": "run", "flags": []}))
+    found = groups[groups["group"].str.startswith("helm")].set_index(["group", "side"])
+    assert len(found) == 4
+    for degrees, error in ((10, 0.0), (30, 0.2)):
+        here = found.loc[f"helm about {degrees} deg"]
+        assert here["turning"].tolist() == pytest.approx([error, error], abs=1e-12)
+        assert here["r"].tolist() == pytest.approx([0.03 * error] * 2, abs=1e-12)
+
+
 def test_one_side_that_is_worse_is_reported_with_what_to_run_next() -> None:
     sentences = uneven(compared(port=-0.14, starboard=0.02))
     assert sentences[0].startswith("the error of the turning is -14% to port and +2% to starboard")

@@ -86,6 +86,24 @@ def test_a_missing_measure_says_why_in_its_row() -> None:
     assert "period: not reached" in replace(shown, measures=spoiled).answer[0].text
 
 
+@pytest.mark.parametrize(("span", "together"), [(20.0, True), (119.0, True), (121.0, False), (540.0, False)])
+def test_a_heading_of_few_degrees_is_drawn_with_the_helm(span: float, together: bool) -> None:
+    """A zigzag, wherever it heads to: one panel, or two where it turns far; the execute headings are in the first."""
+    shown = content("zigzag")
+    psi = shown.log["psi"].to_numpy()
+    wide = shown.log.assign(psi=2.0 + (psi - psi[0]) * np.deg2rad(span) / np.ptp(psi))
+    panels = manoeuvre.histories(replace(shown, log=wide)).views[""]
+    lines = [{str(trace["name"]): np.asarray(trace["y"]) for trace in panel.plot.traces} for panel in panels]
+    assert np.ptp(lines[0]["heading"]) == pytest.approx(span, rel=1e-3)
+    assert ("helm" in lines[0]) == together
+    execute = [name for name in lines[0] if name.endswith(" deg")]
+    assert sorted(execute) == ["-10 deg", "10 deg"]
+    for name in execute:
+        assert set(lines[0][name]) == {float(name.removesuffix(" deg"))}
+    helm = next(panel["helm"] for panel in lines if "helm" in panel)
+    assert np.ptp(helm) == pytest.approx(20.0)
+
+
 def test_ships_are_drawn_to_scale_where_they_were() -> None:
     """Bow and stern of an outline lie on the heading, and the bow half a length ahead."""
     drawn = manoeuvre._outline(np.array([[60.0, 0.0], [-60.0, 0.0]]), north=10.0, east=20.0, psi=np.pi / 2)

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from shipid import figures
-from shipid.data.dataset import read_dataset
+from shipid.data.dataset import Dataset, read_dataset
 from shipid.errors import ShipidError
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import results as frames
@@ -97,6 +97,20 @@ def test_snapshots_start_at_the_ship_and_end_at_its_heading(read: Results, tiny_
             assert not path[0].any()
         naive = snapshot["paths"]["", "naive", 0]
         assert np.hypot(*naive[1]) == pytest.approx(np.hypot(start["u"], start["v"]), rel=1e-3)
+
+
+def test_the_heading_at_the_end_does_not_depend_on_where_north_is(read: Results) -> None:
+    """A log counts headings from -180 to 180 deg: a ship that crosses the limit turns as far as one that does not."""
+    frame = read.dataset.frame
+    snapshots = frames.snapshots(read)
+    expected = [snapshot["psi_end"] for snapshot in snapshots]
+    for most in (max(snapshots, key=lambda one: one["psi_end"]), min(snapshots, key=lambda one: one["psi_end"])):
+        at = frame[(frame["run"] == most["run"]) & (frame["t"] == most["t"])].iloc[0]
+        offset = np.pi - at["psi"] - most["psi_end"] / 2  # the limit is crossed within this window
+        turned = frame.assign(psi=(frame["psi"] + offset + np.pi) % (2 * np.pi) - np.pi)
+        shown = replace(read, dataset=Dataset(turned, read.dataset.metadata))
+        ends = [snapshot["psi_end"] for snapshot in frames.snapshots(shown)]
+        assert ends == pytest.approx(expected, abs=1e-9)
 
 
 def test_outline_is_to_scale(read: Results) -> None:

@@ -17,6 +17,13 @@ from shipid.vessel.regressions import (
 
 KVLCC2 = (320.0, 58.0, 20.8, 0.81)
 KCS = (230.0, 32.2, 10.8, 0.651)
+LIMITS = {  # of a part of wave resistance, and L, B, T, C_b there
+    "B / L = 0.11": (120.0, 13.2, 6.0, 0.6),
+    "B / L = 0.25": (40.0, 10.0, 4.0, 0.55),
+    "L / B = 12": (120.0, 10.0, 4.0, 0.5),
+    "L^3 / volume = 512": (120.0, 120.0**2 / (512 * 2.0), 4.0, 0.5),
+    "L^3 / volume = 1727": (120.0, 120.0**2 / (1727 * 0.9), 2.0, 0.45),
+}
 
 
 def test_friction_is_the_ittc_line() -> None:
@@ -45,6 +52,16 @@ def test_waves_matter_for_a_fast_ship_alone() -> None:
     assert 3e-4 < C_W(KCS, 12.35) < 2e-3
     rising = [wave_resistance(*KCS, speed) for speed in (6.0, 8.0, 10.0, 12.0, 14.0)]
     assert np.all(np.diff(rising) > 0)
+
+
+@pytest.mark.parametrize("limit", LIMITS)
+@pytest.mark.parametrize("froude", [0.2, 0.3, 0.4])
+def test_the_parts_of_wave_resistance_meet(limit: str, froude: float) -> None:
+    """Holtrop and Mennen give other formulae for slender and for full ships: none jumps at its limit."""
+    L, B, T, C_b = LIMITS[limit]
+    speed = froude * (9.81 * L) ** 0.5
+    narrow, wide = (wave_resistance(L, B * factor, T, C_b, speed) for factor in (1 - 1e-6, 1 + 1e-6))
+    assert wide == pytest.approx(narrow, rel=2e-3)
 
 
 def test_allowance_falls_with_length() -> None:
