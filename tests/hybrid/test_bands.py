@@ -79,6 +79,11 @@ def test_too_few_runs_are_one_sentence() -> None:
     for level in (0.0, 1.0, -0.1, 90.0, float("nan")):
         with pytest.raises(DataError, match="is no level of a band"):
             bands.region(made_.paths, made_.columns, 1.0, level)
+    mixed = replace(bands, kinds={"zigzag": 4, "turning": 18})  # enough runs, and too few of one kind
+    mixed.region(made_.paths, made_.columns, 1.0, 0.8, kind="zigzag")
+    mixed.region(made_.paths, made_.columns, 1.0, 0.9, kind="turning")
+    with pytest.raises(DataError, match=r"needs 9 runs or more of the kind 'zigzag' to calibrate it: there are 4"):
+        mixed.region(made_.paths, made_.columns, 1.0, 0.9, kind="zigzag")
     with pytest.raises(DataError, match="no run of the kind 'spiral' calibrated this band"):
         bands.region(made_.paths, made_.columns, 1.0, 0.9, kind="spiral")
 
@@ -176,3 +181,23 @@ def test_a_band_of_one_instant_does_not_know_the_others() -> None:
     stops[:, 1] *= np.linspace(1, 1.01, 9)[:, None]
     turns = traits(stops, {"r": np.zeros(2)}, 1.0, np.zeros(2), 1.0)[:, 1:3]
     np.testing.assert_allclose(turns, 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("step", [0.25, 2.0])
+def test_a_steady_turn_has_no_slip_and_no_change(step: float) -> None:
+    """Circles by their yaw rate: the chords of thirds of the horizon turn by two thirds of the whole angle."""
+    r = np.array([-0.05, 0.0, 0.02])
+    angle = r * step * np.arange(1, HORIZON * 3 + 1)[:, None]
+    paths = (
+        4.0
+        * step
+        * np.arange(1, HORIZON * 3 + 1)[:, None, None]
+        * np.stack([np.sinc(angle / np.pi), np.sinc(angle / 2 / np.pi) * np.sin(angle / 2)], axis=-1)
+    )
+    length, turn, change, slip, _ = traits(paths, {"r": r}, step, np.zeros(3), 1.0).T
+    np.testing.assert_allclose(turn, np.abs(angle[-1]) * 2 / 3, atol=1e-12)
+    np.testing.assert_allclose(change, 0.0, atol=1e-12)
+    np.testing.assert_allclose(slip, 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.exp(length[1]) - 0.02, 4.0 * step * HORIZON * 3)  # straight ahead
+    (slow,) = traits(paths[:, 2:], {"r": r[2:] / 2}, step, np.zeros(1), 1.0)  # it turns more than it would
+    assert slow[3] == pytest.approx(slow[1] / 2)

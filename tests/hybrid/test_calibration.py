@@ -35,6 +35,7 @@ def test_how_alike_windows_are_is_the_intraclass_correlation(count: int, windows
     F = f_oneway(*values).statistic
     alike = _alike(values.ravel(), _runs(np.repeat(np.arange(count), windows)))
     assert alike == pytest.approx(max(F - 1, 0) / (F - 1 + windows))
+    assert _alike(np.ones(6), _runs(np.repeat(np.arange(3), 2))) == 1.0  # nothing differs: a run is one window
 
 
 def test_one_window_a_run_is_the_order_statistic() -> None:

@@ -416,6 +416,18 @@ def test_targets_in_other_units_scale_all(columns, targets):
     )
 
 
+def test_inputs_in_other_units_change_nothing(columns, targets):
+    """Each input has its own z-score: degrees and rpm do as well."""
+    units = {"r": 57.3, "port.n": 60.0, "starboard.n": 60.0}
+    others = {name: units.get(name, 1.0) * values for name, values in columns.items()}
+    setup = recipe(trials=2)
+    one, other = (tuned(here, {"any": targets["rough"]}, setup)["any"] for here in (columns, others))
+    assert [row["params"] for row in one.trials] == [row["params"] for row in other.trials]
+    np.testing.assert_allclose(
+        compensation(other.corrector, others), compensation(one.corrector, columns), rtol=1e-5, atol=1e-6
+    )
+
+
 def test_a_model_without_numbers_is_a_value_and_harms_nobody(columns, targets):
     good = tuned(columns, targets, SMALL)
     one = {**targets, "rough": targets["rough"].copy()}
