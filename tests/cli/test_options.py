@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
+import json
+import operator
+import shlex
 import sys
+from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+import typer
+from typer.testing import CliRunner
 
+from shipid.cli import app
 from shipid.errors import DocumentError, ShipidError
+from tests.cli.running import BAD
+from tests.study.tiny import TINY
 
 
 def test_changes_are_toml_or_text() -> None:
@@ -39,8 +53,6 @@ def test_stem_keeps_the_dot_of_a_name() -> None:
 
 
 def test_the_command_line_can_be_typed_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    import shlex
-
     from shipid.cli.options import command_line
 
     monkeypatch.setattr(sys, "argv", ["/usr/bin/shipid", "manoeuvre", "my ship.toml", "zigzag"])
@@ -62,3 +74,229 @@ def test_a_band_needs_a_level_and_a_rate(given: tuple[float | None, str | None, 
     check_band(0.9, "zigzag", 0.02)
     with pytest.raises(ShipidError, match=message):
         check_band(*given)
+
+
+class Reached(Exception):
+    """The work of a command would begin."""
+
+
+LOG = SimpleNamespace(runs=["A1", "A2", "B1"], digest="none")
+SHIP = "gunnerus-28.9"
+MAPPING, STUDY = (shlex.quote(str(file)) for file in (BAD / "logs" / "plain.toml", TINY))
+AFTER = {"out", "as_json", "html", "csv", "log", "save"}
+"""Options of what is done with results: other tests read what they make."""
+BAND = "--level 0.8 --kind zigzag --adaptive 0.03"
+THE_BAND = {"level": 0.8, "kind": "zigzag", "rate": 0.03}
+SIZES = {"length": 90.0, "beam": 15.0, "draught": 5.0, "block": 0.6, "speed": 6.0, "rpm": 150.0, "shafts": 2}
+SIZES |= {"propeller_diameter": 3.0, "rudder_area": 7.0, "rudder_span": 4.0, "rudder_rate": 3.5, "scale": 1.0}
+SIZES |= {"density": 1010.0, "frontal_area": 200.0, "lateral_area": 800.0}
+IDENTIFY = (
+    f"identify {SHIP} log.parquet --runs A* --test B1 --parameters hull.*,inertia.m --fixed inertia.m --together a,b "
+    "--prior hull.*=0.4 --bounds hull.*=[0.5,3] --nuisance current=0.2 --horizon 12 --set weights.u=0.07 "
+    "--settings begin.toml --ahead 9 --band 0.8"
+)
+
+
+def is_ship(vessel: Any) -> bool:
+    return bool(vessel.key == SHIP)
+
+
+def is_changed(plan: Any) -> bool:
+    return bool(plan.study.grid.N_D == [5])
+
+
+def are_sizes(given: Any) -> bool:
+    kinds = {"propulsor": "propeller-rudder", "ship_type": "tanker", "tunnel_thruster": True}
+    return bool(vars(given) == {**SIZES, **kinds})
+
+
+def are_settings(settings: Any) -> bool:
+    lists = {"parameters": ["hull.*", "inertia.m"], "fixed": ["inertia.m"], "together": [["a", "b"]]}
+    numbers = {
+        "prior": {"hull.*": 0.4},
+        "bounds": {"hull.*": [0.5, 3.0]},
+        "nuisance": {"current": 0.2},
+        "horizon": 12.0,
+    }
+    given = json.loads(settings.model_dump_json(exclude_defaults=True))
+    return bool(given.pop("weights")["u"] == 0.07 and given == {**lists, **numbers, "step": 0.25})
+
+
+WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
+    "predict": (
+        "shipid.study.apply:predict_log",
+        f"predict folder log.csv --cell right --mapping of.toml {BAND}",
+        {"folder": Path("folder"), "cell": "right", "log": Path("log.csv"), "mapping": "of.toml", **THE_BAND},
+    ),
+    "aboard": (
+        "shipid.study.aboard:play",
+        f"aboard log.csv --predictor a.npz --mapping of.toml --every 7 {BAND}",
+        {"file": Path("a.npz"), "log": Path("log.csv"), "mapping": "of.toml", "every": 7.0, **THE_BAND},
+    ),
+    "export": (
+        "shipid.export.write:export_vessel",
+        f"export {SHIP} --to c --out x --single --integrator euler --name other",
+        {"vessel": is_ship, "to": "c", "out": Path("x"), "single": True, "integrator": "euler", "name": "other"},
+    ),
+    "export a predictor": (
+        "shipid.export.write:export_predictor",
+        "export a.npz --to onnx --out x.onnx --single --name other",
+        {"predictor": "a.npz", "to": "onnx", "out": Path("x.onnx"), "single": True, "name": "other"},
+    ),
+    "replay": (
+        "shipid.identification.free_run:free_runs",
+        f"replay {SHIP} log.parquet --run A* --ahead 9 --step 0.3",
+        {"runs": ("A1", "A2"), "length": 9.0, "settings": lambda settings: settings.step == 0.3},
+    ),
+    "identify": (
+        "shipid.identification.outcome:run_identification",
+        f"{IDENTIFY} --profile inertia.m --design",
+        {"vessel": is_ship, "settings": are_settings, "runs": ["A*"], "held_out": ["B1"], "ahead": 9.0, "band": 0.8}
+        | {"profiles": ["inertia.m"], "programme": True},
+    ),
+    "identify structures": (
+        "shipid.study.structures:compare_structures",
+        f"{IDENTIFY} --structures 'mmg, cubic' --folds 5",
+        {"vessel": is_ship, "settings": are_settings, "runs": ["A*"], "held_out": ["B1"], "ahead": 9.0, "level": 0.8}
+        | {"names": ["mmg", "cubic"], "folds": 5},
+    ),
+    "manoeuvre": (
+        "shipid.simulation.measured:measure_standard",
+        f"manoeuvre {SHIP} zigzag 15 5 --speed 3 --side port --duration 90 --step 0.2 --approach rest",
+        {"vessel": is_ship, "name": "zigzag", "angles": [15.0, 5.0], "speed": 3.0, "side": "port", "duration": 90.0}
+        | {"step": 0.2, "approach": "rest"},
+    ),
+    "simulate": (
+        "shipid.simulation.scripted:simulated",
+        f"simulate {SHIP} --manoeuvres runs.toml",
+        {"vessel": is_ship, "name": "runs.toml"},
+    ),
+    "simulate a study": (
+        "shipid.study.prepare:obtain",
+        f"simulate {STUDY} --set grid.N_D=[5]",
+        {"plan": is_changed},
+    ),
+    "vessel new": (
+        "shipid.vessel.template:first_guess",
+        "vessel new --propulsor propeller-rudder --ship-type tanker --tunnel-thruster --name Fram --out f.toml "
+        + " ".join(f"--{name.replace('_', '-')} {value}" for name, value in SIZES.items()),
+        {"given": are_sizes, "name": "Fram"},
+    ),
+    "data import": (
+        "shipid.logs.importing:import_log",
+        f"data import {MAPPING} raw.csv --without heading_offset",
+        {"file": Path("raw.csv"), "without": ["heading_offset"]},
+    ),
+    "data import guess": (
+        "shipid.logs.guess.columns:guess",
+        f"data import --guess raw.csv --names t,x,y --vessel {SHIP} --frame enu",
+        {"path": Path("raw.csv"), "names": ("t", "x", "y"), "vessel": is_ship, "frame": "enu"},
+    ),
+    "data measures": (
+        "shipid.logs.measuring:measure_dataset",
+        "data measures log.parquet --manoeuvre zigzag --length 28.9",
+        {"dataset": LOG, "kind": "zigzag", "length": 28.9},
+    ),
+    "data check": (
+        "shipid.data.outputs:check_outputs",
+        f"data check log.parquet --vessel {SHIP}",
+        {"vessel": is_ship, "dataset": LOG},
+    ),
+    "study new": (
+        "shipid.study.new:draft_study",
+        f"study new --vessel {SHIP} --vessel mariner --data log.parquet --out s.toml",
+        {"vessels": [SHIP, "mariner"], "data": Path("log.parquet"), "out": Path("s.toml")},
+    ),
+    "study variants": (
+        "shipid.study.prepare:obtain",
+        f"study variants {STUDY} --accuracy --set grid.N_D=[5]",
+        {"plan": is_changed},
+    ),
+    "study screen": (
+        "shipid.study.screen:screen",
+        f"study screen {STUDY} wrong --members 7 --single --set grid.N_D=[5] --device gpu",
+        {"plan": is_changed, "wanted": lambda families: [one.name for one in families] == ["wrong"], "count": 7}
+        | {"device": "gpu", "engine": "single"},
+    ),
+    "study rotate": (
+        "shipid.study.rotate:rotate",
+        f"study rotate {STUDY} --tests A* --tests B1 --set grid.N_D=[5] --device gpu",
+        {"plan": is_changed, "tests": ["A*", "B1"], "device": "gpu"},
+    ),
+    "study run": (
+        "shipid.study.run:run_study",
+        f"study run {STUDY} --workers 3 --scheduler tcp://here --set grid.N_D=[5] --leave --device gpu",
+        {"plan": is_changed, "workers": 3, "scheduler": "tcp://here", "device": "gpu", "leave": True},
+    ),
+    "study resume": (
+        "shipid.study.run:run_study",
+        "study resume folder --workers 3 --scheduler tcp://here --leave --device gpu",
+        {"folder": Path("folder"), "workers": 3, "scheduler": "tcp://here", "device": "gpu", "leave": True},
+    ),
+    "study compare": (
+        "shipid.study.matched:compare",
+        "study compare one two --pair drawn=trained --pair a=b",
+        {"folders": [Path("one"), Path("two")], "pairs": {"drawn": "trained", "a": "b"}},
+    ),
+}
+"""The function that does the work of a command, words of the command, and what the function must get."""
+
+
+@pytest.fixture
+def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Logs, folders and devices as if they were there."""
+    monkeypatch.chdir(tmp_path)
+    Path("begin.toml").write_text("[identify]\nstep = 0.25\n")
+    stand_ins: dict[str, Callable[..., Any]] = {
+        "shipid.predictor:Predictor.load": lambda *given: given[0],
+        "shipid.data.dataset:read_dataset": lambda *_: LOG,
+        "shipid.data.checks:check_dataset": lambda *_: None,
+        "shipid.identification.outcome:check": lambda *_, **__: None,
+        "shipid.cli.identify:_look": lambda *_: None,
+        "shipid.hybrid.training:check_device": lambda *_: None,
+        "shipid.engine.engines:named": lambda *_: None,
+        "shipid.study.prepare:obtain": lambda *_: LOG,
+        "shipid.study.screen:notes": lambda *_: [],
+        "shipid.study.rotate:turns": lambda *given: given[2],
+        "shipid.study.store:stored_plan": lambda *_: SimpleNamespace(program="shipid", parts={}),
+    }
+    for place, stand_in in stand_ins.items():
+        module, _, name = place.partition(":")
+        original = operator.attrgetter(name)(import_module(module))
+        monkeypatch.setattr(f"{module}.{name}", functools.wraps(original)(stand_in))
+
+
+@pytest.mark.parametrize("case", WORK)
+@pytest.mark.usefixtures("ready")
+def test_every_option_reaches_the_work(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    place, words, expected = WORK[case]
+    module, name = place.split(":")
+    original, calls = getattr(import_module(module), name), []
+
+    def work(*arguments: Any, **named: Any) -> None:
+        calls.append(inspect.signature(original).bind(*arguments, **named).arguments)
+        raise Reached
+
+    monkeypatch.setattr(import_module(module), name, work)
+    result = CliRunner().invoke(app, shlex.split(words))
+    assert isinstance(result.exception, Reached), result.exception or result.output
+    for key, value in expected.items():
+        got = calls[0].get(key)
+        assert value(got) if callable(value) else got == value, (key, got)
+
+
+def test_every_option_has_such_a_case() -> None:
+    words = [shlex.split(words) for _, words, _ in WORK.values()]
+    used, commands = {word for some in words for word in some}, {tuple(some[:k]) for some in words for k in (1, 2)}
+
+    def options(command: Any, path: tuple[str, ...]) -> Any:
+        for name, inner in getattr(command, "commands", {}).items():
+            yield from options(inner, (*path, name))
+        if path in commands:
+            for one in command.params:
+                if one.param_type_name == "option" and one.name not in {*AFTER, "help"}:
+                    yield path, one.opts
+
+    known = list(options(typer.main.get_command(app), ()))
+    assert len(known) > 60
+    assert [one for one in known if not used & set(one[1])] == []
