@@ -64,8 +64,9 @@ def data_import(
     as_json: Json = False,
 ) -> None:
     """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
-    if guess is None and (vessel or frame):
-        raise ShipidError("is for drafts: give it with --guess LOG", path="--vessel" if vessel else "--frame")
+    of_drafts = {"--names": names, "--vessel": vessel, "--frame": frame}
+    if guess is None and (idle := next((option for option, value in of_drafts.items() if value), None)):
+        raise ShipidError("is for drafts: give it with --guess LOG", path=idle)
     if guess is not None:
         if mapping or log or without:
             raise ShipidError("--guess drafts a mapping of one log: give neither mapping nor repairs", file=guess)

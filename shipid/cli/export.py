@@ -18,7 +18,9 @@ def export(
     to: Annotated[str, typer.Option("--to", help="c, fmu, casadi or onnx")],
     out: Annotated[Path, typer.Option("--out", help="the folder for c, else the file to write")],
     single: Annotated[bool, typer.Option("--single", help="single precision (c and onnx)")] = False,
-    integrator: Annotated[str, typer.Option(help="of a vessel's step: rk4 or euler")] = "rk4",
+    integrator: Annotated[
+        str | None, typer.Option(help="of a vessel's step: rk4 or euler", show_default="rk4")
+    ] = None,
     name: Annotated[str | None, typer.Option(help="name in the source; default from --out")] = None,
 ) -> None:
     """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""
@@ -28,8 +30,11 @@ def export(
     from shipid.vessel.load import load_vessel
 
     if what.endswith(".npz") or Path(what).is_dir():
+        if integrator is not None:
+            raise DocumentError("a predictor keeps that of its study: leave it out", path="--integrator")
         written = export_predictor(Predictor.load(what), to, out, single=single, name=name)
     else:
+        integrator = integrator or "rk4"
         if integrator not in ("euler", "rk4"):
             raise DocumentError(f"no such rule: {choices(integrator, ('euler', 'rk4'))}", path="--integrator")
         vessel = load_vessel(what)

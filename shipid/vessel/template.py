@@ -196,6 +196,15 @@ def _check(given: Particulars) -> None:
         raise ShipidError(
             "two screws steer by their difference: leave it out, or take another propulsor", path="--shafts"
         )
+    idle = {
+        "propeller-rudder": (),
+        "azimuth": ("rudder_area", "rudder_span"),
+        "differential": ("rudder_area", "rudder_span", "rudder_rate"),
+    }
+    for name in idle[given.propulsor]:
+        if getattr(given, name) is not None:
+            option = f"--{name.replace('_', '-')}"
+            raise ShipidError(f"there is none with {given.propulsor}: leave it out", path=option)
     if given.ship_type not in WIND:
         raise ShipidError(f"ship type {given.ship_type!r}: {choices(given.ship_type, WIND)}")
     for what, value, low, high in _ranges(given):

@@ -59,6 +59,7 @@ def test_data_guess_segment_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyP
         ("import", "trial.toml", "--guess", "trial.csv"): "give neither mapping nor repairs",
         ("import",): "draft one with --guess",
         ("import", "trial.toml", "trial.csv", "--vessel", "mariner"): "is for drafts: give it with --guess",
+        ("import", "trial.toml", "trial.csv", "--names", "t,x"): "--names: is for drafts",
         ("check", "trial.parquet", "--html", "page.pdf"): "end in .html",
     }.items():
         assert remedy in str(CliRunner().invoke(app, ["data", *arguments]).exception)

@@ -18,6 +18,8 @@ def test_a_cell_that_is_not_there_is_one_line(tmp_path):
     result = CliRunner().invoke(app, ["export", str(tmp_path / "no.npz"), "--to", "c", "--out", str(tmp_path)])
     assert result.exit_code == 1
     assert "cannot be read" in str(result.exception)
+    words = ["export", str(tmp_path / "no.npz"), "--to", "c", "--out", str(tmp_path), "--integrator", "euler"]
+    assert "--integrator: a predictor keeps that of its study" in str(CliRunner().invoke(app, words).exception)
 
 
 def test_a_folder_is_no_cell_but_has_some(tmp_path):

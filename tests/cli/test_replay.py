@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
@@ -37,6 +39,12 @@ def test_the_vessel_that_made_a_run_repeats_it(log: Path, tmp_path: Path) -> Non
     measured, replayed = (both[both["model"] == name] for name in ("measured", "replayed"))
     for name, tolerance in (("north", 0.3), ("east", 0.3), ("psi", 0.02), ("u", 0.01)):
         assert measured[name].to_numpy() == pytest.approx(replayed[name].to_numpy(), abs=tolerance), name
+    shown = re.search(r"^ *zz 10 +(\S+) +(\S+) +(\S+) +(\S+) *$", result.output, re.MULTILINE)
+    assert shown is not None, result.output
+    off = {name: measured[name].to_numpy() - replayed[name].to_numpy() for name in ("u", "v", "r", "north", "east")}
+    rms = {name: float(np.sqrt(np.mean(values**2))) for name, values in off.items()}
+    expected = [rms["u"], rms["v"], np.degrees(rms["r"]), np.hypot(rms["north"], rms["east"])]
+    assert [float(value) for value in shown.groups()] == pytest.approx(expected, rel=0.01)
     assert "zz 10" in page.read_text()
     assert "Recorded and replayed" in page.read_text()
 

@@ -108,6 +108,25 @@ def test_what_is_identified_sees_no_moment_of_the_test(recorded: Recorded, monke
     assert not data.frame["t"].between(first, last).any()
 
 
+def test_what_is_not_identified_stays_as_it_was(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two families on one member: each has the numbers that it identifies, and the others of that member."""
+    some = {**FITTED, "name": "some", "identify": {**IDENTIFY, "parameters": PATHS[:1]}}
+    plan, dataset = study(recorded, [*BOTH, some])
+    prepared = prepare(plan, dataset)
+    right = plan.vessels["gunnerus-28.9"].parameters
+
+    def identify(_: Any, __: Any, ___: Any, settings: Any) -> Any:
+        values = {path: right[path] for path in settings.parameters}
+        return SimpleNamespace(status="ok", sentence="", seconds=0.0, values=values)
+
+    monkeypatch.setattr(solve, "identify", identify)
+    found = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
+    for name, factors in {"wrong": [1.3, 1.3, 1.3], "fitted": [1, 1, 1], "some": [1, 1.3, 1.3]}.items():
+        variant = found[name].foundation.variant
+        assert variant is not None
+        assert [variant.values[path] / right[path] for path in PATHS] == pytest.approx(factors), name
+
+
 def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
     """Compensated, identified alone, identified then compensated: rows, stored predictors and the report's paths."""
     plan, _ = study(recorded, BOTH)

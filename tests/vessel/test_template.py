@@ -208,6 +208,8 @@ def test_given_areas_and_type_are_taken() -> None:
         ({"lateral_area": 0.0}, "lateral area [m^2] = 0"),
         ({"propulsor": "azimut"}, "did you mean 'azimuth'?"),
         ({"ship_type": "tnker"}, "did you mean 'tanker'?"),
+        ({"propulsor": "azimuth", "rudder_area": 20.0}, "--rudder-area: there is none with azimuth: leave it out"),
+        ({"propulsor": "differential", "rudder_rate": 5.0}, "--rudder-rate: there is none with differential"),
         ({"length": 70.0, "block": 0.41, "draught": 12.0}, "Clarke's formula"),
     ],
 )
