@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from typer.testing import CliRunner
 from shipid.cli import app
 from shipid.errors import ResultError, ShipidError
 from shipid.study import compare, store
-from shipid.study.compare import compare_errors, compare_findings, read_worlds
+from shipid.study.compare import compare_bands, compare_errors, compare_findings, read_worlds
 from tests.study.byhand import grid
 from tests.study.tiny import run_here, tiny_plan
 
@@ -101,6 +102,27 @@ def test_failed_cells_are_left_out(made: Any) -> None:
     frame = compare_errors([one, replace(other)]).set_index(["family", "N_D"])
     assert frame.loc[("bad", 30), ["mean", "worlds"]].tolist() == [2.0, 1]
     assert frame.loc[("good", 30), "worlds"] == 2
+
+
+def test_a_member_weighs_once_and_a_failed_cell_nothing() -> None:
+    """A of a family is the mean over its members, however many cells each has; what is identified has no one A."""
+    columns = ["foundation", "family", "method", "N_D", "status", "A", "H", "coverage", "width"]
+    rows: list[tuple[Any, ...]] = [
+        ("f-1", "f", "drawn", 4, "ok", 1.0, 0.6, 0.8, 2.0),
+        ("f-1", "f", "drawn", 6, "ok", 1.0, 0.5, 0.9, 1.5),
+        ("f-2", "f", "drawn", 4, "ok", 3.0, 1.0, 0.6, 4.0),
+        ("f-2", "f", "drawn", 6, "failed", 3.0, 99.0, 0.0, 99.0),
+        ("i", "i", "drawn", 4, "ok", 7.0, 0.2, 0.9, 1.0),
+        ("none", "none", "drawn", 4, "ok", 50.0, 9.0, np.nan, np.nan),
+    ]
+    plan = SimpleNamespace(identified={"i"})
+    worlds: Any = [SimpleNamespace(cells=pd.DataFrame(rows, columns=columns), plan=plan)] * 2
+    errors = compare_errors(worlds).set_index(["family", "N_D"])["mean"].to_dict()
+    assert errors == {("f", 0): 2.0, ("f", 4): 0.8, ("f", 6): 0.5, ("i", 4): 0.2, ("none", 4): 9.0}
+    bands = compare_bands(worlds).set_index(["family", "N_D"])
+    assert bands["coverage"].to_dict() == pytest.approx({("f", 4): 0.7, ("f", 6): 0.9, ("i", 4): 0.9})
+    assert bands["width"].to_dict() == {("f", 4): 3.0, ("f", 6): 1.5, ("i", 4): 1.0}
+    assert set(bands["worlds"]) == {2}
 
 
 def test_the_command_prints_both_tables(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
