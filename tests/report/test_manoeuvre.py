@@ -105,6 +105,26 @@ def test_a_heading_of_few_degrees_is_drawn_with_the_helm(span: float, together: 
 
 
 def test_ships_are_drawn_to_scale_where_they_were() -> None:
-    """Bow and stern of an outline lie on the heading, and the bow half a length ahead."""
-    drawn = manoeuvre._outline(np.array([[60.0, 0.0], [-60.0, 0.0]]), north=10.0, east=20.0, psi=np.pi / 2)
-    np.testing.assert_allclose(drawn[:2], [[80.0, 10.0], [-40.0, 10.0]], atol=1e-9)
+    """Bow and stern of an outline lie on the heading, the bow half a length ahead; starboard of east is south."""
+    shape = np.array([[60.0, 0.0], [-60.0, 0.0], [0.0, 9.0]])
+    drawn = manoeuvre._outline(shape, north=10.0, east=20.0, psi=np.pi / 2)
+    np.testing.assert_allclose(drawn[:3], [[80.0, 10.0], [-40.0, 10.0], [20.0, 1.0]], atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "stop", "spiral"])
+def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
+    shown = content(kind)
+    shown = replace(shown, log=shown.log.assign(psi=shown.log["psi"] + 1.0, shaft=np.linspace(-1, 2, len(shown.log))))
+    panels = manoeuvre.histories(shown).views[""]
+    lines = {str(trace["name"]): np.asarray(trace["y"]) for panel in panels for trace in panel.plot.traces}
+    log = shown.log
+    expected = {"heading": np.degrees(log["psi"] - log["psi"].iloc[0]), "helm": np.degrees(log["helm"])}
+    expected |= {"ahead, u": log["u"], "to starboard, v": log["v"], "yaw rate, r": np.degrees(log["r"])}
+    for name, values in {**expected, "shaft": 60 * log["shaft"]}.items():
+        np.testing.assert_allclose(lines[name], values, rtol=1e-5, atol=1e-5, err_msg=name)
+    if kind == "spiral":
+        figure = manoeuvre.spiral(shown)
+        assert figure is not None
+        (trace,) = figure.views[""][0].plot.traces
+        for axis, column in (("x", "helm"), ("y", "rate")):
+            np.testing.assert_allclose(trace[axis], np.degrees(shown.levels[column]), rtol=1e-5, atol=1e-6)
