@@ -35,6 +35,46 @@ def test_the_arrays_say_what_scikit_learn_says():
     np.testing.assert_allclose(mine, forest.predict(fresh), rtol=0, atol=1e-12)
 
 
+@pytest.fixture(scope="module")
+def set_aside():
+    """Every path is set to starboard, and ahead where the ship is fast."""
+    pytest.importorskip("sklearn")
+    t = np.arange(1, HORIZON + 1)[:, None] / HORIZON
+
+    def error(_, windows):
+        return np.stack([3 * t * np.sign(windows.columns["u"] - 3.5), np.ones_like(windows.columns["u"]) * t], axis=-1)
+
+    return missed(world(ship(), ship(), runs=6, seconds=40), error)
+
+
+def grown(here, **settings):
+    return fitted(Forest(trials=1, trees=25, terms=3, **settings), here)
+
+
+def test_one_leaf_is_the_mean_and_its_mirror_has_no_side(set_aside):
+    for mirror, side in ((False, 1.0), (True, 0.0)):
+        one = grown(set_aside, leaf=1e4, share=1.0, mirror=mirror)
+        assert (one.trees.left == -1).all()
+        instants = set_aside.test.instants(known=False)
+        paths = one.predict(set_aside.physics, instants, np.zeros((HORIZON, len(set_aside.test), 2)))
+        np.testing.assert_allclose(np.ptp(paths, axis=1), 0.0, atol=1e-9)
+        assert paths[-1, 0, 1] == pytest.approx(side, abs=0.05)
+
+
+def test_leaf_and_share_shape_the_trees(set_aside):
+    """A leaf holds so many windows; of all inputs the speed splits first, of one at random it seldom does."""
+    windows = len(set_aside.train)
+    fine, coarse = (grown(set_aside, leaf=leaf, share=1.0, mirror=False) for leaf in (1, windows // 4))
+    assert len(fine.trees.left) > len(coarse.trees.left)
+    assert (coarse.trees.left == -1).sum() <= 4 * 25
+    first = [
+        {one.names[i] for i in one.trees.feature[one.trees.first]}
+        for one in (fine, grown(set_aside, leaf=1, share=0.01))
+    ]
+    assert first[0] == {"u"}
+    assert len(first[1]) > 3
+
+
 def test_without_scikit_learn_one_line_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
     with pytest.raises(ShipidError, match=r"shipid\[forest\]") as caught:

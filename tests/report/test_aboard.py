@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -58,6 +60,27 @@ def test_it_draws_what_was_played(banded: bool, physics: bool, tmp_path) -> None
     assert "Alarm: at 4 of 10 instants." in text
     assert NASTY not in text
     assert "latency: 10 ms" not in text
+
+
+def test_it_opens_at_the_worst_run_in_time_of_the_run() -> None:
+    """Three runs of another day: the second errs most; its band is that of the last step, along and across."""
+    here = content()
+    frames: dict[str, list[pd.DataFrame]] = {"instants": [], "points": [], "track": []}
+    for name, worse in (("a", 1.0), ("b", 3.0), ("c", 2.0)):
+        for key, parts in frames.items():
+            part = getattr(here, key).assign(run=name)
+            parts.append(
+                part.assign(t=part["t"] + 1e6, **({"error": worse * part["error"]} if "error" in part else {}))
+            )
+    three = replace(here, **{key: pd.concat(parts, ignore_index=True) for key, parts in frames.items()})
+    for figure in (seen(three), along(three)):
+        assert list(figure.controls[0].options) == ["a", "b", "c"]
+        assert figure.controls[0].start == 1
+    lines = {str(trace["name"]): trace for trace in along(three).views["1"][0].plot.traces}
+    np.testing.assert_allclose(lines["error"]["x"], here.instants["t"])
+    np.testing.assert_allclose(lines["error"]["y"], 3.0 * here.instants["error"], rtol=1e-6)
+    np.testing.assert_allclose(lines["band along"]["y"], 5.0)
+    np.testing.assert_allclose(lines["band across"]["y"], 2.5)
 
 
 def test_every_item_is_declared() -> None:

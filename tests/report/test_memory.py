@@ -87,6 +87,10 @@ def test_the_observer_says_its_numbers(past: ReportContent) -> None:
     assert [shape.x0 for shape in plot.layout.shapes] == [5.0, 30.0]
     force = next(trace for trace in plot.data if trace.name == "ahead")
     assert force.y == pytest.approx(-2.0)  # cm/s^2
+    moment = next(trace for trace in plot.data if trace.name == "yaw")
+    assert moment.y == pytest.approx(np.degrees(1e-3))
+    rate = next(trace for trace in plot.data if trace.name == "r filtered")
+    assert rate.y == pytest.approx(np.degrees(0.01))
 
 
 @pytest.mark.parametrize(("fade", "words"), [(0.0, "fades immediately"), (np.inf, "does not fade")])
@@ -112,7 +116,10 @@ def test_the_gain_counts_intervals_free_of_zero(past: ReportContent) -> None:
     heights = {value for trace in points for value in np.asarray(trace.y, dtype=float).round(4)}
     assert heights == {-0.1, -0.05, -0.6, -0.4, 0.3}
     bars = next(trace for trace in points if NASTY not in trace.name and "none" not in trace.name and len(trace.y) == 2)
-    assert bars.error_y.arrayminus is not None
+    low, high = (
+        np.asarray(bars.y) + sign * np.asarray(bars.error_y[side]) for sign, side in ((-1, "arrayminus"), (1, "array"))
+    )
+    np.testing.assert_allclose([low, high], [[-0.2, -0.1], [-0.01, 0.02]], atol=1e-6)
 
 
 def test_rivals_that_differ_in_more_are_named(past: ReportContent) -> None:
@@ -132,7 +139,11 @@ def test_windows_offer_the_largest_and_the_smallest_gain(past: ReportContent) ->
     ]
     assert "in 72 % of the windows" in figure.takeaway  # 1 + t / 100 is above 1.3 from t = 31 s on
     assert "1.59 m become 1.30 m" in figure.takeaway
-    assert [shape.x0 for shape in figure.views["0-0"][0].figure.layout.shapes] == [30.0], "no order before the windows"
+    plot = figure.views["0-0"][0].figure
+    assert [shape.x0 for shape in plot.layout.shapes] == [30.0], "no order before the windows"
+    first, second, difference = (np.asarray(trace.y, dtype=float) for trace in plot.data)
+    np.testing.assert_allclose(difference, second - first, atol=1e-6)  # with less without
+    assert (first[-1], second[-1]) == pytest.approx((1.59, 1.3))
 
 
 def test_the_map_has_a_cell_for_each_model_and_amount(past: ReportContent) -> None:
