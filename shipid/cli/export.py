@@ -18,9 +18,7 @@ def export(
     to: Annotated[str, typer.Option("--to", help="c, fmu, casadi or onnx")],
     out: Annotated[Path, typer.Option("--out", help="the folder for c, else the file to write")],
     single: Annotated[bool, typer.Option("--single", help="single precision (c and onnx)")] = False,
-    integrator: Annotated[
-        str | None, typer.Option(help="of a vessel's step: rk4 or euler", show_default="rk4")
-    ] = None,
+    integrator: Annotated[str | None, typer.Option(help="of a vessel's step: rk4 or euler", show_default="rk4")] = None,
     name: Annotated[str | None, typer.Option(help="name in the source; default from --out")] = None,
 ) -> None:
     """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""

@@ -499,7 +499,8 @@ class Plan:
     def draws(self) -> dict[str, Any] | None:
         """What decides orders and weather of simulated runs, whatever the ship; None for recorded runs."""
         truth = self.study.truth
-        return truth.model_dump(include={"seed", "manoeuvre", "wind_speed", "waves"}) if truth else None
+        weather = {"wind_speed", "gusts", "waves", "current_speed", "environment"}
+        return truth.model_dump(include={"seed", "manoeuvre", *weather}) if truth else None
 
     @property
     def obtaining(self) -> str:

@@ -42,7 +42,9 @@ def set_aside():
     t = np.arange(1, HORIZON + 1)[:, None] / HORIZON
 
     def error(_, windows):
-        return np.stack([3 * t * np.sign(windows.columns["u"] - 3.5), np.ones_like(windows.columns["u"]) * t], axis=-1)
+        return np.stack(
+            [3 * t * np.sign(windows.columns["u"] - 3.5), np.ones_like(windows.columns["u"]) * t**2], axis=-1
+        )
 
     return missed(world(ship(), ship(), runs=6, seconds=40), error)
 

@@ -116,6 +116,8 @@ def test_every_foundation_is_fitted_or_has_diverged():
     ]
     assert (sound(here, "one"), sound(here, "other")) == (False, True)
     np.testing.assert_array_equal(used(here), np.arange(9))
+    once = replace(here, folds=[(np.array([1, 4]), np.array([7])), (np.array([4]), np.array([2]))])
+    assert used(once).tolist() == [1, 2, 4, 7]  # what validates alone trains the last model, too
     assert diverged(OneStep(), []).trials == []
 
 

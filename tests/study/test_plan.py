@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import re
 import tomllib
+import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -119,6 +121,68 @@ def test_the_first_instant_comes_after_the_run_up() -> None:
     windows = all_windows(plan, obtain(plan))
     assert (windows.t.min(), windows.t.max()) == (32.0, 32.0 + 59.0)
     assert set(windows.spans.values()) == {(0.0, 32.0 + 59.0 + 15.0)}
+
+
+@pytest.mark.parametrize(("step", "steps"), [(1.0, 7), (0.5, 13), (4.0, 2)])
+def test_a_past_in_seconds_is_whole_steps(tmp_path: Path, step: float, steps: int) -> None:
+    """As many as hold it."""
+    ahead = {"prediction.ahead": 8.0, "prediction.step": step, "prediction.interval": step}
+    assert tiny_plan(tmp_path, {**ahead, "prediction.past": 6.5}).past == steps
+    assert tiny_plan(tmp_path, ahead).past == 0
+
+
+def test_orders_and_weather_make_pairs_of_runs_and_nothing_else_does(tmp_path: Path) -> None:
+    """Runs of two truths are pairs where all is alike that is drawn before the ship reacts."""
+    plan = tiny_plan(tmp_path)
+    draws, truth = plan.draws, plan.study.truth
+    assert truth is not None
+    assert draws == tiny_plan(tmp_path, {"truth.manoeuvres": 13, "truth.sensors.u.noise": 0.1, "grid.N_D": [5]}).draws
+    sea = {"H_s": 1.0, "T_p": 6.0}
+    for key, value in {
+        **{"seed": 4, "wind_speed": (1.0, 2.0), "current_speed": (0.2, 0.3), "environment": {"h": 9.0}},
+        **{"waves": sea, "gusts": {"z": 5.0}},
+    }.items():
+        other = plan.study.model_copy(update={"truth": truth.model_copy(update={key: value})})
+        with warnings.catch_warnings():  # of values that are no models here
+            warnings.simplefilter("ignore")
+            assert replace(plan, study=other).draws != draws, key
+    assert tiny_plan(tmp_path, {"truth.manoeuvre.0.n_rpm": [60.0, 200.0]}).draws != draws
+
+
+def test_another_source_is_another_study(tmp_path: Path) -> None:
+    """Logs of one name with another digest: kept results are not taken for theirs."""
+    plan = tiny_plan(tmp_path)
+    logs = [replace(plan, sources={"log": digest}) for digest in ("aa", "bb")]
+    assert len({one.digest for one in (plan, *logs)}) == 3
+    assert logs[0].folder != logs[1].folder
+
+
+@pytest.mark.parametrize("integrator", ["euler", "rk4"])
+def test_what_is_identified_is_integrated_as_it_predicts(tmp_path: Path, integrator: str) -> None:
+    document = tiny_plan(tmp_path).document
+    document["prediction"] |= {"integrator": integrator, "step": 0.5}
+    document["family"].append({"name": "fit", "extends": "right", "identify": {"parameters": ["inertia.m"]}})
+    plan = build_plan(document, tmp_path / "tiny.toml")
+    settings = next(one.identify for one in plan.foundations if one.name == "fit")
+    assert settings is not None
+    assert (settings.method, settings.step, settings.horizon) == (integrator, 0.5, plan.study.prediction.ahead)
+
+
+def test_an_observer_measures_no_position_where_velocities_make_the_path(tmp_path: Path) -> None:
+    document = tiny_plan(tmp_path).document
+    document["family"].append({"name": "seen", "extends": "right", "observer": {}})
+    document["method"] = [{"name": "alone", "kind": "alone"}]
+    simulated = build_plan(document, tmp_path / "tiny.toml")
+    del document["truth"]
+    document |= {"data": {"dataset": "log.parquet", "path": "velocity"}, "split": {"test": ["f"]}}
+    recorded = build_plan(document, tmp_path / "tiny.toml")
+    here, there = (next(one.observer for one in plan.foundations if one.observer) for plan in (simulated, recorded))
+    assert here is not None
+    assert there is not None
+    assert {"north", "east"} <= set(here.measured)
+    assert set(there.measured) == {"psi", "u", "v", "r"}
+    assert here.current != 0.0
+    assert there.current == 0.0  # without a position nobody sees one
 
 
 def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
