@@ -149,6 +149,9 @@ def test_predict_writes_the_band(folder: Path, tmp_path: Path, results: Results)
     adaptive = pd.read_csv(out)
     np.testing.assert_allclose(adaptive["band_along"], frame["band_along"] * adaptive["band_factor"])
     assert adaptive["band_factor"].nunique() > 1
+    since = adaptive["t"] - adaptive.groupby("run")["t"].transform("min")
+    before = since < adaptive["ahead"].max() - 1e-6  # no path of the run has ended yet
+    np.testing.assert_allclose(adaptive["band_factor"][before], 1.0)
     with pytest.raises(DataError, match="needs 99 runs"):
         CliRunner().invoke(app, [*asked[:-1], "0.99"], catch_exceptions=False)
 
@@ -163,6 +166,14 @@ def test_an_adaptive_band_looks_at_ended_paths_alone() -> None:
     assert (np.diff(factors[5:]) < 0).all()
     later = along_run(np.where(now > 6, np.nan, reach), now + 5.0, now, Band(0.9, rate=0.05), table)
     np.testing.assert_array_equal(later, factors)
+
+
+def test_an_adaptive_band_judges_by_the_band_that_was_given() -> None:
+    """Errors of 1.3 radii all along: once the band is that wide they are hits, and it misses its share."""
+    now, table = np.arange(600.0), -np.log1p(-LEVELS)
+    factors = along_run(np.full(600, 1.3), now + 5.0, now, Band(0.9, rate=0.02), table)
+    assert factors.max() < 10.0
+    assert np.mean(factors[100:] < 1.3) == pytest.approx(0.1, abs=0.03)
 
 
 @pytest.mark.slow

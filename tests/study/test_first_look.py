@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.simulation.manoeuvre import TurningCircle, Zigzag
 from shipid.simulation.perform import perform
-from shipid.study.first_look import GROUPS, Look, _members, first_look, steady_speed
+from shipid.study.first_look import GROUPS, Look, _backwards, _members, _some, _Trial, first_look, steady_speed
 from shipid.vessel.load import Vessel, load_vessel
 
 SHIP, RPM = "kvlcc2-l7", 627.0
@@ -57,6 +59,27 @@ def test_a_rudder_of_the_other_sign_is_reported(log: Dataset) -> None:
     view = look(load_vessel(SHIP), mirrored)
     assert any("turns the other way" in fact for fact in view.facts)
     assert view.wrong
+
+
+def test_a_trial_errs_as_the_vessel_with_its_numbers(log: Dataset) -> None:
+    """Also with another steering gear: where its rudder was before each instant follows from the new one."""
+    ship, windows = load_vessel(SHIP), _some(log, 16, 1.0, "position")
+    rate = next(path for path in ship.parameters if path.endswith("actuator.delta.rate"))
+    rows = [{}, {rate: 0.15 * ship.parameters[rate]}, {D_P: 0.8 * ship.parameters[D_P]}]
+    rows.append(rows[1] | rows[2])
+    errors = _Trial(ship, log, windows, 1e9).errors(rows)
+    alone = [_Trial(ship.with_values(row), log, windows, 1e9).errors([{}])[0] for row in rows]
+    assert errors == pytest.approx(alone, rel=1e-9)
+    assert errors[1] > 1.5 * errors[0]
+
+
+def test_a_shaft_that_goes_astern_at_times_has_no_wrong_sign(log: Dataset) -> None:
+    windows = _some(log, 16, 1.0, "position")
+    name = next(name for name in windows.planned if name.endswith(".n"))
+    some = np.arange(len(windows)) % 5 == 0
+    for astern, expected in ((some, []), (np.full(len(windows), True), [name])):
+        planned = {**windows.planned, name: np.where(astern, -1.0, 1.0) * np.abs(windows.planned[name])}
+        assert _backwards(replace(windows, planned=planned)) == expected
 
 
 def test_steady_speed_is_that_of_the_published_approach() -> None:
