@@ -71,9 +71,9 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     the others. `H_low`, `H_high`: 95 % interval of H over test runs, without what another training would give; not a
     number with fewer than five. `difference` is H less that of the method `reference` over the `pairs` of cells in
     which both have one, every cell with the same weight, with a 95 % interval `low`, `high` by a bootstrap over test
-    runs: all windows and cells of a run, in its world, are drawn together. `better` counts test runs with a lower error. `least`, `greatest`: the
-    difference by world; `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. The family
-    `with physics` is all of them but `none`.
+    runs: all windows and cells of a run, in its world, are drawn together. `better` counts test runs with a lower
+    error. `least`, `greatest`: the difference by world; `world_low`, `world_high`: Student's 95 % interval over worlds,
+    from three on. The family `with physics` is all of them but `none`.
     """
     frames = [cells, cells[cells["family"] != NO_MODEL].assign(family=EVERY)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
