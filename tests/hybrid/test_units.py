@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,8 @@ def test_even_units_do_not_feel_the_mirror_and_odd_ones_change_sign(table):
     np.testing.assert_allclose(even, even_image, atol=1e-12)
     np.testing.assert_allclose(odd, -odd_image, atol=1e-12)
     assert np.abs(odd).max() > 0.01
+    plain, _ = replace(units, reflection=None).parts(here)
+    np.testing.assert_allclose(even[:, 1:] + odd, plain[:, 1:], atol=1e-12)  # halves of the same units
 
 
 def test_without_a_mirror_there_is_one_kind_of_unit(table):
