@@ -35,6 +35,7 @@ def test_even_units_do_not_feel_the_mirror_and_odd_ones_change_sign(table):
     assert np.abs(odd).max() > 0.01
     plain, _ = replace(units, reflection=None).parts(here)
     np.testing.assert_allclose(even[:, 1:] + odd, plain[:, 1:], atol=1e-12)  # halves of the same units
+    assert np.abs(np.corrcoef([*units.weight, units.offset])[-1, :-1]).max() < 0.9  # drawn apart from the weights
 
 
 def test_without_a_mirror_there_is_one_kind_of_unit(table):
