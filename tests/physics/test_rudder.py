@@ -42,8 +42,9 @@ def test_the_formulae_of_the_paper(v: float, r: float, delta: float) -> None:
     X, Y = -(1 - 0.387) * F_N * np.sin(delta), -(1 + 0.312) * F_N * np.cos(delta)
     N = -(-0.5 + 0.312 * -0.464) * L * F_N * np.cos(delta)
     u_P = u * (1 - w_P)
-    forces = wrench([u, v, 0, 0, 0, r], delta, [u_P, u_P * np.sqrt(1 + 8 * K_T / (np.pi * J**2)), D_P])
-    np.testing.assert_allclose(forces[[0, 1, 5]], [X, Y, N], rtol=2e-3, atol=1e-3)
+    flow = [u_P, u_P * np.sqrt(1 + 8 * K_T / (np.pi * J**2)), D_P]
+    forces = wrench([u, v, 0, 0, 0, r], delta, flow, y=0.4, z=0.2)
+    np.testing.assert_allclose(forces, [X, Y, 0, -0.2 * Y, 0.2 * X, N - 0.4 * X], rtol=2e-3, atol=1e-3)
 
 
 def test_helm_to_starboard_turns_to_starboard_and_costs_speed() -> None:
