@@ -168,6 +168,31 @@ def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
     np.testing.assert_allclose(gained[3:, 0], now, rtol=1e-9)
 
 
+def test_moving_water_carries_the_path_and_the_wind_along() -> None:
+    """Galilei: ship, wind and water faster by one velocity make a path that goes with it, under the same force."""
+    vessel, rng, count, horizon, step = load_vessel("gunnerus-28.9"), np.random.default_rng(5), 4, 20, 0.5
+    filters, water = bank(vessel), np.array([[0.5], [-0.8]])
+    columns = {name: rng.uniform(0.3, 1.5, count) for name in (*MEASURED, *dynamics(vessel).commands)}
+    columns |= {"u": rng.uniform(2, 4, count), "psi": rng.uniform(-3, 3, count), "r": rng.uniform(-0.05, 0.05, count)}
+    wind = rng.uniform(-6, 6, (2, count))
+    force = {f"observer.{name}": rng.uniform(-1e-3, 1e-3, count) for name in "XYN"}
+
+    def path(flow: np.ndarray) -> np.ndarray:
+        c, s = np.cos(columns["psi"]), np.sin(columns["psi"])
+        moved = columns | {"u": columns["u"] + c * flow[0] + s * flow[1], "v": columns["v"] + c * flow[1] - s * flow[0]}
+        north, east = wind + flow
+        moved |= {"V_w": np.hypot(north, east), "beta_w": np.arctan2(east, north)}
+        seen = {f"observer.{name}": moved[name] for name in MEASURED} | force
+        seen |= {f"observer.current_{name}": flow[i] + np.zeros(count) for i, name in enumerate(("north", "east"))}
+        paths, _ = observed_paths(filters, moved | seen, horizon, step)
+        x, y = np.moveaxis(paths, -1, 0)
+        return np.array([c * x - s * y, s * x + c * y])
+
+    ages = step * np.arange(1, horizon + 1)
+    carried = np.broadcast_to(water[:, :, None] * ages[:, None], (2, horizon, count))
+    np.testing.assert_allclose(path(water) - path(0 * water), carried, atol=1e-9)
+
+
 @pytest.mark.parametrize("path", ["position", "velocity"])
 def test_tuning_judges_the_paths_of_a_prediction(path: Literal["position", "velocity"]) -> None:
     """With `velocity` a path starts where the ship is; with `position`, where the observer believes her to be."""

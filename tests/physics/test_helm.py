@@ -131,6 +131,15 @@ def test_speed_is_damped_and_heading_takes_the_short_way() -> None:
     np.testing.assert_allclose(short[0, 0], -40 * 0.1**2 * (2 * np.pi - 6.0), atol=1e-6)
 
 
+def test_an_error_that_lasts_counts_by_its_integral() -> None:
+    """omega^2 (e + omega / 10 integral(e)): 5 m s to the north count as 0.05 m."""
+    lasting = {"north": 5.0, "east": 0.0, "heading": 0.0}
+    held = numbers(holding().orders(at(), ORDERS, lasting))
+    known = numbers(holding().orders(at(north=3.0 - 0.05), ORDERS, dict.fromkeys(lasting, 0.0)))
+    assert held == pytest.approx(known)
+    assert held["port.alpha"] != pytest.approx(np.pi / 2, abs=1e-3)
+
+
 def test_a_unit_keeps_to_its_greatest_speed() -> None:
     far = numbers(holding().orders(at(north=-1e4), ORDERS, dict.fromkeys(("north", "east", "heading"), 0.0)))
     assert far["port.n"] == far["starboard.n"] == 3.0

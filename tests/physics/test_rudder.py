@@ -8,7 +8,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.rudder import rudder, rudder_coefficients, rudder_derivatives, rudder_polynomial
+from shipid.physics.rudder import (
+    coefficients_normal_force,
+    rudder,
+    rudder_coefficients,
+    rudder_derivatives,
+    rudder_polynomial,
+)
 
 # KVLCC2 at 7 m: Yasukawa and Yoshimura (2015), tables 1 and 3
 RUDDER: dict[str, Any] = {
@@ -132,4 +138,7 @@ def test_rudder_coefficients_by_hand() -> None:
     forces = np.array(ca.evalf(rudder_coefficients(*given, kappa=0.5, L_pp=L, rho=1000.0, **values))).ravel()
     force = 500 * L**2 * c**2
     Y, N = force * (-0.02 * delta - 0.001 * delta), force * L * 0.03 * abs(beta) * beta * delta
-    np.testing.assert_allclose(forces, [force * -0.01 * delta**2, Y, 0, 0, 0, N], rtol=1e-9)
+    X = force * -0.01 * delta**2
+    np.testing.assert_allclose(forces, [X, Y, 0, 0, 0, N], rtol=1e-9)
+    shown = ca.evalf(coefficients_normal_force(*given, kappa=0.5, L_pp=L, rho=1000.0, **values))
+    assert float(shown) == pytest.approx(-X * np.sin(delta) - Y * np.cos(delta))  # across the blade
