@@ -25,11 +25,19 @@ def test_the_simulating_vessel_reproduces_its_log() -> None:
 
 
 def test_errors_are_root_mean_squares_of_the_series() -> None:
-    result = free_runs({"other": OTHER}, DATA, DATA.runs[:1], SETTINGS)
-    log, other = (result.series[result.series["model"] == name] for name in (MEASURED, "other"))
-    difference = (other["u"].to_numpy() - log["u"].to_numpy())[1:]
-    assert np.abs(difference).max() > 1e-4
-    assert result.errors["u"][0] == pytest.approx(np.sqrt((difference**2).mean()))
+    result = free_runs({"other": OTHER}, DATA, DATA.runs, SETTINGS)
+    log, other = (result.series[result.series["model"] == name].set_index(["run", "t"]) for name in (MEASURED, "other"))
+    away = other.select_dtypes(float) - log.select_dtypes(float)
+    away["position"] = np.hypot(away["north"], away["east"])
+    away = away[away.index.get_level_values("t") > 0]
+    assert np.abs(away["u"]).max() > 1e-4
+    errors = result.errors.set_index("run")
+    for name in ("u", "v", "r", "position"):
+        squares = away[name] ** 2
+        assert errors[name][ALL] == pytest.approx(np.sqrt(squares.mean()))
+        for run in DATA.runs:
+            assert errors[name][run] == pytest.approx(np.sqrt(squares[run].mean()))
+    assert errors["u"][DATA.runs[0]] != errors["u"][DATA.runs[1]]
 
 
 def test_every_piece_begins_at_the_measured_state() -> None:
