@@ -9,6 +9,7 @@ from shipid.errors import DataError
 from shipid.identification.free_run import ALL, MEASURED, free_runs
 from shipid.identification.settings import Identify
 from shipid.vessel.load import load_vessel
+from tests.conftest import variety
 from tests.identification.trials import trials
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -22,6 +23,14 @@ def test_the_simulating_vessel_reproduces_its_log() -> None:
     assert errors["run"].tolist() == [ALL, *DATA.runs]
     assert errors["samples"].tolist() == [60, 30, 30]
     assert errors[["u", "v", "r", "position"]].to_numpy().max() < 1e-9
+
+
+def test_a_piece_begins_where_the_actuators_are() -> None:
+    """Rudders and shafts that lag are in motion where a piece begins; the log holds their orders."""
+    ship = variety()["actuators"]
+    data = trials(ship, runs=2, steps=30)
+    errors = free_runs({"true": ship}, data, data.runs, SETTINGS, length=7.0).errors
+    assert errors[["u", "v", "r", "position"]].to_numpy().max() < 1e-6
 
 
 def test_errors_are_root_mean_squares_of_the_series() -> None:
