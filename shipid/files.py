@@ -169,11 +169,14 @@ def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bo
         (np.savez_compressed if compressed else np.savez)(stream, allow_pickle=False, **arrays)
 
 
-def read_arrays(file: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """Read all arrays of a `.npz`, never a pickle: OSError if it cannot be opened, ValueError for anything else."""
+def read_arrays(file: str | os.PathLike[str], *beginnings: str) -> dict[str, np.ndarray]:
+    """Read the arrays of a `.npz`, or those whose names begin so; never a pickle.
+
+    OSError if it cannot be opened, ValueError for anything else.
+    """
     try:
         with Path(file).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
+            return {name: stored[name] for name in stored.files if name.startswith(beginnings or "")}
     except (zipfile.BadZipFile, zlib.error, EOFError, TypeError, AttributeError, NotImplementedError) as error:
         raise ValueError(f"{file} is not a whole .npz") from error
 

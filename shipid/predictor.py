@@ -348,9 +348,9 @@ def fit(
 
 def read_bands(file: str | os.PathLike[str]) -> tuple[Bands | None, str]:
     """Read the bands of a saved predictor alone, and why it has none if it has none; a damaged file as it comes."""
-    arrays = read_arrays(file)
-    header = json.loads(str(arrays["header"]))
-    band = {name.removeprefix(BANDS): values for name, values in arrays.items() if name.startswith(BANDS)}
+    arrays = read_arrays(file, "header", BANDS)
+    header = json.loads(str(arrays.pop("header")))
+    band = {name.removeprefix(BANDS): values for name, values in arrays.items()}
     known = header["bands"]
     return None if known is None else Bands.from_arrays(known, band), _no_band(header["provenance"])
 

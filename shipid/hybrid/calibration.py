@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,12 +40,21 @@ class _Runs:
     weight: Array
     count: int
 
+    @cached_property
+    def sizes(self) -> NDArray[np.int64]:
+        """Number of windows of each run, (G,)."""
+        return np.bincount(self.place, minlength=self.count)
+
+    def sorted(self, order: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Sort windows in some order by their run, and within a run in that order."""
+        few = self.place.astype(np.uint16 if self.count < 2**16 else np.int64)  # short numbers are sorted by radix
+        return order[np.argsort(few[order], kind="stable")]
+
     def means(self, values: Array) -> Array:
         """Means (G, ...) over the windows of each run, of values (S, ...)."""
         sums = np.zeros((self.count, *values.shape[1:]))
         np.add.at(sums, self.place, values)
-        sizes = np.bincount(self.place, minlength=self.count)
-        return sums / sizes.reshape(-1, *[1] * (values.ndim - 1))
+        return sums / self.sizes.reshape(-1, *[1] * (values.ndim - 1))
 
 
 def calibrated(
@@ -87,7 +97,7 @@ def calibrated(
     best = None
     for circle in (True, False):
         fitted = _fitted(runs, apart, normal, circle)
-        whole = radii(fitted.scores.max(axis=0), runs.place)
+        whole = _radii(fitted.scores.max(axis=0), runs)
         size = float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[_middle_level(runs.count)]
         if best is None or size < TIGHTER * best[0]:
             best = size, fitted, whole
@@ -96,13 +106,13 @@ def calibrated(
     of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind and (of == kind).sum() >= FEWEST}
     reach, of = fitted.scores.max(axis=0), of[runs.place]
-    by_kind = [radii(reach[of == kind], np.unique(runs.place[of == kind], return_inverse=True)[1]) for kind in known]
+    by_kind = [radii(reach[of == kind], runs.place[of == kind]) for kind in known]
     return Bands(
         runs=runs.count,
         along=fitted.scale[:, 0],
         across=fitted.scale[:, 1],
         whole=whole,
-        steps=np.stack([radii(row, runs.place) for row in fitted.scores], axis=1),
+        steps=np.stack([_radii(row, runs) for row in fitted.scores], axis=1),
         names=tuple(names),
         centres=centres,
         spread=spread,
@@ -121,17 +131,20 @@ def calibrated(
 def radii(scores: Array, place: NDArray[np.int64]) -> Array:
     """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs.
 
-    place : index of the run of each window, 0 .. G - 1. The result depends on the scores by run alone, and not on the
+    place : number of the run of each window, (S,). The result depends on the scores by run alone, and not on the
     order of the runs.
     """
-    runs = _runs(place)
-    count, ranks = runs.count, _ranks(scores, runs)
-    order = np.argsort(ranks, kind="stable")
-    at = np.cumsum(runs.weight[order]) - runs.weight[order] / 2
-    wanted = np.interp(LEVELS, at, ranks[order])
-    # Where windows of a run are nearly one window, the new run may also fall between two others: (G + 1) level.
-    wanted = np.clip(wanted + _alike(ranks, runs) ** 2 * (LEVELS - 0.5) / (count - 1), 0.0, 1.0)
+    return _radii(scores, _runs(place))
+
+
+def _radii(scores: Array, runs: _Runs) -> Array:
     order = np.argsort(scores, kind="stable")
+    ranks = _ranks(order, runs)
+    rising_ranks = np.argsort(ranks, kind="stable")
+    at = np.cumsum(runs.weight[rising_ranks]) - runs.weight[rising_ranks] / 2
+    wanted = np.interp(LEVELS, at, ranks[rising_ranks])
+    # Where windows of a run are nearly one window, the new run may also fall between two others: (G + 1) level.
+    wanted = np.clip(wanted + _alike(ranks, runs) ** 2 * (LEVELS - 0.5) / (runs.count - 1), 0.0, 1.0)
     weights = runs.weight[order]
     at = np.cumsum(weights) - weights / 2
     at = (at - at[0]) / (at[-1] - at[0]) if at[-1] > at[0] else at
@@ -139,16 +152,15 @@ def radii(scores: Array, place: NDArray[np.int64]) -> Array:
     return rising
 
 
-def _ranks(scores: Array, runs: _Runs) -> Array:
-    """Share (S,) of the windows of the other runs, each run weighing the same, that have a lower score."""
-    order = np.argsort(scores, kind="stable")
-    below = np.empty(len(scores))
+def _ranks(order: NDArray[np.int64], runs: _Runs) -> Array:
+    """Share (S,) of the windows of the other runs, each run weighing the same, that come before in an order."""
+    below = np.empty(len(order))
     below[order] = np.cumsum(runs.weight[order]) - runs.weight[order]  # of all
-    by_run = np.lexsort((scores, runs.place))
-    sizes = np.bincount(runs.place, minlength=runs.count)
+    by_run = runs.sorted(order)
+    sizes = runs.sizes
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    mine = np.empty(len(scores))
-    mine[by_run] = (np.arange(len(scores)) - starts[runs.place[by_run]]) / sizes[runs.place[by_run]]
+    mine = np.empty(len(order))
+    mine[by_run] = (np.arange(len(order)) - starts[runs.place[by_run]]) / sizes[runs.place[by_run]]
     shares: Array = np.clip((runs.count * below - mine) / (runs.count - 1), 0.0, 1.0)
     return shares
 
@@ -157,7 +169,7 @@ def _alike(ranks: Array, runs: _Runs) -> float:
     """How alike the windows of one run are, 0 to 1: share of the variance of their ranks that lies between runs."""
     means = runs.means(ranks)
     within = float(runs.weight @ (ranks - means[runs.place]) ** 2)
-    sizes = np.bincount(runs.place, minlength=runs.count)
+    sizes = runs.sizes
     within *= float(np.mean(sizes / np.maximum(sizes - 1, 1)))
     between = float(means.var(ddof=1)) - within * float(np.mean(1 / sizes))
     total = max(between, 0.0) + within

@@ -20,6 +20,8 @@ from shipid.study.results import Results, judged_cells, naive_summary
 from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, too_few
 from shipid.study.worth import FEWEST_MODELS, Estimate, break_even, runs_without_physics
 
+MANY = 3  # methods that learn: their comparison is what the study asks
+
 
 def by_model(results: Results) -> pd.DataFrame:
     """Mean over seeds of A, H, H_90 [m] and validation loss [m^2] per foundation and N_D.
@@ -125,8 +127,11 @@ class Case:
         return [str(m) for m in names["model"] if m in self.table.H and m in self.table.A]
 
 
-def answer(results: Results) -> list[tuple[str, str]]:
-    """A few sentences built from the results, each with the anchor of the figure that carries it."""
+def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """A few sentences built from the results, each with the anchor of the figure that carries it.
+
+    methods : sentences that compare the methods; of a study of many methods they come first.
+    """
     claims, every_model = results.plan.claims, by_model(results)
     rows = every_model[~every_model["family"].isin(results.plan.aside)]
     caveats = _caveats(results)
@@ -140,15 +145,18 @@ def answer(results: Results) -> list[tuple[str, str]]:
     chart = "map" if _has_map(rows) else "gain"
     pure = rows[rows["family"] == NO_MODEL]
     judged = NO_MODEL in case.table.H
+    learning = results.plan.learning
+    which = [(text, "methods") for text in methods]
+    sentences += which if len(learning) >= MANY else []
     if judged and (good := _good_enough(case)):
         sentences.append((good, chart))
     if len(pure) and case.smallest < largest:
         sentences.append((_enough_runs(case), chart))
     sentences.append((_headline(case), "gain"))
-    learning = results.plan.learning
     if len(learning) > 1:
-        spoken = f"The study has {len(learning)} methods that learn from data; the answer speaks of "
+        spoken = f"The study has {len(learning)} methods that learn from data; the other sentences speak of "
         sentences.append((f"{spoken}{results.plan.judged!r}, the one that the study judges by.", "cells"))
+        sentences += which if len(learning) < MANY else []
     sentences += [(text, chart) for text in _physics_or_none(case, judged)]
     known = case.at(largest)
     known = known[known["A"] > 0]  # an exact model has no error that could be left
@@ -297,7 +305,9 @@ def _caveats(results: Results) -> list[str]:
     if len(failed):
         by_reason = failed.drop_duplicates("model").groupby("sentence", sort=False)["model"]
         why = "; ".join(f"{named(map(str, models))}: {reason}" for reason, models in by_reason)
-        sentences.append(f"{len(failed)} of {len(cells)} cells have no result ({why})")
+        sentences.append(
+            f"{len(failed)} of {len(cells)} cells {'has' if len(failed) == 1 else 'have'} no result ({why})"
+        )
     return sentences
 
 

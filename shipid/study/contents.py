@@ -13,7 +13,7 @@ from shipid.errors import ResultError
 from shipid.files import temporary_folder, write_table, write_text
 from shipid.report import Finding, ReportContent, Sentence, Snapshot, write_report, write_summary
 from shipid.report.comparison import write_comparison
-from shipid.report.methods import MethodsContent
+from shipid.report.methods import MethodsContent, verdicts
 from shipid.study import advise, bands, memory, methods, seals, store
 from shipid.study import results as parts
 from shipid.study.claims import Claims
@@ -52,10 +52,11 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         frames[name] = frame(results)
     if say is not None:
         say(f"{results.plan.name}: answer, findings and errors of {len(results.cells)} cells")
+    answer = advise.answer(results, verdicts(frames["methods"])), bands.answer(results)
     return ReportContent(
         title=results.plan.question,
         name=results.plan.name,
-        answer=[Sentence(text, figure) for text, figure in (*advise.answer(results), *bands.answer(results))],
+        answer=[Sentence(text, figure) for part in answer for text, figure in part],
         findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
         cells=results.cells,
         naive=parts.naive_summary(results),

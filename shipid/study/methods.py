@@ -70,10 +70,10 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
     the others. `H_low`, `H_high`: 95 % interval of H over test runs, without what another training would give; not a
     number with fewer than five. `difference` is H less that of the method `reference` over the `pairs` of cells in
-    which both have one, with a 95 % interval `low`, `high` by a bootstrap over test runs: all windows and cells of a
-    run, in its world, are drawn together. `better` counts test runs with a lower error. `least`, `greatest`: the
-    difference by world; `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. The family
-    `with physics` is all of them but `none`.
+    which both have one, every cell with the same weight, with a 95 % interval `low`, `high` by a bootstrap over test
+    runs: all windows and cells of a run, in its world, are drawn together. `better` counts test runs with a lower
+    error. `least`, `greatest`: the difference by world; `world_low`, `world_high`: Student's 95 % interval over worlds,
+    from three on. The family `with physics` is all of them but `none`.
     """
     frames = [cells, cells[cells["family"] != NO_MODEL].assign(family=EVERY)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
@@ -108,16 +108,20 @@ def _interval(mine: Mapping[Any, Mapping[str, Any]]) -> dict[str, float]:
 
 def _by_run(
     cells: Mapping[tuple[str, str, int], tuple[Mapping[str, float], Mapping[str, int]]],
-) -> tuple[dict[tuple[str, str], float], dict[tuple[str, str], int]]:
-    """Sums and counts of cells added up: (world, test run) -> sum [m], and -> number of windows."""
+) -> tuple[dict[tuple[str, str], float], dict[tuple[str, str], float]]:
+    """Sums and weights of cells added up: (world, test run) -> sum [m], and -> share of the windows of its cells.
+
+    Every cell weighs 1, as in the mean of H: a part of a study with a long test run is no more than one with a short.
+    """
     sums: dict[tuple[str, str], float] = {}
-    counts: dict[tuple[str, str], int] = {}
+    shares: dict[tuple[str, str], float] = {}
     for (world, *_), (added, windows) in cells.items():
+        total = sum(windows.values())
         for run, count in windows.items():
             place = world, run
-            sums[place] = sums.get(place, 0.0) + added[run]
-            counts[place] = counts.get(place, 0) + count
-    return sums, counts
+            sums[place] = sums.get(place, 0.0) + added[run] / total
+            shares[place] = shares.get(place, 0.0) + count / total
+    return sums, shares
 
 
 def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapping[str, Any]]) -> dict[str, Any]:
@@ -141,7 +145,7 @@ def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapp
     return row
 
 
-def _mean(sums: Mapping[tuple[str, str], float], counts: Mapping[tuple[str, str], int], world: str) -> float:
+def _mean(sums: Mapping[tuple[str, str], float], counts: Mapping[tuple[str, str], float], world: str) -> float:
     mine = [key for key in sums if key[0] == world]
     return sum(sums[key] for key in mine) / sum(counts[key] for key in mine)
 

@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 import numpy as np
+import pytest
 
 from shipid.report.section import declared
 from shipid.report.sections import SECTIONS
@@ -185,10 +186,24 @@ def test_incomplete_study_is_provisional(made: Any) -> None:
     assert advice.startswith("1 of 6 cells are not finished: what follows is provisional.")
 
 
+def test_the_comparison_of_methods_comes_first_where_there_are_many(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And after the answer on physics and runs where there are two; the sentence that names the method is said once."""
+    results = made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}))
+    plain = [sentence for sentence, _ in answer(results)]
+    for names in (["drawn", "memory"], ["drawn", "memory", "forest"]):
+        monkeypatch.setattr(type(results.plan), "learning", names)
+        sentences = answer(results, ["Memory errs least."])
+        at = sentences.index(("Memory errs least.", "methods"))
+        assert (at == 0) == (len(names) > 2)
+        others = [sentence for sentence, _ in sentences if sentence != "Memory errs least."]
+        assert [sentence for sentence in others if "judges by" not in sentence] == plain
+        assert len(others) == len(plain) + 1
+
+
 def test_failed_cells_are_reported_and_not_counted(made: Any) -> None:
     """`bad` has no result at 30 runs: nothing is claimed of every model, and the failure is named."""
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, None), "none": (9.0, 4.0)})))
-    assert "1 of 6 cells have no result (bad: no training converged)" in advice
+    assert "1 of 6 cells has no result (bad: no training converged)" in advice
     assert "every physics model with a result does better than no physics" in advice
     assert "(over 1 model)" in advice
 

@@ -16,7 +16,10 @@ from shipid.study.methods import COLUMNS, EVERY, compared
 def cells(
     rng: np.random.Generator, effect: float, worlds: int = 2, runs: int = 12, noise: float = 0.3, **more: Any
 ) -> pd.DataFrame:
-    """Cells of `drawn` and of `other`, which errs by `effect` [m] more, in runs and worlds that differ much."""
+    """Cells of `drawn` and of `other`, which errs by `effect` [m] more, in runs and worlds that differ much.
+
+    The runs of one world are longer than those of another, as the parts of a study with each run as the test in turn.
+    """
     rows = []
     for world in range(worlds):
         for family, members in (("moderate", 2), ("none", 1)):
@@ -24,7 +27,7 @@ def cells(
                 hard = rng.uniform(1.0, 4.0, runs)
                 for method, more_error in (("drawn", 0.0), ("other", effect)):
                     error = hard + more_error + noise * rng.standard_normal(runs)
-                    counts = {f"T{k}": int(5 + k % 3) for k in range(runs)}
+                    counts = {f"T{k}": int(5 + k % 3) * (1 + 4 * world) for k in range(runs)}
                     sums = {name: float(error[k] * counts[name]) for k, name in enumerate(counts)}
                     H = sum(sums.values()) / sum(counts.values())
                     rows.append(
