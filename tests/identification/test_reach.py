@@ -30,9 +30,9 @@ def test_it_is_the_greatest_of_the_motion() -> None:
 @pytest.mark.parametrize(
     ("name", "words", "near", "far"),
     [
-        ("drift", "deg of drift", 21.0, 23.0),
-        ("rate", "r L / U of", 0.52, 0.58),
-        ("helm", "deg of helm", 31.0, 34.0),
+        ("drift", "deg of drift", 21.8, 23.0),
+        ("rate", "r L / U of", 0.54, 0.58),
+        ("helm", "deg of helm", 32.5, 34.0),
         ("speed", "a speed of", 1.9, 1.7),
     ],
 )
