@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from casadi import SX
+from scipy.linalg import expm
 
 from shipid.data.causal import causal_columns, last_known
 from shipid.data.dataset import Dataset
@@ -20,10 +21,13 @@ from shipid.observer import (
     COLUMNS,
     LOW,
     MEASURED,
+    NUMBERS,
     STATES,
     Estimates,
     Observer,
+    _growth,
     _rates,
+    _waves,
     bank,
     begin,
     observe,
@@ -116,6 +120,63 @@ def test_an_order_and_wind_act_from_their_row_on() -> None:
         assert np.flatnonzero(moved)[0] == 26, change
 
 
+@pytest.mark.parametrize(
+    ("change", "moved"),
+    [
+        ({"moment": 2.0}, {"force_r": 2.0, "q_r": 2.0, "a_r": 2.0}),
+        ({"model_error": 2.0}, {"q_u": 2.0, "q_v": 2.0, "q_r": 2.0}),
+        ({"jump": 2.0, "settle": 3.0, "memory": 5.0}, {"jump": 2.0, "settle": 3.0, "memory": 5.0}),
+        ({"current": 2.0}, {"current": 2.0, "current_north": 2.0, "current_east": 2.0}),
+        ({"period": 2.0}, {"omega": 0.5, "x_w": 2.0, "y_w": 2.0, "psi_w": 2.0}),
+        ({"damping": 2.0}, {"zeta": 2.0}),
+    ],
+)
+def test_a_setting_scales_what_it_names_and_nothing_else(change: dict[str, float], moved: dict[str, float]) -> None:
+    vessel, plain = load_vessel("gunnerus-28.9"), Observer()
+    other = Observer(**{name: factor * getattr(plain, name) for name, factor in change.items()})
+    before, after = bank(vessel, plain), bank(vessel, other)
+    for names, one, two in ((NUMBERS, before.numbers, after.numbers), (STATES, before.first, after.first)):
+        np.testing.assert_allclose(two, one * [moved.get(name, 1.0) for name in names], rtol=1e-12)
+
+
+@pytest.mark.parametrize("dt", [0.1, 0.8])
+def test_waves_are_the_oscillator_and_stay_as_high_as_they_are(dt: float) -> None:
+    """xi'' + 2 zeta omega xi' + omega^2 xi = noise; steady velocities have the spread of the numbers."""
+    number = dict(zip(NUMBERS, ca.vertsplit(ca.DM(bank(load_vessel("gunnerus-28.9")).numbers[-1])), strict=True))
+    omega, zeta = float(number["omega"]), float(number["zeta"])
+    transition, noise = (np.array(ca.evalf(part)) for part in _waves({k: SX(v) for k, v in number.items()}, SX(dt)))
+    rate = np.kron([[0, 1], [-(omega**2), -2 * zeta * omega]], np.eye(3))
+    np.testing.assert_allclose(transition, expm(rate * dt), atol=1e-12)
+    speeds = np.array([float(number[f"wave_{name}"]) for name in "uvr"])
+    steady = np.diag(np.concatenate([speeds / omega, speeds]) ** 2)
+    np.testing.assert_allclose(transition @ steady @ transition.T + noise, steady, atol=1e-15)
+    assert np.linalg.eigvalsh(noise).min() > 0
+
+
+def test_two_steps_add_the_uncertainty_of_one_twice_as_long() -> None:
+    """White accelerations in axes of the ship: Q(2 dt) = F Q(dt) F^T + Q(dt), F moving the place by the velocities."""
+    number = {name: SX(0.1 * (i + 1)) for i, name in enumerate(NUMBERS)}
+    psi, dt, restless = 0.7, 0.4, SX([0.2, 0.1, 0.3])
+    once, twice = (np.array(ca.evalf(ca.densify(_growth(number, SX(psi), restless, SX(k * dt))))) for k in (1, 2))
+    c, s = np.cos(psi), np.sin(psi)
+    move = np.eye(LOW)
+    move[:3, 3:6] = dt * np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    np.testing.assert_allclose(twice, move @ once @ move.T + once, atol=1e-12)
+    powers = [float(number[f"q_{k}"]) ** 2 + float(number["jump"] * restless[i]) ** 2 for i, k in enumerate("uvr")]
+    np.testing.assert_allclose(np.diag(once)[3:6], dt * np.array(powers))
+
+
+def test_what_is_known_badly_counts_little() -> None:
+    """A column of standard deviations weighs each row: speeds that may be wrong by 1,000 km/s move nothing."""
+    vessel, frame = load_vessel("gunnerus-28.9"), calm().data.frame
+    run = frame[frame["run"] == "M000"].iloc[:25].reset_index(drop=True)
+    bad = (run.index >= 5) & (run.index < 15)
+    known = run.assign(std_u=np.where(bad, 1e6, 0.0))
+    moved = known.assign(u=known["u"] + 3.0 * bad)
+    one, other = (observe(vessel, Dataset(log, calm().data.metadata)).columns["observer.v"] for log in (known, moved))
+    np.testing.assert_allclose(other, one, atol=1e-4)
+
+
 def test_runs_together_are_runs_alone() -> None:
     vessel, frame = load_vessel("gunnerus-28.9"), calm().data.frame
     short = frame[(frame["run"] != "M001") | (frame["t"] < 30)]
@@ -166,6 +227,31 @@ def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
     gained = np.array(model.rates(*inputs, tau[0, 0])) - np.array(model.rates(*inputs, np.zeros(3)))
     now = np.exp(-0.5 / filters.fade) * np.array([0.01, -0.02, 0.001])
     np.testing.assert_allclose(gained[3:, 0], now, rtol=1e-9)
+
+
+def test_moving_water_carries_the_path_and_the_wind_along() -> None:
+    """Galilei: ship, wind and water faster by one velocity make a path that goes with it, under the same force."""
+    vessel, rng, count, horizon, step = load_vessel("gunnerus-28.9"), np.random.default_rng(5), 4, 20, 0.5
+    filters, water = bank(vessel), np.array([[0.5], [-0.8]])
+    columns = {name: rng.uniform(0.3, 1.5, count) for name in (*MEASURED, *dynamics(vessel).commands)}
+    columns |= {"u": rng.uniform(2, 4, count), "psi": rng.uniform(-3, 3, count), "r": rng.uniform(-0.05, 0.05, count)}
+    wind = rng.uniform(-6, 6, (2, count))
+    force = {f"observer.{name}": rng.uniform(-1e-3, 1e-3, count) for name in "XYN"}
+
+    def path(flow: np.ndarray) -> np.ndarray:
+        c, s = np.cos(columns["psi"]), np.sin(columns["psi"])
+        moved = columns | {"u": columns["u"] + c * flow[0] + s * flow[1], "v": columns["v"] + c * flow[1] - s * flow[0]}
+        north, east = wind + flow
+        moved |= {"V_w": np.hypot(north, east), "beta_w": np.arctan2(east, north)}
+        seen = {f"observer.{name}": moved[name] for name in MEASURED} | force
+        seen |= {f"observer.current_{name}": flow[i] + np.zeros(count) for i, name in enumerate(("north", "east"))}
+        paths, _ = observed_paths(filters, moved | seen, horizon, step)
+        x, y = np.moveaxis(paths, -1, 0)
+        return np.array([c * x - s * y, s * x + c * y])
+
+    ages = step * np.arange(1, horizon + 1)
+    carried = np.broadcast_to(water[:, :, None] * ages[:, None], (2, horizon, count))
+    np.testing.assert_allclose(path(water) - path(0 * water), carried, atol=1e-9)
 
 
 @pytest.mark.parametrize("path", ["position", "velocity"])

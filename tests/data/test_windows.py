@@ -342,7 +342,7 @@ def wandering(seed: int, offset: float) -> pd.DataFrame:
     st.sampled_from([0.3, 0.5, 1.0]),
     st.sampled_from([0.4, 1.0, 2.5]),
     st.integers(0, 4),
-    st.floats(0.1, 0.9),
+    st.floats(0.2, 0.9),
 )
 @settings(max_examples=40, deadline=None)
 def test_a_later_row_changes_no_input(
@@ -372,7 +372,7 @@ def test_a_later_row_changes_no_input(
         np.testing.assert_array_equal(other.columns[name][known], values[known], err_msg=name)
     for name, values in one.past.items():
         np.testing.assert_array_equal(other.past[name][:, known], values[:, known], err_msg=name)
-    assert not np.array_equal(one.columns["u"], other.columns["u"])
+    np.testing.assert_array_equal(other.columns["u"] != one.columns["u"], ~known)
     # whole pasts and futures, and no instant twice
     assert (one.begin >= frame["t"].iloc[0] - 1e-4).all()
     assert (one.end <= frame["t"].iloc[-1] + 1e-4).all()

@@ -12,9 +12,11 @@ import pytest
 
 from shipid.engine.casadi import memory_along
 from shipid.engine.integrate import Method
-from shipid.engine.rollout import rollout
+from shipid.engine.rollout import distances, rollout
 from shipid.errors import DataError, ShipidError
 from shipid.interrupts import uninterrupted
+from shipid.metrics import position_error
+from shipid.physics.helm import zigzag
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, members
@@ -217,6 +219,35 @@ def test_explicit_euler_uses_what_the_actuator_has_reached(engine: Any) -> None:
     n = 2.0 * (1 - np.exp(-0.5))
     gained = 2 * 0.8208 * 1025 * n**2 * 1.9**4 / (410931.81 + 79320.5895)
     np.testing.assert_allclose(path["u"][:, 0, 0], [0.0, 0.0, gained], rtol=1e-6, atol=1e-6)
+
+
+def test_actuators_of_a_helmsman_begin_at_his_first_order(draw_inputs: Draw) -> None:
+    vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": LAG})
+    commands = dynamics(vessel).commands
+    given = draw_inputs(vessel, 2)
+    orders = {name: np.linspace(1.0, 2.0, 6)[:, None] * values for name, values in given["commands"].items()}
+    helm = {"course": np.zeros(2), "execute_heading": np.full(2, 9.0)}
+    given["commands"] = {name: orders[name] for name in commands} | helm
+    path = rollout(vessel, **given, helmsman=zigzag(commands), step=1.0, num_steps=6, engine="casadi")
+    np.testing.assert_allclose(path["actual.port.n"][0, 0], orders["port.n"][0])
+    assert (np.diff(path["actual.port.n"][1:, 0], axis=0) != 0).all()
+
+
+@pytest.mark.parametrize("engine", ["casadi", "torch"])
+def test_distances_begin_where_the_actuators_are(draw_inputs: Draw, engine: Any) -> None:
+    """Those of the paths from the same start; an order that is no number is reported, though a limit hides it."""
+    limited = {**LAG, "low": -3.0, "high": 3.0}
+    vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": limited})
+    given, goal = draw_inputs(vessel, 3), np.ones((5, 3, 2))
+    reached = {"port.n": given["commands"]["port.n"] - 1.0}
+    path = rollout(vessel, **given, memory=reached, step=1.0, num_steps=5, keep=("north", "east"), engine=engine)
+    measured = distances(vessel, **given, memory=reached, goal=goal, step=1.0, engine=engine)
+    np.testing.assert_allclose(measured.total[0], position_error(path.states[1:, 0], goal).sum(axis=0), rtol=1e-9)
+    at_order = distances(vessel, **given, goal=goal, step=1.0, engine=engine)
+    assert (np.abs(at_order.total - measured.total) > 1e-3).all()
+    given["commands"]["port.n"] = np.where(np.arange(3) == 1, np.nan, given["commands"]["port.n"])
+    missing = distances(vessel, **given, memory=reached, goal=goal, step=1.0, engine=engine)
+    assert missing.diverged.tolist() == [[False, True, False]]
 
 
 def test_memory_along_a_run_is_the_lag_of_its_orders() -> None:

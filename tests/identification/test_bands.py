@@ -60,6 +60,27 @@ def test_of_a_linear_measure_it_is_the_propagated_covariance(fitted: tuple[Solut
     assert (wider["high"] > rows["high"]).all()
 
 
+@pytest.mark.parametrize("bend", [0.5, -0.5])
+def test_of_a_bent_measure_it_has_the_moments_of_a_normal_error(
+    fitted: tuple[Solution, Statistics], bend: float
+) -> None:
+    """2 z + b z^2 of a standard normal z has the mean b and the variance 4 + 2 b^2: the band moves to one side."""
+    solution, known = fitted
+    best = known.covariances[known.chosen]
+    axis = principal(best.matrix)[:, 0]
+    base = np.array([SHIP.parameters[path] for path in solution.paths])
+
+    def bent(vessel: Vessel) -> Mapping[str, float]:
+        factors = np.array([vessel.parameters[path] for path in solution.paths]) / base
+        z = float(axis @ (factors - solution.factors)) / float(axis @ axis)
+        return {"bent": 2 * z + bend * z**2}
+
+    row = bands(SHIP, solution, known, [("one", bent)], 0.8).iloc[0]
+    half = np.sqrt(4.5) * stats.t.ppf(0.9, np.median(best.freedom))
+    assert row["deviation"] == pytest.approx(np.sqrt(4.5), rel=1e-6)
+    assert (row["low"], row["high"]) == pytest.approx((-half + min(bend, 0), half + max(bend, 0)), rel=1e-6)
+
+
 def test_bands_hold_the_truth_of_simulated_trials() -> None:
     truth, held = linear(SHIP)["one"], []
     for seed in range(12):

@@ -9,6 +9,7 @@ from shipid.errors import DataError
 from shipid.identification.free_run import ALL, MEASURED, free_runs
 from shipid.identification.settings import Identify
 from shipid.vessel.load import load_vessel
+from tests.conftest import variety
 from tests.identification.trials import trials
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -24,12 +25,28 @@ def test_the_simulating_vessel_reproduces_its_log() -> None:
     assert errors[["u", "v", "r", "position"]].to_numpy().max() < 1e-9
 
 
+def test_a_piece_begins_where_the_actuators_are() -> None:
+    """Rudders and shafts that lag are in motion where a piece begins; the log holds their orders."""
+    ship = variety()["actuators"]
+    data = trials(ship, runs=2, steps=30)
+    errors = free_runs({"true": ship}, data, data.runs, SETTINGS, length=7.0).errors
+    assert errors[["u", "v", "r", "position"]].to_numpy().max() < 1e-6
+
+
 def test_errors_are_root_mean_squares_of_the_series() -> None:
-    result = free_runs({"other": OTHER}, DATA, DATA.runs[:1], SETTINGS)
-    log, other = (result.series[result.series["model"] == name] for name in (MEASURED, "other"))
-    difference = (other["u"].to_numpy() - log["u"].to_numpy())[1:]
-    assert np.abs(difference).max() > 1e-4
-    assert result.errors["u"][0] == pytest.approx(np.sqrt((difference**2).mean()))
+    result = free_runs({"other": OTHER}, DATA, DATA.runs, SETTINGS)
+    log, other = (result.series[result.series["model"] == name].set_index(["run", "t"]) for name in (MEASURED, "other"))
+    away = other.select_dtypes(float) - log.select_dtypes(float)
+    away["position"] = np.hypot(away["north"], away["east"])
+    away = away[away.index.get_level_values("t") > 0]
+    assert np.abs(away["u"]).max() > 1e-4
+    errors = result.errors.set_index("run")
+    for name in ("u", "v", "r", "position"):
+        squares = away[name] ** 2
+        assert errors[name][ALL] == pytest.approx(np.sqrt(squares.mean()))
+        for run in DATA.runs:
+            assert errors[name][run] == pytest.approx(np.sqrt(squares[run].mean()))
+    assert errors["u"][DATA.runs[0]] != errors["u"][DATA.runs[1]]
 
 
 def test_every_piece_begins_at_the_measured_state() -> None:

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.data.kinematics import Noise
+from shipid.data.kinematics import STATES, Noise, smooth
 from shipid.errors import DataError
 from shipid.identification.inverse import inverse_dynamics
 from shipid.simulation.truth import Truth, simulate
@@ -130,6 +130,27 @@ def test_noise_is_averaged_not_differentiated() -> None:
     sea = Noise({"north": 0.3, "east": 0.3, "psi": 0.002, "u": 0.02, "v": 0.02, "r": 0.002}, 0.1, 0.02)
     smoothed = inverse_dynamics(SHIP, log, log.runs, [[path] for path in MAIN], noise=sea)
     assert np.abs(smoothed.factors - 1).max() < 0.25
+    run = log.frame[log.frame["run"] == log.runs[0]].reset_index(drop=True)
+    columns = {name: run[name].to_numpy() for name in STATES} | {"psi": np.unwrap(run["psi"])}
+    states = smooth(run["t"].to_numpy(), columns, sea)
+    before = Dataset(run.assign(**{name: states.state(name) for name in STATES}), log.metadata)
+    first = inverse_dynamics(SHIP, log, log.runs[:1], [[MAIN[0]]], noise=sea, window=8.0)
+    assert inverse_dynamics(SHIP, before, log.runs[:1], [[MAIN[0]]], window=8.0).factors == pytest.approx(first.factors)
+    assert inverse_dynamics(SHIP, log, log.runs[:1], [[MAIN[0]]], window=8.0).factors != pytest.approx(first.factors)
+
+
+def test_wind_may_be_given_for_a_run_instead_of_its_columns() -> None:
+    some = LOG.runs[:3]
+    bare = Dataset(LOG.frame.drop(columns=["V_w", "beta_w"]), LOG.metadata)
+    felt = {
+        str(run): {name: float(rows[name].iloc[0]) for name in ("V_w", "beta_w")}
+        for run, rows in LOG.frame.groupby("run")
+    }
+    groups = [["wind.A_LW"], ["hull.derivatives.N_ur"]]
+    logged = inverse_dynamics(SHIP, LOG, some, groups)
+    given = inverse_dynamics(SHIP, bare, some, groups, environment=felt)
+    np.testing.assert_allclose(given.factors, logged.factors, rtol=1e-9)
+    assert inverse_dynamics(SHIP, bare, some, groups).factors[1] != pytest.approx(logged.factors[1], rel=1e-4)
 
 
 def test_a_start_can_be_simulated() -> None:

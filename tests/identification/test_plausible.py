@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from shipid.identification.plausible import KINDS, verdict, within
+from shipid.identification.plausible import KINDS, NEAR, verdict, within
 from shipid.vessel.load import Vessel, load_vessel
 
 
@@ -57,6 +57,17 @@ def test_factors_within_the_range_have_no_complaint_and_those_beyond_have(path: 
             inside, outside = ((end - sense * share) * vessel.parameters[path] for share in (1e-3, -1e-3))
             assert "no ship" not in verdict(vessel, path, {path: inside})
             assert "no ship" in verdict(vessel, path, {path: outside})
+
+
+@pytest.mark.parametrize("path", ["added_mass.Y_vdot", "thruster.rudder.ell_R"])
+def test_only_what_is_near_an_end_is_said_to_be_at_it(path: str) -> None:
+    """Numbers whose ratio to those of ships is linear."""
+    vessel = load_vessel("kvlcc2-l7")
+    low, high = within(vessel, path)
+    for share, there in ((NEAR / 2, True), (2 * NEAR, False), (0.5, False)):
+        for place in (share, 1 - share):
+            value = (low + place * (high - low)) * vessel.parameters[path]
+            assert ("at the end of the range" in verdict(vessel, path, {path: value})) == there
 
 
 def test_what_has_no_range_has_no_bounds() -> None:

@@ -58,6 +58,15 @@ def test_a_skewed_profile_has_the_ends_of_its_formula() -> None:
     )  # fmt: skip
     assert curve.low == pytest.approx(np.log(1 - t * w), rel=0.05)
     assert curve.high == pytest.approx(np.log(1 + t * w), rel=0.05)
+    assert "not converged" not in curve.sentence
+
+    def worse(path: str, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+        objective, factors = refit_of(lambda f: (np.exp(f) - 1) / w)(path, value, start)
+        return objective + 700.0, factors
+
+    other = profile("a", np.zeros(1), 0, 700.0, worse, half_width=t * w, freedom=30.0)  # what no factor explains
+    assert (other.low, other.high) == pytest.approx((curve.low, curve.high))
+    assert other.sentence == curve.sentence
 
 
 def test_open_ends_are_reported() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,25 @@ def test_it_is_the_greatest_of_the_motion() -> None:
     assert reach.rate == pytest.approx(0.3 * 7)
     assert reach.helm == pytest.approx(30)
     assert reach.speed == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "near", "far"),
+    [
+        ("drift", "deg of drift", 21.8, 23.0),
+        ("rate", "r L / U of", 0.54, 0.58),
+        ("helm", "deg of helm", 32.5, 34.0),
+        ("speed", "a speed of", 1.9, 1.7),
+    ],
+)
+def test_each_part_has_a_tenth_to_spare(name: str, words: str, near: float, far: float) -> None:
+    data = Reach(drift=20.0, rate=0.5, helm=30.0, speed=2.0)
+    assert beyond("a turn", replace(data, **{name: near}), data) == ""
+    sentence = beyond("a turn", replace(data, **{name: far}), data)
+    assert words in sentence
+    assert " and " not in sentence
+    little = Reach(drift=0.5, rate=0.01, helm=0.5, speed=2.0)
+    assert beyond("a turn", Reach(drift=1.4, rate=0.029, helm=1.4, speed=2.0), little) == ""
 
 
 def test_a_ship_at_rest_has_no_drift() -> None:

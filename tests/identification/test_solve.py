@@ -13,7 +13,7 @@ from shipid.errors import ShipidError
 from shipid.identification.fit import origin, search
 from shipid.identification.residuals import build, predict
 from shipid.identification.settings import POSITIVE, Identify, unknowns
-from shipid.identification.solve import LEAST, Solution, _discounted, identify
+from shipid.identification.solve import LEAST, Solution, _discounted, _weakest, identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, orders, trials
@@ -256,6 +256,12 @@ def test_what_the_data_do_not_support_is_dropped() -> None:
     for path in solution.dropped:
         assert solution.values[path] == base.parameters[path]
     assert solution.factors[3] == pytest.approx(2.0, rel=0.02)
+    coarse = replace(solution, residuals=solution.residuals / 10, jacobian=solution.jacobian / 10)
+    verdicts = [
+        [_weakest(one, 10.0**power, solution.centre) for power in range(5)] for one in (solution, coarse)
+    ]  # whatever deviations are declared
+    assert verdicts[0] == verdicts[1]
+    assert {None, 3} == set(verdicts[0])
 
 
 def test_what_cannot_be_seen_is_dropped_first() -> None:

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from shipid.errors import ShipidError
-from shipid.identification.statistics import LinearFit, blocks, statistics
+from shipid.identification.statistics import LinearFit, blocks, statistics, whiteness
 from tests.identification.linear import SIGNALS, design, fitted, labels, noise
 
 RUNS, SAMPLES, COUNT = 20, 80, 6
@@ -119,6 +120,42 @@ def test_levels_and_memory_are_measured() -> None:
     coloured = statistics(one(0.8)).whiteness
     assert np.mean([colour.memory for colour in coloured.values()]) == pytest.approx(9, rel=0.25)
     assert not any(colour.white for colour in coloured.values())
+
+
+def test_whiteness_is_that_of_ljung_and_box() -> None:
+    """Q = n (n + 2) sum r_k^2 / (n - k) is chi squared; of several runs the sums are added."""
+    expected, freedom, runs = 0.0, 0, (37, 60)
+    errors = [np.random.default_rng(n).normal(size=n) for n in runs]
+    for error in errors:
+        n, lags = len(error), min(10, len(error) // 5)
+        r = np.array([error[k:] @ error[:-k] for k in range(1, lags + 1)]) / (error @ error)
+        expected += n * (n + 2) * float((r**2 / (n - np.arange(1, lags + 1))).sum())
+        freedom += lags
+    clusters = np.repeat([0, 1], runs)
+    fit = LinearFit(("p",), np.ones(1), np.concatenate(errors), np.ones((97, 1)), clusters, ("u",) * 97)
+    assert whiteness(fit)["u"].probability == pytest.approx(stats.chi2.sf(expected, freedom))
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.8])
+def test_correlated_residuals_are_worth_fewer(phi: float) -> None:
+    for colour in statistics(one(phi)).whiteness.values():
+        assert colour.effective * colour.memory == pytest.approx(colour.samples)
+        assert colour.effective <= colour.samples
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.8])
+def test_without_priors_an_interval_is_that_of_the_data_alone(phi: float) -> None:
+    estimates = statistics(one(phi))
+    np.testing.assert_allclose(estimates.alone, (estimates.high - estimates.low) / 2, rtol=1e-9)
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.8])
+def test_a_prior_much_narrower_than_the_data_is_the_error_in_every_form(phi: float) -> None:
+    widths = 1e-5 * np.arange(1, COUNT + 1)
+    estimates = statistics(one(phi, prior_widths=widths))
+    assert {"fisher", "sandwich"} <= set(estimates.covariances)
+    for form in estimates.covariances.values():
+        np.testing.assert_allclose(form.errors, widths, rtol=1e-3)
 
 
 def test_a_pair_that_acts_as_one_is_named() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DataError
-from shipid.measures.record import crossing, departure, extreme, plateaus, value_at
+from shipid.measures.record import crossing, departure, extreme, integral, mean, plateaus, settled, value_at
 from tests.measures.made_records import every, stopped
 
 T = np.cumsum(np.array([0.0, 0.7, 0.4, 0.5, 0.9, 0.3, 0.6, 0.8, 0.5, 0.4]))
@@ -29,6 +29,22 @@ def test_crossings_go_the_way_that_is_asked_for() -> None:
     assert crossing(T, cubic, 0.0, 3.0) == pytest.approx(4.5)
     assert crossing(T, cubic, 0.0, 4.8) == 4.8  # beyond it by then
     assert np.isnan(crossing(T, cubic, 1e3, 0.0))
+    dip = (T - 1.4) * (T - 1.58)  # between two samples
+    assert crossing(T, dip, 0.0, 1.45) == pytest.approx(1.58)
+
+
+def test_what_has_settled_does_not_depend_on_its_sign() -> None:
+    """The last quarter less the one before is 1.4 % of the rate, for a turn to either side."""
+    t = np.linspace(0.0, 40.0, 81)
+    rate = 1.0 - np.exp(-t / 7.0)
+    for sense in (1.0, -1.0):
+        assert settled(t, sense * rate, 0.0, 40.0, sense) == pytest.approx(sense * mean(t, rate, 30.0, 40.0))
+        assert np.isnan(settled(t, sense * rate, 0.0, 40.0, sense / 10))
+
+
+def test_integrals_begin_and_end_between_samples() -> None:
+    assert integral(T, 3.0 + 2 * T, 0.3, 4.1) == pytest.approx(3 * 3.8 + 4.1**2 - 0.3**2)
+    assert mean(T, 3.0 + 2 * T, 0.3, 4.1) == pytest.approx(3.0 + 4.4)
 
 
 def test_extremes_lie_inside() -> None:

@@ -25,6 +25,16 @@ def test_reaches_of_a_constant_deceleration(interval: float) -> None:
     assert measures["heading_change"].value == pytest.approx(VEER * time, abs=1e-6)
 
 
+def test_a_shaft_that_is_stopped_is_ordered_to_stop() -> None:
+    record = every(stopped(), 0.5)
+    assert record.shaft is not None
+    drifting = replace(record, shaft=np.maximum(record.shaft, 0.0))
+    for name, one in stop(record).items():
+        assert stop(drifting)[name].value == pytest.approx(one.value), name
+    astern = replace(record, shaft=np.full_like(record.t, -1.0))
+    assert stop(astern)["execute"].value == record.t[0]
+
+
 def test_without_a_shaft_nothing_is_known() -> None:
     measures = stop(replace(every(stopped(), 1.0), shaft=None))
     assert all(one.why == "the shaft is not ordered to stop or astern" for one in measures.values())

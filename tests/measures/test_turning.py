@@ -60,5 +60,8 @@ def test_pull_out_of_a_stable_and_of_an_unstable_ship() -> None:
     left = 0.3 * DEGREE
     measures = pull_out(replace(record, r=record.r + left * (record.t > 110)))
     assert measures["residual_rate"].value == pytest.approx(left, rel=1e-3)
+    again = replace(record, helm=record.helm - 20 * DEGREE * (record.t > 200), r=record.r + (record.t > 200))
+    same = pull_out(again)  # the helm goes over to the other side later
+    assert same["residual_rate"].value == pytest.approx(0.0, abs=1e-4)
     early = pull_out(rows(record, slice(0, 2 * 120)))
     assert "still changes" in early["residual_rate"].why

@@ -9,7 +9,18 @@ import pytest
 
 from shipid.measures import zigzag
 from shipid.units import DEGREE
-from tests.measures.made_records import GAIN, START, TIME, clock, every, made_record, nomoto, zigzag_10, zigzag_legs
+from tests.measures.made_records import (
+    GAIN,
+    SPEED,
+    START,
+    TIME,
+    clock,
+    every,
+    made_record,
+    nomoto,
+    zigzag_10,
+    zigzag_legs,
+)
 
 
 @pytest.mark.parametrize(("helm", "heading"), [(10, 10), (20, 20), (20, 10), (10, 5), (15, 1)])
@@ -31,6 +42,20 @@ def test_overshoots_and_times_of_nomoto(helm: float, heading: float, interval: f
     assert measures["initial_turning"].value == pytest.approx(5.0 * (legs[1][0] - START), abs=5 * time)
     assert measures["period"].value == pytest.approx(legs[3][0] - legs[1][0], abs=time)
     assert GAIN * helm * DEGREE * TIME > 0
+
+
+def test_speed_and_reach_are_those_of_the_record() -> None:
+    fine = zigzag_10()
+    measures, (_, second, third, *_) = (
+        zigzag(every(fine, 0.5)),
+        (leg for leg, _ in zigzag_legs(*[10 * DEGREE] * 2, 4)[0]),
+    )
+    until = fine.speed[(fine.t >= START) & (fine.t <= third)]
+    assert measures["approach_speed"].value == pytest.approx(SPEED)
+    assert measures["speed_loss"].value == pytest.approx(1 - until.min() / SPEED, rel=0.01)
+    assert measures["speed_loss"].value > 0.002
+    back = fine.t[(fine.t > second) & (fine.psi <= 0)][0]
+    assert measures["reach"].value == pytest.approx(back - START, abs=0.02)
 
 
 def test_overshoots_count_from_the_execute_heading_not_from_the_helm() -> None:

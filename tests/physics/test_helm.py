@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.helm import Helmsman, Unit, station_keeping, yaw_rate, zigzag
+from shipid.physics.helm import Helmsman, Unit, course_keeping, station_keeping, yaw_rate, zigzag
 from shipid.physics.signals import steers
 
 COMMANDS = ("port.n", "port.alpha", "rudder.delta")
@@ -22,7 +22,7 @@ def test_angles_steer_and_shafts_do_not() -> None:
     assert [steers(name) for name in COMMANDS] == [False, True, True]
 
 
-@pytest.mark.parametrize("make", [zigzag, yaw_rate])
+@pytest.mark.parametrize("make", [zigzag, yaw_rate, course_keeping])
 def test_one_helmsman_per_set_of_commands(make: Any) -> None:
     """One object, one compilation; he gets every command."""
     assert make(COMMANDS) is make(COMMANDS)
@@ -57,6 +57,38 @@ def test_yaw_rate_law() -> None:
     hard_over = numbers(helmsman.orders({"r": 1.0}, inputs, {"integral": 0.9}))
     assert hard_over["port.alpha"] == 0.5
     assert numbers(helmsman.advance({"r": 9.0}, inputs, {"integral": 0.9}, 9.0)) == {"integral": -1.0}
+
+
+def test_course_keeping_is_the_pid_law_of_its_frequency() -> None:
+    """A ship r' = effect s with the helm share s: the error has the roots of (p + omega)^2 p + omega^3 / 10."""
+    omega, effect, step = 0.2, 0.05, 0.05
+    inputs = {"port.n": 2.0, "port.alpha": -0.5, "rudder.delta": 0.6, "course": 6.2, "omega": omega, "effect": effect}
+    helmsman = course_keeping(COMMANDS)
+    assert helmsman.advance is not None
+    seen, memory = {name: ca.SX.sym(name) for name in ("psi", "r")}, {"integral": ca.SX.sym("integral")}
+    ordered = helmsman.orders(seen, inputs, memory)
+    assert ordered["port.n"] == 2.0
+    after = [*(ordered[name] for name in COMMANDS[1:]), helmsman.advance(seen, inputs, memory, step)["integral"]]
+    law = ca.Function("law", [*seen.values(), *memory.values()], after)
+    psi, r, integral, path = 0.0, 0.0, 0.0, []  # 0.083 rad to port is the short way
+    for _ in range(800):
+        alpha, delta, integral = map(float, law(psi, r, integral))
+        assert alpha / -0.5 == pytest.approx(delta / 0.6)
+        r += step * effect * delta / 0.6
+        psi += step * r
+        path.append(psi)
+    t = step * np.arange(1, 801)
+    roots = np.roots([1, 2 * omega, omega**2, omega**3 / 10])
+    start = np.vander(roots, 3, increasing=True).T  # error, its rate and acceleration at first
+    error = 6.2 - 2 * np.pi
+    shares = np.linalg.solve(start, [error, 0, -(omega**2) * error])
+    expected = error - (np.exp(np.outer(t, roots)) @ shares).real
+    np.testing.assert_allclose(path, expected, atol=0.02 * abs(error))
+    still = dict.fromkeys(("psi", "r"), 0.0)
+    for sign in (1, -1):
+        hard = {**inputs, "course": sign * 3.0, "effect": 1e-3}
+        assert numbers(helmsman.orders(still, hard, {"integral": 0.0}))["rudder.delta"] == sign * 0.6
+        assert numbers(helmsman.advance(still, hard, {"integral": 0.0}, 1e3)) == {"integral": sign}
 
 
 UNITS = (
@@ -97,6 +129,15 @@ def test_speed_is_damped_and_heading_takes_the_short_way() -> None:
     np.testing.assert_allclose(thrusts(at(u=0.2))[:, 0], [-50 * 2 * 0.1 * 0.2] * 2, atol=1e-6)
     short = thrusts(at(psi=3.0), heading=-3.0)  # 0.28 rad to starboard: the port unit pushes less than its bias astern
     np.testing.assert_allclose(short[0, 0], -40 * 0.1**2 * (2 * np.pi - 6.0), atol=1e-6)
+
+
+def test_an_error_that_lasts_counts_by_its_integral() -> None:
+    """omega^2 (e + omega / 10 integral(e)): 5 m s to the north count as 0.05 m."""
+    lasting = {"north": 5.0, "east": 0.0, "heading": 0.0}
+    held = numbers(holding().orders(at(), ORDERS, lasting))
+    known = numbers(holding().orders(at(north=3.0 - 0.05), ORDERS, dict.fromkeys(lasting, 0.0)))
+    assert held == pytest.approx(known)
+    assert held["port.alpha"] != pytest.approx(np.pi / 2, abs=1e-3)
 
 
 def test_a_unit_keeps_to_its_greatest_speed() -> None:

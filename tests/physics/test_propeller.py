@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -10,11 +11,15 @@ import pytest
 
 from shipid.physics.propeller import (
     controllable_pitch,
+    controllable_thrust,
     controllable_wash,
     four_quadrant,
+    four_quadrant_shaft_thrust,
     four_quadrant_wash,
     propeller,
+    propeller_thrust,
     quadratic,
+    quadratic_shaft_thrust,
     quadratic_wash,
     service_speed,
     wash,
@@ -52,9 +57,10 @@ def test_beyond_the_polynomial_the_coefficient_stays() -> None:
     assert fast[0] == fast[1] < 0
 
 
-def test_a_screw_off_the_middle_turns_the_ship() -> None:
-    there = thrust(1.0, 10.0, y=0.5)
-    assert there[5] == pytest.approx(-0.5 * there[0])
+def test_a_screw_off_the_middle_turns_the_ship_and_its_flow_is_that_of_its_place() -> None:
+    there = thrust(1.0, 10.0, y=0.5, z=0.3)
+    np.testing.assert_allclose(there[3:], [0, 0.3 * there[0], -0.5 * there[0]])
+    assert washed([0.1, 0, 0, 0, 0, 0.2], 10.0, y=0.5)[0] == pytest.approx(0)  # a turn about the screw
 
 
 def test_race_is_momentum_theory() -> None:
@@ -137,8 +143,10 @@ def test_a_stopped_screw_drags_by_its_disc() -> None:
         assert thrust(u, 0.0, k_drag=0.15)[0] == pytest.approx(-0.78 * 0.15 * RHO * 0.216**2 * u_P * abs(u_P))
     assert thrust(1.179, 10.4, k_drag=0.15)[0] == thrust(1.179, 10.4)[0]
     rng = np.random.default_rng(3)
-    for u, n in rng.uniform([-2, -12], [2, 12], (100, 2)):
-        assert (thrust(u, n, k_drag=0.3)[0] - thrust(u, n)[0]) * u <= 0
+    for u, n in rng.uniform([-2, -12], [2, 12], (30, 2)):
+        driven = thrust(u, n, k_drag=0.3)[0]
+        assert (driven - thrust(u, n)[0]) * u <= 0
+        assert thrust(-u, -n, k_drag=0.3)[0] == pytest.approx(-driven)  # ship and screw the other way round
 
 
 def test_drag_of_a_driven_screw_has_no_step_at_the_ends_of_its_curve() -> None:
@@ -159,6 +167,8 @@ def test_a_screw_astern_pushes_the_stern_aside() -> None:
     np.testing.assert_array_equal(thrust(u, 8.0, **aside), thrust(u, 8.0))
     left = {"Y_astern": {"1": 0.03, "J": -0.02}, "N_astern": {"1": -0.4}}
     np.testing.assert_allclose(thrust(u, n, **left), forces * [1, -1, 1, -1, 1, -1])
+    lower = thrust(u, n, z=0.3, **aside) - forces
+    np.testing.assert_allclose(lower, [0, 0, 0, -0.3 * forces[1], 0.3 * forces[0], 0], atol=1e-12)
 
 
 def test_a_screw_astern_draws_water_past_the_rudder() -> None:
@@ -175,18 +185,25 @@ def test_a_screw_astern_draws_water_past_the_rudder() -> None:
     np.testing.assert_allclose(*near, atol=1e-3)
 
 
-def in_four_quadrants(u: float, n: float, **other: Any) -> tuple[float, np.ndarray]:
-    """Surge force and slipstream of KVLCC2's screw, whose polynomial is laid on the quadrants n > 0."""
+@cache
+def four_quadrants() -> ca.Function:
+    """(u, n) -> surge force and slipstream of KVLCC2's screw, whose polynomial is laid on the quadrants n > 0."""
     beta = np.linspace(-180, 180, 721)
     J = np.clip(0.7 * np.pi * np.tan(np.radians(beta)), -1.0, 1.5)
     K = 0.2931 - 0.2753 * J - 0.1385 * J**2
     ahead = np.cos(np.radians(beta)) ** 2 * 8 / np.pi * K / (0.7 * np.pi) ** 2
     C_T = np.where(np.abs(beta) < 90, ahead, -0.8 * ahead[::-1])
     C_T[0] = C_T[-1] = -0.1
-    given = {**WAKE, "x": -3.36, "D_p": 0.216, "beta_deg": list(ca.SX(beta).nz), "C_T": list(ca.SX(C_T).nz), **other}
-    nu_r = ca.SX(np.array([u, 0, 0, 0, 0, 0]))
-    force = float(ca.evalf(four_quadrant(nu_r, ca.SX(n), t_P=0.22, rho=RHO, **given))[0])
-    return force, np.array(ca.evalf(four_quadrant_wash(nu_r, ca.SX(n), **given))).ravel()
+    given = {**WAKE, "x": -3.36, "D_p": 0.216, "beta_deg": list(ca.SX(beta).nz), "C_T": list(ca.SX(C_T).nz)}
+    u, n = ca.SX.sym("u"), ca.SX.sym("n")
+    nu_r = ca.vertcat(u, ca.SX(5, 1))
+    force = four_quadrant(nu_r, n, t_P=0.22, rho=RHO, **given)[0]
+    return ca.Function("four_quadrants", [u, n], [force, four_quadrant_wash(nu_r, n, **given)])
+
+
+def in_four_quadrants(u: float, n: float) -> tuple[float, np.ndarray]:
+    force, flow = four_quadrants()(u, n)
+    return float(force), np.array(flow).ravel()
 
 
 @pytest.mark.parametrize(("u", "n"), [(1.179, 10.4), (0.0, 8.0), (-0.4, 9.0), (1.0, 5.0)])
@@ -222,8 +239,9 @@ def test_quadratic_thrust_by_hand() -> None:
     """T = T_nn n|n| - T_nu |n| u - T_uu u|u|; Y and N are shares of T."""
     u, n = 0.7, 20.0
     T = 3.6e-3 * 400 - 1.5e-4 * 20 * u - 0.2 * u**2
-    forces = quadratic_wrench(u, n, T_uu=0.2, t_P=0.1, Y_T=0.04, N_T=-0.3, y=0.2)
-    np.testing.assert_allclose(forces, [0.9 * T, 0.04 * T, 0, 0, 0, -0.3 * T - 0.2 * 0.9 * T], atol=1e-12)
+    forces = quadratic_wrench(u, n, T_uu=0.2, t_P=0.1, Y_T=0.04, N_T=-0.3, y=0.2, z=0.5)
+    X, Y = 0.9 * T, 0.04 * T
+    np.testing.assert_allclose(forces, [X, Y, 0, -0.5 * Y, 0.5 * X, -0.3 * T - 0.2 * X], atol=1e-12)
     astern = quadratic_wrench(u, -n, k_astern=1.4, dT_nu=3e-4)[0]
     assert astern == pytest.approx(-1.4 * 3.6e-3 * 400 - 4.5e-4 * 20 * u)
 
@@ -337,3 +355,30 @@ def test_a_ship_with_one_takes_pitch_as_an_order_and_her_rudder_its_wash() -> No
     np.testing.assert_allclose(both[1], both[0], rtol=2e-3, atol=1e-9)
     assert rates(ship, 10.4, 0.4, 0.0)[3] < rates(ship, 10.4, 0.721, 0.0)[3]
     assert 0 < rates(ship, 10.4, 0.4, 0.2)[5] < rates(ship, 10.4, 0.721, 0.2)[5]
+
+
+FLOW: dict[str, Any] = {**WAKE, "x": -3.36, "y": 0.4, "tau": 0.2, "C_P": 0.3}
+DRIVEN: dict[str, Any] = {"T_nn": 3.6e-3, "T_nu": 1.5e-4, "T_uu": 0.2, "k_astern": 1.4, "dT_nu": 3e-4, "k_driven": 0.3}
+CURVE: dict[str, Any] = {"beta_deg": [-180.0, -60.0, 20.0, 110.0, 180.0], "C_T": [-0.5, -0.7, 0.9, 0.4, -0.5]}
+POLYNOMIAL = {"K_T": SCREW["K_T"], "K_T_astern": ASTERN, "J_min": -0.4, "J_max": 0.8, "k_astern": 0.9, "k_drag": 0.15}
+
+
+@pytest.mark.parametrize(
+    ("force", "shaft", "numbers", "pitch"),
+    [
+        (propeller, propeller_thrust, {**FLOW, **POLYNOMIAL, "D_p": 0.216, "rho": RHO}, []),
+        (quadratic, quadratic_shaft_thrust, {"x": -3.36, "y": 0.4, **DRIVEN, "w_P0": 0.3}, []),
+        (four_quadrant, four_quadrant_shaft_thrust, {**FLOW, **CURVE, "D_p": 0.216, "rho": RHO}, []),
+        (controllable_pitch, controllable_thrust, {**FLOW, **VARIABLE, "k_astern": 0.7, "rho": RHO}, [-0.6]),
+    ],
+)
+def test_thrust_in_the_shaft_is_that_on_the_ship_before_the_deduction(
+    force: Any, shaft: Any, numbers: dict[str, Any], pitch: list[float]
+) -> None:
+    """X = (1 - t_P) T with every number given, ahead, astern and driven by the water, drifting and turning."""
+    taken = {name: value for name, value in numbers.items() if shaft is not quadratic_shaft_thrust or name not in "xy"}
+    for u, n in ((1.2, 9.0), (1.2, -9.0), (-0.8, 9.0), (-0.8, -9.0), (3.0, 2.0), (-3.0, -2.0)):
+        inputs = [ca.SX(np.array([u, 0.2, 0, 0, 0, 0.1])), ca.SX(n), *map(ca.SX, pitch)]
+        X, T = float(ca.evalf(force(*inputs, t_P=0.22, **numbers))[0]), float(ca.evalf(shaft(*inputs, **taken)))
+        assert pytest.approx(0.78 * T, rel=1e-12) == X
+        assert T != 0

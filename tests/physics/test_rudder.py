@@ -8,7 +8,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.rudder import rudder, rudder_coefficients, rudder_derivatives, rudder_polynomial
+from shipid.physics.rudder import (
+    coefficients_normal_force,
+    rudder,
+    rudder_coefficients,
+    rudder_derivatives,
+    rudder_polynomial,
+)
 
 # KVLCC2 at 7 m: Yasukawa and Yoshimura (2015), tables 1 and 3
 RUDDER: dict[str, Any] = {
@@ -42,8 +48,9 @@ def test_the_formulae_of_the_paper(v: float, r: float, delta: float) -> None:
     X, Y = -(1 - 0.387) * F_N * np.sin(delta), -(1 + 0.312) * F_N * np.cos(delta)
     N = -(-0.5 + 0.312 * -0.464) * L * F_N * np.cos(delta)
     u_P = u * (1 - w_P)
-    forces = wrench([u, v, 0, 0, 0, r], delta, [u_P, u_P * np.sqrt(1 + 8 * K_T / (np.pi * J**2)), D_P])
-    np.testing.assert_allclose(forces[[0, 1, 5]], [X, Y, N], rtol=2e-3, atol=1e-3)
+    flow = [u_P, u_P * np.sqrt(1 + 8 * K_T / (np.pi * J**2)), D_P]
+    forces = wrench([u, v, 0, 0, 0, r], delta, flow, y=0.4, z=0.2)
+    np.testing.assert_allclose(forces, [X, Y, 0, -0.2 * Y, 0.2 * X, N - 0.4 * X], rtol=2e-3, atol=1e-3)
 
 
 def test_helm_to_starboard_turns_to_starboard_and_costs_speed() -> None:
@@ -131,4 +138,7 @@ def test_rudder_coefficients_by_hand() -> None:
     forces = np.array(ca.evalf(rudder_coefficients(*given, kappa=0.5, L_pp=L, rho=1000.0, **values))).ravel()
     force = 500 * L**2 * c**2
     Y, N = force * (-0.02 * delta - 0.001 * delta), force * L * 0.03 * abs(beta) * beta * delta
-    np.testing.assert_allclose(forces, [force * -0.01 * delta**2, Y, 0, 0, 0, N], rtol=1e-9)
+    X = force * -0.01 * delta**2
+    np.testing.assert_allclose(forces, [X, Y, 0, 0, 0, N], rtol=1e-9)
+    shown = ca.evalf(coefficients_normal_force(*given, kappa=0.5, L_pp=L, rho=1000.0, **values))
+    assert float(shown) == pytest.approx(-X * np.sin(delta) - Y * np.cos(delta))  # across the blade

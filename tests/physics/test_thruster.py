@@ -98,6 +98,18 @@ def test_continuations_join_the_polynomial(entry: str, values: tuple[float, floa
         np.testing.assert_allclose(wrenches[0], wrenches[1], atol=0.2)
 
 
+@pytest.mark.parametrize("J", [0.5, -0.2])
+def test_beyond_the_side_limit_the_drag_grows_by_its_slope(J: float) -> None:
+    """d(K_y)/d(J_y) = -(k_side + k_sideJ J), without its part in J for a unit that goes astern; the same to port."""
+    n, unit = 2.0, 2.0 * 1.9
+    for sense in (1, -1):
+        flows = [[J * unit, sense * J_y * unit, 0, 0, 0, 0] for J_y in (0.7, 0.9)]
+        near, far = (numbers(azimuth(k_side=0.3, k_sideJ=0.2)(flow, n, 0.0)) for flow in flows)
+        slope = (far[1] - near[1]) / (0.2 * 1.0 * 1025 * n**2 * 1.9**4)
+        assert slope == pytest.approx(-sense * (0.3 + 0.2 * max(J, 0.0)))
+        assert far[0] == pytest.approx(near[0])
+
+
 def test_a_stopped_unit_drags() -> None:
     """At n = 0 the over-running part remains: about k_over2 rho D_p^2 u^2."""
     drag = numbers(azimuth()(np.array([5.0, 0, 0, 0, 0, 0]), 0.0, 0.0))[0]

@@ -6,7 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.waves import drift, first_order, multiples
+from shipid.physics.frames import current
+from shipid.physics.waves import drift, first_order, multiples, passage_rates
 
 COUNT = 7  # harmonics 0 ... 6
 OMEGA, CHI, EPSILON = 1.2, 2.3, 0.8
@@ -43,6 +44,16 @@ def test_multiples_are_cosines_and_sines() -> None:
         cosines, sines = multiples(ca.cos(ca.SX(0.7)), ca.sin(ca.SX(0.7)), count)
         np.testing.assert_allclose([float(c) for c in cosines], np.cos(0.7 * np.arange(count + 1)), atol=1e-12)
         np.testing.assert_allclose([float(s) for s in sines], np.sin(0.7 * np.arange(count + 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_water_goes_where_the_current_sets(seed: int) -> None:
+    """Whatever the heading and the motion of the ship."""
+    rng = np.random.default_rng(seed)
+    eta, nu = (ca.SX(rng.uniform(-0.5, 3.0, 6) * [1, 1, 1, 0.1, 0.1, 1]) for _ in range(2))
+    nu_c, _ = current(eta, nu, ca.SX(0.8), ca.SX(2.2))
+    rates = np.array(ca.evalf(passage_rates(eta, nu, nu - nu_c))).ravel()
+    np.testing.assert_allclose(rates, [1, 0.8 * np.cos(2.2), 0.8 * np.sin(2.2)])
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -16,6 +16,7 @@ from shipid.simulation.manoeuvre import (
     ReverseSpiral,
     Spiral,
     StationKeeping,
+    Steps,
     TurningCircle,
     Zigzag,
 )
@@ -54,6 +55,16 @@ def test_each_run_is_as_long_as_its_manoeuvre() -> None:
     assert ends.to_list() == pytest.approx([20.0, 7.0, 8.0])
     for _, run in frame.groupby("run"):
         np.testing.assert_allclose(np.diff(run["t"]), 0.5)
+
+
+def test_lagged_actuators_begin_at_their_first_order() -> None:
+    orders = {"n_rpm": (60.0, 180.0), "alpha_deg": (-30.0, 30.0)}
+    chosen = [Steps(orders=orders, hold=(2.0, 4.0), seed=seed, duration=12.0, start_speed=3.0) for seed in range(3)]
+    frame = perform(LAGGED, chosen, step=0.1)
+    first = frame[frame["t"] == 0]
+    for name in ("port.n", "port.alpha"):
+        assert (frame.groupby("run")[name].nunique() > 2).all()
+        np.testing.assert_allclose(first[f"actual.{name}"], first[name])
 
 
 def test_interval_only_thins_the_log() -> None:

@@ -176,6 +176,15 @@ def test_one_direction_is_one_drift_and_many_are_many() -> None:
     assert short.shape[:2] == (3, 60)
 
 
+def test_waves_are_longer_where_gravity_is_less() -> None:
+    """k = omega^2 / g with the gravity of the vessel's document."""
+    drawn = draw()
+    for g in (9.81, 9.78, 3.7):
+        ship = SHIP.with_values({"constants.g": g})
+        head = wave_loads(ship, drawn)["waves.first_order"][..., :2]
+        np.testing.assert_allclose(head[..., 1], head[..., 0] ** 2 / g)
+
+
 def test_loads_scale_with_height_and_drift_with_its_square() -> None:
     low, high = (wave_loads(SHIP, draw(Sea(H_s=H_s, T_p=5.0))) for H_s in (1.0, 2.0))
     np.testing.assert_allclose(high["waves.first_order"][..., 5:], 2 * low["waves.first_order"][..., 5:], rtol=1e-9)

@@ -106,14 +106,25 @@ def test_quantisation_comes_last() -> None:
     assert len(np.unique(rounded)) > 5
 
 
-def test_headings_are_interpolated_across_the_wrap() -> None:
-    continuous = record(("M001",))
-    wrapped = continuous.assign(psi=(continuous["psi"] + np.pi) % (2 * np.pi) - np.pi)
-    assert (np.diff(wrapped["psi"]) < -6).any()
-    sensor = {"psi": Sensor(latency=0.42, interval=0.33)}
-    np.testing.assert_allclose(
-        measure(wrapped, sensor, 0.1, seed=1)["psi"], measure(continuous, sensor, 0.1, seed=1)["psi"], atol=1e-9
-    )
+@pytest.mark.parametrize("name", ["psi", "beta_w"])
+def test_angles_are_interpolated_across_the_wrap(name: str) -> None:
+    continuous = record(("M001",)).assign(beta_w=lambda rows: 1.0 - 0.2 * rows["t"])
+    wrapped = continuous.assign(**{name: (continuous[name] + np.pi) % (2 * np.pi) - np.pi})
+    assert (np.abs(np.diff(wrapped[name])) > 6).any()
+    sensor = {name: Sensor(latency=0.42, interval=0.33)}
+    away = measure(wrapped, sensor, 0.1, seed=1)[name] - measure(continuous, sensor, 0.1, seed=1)[name]
+    np.testing.assert_allclose(away, away[0], atol=1e-9)
+    assert away[0] % (2 * np.pi) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(("step", "rows"), [(0.3, 7), (0.05, 3), (0.1, 10)])
+@pytest.mark.parametrize("begin", [0.0, 1.7e9 + 0.7])
+def test_no_sample_is_a_row_late(step: float, rows: int, begin: float) -> None:
+    """Whatever the clock and its rounding: 2.1 / 0.3 is more than 7."""
+    fine = record(("M001",), rows=201, step=step)
+    sensor = {"north": Sensor(interval=round(rows * step, 9))}
+    log = measure(fine.assign(t=fine["t"] + begin), sensor, step, seed=1)["north"]
+    np.testing.assert_allclose(log, 3.0 * step * rows * (np.arange(201) // rows), atol=1e-4)
 
 
 def test_draws_depend_on_seed_run_and_column_alone() -> None:
@@ -127,6 +138,8 @@ def test_draws_depend_on_seed_run_and_column_alone() -> None:
     first, second = (both.loc[both["run"] == run, "v"].to_numpy() for run in ("M001", "M002"))
     assert not np.isin(first, second).any()
     assert not np.isin(first, measure(record(), {"v": noisy}, 1.0, seed=5)["v"]).any()
+    noise, bias = (measure(record(), {"v": one}, 1.0, seed=4)["v"] for one in (Sensor(noise=0.1), Sensor(bias=0.1)))
+    assert not np.isin(noise, bias).any()
     assert (
         abs(np.corrcoef(both["u"] - record()["u"][np.tile(np.arange(ROWS) % 20 == 0, 2)].to_numpy(), both["v"])[0, 1])
         < 0.3

@@ -13,7 +13,7 @@ from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError
 from shipid.simulation.sea import Sea, draw_components, wave_loads
-from shipid.simulation.truth import Truth, check_truth, simulate
+from shipid.simulation.truth import Truth, _weather, check_truth, simulate
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import LAG, PATCHED
@@ -72,6 +72,31 @@ def test_draws_fill_their_ranges() -> None:
     drawn = rows[list(ranges)].to_numpy()
     off_diagonal = np.corrcoef(drawn.T) - np.eye(len(ranges))
     assert np.abs(off_diagonal).max() < 5 / np.sqrt(count)  # each quantity alone
+
+
+def test_every_quantity_of_the_weather_is_drawn_alone() -> None:
+    """Wind, current and sea: each speed and each direction fills its range, and none follows another."""
+    count, speeds = 400, {"wind_speed": (2.0, 9.0), "current_speed": (0.5, 1.5)}
+    felt, chi = _weather(truth(manoeuvres=count, **speeds), SIX.with_values({"current.kind": "uniform"}))
+    drawn = {**felt, "chi": chi}
+    limits = {"V_w": (2.0, 9.0), "V_c": (0.5, 1.5), **dict.fromkeys(("beta_w", "beta_c", "chi"), (0.0, 2 * np.pi))}
+    assert set(drawn) == set(limits)
+    for name, (low, high) in limits.items():
+        assert low <= drawn[name].min() < low + 0.03 * (high - low)
+        assert high - 0.03 * (high - low) < drawn[name].max() <= high
+    off_diagonal = np.corrcoef(list(drawn.values())) - np.eye(len(drawn))
+    assert np.abs(off_diagonal).max() < 5 / np.sqrt(count)
+
+
+def test_the_method_is_that_of_the_block() -> None:
+    """Euler's error falls with the step; RK4 is its limit."""
+    exact, coarse, fine = (
+        simulate(truth(method=method, step=step), SHIP)["psi"]
+        for method, step in (("rk4", 0.1), ("euler", 0.1), ("euler", 0.05))
+    )
+    errors = [np.abs(one - exact).max() for one in (coarse, fine)]
+    assert errors[1] == pytest.approx(errors[0] / 2, rel=0.15)
+    assert errors[1] > 1e-6
 
 
 def test_orders_and_wind_hold_and_are_equal_on_both_sides() -> None:
@@ -193,6 +218,11 @@ def test_sensors_disturb_what_they_measure_and_nothing_else() -> None:
     sensors = {"u": {"noise": 0.1}, "psi": {"bias": 0.02}, "north": {"latency": 0.5}}
     measured = simulate(truth(duration=10.0, sensors=sensors), SHIP)
     assert 0.05 < (measured["u"] - exact["u"]).std() < 0.2
+    again = (
+        simulate(truth(duration=10.0, sensors=sensors, seed=6), SHIP)["u"]
+        - simulate(truth(duration=10.0, seed=6), SHIP)["u"]
+    )
+    assert abs(np.corrcoef(again, measured["u"] - exact["u"])[0, 1]) < 0.6  # noise of another seed
     per_run = (measured["psi"] - exact["psi"]).groupby(measured["run"])
     assert per_run.std().max() < 1e-9 < per_run.mean().abs().max()
     fine = simulate(truth(duration=10.0, interval=0.5), SHIP)

@@ -207,6 +207,16 @@ def test_without_coriolis_the_mass_does_not_turn() -> None:
     np.testing.assert_allclose(M @ difference, [m * v * r, -m * u * r, 0], atol=1e-6 * m)
 
 
+@pytest.mark.parametrize("name", ["gunnerus-28.9-6dof", "gunnerus-33.9-6dof"])
+def test_heave_of_a_pitching_and_rolling_ship_does_not_drive_her(name: str) -> None:
+    """Buoyancy stays vertical: w q gives no surge and w p no sway, but for drag, where a free body has q w and p w."""
+    ship, w, angular = load_vessel(name), 0.5, 0.1
+    heaving = rates(ship, w=w)
+    for driven, turned in (("u", "q"), ("v", "p")):
+        both, turning = (rates(ship, w=heave, **{turned: angular})[driven] for heave in (w, 0.0))
+        assert abs(both - turning - heaving[driven]) < 0.2 * w * angular
+
+
 def test_a_body_that_moves_steadily_has_no_added_mass_in_heave() -> None:
     """A body that turns about all axes and keeps its velocity in space: nu_dot = -omega x v in its axes."""
     rng = np.random.default_rng(0)
