@@ -167,6 +167,9 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
         for repair in others
     ]
     rows, more = apply_repairs(rows, others, off)
+    if rows.empty:
+        kinds = ", ".join(record["kind"] for record in more if record["note"] not in ("switched off", "no row is left"))
+        raise DataError(f"no row is left after {kinds}", file=file, path="repair")
     rows, estimated = _estimated(rows, mapping, file) if mapping.estimate is not None else (rows, [])
     if "beta_w" in mapping.columns and mapping.columns["beta_w"].relative:
         rows = _true_wind(rows)

@@ -259,8 +259,8 @@ def apply_repairs(
     """Apply repairs in order and flag what they touch; a record {kind, column, count, note} for each, also if off."""
     off, records = set(without), []
     for repair in repairs:
-        count, note = 0, "switched off"
-        if repair.enabled and repair.kind not in off:
+        count, note = 0, "switched off" if len(rows) else "no row is left"
+        if repair.enabled and repair.kind not in off and len(rows):
             outcome = REPAIRS[repair.kind][1](rows, repair)
             bit = 1 << FLAGS.index(repair.kind)
             flags = outcome.rows["flags"].to_numpy() | np.where(outcome.touched, bit, 0)

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import BREAK, Dataset, flag_bit, pieces
+from shipid.errors import DataError
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.repairs import FLAGS, Latency, apply_repairs
 from tests.logs.conftest import as_log, turning
@@ -170,3 +171,17 @@ def test_a_late_signal_of_a_broken_log_is_mended_stretch_by_stretch(signal: str,
     values = mended.drop(columns="flags")
     pd.testing.assert_frame_equal(values, pd.concat(alone, ignore_index=True).drop(columns="flags"))
     assert np.flatnonzero(mended["flags"].to_numpy() & bit).tolist() == [len(alone[0])]
+
+
+@pytest.mark.parametrize("order", ["break first", "break last"])
+def test_a_log_without_a_row_left_names_the_repairs(
+    order: str, plain_mapping: Callable[..., Path], tmp_path: Path
+) -> None:
+    """A break that holds the whole log, with a latency before or after it, which needs rows."""
+    gone = '\n[[repair]]\nkind = "break"\nintervals = [[-1e6, 1e6]]\nreason = "a test"\n'
+    late = '\n[[repair]]\nkind = "latency"\nsignal = "velocity"\nseconds = 1.5\nreason = "a test"\n'
+    mapping = read_mapping(plain_mapping(gone + late if order == "break first" else late + gone))
+    log = as_log(MOTION, tmp_path / "log.csv")
+    with pytest.raises(DataError, match=r"log\.csv.*no row is left after (latency, )?break"):
+        import_log(mapping, log)
+    assert len(import_log(mapping, log, without=("break",)).frame) > 400

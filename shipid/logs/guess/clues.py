@@ -150,6 +150,7 @@ class State:
 
     t : time [s], (N,). clock_unit : unit of the log's clock. columns : name -> values as logged, (N,).
     chosen : windows over which changes are compared. taken : columns of the log that already have a meaning.
+    joined : whether t runs over several files, so that it is the clock of none of them.
     position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
@@ -158,6 +159,7 @@ class State:
     clock_unit: str
     columns: dict[str, Array]
     chosen: Windows
+    joined: bool = False
     taken: set[str] = field(default_factory=set)
     suggestions: list[Suggestion] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)

@@ -85,7 +85,7 @@ def guess(
     source = read_source(Path(path), names)
     sniffed = source.sniffed
     columns = evidence.filled(sniffed.t, sniffed.columns.items())
-    state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t))
+    state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), len(source.files) > 1)
     numbering = tuple(
         name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])
     )

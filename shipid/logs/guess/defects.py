@@ -135,7 +135,11 @@ def _jumps(state: State, path: Complex) -> None:
     stay = [place for place in places if place[2] > 5.0]
     spikes = [place for place in places if place[2] <= 5.0]
     repair: dict[str, Any]
-    if stay:
+    if stay and state.joined:
+        count = f"at {len(stay)} place{'s' * (len(stay) > 1)}"
+        sentence = f"the position jumps {count} of the files and does not come back: `data check` shows where"
+        state.find("position jumps", (), 0.9, sentence)
+    elif stay:
         words = ", ".join(f"t = {start / unit:.6g} to {end / unit:.6g} ({far:.0f} m)" for start, end, far in stay[:6])
         repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
         state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)

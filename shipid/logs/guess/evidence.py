@@ -217,7 +217,10 @@ def _boxcar(values: Array, width: int) -> Array:
 
 
 def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float, float, float]]:
-    """Return where a position leaves its integrated velocity in one step: (start [s], end [s], lasting error [m])."""
+    """Return where a position leaves its integrated velocity in one step: (start [s], end [s], lasting error [m]).
+
+    Each lies between two holes of the clock: what a ship did in a hole, or between two files, is no jump.
+    """
     usual = float(np.median(np.diff(t)))
     reach = max(1, round(2.0 / usual))
     if len(t) < 20 * reach:
@@ -233,9 +236,10 @@ def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float,
     groups = np.split(edges, np.flatnonzero(np.diff(edges) > 2 * reach) + 1)
     leaps = []
     for group in groups:
-        start, end = max(0, group[0] - 1), min(len(t) - 1, group[-1] + reach + 1)
+        first, last = np.searchsorted(holes, [holes[group[0]], holes[group[-1]] + 1])  # rows of its stretch
+        start, end = max(first, group[0] - 1), min(last - 1, group[-1] + reach + 1)
         around = 3 * reach
-        before, after = drift[max(0, start - around) : start + 1], drift[end : end + around + 1]
+        before, after = drift[max(first, start - around) : start + 1], drift[end : min(last, end + around + 1)]
         stays = abs(_middle(after) - _middle(before))
         leaps.append((float(t[start]), float(t[end]), float(stays)))
     return leaps

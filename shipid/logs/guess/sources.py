@@ -166,8 +166,10 @@ def _alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) 
 
 
 def _joined(logs: list[Sniffed]) -> Sniffed:
-    """Return the rows of several files one after another, `PAUSE` s apart."""
+    """Return the rows of several files one after another, `PAUSE` s apart; those of one file by its clock."""
     first = logs[0]
+    if len(logs) == 1:
+        return first
     chosen = logs if len(logs) <= MOST else [logs[i] for i in np.linspace(0, len(logs) - 1, MOST).astype(int)]
     names = [name for name in first.columns if all(name in log.columns for log in chosen)]
     t, start = [], 0.0

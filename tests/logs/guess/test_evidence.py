@@ -115,6 +115,21 @@ def test_a_jump_stays_and_a_spike_does_not() -> None:
     assert evidence.jumps(T, PATH, PATH) == []
 
 
+@pytest.mark.parametrize("late", [0.0, 1.0, 2.0, 4.0, 9.0])
+def test_a_jump_ends_where_a_hole_of_the_clock_begins(late: float) -> None:
+    """What lies beyond a hole is another run, however near to it the position jumps."""
+    half = len(T) // 2
+    clock = T + np.where(np.arange(len(T)) >= half, 1e4, 0.0)
+    at = T[half - 1] - late
+    jumped = PATH + np.where(at <= T, 40.0, 0.0) + np.where(np.arange(len(T)) >= half, 1e5, 0.0)
+    found = evidence.jumps(clock, jumped, PATH)
+    assert len(found) == 1
+    start, end, stays = found[0]
+    assert start < at <= end <= clock[half - 1]
+    assert stays == pytest.approx(40.0 if late >= 1.0 else stays)
+    assert stays < 50.0
+
+
 def test_straight_parts_are_those_without_turning() -> None:
     r = np.where(T < 300.0, 0.0, 0.02)
     rows = evidence.straight(r, T)

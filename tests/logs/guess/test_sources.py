@@ -102,3 +102,19 @@ def test_names_of_runs_may_be_words(tmp_path: Path) -> None:
     assert found.source.parts == {"from": "run"}
     dataset = import_log(read_mapping(write_new(draft_mapping(found), tmp_path / "draft.toml")), file)
     assert dataset.runs == ["all ZZ a", "all TC"]
+
+
+def test_a_jump_within_one_of_many_files_makes_no_repair_by_their_joined_clock(tmp_path: Path) -> None:
+    """Times of several files in a row are the clock of none: an interval would remove sound rows of another file."""
+    folder_of(tmp_path / "logs", "a.csv", "b.csv", "c.csv")
+    jumped = pd.read_csv(tmp_path / "logs" / "b.csv")
+    jumped.loc[500:, "N"] += 300.0
+    for count in (3, 1):
+        jumped.to_csv(tmp_path / "logs" / "b.csv", index=False)
+        for name in "ac" if count == 1 else "":
+            (tmp_path / "logs" / f"{name}.csv").unlink()
+        found = [one for one in guess(tmp_path / "logs").findings if one.kind == "position jumps"]
+        assert len(found) == 1
+        assert (found[0].repair is None) == (count > 1)
+    begin, end = found[0].repair["intervals"][0]
+    assert begin <= jumped["time"].iloc[500] <= end, "by the clock of the file, which does not begin at 0"
