@@ -121,7 +121,8 @@ def _draft(
     source = guessed.source
     if source.pattern is not None:
         count = f"{source.held} runs" if source.parts else "as many runs"
-        sentence = f"{len(source.files)} files {source.pattern!r} are one source of {count}"
+        files = f"{len(source.files)} file{'s' * (len(source.files) > 1)}"
+        sentence = f"{files} {source.pattern!r}: one source of {count}"
         answer.say(sentence, files=len(source.files), pattern=source.pattern)
     left = [{"left out": name, "because": why} for name, why in source.skipped.items()]
     answer.rows("left_out", left, table(["left out", "because"], source.skipped.items()) if left else None)

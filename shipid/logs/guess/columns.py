@@ -118,7 +118,7 @@ def _runs(state: State, source: Source) -> None:
     said = [f"column {column!r} says them"] if column else []
     said += [f"the clock pauses for more than {pause:g} s between them"] if pause else []
     state.taken.update({column} if column else ())
-    sentence = f"{source.held} runs in {len(source.files)} files: {' and '.join(said)}"
+    sentence = f"{source.held} runs in {len(source.files)} file{'s' * (len(source.files) > 1)}: {' and '.join(said)}"
     state.find("several runs in a file", (column,) if column else (), 0.9, sentence)
 
 

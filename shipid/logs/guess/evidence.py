@@ -233,10 +233,10 @@ def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float,
     if not wild.any() or wild.mean() > 0.05:
         return []
     edges = np.flatnonzero(wild)
-    groups = np.split(edges, np.flatnonzero(np.diff(edges) > 2 * reach) + 1)
+    groups = np.split(edges, np.flatnonzero((np.diff(edges) > 2 * reach) | (np.diff(holes[edges]) > 0)) + 1)
     leaps = []
     for group in groups:
-        first, last = np.searchsorted(holes, [holes[group[0]], holes[group[-1]] + 1])  # rows of its stretch
+        first, last = np.searchsorted(holes, holes[group[0]] + np.array([0, 1]))  # rows of its stretch
         start, end = max(first, group[0] - 1), min(last - 1, group[-1] + reach + 1)
         around = 3 * reach
         before, after = drift[max(first, start - around) : start + 1], drift[end : min(last, end + around + 1)]

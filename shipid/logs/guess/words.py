@@ -292,7 +292,7 @@ def parts_of(name: str) -> tuple[str, ...]:
     words = [
         part.lower()
         for word in whole
-        for part in ([word] if word.lower() in _vocabulary() | UNIT_PARTS else _EDGE.split(word))
+        for part in ([word] if word.lower() in _vocabulary() | UNIT_PARTS else _EDGE.split(word.replace("StB", "Stb")))
     ]
     return tuple(SYNONYMS.get(part, part) for word in words for part in _cut(word))
 

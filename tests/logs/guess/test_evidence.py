@@ -122,8 +122,11 @@ def test_a_jump_ends_where_a_hole_of_the_clock_begins(late: float) -> None:
     clock = T + np.where(np.arange(len(T)) >= half, 1e4, 0.0)
     at = T[half - 1] - late
     jumped = PATH + np.where(at <= T, 40.0, 0.0) + np.where(np.arange(len(T)) >= half, 1e5, 0.0)
+    jumped = jumped + np.where(T[half] + late < T, 40.0j, 0.0)  # and soon after the hole
     found = evidence.jumps(clock, jumped, PATH)
-    assert len(found) == 1
+    assert len(found) == 2
+    assert found[1][0] >= clock[half]
+    assert found[1][2] < 50.0
     start, end, stays = found[0]
     assert start < at <= end <= clock[half - 1]
     assert stays == pytest.approx(40.0 if late >= 1.0 else stays)

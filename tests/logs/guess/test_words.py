@@ -99,6 +99,14 @@ def test_sides(name: str, side: str | None) -> None:
     assert side_of(name) == side
 
 
+@pytest.mark.parametrize("name", ["Ruderpropeller_Winkel_{}_deg", "rpm{}", "Ruder{}", "Drehzahl {} [1/min]", "n_{}"])
+@pytest.mark.parametrize(("port", "starboard"), [("BB", "StB"), ("BB", "STB"), ("Bb", "Stb"), ("PS", "SB")])
+def test_both_sides_of_a_pair_fit_the_same(name: str, port: str, starboard: str) -> None:
+    names = name.format(port), name.format(starboard)
+    assert [side_of(one) for one in names] == ["port", "starboard"]
+    assert fits(names[0]) == fits(names[1])
+
+
 def test_every_phrase_fits_its_meaning() -> None:
     for meaning, phrases in {**PHRASES, "": OTHERS}.items():
         for phrase in phrases.split(", "):
