@@ -130,6 +130,7 @@ def cells(content: ReportContent) -> Table:
 
 def _with_trials(cells: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
     """Cells with how many trials they had, and how many of them were stopped or diverged."""
+    cells = cells.drop(columns="trials", errors="ignore")  # of a stored cell: the list of them
     if trials.empty:
         return cells
     states = pd.crosstab(trials.cell, trials.state).reindex(columns=["complete", "stopped", "diverged"], fill_value=0)

@@ -21,6 +21,7 @@ from shipid.study.verdict import interval, manoeuvres, metres, named, runs, show
 from shipid.study.worth import FEWEST_MODELS, Estimate, break_even, runs_without_physics
 
 MANY = 3  # methods that learn: their comparison is what the study asks
+SHOWN = 5  # models that a sentence lists
 
 
 def by_model(results: Results) -> pd.DataFrame:
@@ -46,6 +47,8 @@ def by_model(results: Results) -> pd.DataFrame:
 def best_model(results: Results) -> str | None:
     """Name of the physics model with the lowest validation loss at the largest amount of data; None without one.
 
+    Where the judged method learns nothing there is no validation loss, and so no best model.
+
     Models that were identified are left out where there are others: they were fitted to their validation runs, too, so
     their loss says too little. So are families that a study sets aside.
     """
@@ -54,7 +57,7 @@ def best_model(results: Results) -> str | None:
     top = table[(table["N_D"] == table["N_D"].max()) & (table["family"] != NO_MODEL)]
     fair = top[~top["family"].isin(results.plan.identified)]
     chosen = top if fair.empty else fair
-    return None if chosen.empty else str(chosen.iloc[int(chosen["loss"].argmin())]["model"])
+    return None if chosen["loss"].isna().all() else str(chosen.iloc[int(chosen["loss"].argmin())]["model"])
 
 
 @dataclass(frozen=True)
@@ -138,6 +141,8 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     sentences = [(f"{'; '.join(caveats)}.", "cells")] if caveats else []
     largest = int(rows["N_D"].max()) if len(rows) else 0
     best = best_model(results)
+    if best is None and len(rows) and not results.plan.learning:
+        return [*sentences, (_nothing_learns(results, rows[rows["N_D"] == largest]), "cells")]
     if best is None:
         where = f" at {runs(largest)}" if largest else ""
         return [*sentences, (f"No cell with physics has a result{where}, so there is no conclusion yet.", "cells")]
@@ -172,6 +177,15 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     nominal = every_model[every_model["family"] == claims.nominal] if claims else every_model[:0]
     sentences += [(text, "gain") for text in _nominal(nominal, largest)]
     return [*sentences, *((text, "cells") for text in _how_to_read(case))]
+
+
+def _nothing_learns(results: Results, rows: pd.DataFrame) -> str:
+    """What physics alone reaches, where no method of the study learns from data."""
+    ahead = f"{results.test.horizon * results.test.step:g} s ahead"
+    errors = sorted(zip(rows["H"], rows["model"], strict=True))[:SHOWN]
+    shown = ", ".join(f"{model} {metres(H)}" for H, model in errors)
+    least = f" (the least of {len(rows)})" if len(rows) > SHOWN else ""
+    return f"No method of the study learns from data. Mean errors of physics alone, {ahead}{least}: {shown}."
 
 
 def _has_map(table: pd.DataFrame) -> bool:

@@ -13,7 +13,8 @@ import pytest
 from shipid.files import read_json
 from shipid.study import contents, seals
 from shipid.study.contents import report_content, share_pages, write_pages
-from shipid.study.results import read_results
+from shipid.study.plan import build_plan
+from shipid.study.results import read_cells, read_results
 from tests.study.tiny import events_here, run_here, tiny_plan, without_figures
 
 
@@ -87,3 +88,18 @@ def test_a_report_before_the_last_note_of_a_run_leaves_the_final_one_to_the_run(
             with without_figures():
                 write_pages(folder)
     assert "wall_seconds" in read_json(folder / "provenance.json")
+
+
+def test_a_study_of_physics_alone_has_a_page_and_says_so(tmp_path: Path) -> None:
+    """No method learns: there are no trials, no validation and no best model, and the errors are those of physics."""
+    document = tiny_plan(tmp_path).document | {"method": [{"name": "alone", "kind": "alone"}]}
+    folder = tmp_path / "run"
+    run_here(build_plan(document, tmp_path / "tiny.toml"), folder)
+    write_pages(folder)
+    cells = read_cells(folder)
+    assert (cells["H"] == cells["A"]).all()
+    answer = (folder / "answer.txt").read_text()
+    assert answer.startswith("No method of the study learns from data. Mean errors of physics alone, ")
+    assert f"{cells['H'].min():.2f} m" in answer
+    assert "best in validation" not in answer
+    assert (folder / "report.html").stat().st_size > 1e5
