@@ -156,7 +156,7 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
     rows, first, read, begins = _columns(mapping, file, progress)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
     others = [repair for repair in mapping.repair if not isinstance(repair, WrapInterpolation)]
-    rows, records = apply_repairs(rows, wrapping, off)
+    rows, records = apply_repairs(rows, wrapping, off, file)
     rows = _unwrapped(rows, mapping.columns)
     rows, origin = _projected(rows, mapping) if "latitude" in rows else (rows, None)
     rows, gaps = _close_gaps(rows, mapping.clock.max_gap, file)
@@ -166,10 +166,7 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
         repair.model_copy(update={"turn": fixed}) if isinstance(repair, Latency) and repair.turn is None else repair
         for repair in others
     ]
-    rows, more = apply_repairs(rows, others, off)
-    if rows.empty:
-        kinds = ", ".join(record["kind"] for record in more if record["note"] not in ("switched off", "no row is left"))
-        raise DataError(f"no row is left after {kinds}", file=file, path="repair")
+    rows, more = apply_repairs(rows, others, off, file)
     rows, estimated = _estimated(rows, mapping, file) if mapping.estimate is not None else (rows, [])
     if "beta_w" in mapping.columns and mapping.columns["beta_w"].relative:
         rows = _true_wind(rows)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from shipid.data.dataset import BREAK
+from shipid.errors import DataError
 
 Mask = NDArray[np.bool_]
 Interval = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
@@ -254,14 +256,20 @@ FLAGS = ("interpolated", *REPAIRS)
 
 
 def apply_repairs(
-    rows: pd.DataFrame, repairs: Iterable[Repair], without: Iterable[str] = ()
+    rows: pd.DataFrame, repairs: Iterable[Repair], without: Iterable[str] = (), file: Path | None = None
 ) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
-    """Apply repairs in order and flag what they touch; a record {kind, column, count, note} for each, also if off."""
+    """Apply repairs in order and flag what they touch; a record {kind, column, count, note} for each, also if off.
+
+    Raises DataError, with the file, for a repair that leaves no row.
+    """
     off, records = set(without), []
     for repair in repairs:
-        count, note = 0, "switched off" if len(rows) else "no row is left"
-        if repair.enabled and repair.kind not in off and len(rows):
+        count, note = 0, "switched off"
+        if repair.enabled and repair.kind not in off:
             outcome = REPAIRS[repair.kind][1](rows, repair)
+            if outcome.rows.empty:
+                message = f"no row is left ({outcome.note}): change it, or leave it out with --without {repair.kind}"
+                raise DataError(message, file=file, path=f"repair.{repair.kind}")
             bit = 1 << FLAGS.index(repair.kind)
             flags = outcome.rows["flags"].to_numpy() | np.where(outcome.touched, bit, 0)
             rows, count, note = outcome.rows.assign(flags=flags), outcome.count, outcome.note

@@ -173,15 +173,13 @@ def test_a_late_signal_of_a_broken_log_is_mended_stretch_by_stretch(signal: str,
     assert np.flatnonzero(mended["flags"].to_numpy() & bit).tolist() == [len(alone[0])]
 
 
-@pytest.mark.parametrize("order", ["break first", "break last"])
-def test_a_log_without_a_row_left_names_the_repairs(
-    order: str, plain_mapping: Callable[..., Path], tmp_path: Path
-) -> None:
-    """A break that holds the whole log, with a latency before or after it, which needs rows."""
+@pytest.mark.parametrize("first", [True, False])
+def test_a_repair_that_leaves_no_row_is_named(first: bool, plain_mapping: Callable[..., Path], tmp_path: Path) -> None:
+    """A break that holds the whole log, with a latency, which needs rows, after or before it."""
     gone = '\n[[repair]]\nkind = "break"\nintervals = [[-1e6, 1e6]]\nreason = "a test"\n'
     late = '\n[[repair]]\nkind = "latency"\nsignal = "velocity"\nseconds = 1.5\nreason = "a test"\n'
-    mapping = read_mapping(plain_mapping(gone + late if order == "break first" else late + gone))
+    mapping = read_mapping(plain_mapping(gone + late if first else late + gone))
     log = as_log(MOTION, tmp_path / "log.csv")
-    with pytest.raises(DataError, match=r"log\.csv.*no row is left after (latency, )?break"):
+    with pytest.raises(DataError, match=r"log\.csv: repair\.break: no row is left .*--without break"):
         import_log(mapping, log)
     assert len(import_log(mapping, log, without=("break",)).frame) > 400
