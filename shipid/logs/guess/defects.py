@@ -145,8 +145,9 @@ def _jumps(state: State, path: Complex) -> None:
         state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
     if spikes:
         words = ", ".join(f"{(start + end) / 2 / unit:.6g}" for start, end, _ in spikes[:6])
+        words = f"at {len(spikes)} place{'s' * (len(spikes) > 1)} of the files" if state.joined else f"near t = {words}"
         repair = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
-        state.find("position spikes", (), 0.8, f"the position leaves and comes back near t = {words}", repair)
+        state.find("position spikes", (), 0.8, f"the position leaves and comes back {words}", repair)
 
 
 def _heading_offset(state: State) -> None:

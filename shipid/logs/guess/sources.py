@@ -65,9 +65,9 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> Source:
                 skipped[file.relative_to(folder).as_posix()] = error.message
         if sniffed:
             break
-    for other in patterns[patterns.index(pattern) + 1 :] if sniffed else ():
-        for file in sorted(folder.glob(other)):
-            skipped[file.relative_to(folder).as_posix()] = f"the logs are files {pattern!r}"
+    others = patterns[patterns.index(pattern) + 1 :] if sniffed else []
+    for file in sorted(file for other in others for file in folder.glob(other) if file.is_file()):
+        skipped[file.relative_to(folder).as_posix()] = f"the logs are files {pattern!r}"
     if not sniffed and not skipped:
         raise DataError(f"cannot be read: no file {pattern!r} with a log in this folder", file=folder)
     if not sniffed:
