@@ -141,7 +141,8 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     sentences = [(f"{'; '.join(caveats)}.", "cells")] if caveats else []
     largest = int(rows["N_D"].max()) if len(rows) else 0
     best = best_model(results)
-    if best is None and len(rows) and not results.plan.learning:
+    judged_by = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
+    if len(rows) and not judged_by.compensates:
         return [*sentences, (_nothing_learns(results, rows[rows["N_D"] == largest]), "cells")]
     if best is None:
         where = f" at {runs(largest)}" if largest else ""
@@ -180,12 +181,12 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
 
 
 def _nothing_learns(results: Results, rows: pd.DataFrame) -> str:
-    """What physics alone reaches, where no method of the study learns from data."""
-    ahead = f"{results.test.horizon * results.test.step:g} s ahead"
+    """What physics alone reaches, where the method that the study judges by learns nothing from data."""
     errors = sorted(zip(rows["H"], rows["model"], strict=True))[:SHOWN]
     shown = ", ".join(f"{model} {metres(H)}" for H, model in errors)
     least = f" (the least of {len(rows)})" if len(rows) > SHOWN else ""
-    return f"No method of the study learns from data. Mean errors of physics alone, {ahead}{least}: {shown}."
+    begins = f"The method {results.plan.judged!r} learns nothing from data. Mean errors of physics alone"
+    return f"{begins}, {_ahead(results)} ahead{least}: {shown}."
 
 
 def _has_map(table: pd.DataFrame) -> bool:
@@ -193,8 +194,8 @@ def _has_map(table: pd.DataFrame) -> bool:
     return table["N_D"].nunique() > 1 and table[table["family"] != NO_MODEL]["model"].nunique() > 1
 
 
-def _ahead(case: Case) -> str:
-    return f"{case.results.test.horizon * case.results.test.step:g} s"
+def _ahead(results: Results) -> str:
+    return f"{results.test.horizon * results.test.step:g} s"
 
 
 def _good_enough(case: Case) -> str:
@@ -214,7 +215,7 @@ def _good_enough(case: Case) -> str:
         else:
             parts.append(f"with {runs(amount)} {_limit(limit)}")
             limits = True
-    begins = f"How good must the physics be, {_ahead(case)} ahead? " if limits else ""
+    begins = f"How good must the physics be, {_ahead(case.results)} ahead? " if limits else ""
     if not limits and len(parts) == 2 and len({part.partition("runs ")[2] or part for part in parts}) == 1:
         parts = [f"with {case.smallest} or {parts[1].removeprefix('with ')}"]
     return f"{begins}{parts[0][0].upper()}{'; '.join(parts)[1:]}."
@@ -302,8 +303,8 @@ def _headline(case: Case) -> str:
     chosen = "" if case.smallest < case.largest else "best in validation; "
     text = (
         f"With {runs(case.largest)}, {case.best} ({chosen}{metres(alone)} mean error alone) "
-        f"predicts {_ahead(case)} ahead with {case.H(case.best, case.largest)} mean error; nine errors in ten are "
-        f"below {metres(worst)}"
+        f"predicts {_ahead(case.results)} ahead with {case.H(case.best, case.largest)} mean error; "
+        f"nine errors in ten are below {metres(worst)}"
     )
     pure = case.rows[(case.rows["family"] == NO_MODEL) & (case.rows["N_D"] == case.largest)]
     return f"{text}. Without physics: {case.H(NO_MODEL, case.largest)}." if len(pure) else f"{text}."
