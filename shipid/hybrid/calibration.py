@@ -45,7 +45,7 @@ class _Runs:
         """Number of windows of each run, (G,)."""
         return np.bincount(self.place, minlength=self.count)
 
-    def sorted(self, order: NDArray[np.int64]) -> NDArray[np.int64]:
+    def by_run(self, order: NDArray[np.int64]) -> NDArray[np.int64]:
         """Sort windows in some order by their run, and within a run in that order."""
         few = self.place.astype(np.uint16 if self.count < 2**16 else np.int64)  # short numbers are sorted by radix
         return order[np.argsort(few[order], kind="stable")]
@@ -156,7 +156,7 @@ def _ranks(order: NDArray[np.int64], runs: _Runs) -> Array:
     """Share (S,) of the windows of the other runs, each run weighing the same, that come before in an order."""
     below = np.empty(len(order))
     below[order] = np.cumsum(runs.weight[order]) - runs.weight[order]  # of all
-    by_run = runs.sorted(order)
+    by_run = runs.by_run(order)
     sizes = runs.sizes
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     mine = np.empty(len(order))
