@@ -36,8 +36,8 @@ from shipid.data.windows import Windows, cut_windows, to_frame
 from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
+from shipid.engine.samples import on_samples
 from shipid.errors import DocumentError, ShipidError, choices
-from shipid.interrupts import uninterrupted
 from shipid.metrics import position_error
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
@@ -77,15 +77,15 @@ class Observer(BaseModel):
     ] = (1e-5, 2e-4)
     model_error: Annotated[
         NotNegative, Field(description="white acceleration over the change of the slow one, in sqrt(s)")
-    ] = 10.0
+    ] = 1.0
     jump: Annotated[NotNegative, Field(description="share of a change by an order that the physics may miss")] = 1.0
     settle: Annotated[Positive, Field(description="time in which that ends, x sqrt(L / g)")] = 2.0
     current: Annotated[NotNegative, Field(description="standard deviation of the current, x sqrt(g L); 0: none")] = 0.03
     waves: Annotated[
         tuple[NotNegative, ...], Field(min_length=1, description="levels of wave-frequency u and v, x sqrt(g L)")
-    ] = (0.0, 2e-2)
+    ] = (0.0, 1e-2, 3e-2)
     period: Annotated[Positive, Field(description="of the waves met, x sqrt(L / g)")] = 2.9
-    damping: Annotated[FiniteFloat, Field(gt=0, lt=1, description="of the wave model: how broad the waves are")] = 0.2
+    damping: Annotated[FiniteFloat, Field(gt=0, lt=1, description="of the wave model: how broad the waves are")] = 0.5
     noise: Annotated[
         dict[str, Positive], Field(description="column -> standard deviation of a sample, SI; others by size")
     ] = {}
@@ -209,7 +209,7 @@ def filter_function(model: Dynamics) -> ca.Function:
     after, left, likelihood = ahead, predicted, likelihood * ca.exp(-dt / number["memory"])
     innovations, spreads = [], []
     for i in range(6):  # one at a time: independent noise, and no matrix to invert
-        given = ca.fabs(measured[i]) < np.inf  # false for NaN; x == x would be simplified away
+        given = ca.fabs(measured[i]) < DIVERGED  # false for NaN; x == x would be simplified away
         innovation = ca.if_else(given, measured[i], output[i]) - output[i]
         innovations.append(innovation)
         spreads.append(rows[i, :] @ predicted @ rows[i, :].T + noise[i] ** 2)
@@ -393,22 +393,22 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None) 
     starts = np.array([rows[0] for rows in places])
     states = np.concatenate([begin(filters, measured[row], commands[row]) for row in starts], axis=1)
     estimate[starts, :6] = np.where(np.isnan(measured[starts]), 0.0, measured[starts])
-    values = np.array(list(vessel.parameters.values()))[:, None]
-    step = observer_function(model, count)
+    values = np.array(list(vessel.parameters.values()))
+    step = on_samples(filter_function(model), len(frame) * count, shared=["parameters"])
     order = sorted(range(len(places)), key=lambda i: -len(places[i]))  # those that end first last
     states = np.concatenate([states[:, i * count : (i + 1) * count] for i in order], axis=1)
     places = [places[i] for i in order]
     for k in range(1, longest):
         going = sum(len(rows) > k for rows in places)
         now, past = (np.array([rows[i] for rows in places[:going]]) for i in (k, k - 1))
-        dt = (table["t"][now] - table["t"][past])[None]
-        inputs = states[:, : going * count], commands[past].T, weather[past].T, np.tile(values, (1, going))
-        given = measured[now].T, noise[now].T, np.tile(filters.numbers.T, (1, going)), dt
-        with uninterrupted():
-            results = [np.array(part) for part in _mapped(step, going)(*inputs, *given)]
-        states, estimate[now], weights[now] = results[0], results[1].T, results[4].T
-        innovation[now], spread[now] = np.where(np.isnan(measured[now]), np.nan, results[2].T), results[3].T
-        age[now] = age[past] + dt[0]
+        dt = table["t"][now] - table["t"][past]
+        each = (np.repeat(part[rows].T, count, axis=1) for part, rows in ((commands, past), (weather, past)))
+        seen = (np.repeat(part[now].T, count, axis=1) for part in (measured, noise))
+        numbers = np.tile(filters.numbers.T, (1, going))
+        results = step(states[:, : going * count], *each, values, *seen, numbers, np.repeat(dt, count)[None])
+        states, estimate[now], innovation[now], spread[now], weights[now] = _mixed(results, count)
+        innovation[now] = np.where(np.isnan(measured[now]), np.nan, innovation[now])
+        age[now] = age[past] + dt
     columns = {f"observer.{name}": estimate[:, i] for i, name in enumerate(COLUMNS)}
     given = np.isfinite(innovation)
     squares = np.where(given, innovation**2 / spread, 0.0).sum(axis=1)
@@ -416,9 +416,28 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None) 
     return Estimates(columns, innovation, spread, weights, age)
 
 
-@lru_cache(maxsize=64)
-def _mapped(step: ca.Function, count: int) -> ca.Function:
-    return step.map(count)
+def _mixed(results: Sequence[Array], count: int) -> tuple[Array, ...]:
+    """What K = `count` filters of every stretch know together, as in `observer_function`.
+
+    results : of the filters, (., R K) each, those of a stretch side by side. Returns states (n, R K), then estimate,
+    innovation and spread (R, .), and weights (R, K).
+    """
+    after, *parts = (part.reshape(len(part), -1, count) for part in results)
+    sound = (np.abs(after) < DIVERGED).all(axis=0)
+    likelihood = np.where(sound, np.nan_to_num(after[-1]), -DIVERGED)
+    weights = np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
+    weights /= weights.sum(axis=1, keepdims=True)
+    if not sound.all():  # a filter that diverged begins again from the likeliest
+        after = _bounded(after)
+        best = likelihood == likelihood.max(axis=1, keepdims=True)
+        after = np.where(sound, after, (after * best / best.sum(axis=1, keepdims=True)).sum(axis=2, keepdims=True))
+    means = (np.einsum("irk,rk->ri", _bounded(part), weights) for part in parts)
+    return (after.reshape(len(after), -1), *means, weights)
+
+
+def _bounded(values: Array) -> Array:
+    """The values within +-DIVERGED; what is not a number becomes a bound, as by `_finite`."""
+    return np.asarray(np.fmin(np.fmax(values, -DIVERGED), DIVERGED))
 
 
 def tau_extra(filters: Bank, columns: Mapping[str, Array], horizon: int, step: float) -> Array:

@@ -15,6 +15,7 @@ from scipy.linalg import expm
 from shipid.data.causal import causal_columns, last_known
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants
+from shipid.engine import samples
 from shipid.errors import DocumentError
 from shipid.hybrid.physics import Physics
 from shipid.observer import (
@@ -128,7 +129,7 @@ def test_an_order_and_wind_act_from_their_row_on() -> None:
         ({"jump": 2.0, "settle": 3.0, "memory": 5.0}, {"jump": 2.0, "settle": 3.0, "memory": 5.0}),
         ({"current": 2.0}, {"current": 2.0, "current_north": 2.0, "current_east": 2.0}),
         ({"period": 2.0}, {"omega": 0.5, "x_w": 2.0, "y_w": 2.0, "psi_w": 2.0}),
-        ({"damping": 2.0}, {"zeta": 2.0}),
+        ({"damping": 1.5}, {"zeta": 1.5}),
     ],
 )
 def test_a_setting_scales_what_it_names_and_nothing_else(change: dict[str, float], moved: dict[str, float]) -> None:
@@ -282,6 +283,34 @@ def test_tuning_never_chooses_worse_than_what_it_began_with() -> None:
     first = f"current {Observer().current}, fade {Observer().fade}"
     assert min(tried.values()) <= tried[first]
     assert isinstance(chosen, Observer)
+
+
+def test_along_a_log_it_is_the_function_that_goes_aboard(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled or interpreted, all runs at once or instant by instant; also where a filter begins again."""
+    vessel, frame = load_vessel("gunnerus-28.9"), calm().data.frame
+    run = frame[frame["run"] == "M000"].iloc[:25].reset_index(drop=True)
+    settings = Observer(waves=(0.01,), change=(2e-4, 1e9), measured=("north", "east", "psi", "u", "r"))
+    filters = bank(vessel, settings)  # half of them diverge at once
+    log = Dataset(run, calm().data.metadata)
+    ways = []
+    for from_here in (np.inf, 0.0):
+        monkeypatch.setattr(samples, "NATIVE_FROM", from_here)
+        ways.append(observe(vessel, log, filters.settings))
+    step, model = observer_function(filters.model, filters.num_filters), filters.model
+    orders, weather = run[list(model.commands)].to_numpy(), run[list(model.environment)].to_numpy()
+    measured, values = run[list(MEASURED)].to_numpy(), list(vessel.parameters.values())
+    measured[:, MEASURED.index("v")] = np.nan
+    states = begin(filters, measured[0], orders[0])
+    for k in range(1, len(run)):
+        numbers = filters.numbers.T
+        given = orders[k - 1], weather[k - 1], values, measured[k], filters.noise, numbers, 1.0
+        states, estimate, innovation, _, weights = map(np.array, step(states, *given))
+        for one in ways:
+            columns = [one.columns[f"observer.{name}"][k] for name in COLUMNS]
+            np.testing.assert_allclose(columns, estimate[:, 0], rtol=1e-6, atol=1e-9)
+            np.testing.assert_allclose(one.weights[k], weights[:, 0], atol=1e-6)
+            seen = np.isfinite(measured[k])
+            np.testing.assert_allclose(one.innovation[k][seen], innovation[seen, 0], rtol=1e-6, atol=1e-9)
 
 
 def test_unknown_noise_is_refused() -> None:

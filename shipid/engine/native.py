@@ -146,10 +146,10 @@ def target(precision: Precision = DOUBLE) -> Target:
     return best if failure is None else replace(best, prefix="")
 
 
-def _command(command: str, wanted: Target) -> list[str]:
-    """Command that compiles `{source}` into the shared library `{library}`."""
+def _command(command: str, wanted: Target, more: Sequence[str] = ()) -> list[str]:
+    """Command that compiles `{source}` into the shared library `{library}`; later options take precedence."""
     mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
-    return [command, *OPTIONS, *wanted.flags, "{source}", "-o", "{library}", *mvec, "-lm"]
+    return [command, *OPTIONS, *more, *wanted.flags, "{source}", "-o", "{library}", *mvec, "-lm"]
 
 
 @cache
@@ -352,20 +352,20 @@ def _library(model: Dynamics, step: float, method: Method, precision: Precision 
     return compiled_for(lambda: _Source(model, step, method).text(target(precision)))
 
 
-def compiled_for(source: Callable[[], str]) -> Any:
+def compiled_for(source: Callable[[], str], more: Sequence[str] = ()) -> Any:
     """The compiled function `run` of C source; NoLibrary if there is no compiler or it fails."""
     if compiler() is None:
         raise NoLibrary(
             "engines 'native' and 'single' need a C compiler, and there is none: install gcc, or use 'torch'"
         )
     try:
-        return compiled(source())
+        return compiled(source(), more)
     except NoLibrary as error:
         raise NoLibrary(f"{error.message}: use engine 'torch'") from None
 
 
-def compiled(source: str) -> Any:
-    """The compiled function `run` of C source, from the cache if possible.
+def compiled(source: str, more: Sequence[str] = ()) -> Any:
+    """The compiled function `run` of C source, from the cache if possible; `more`: further options of the compiler.
 
     A library in the cache that is damaged or may be another user's is not loaded but compiled anew. NoLibrary if the
     compiler fails or hangs, or where nothing can be written.
@@ -373,7 +373,7 @@ def compiled(source: str) -> Any:
     command, folder = compiler(), _folder()
     if command is None or folder is None:
         raise NoLibrary("there is no C compiler")
-    words = [source, *OPTIONS, command, compiler_version(command), platform.machine(), *sorted(_processor())]
+    words = [source, *OPTIONS, *more, command, compiler_version(command), platform.machine(), *sorted(_processor())]
     library = folder / f"{hashlib.sha256(chr(10).join(words).encode()).hexdigest()[:24]}.so"
     try:
         return load(library)
@@ -381,7 +381,7 @@ def compiled(source: str) -> Any:
         pass  # not there
     except NoLibrary as error:
         log.warning("%s: compiled anew", error.message)
-    failure = build(_command(command, target()), source, library)
+    failure = build(_command(command, target(), more), source, library)
     if failure is not None:
         raise NoLibrary(f"the C compiler failed ({failure.splitlines()[0]})")
     try:

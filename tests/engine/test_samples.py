@@ -1,0 +1,72 @@
+"""A function on many samples: C and the virtual machine agree on every number, also on what is none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from shipid.engine import native, samples
+from shipid.engine.libraries import NoLibrary
+from shipid.engine.native import compiler
+from shipid.engine.samples import on_samples
+
+
+@pytest.fixture(autouse=True)
+def own_cache(libraries_kept: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(libraries_kept))
+    monkeypatch.setattr(native, "_refused", [])
+    samples._library.cache_clear()
+    yield
+    samples._library.cache_clear()
+
+
+def function() -> ca.Function:
+    """Outputs of unlike sizes, an input that is not used, a choice by what is a number."""
+    x, y, p, unused = ca.SX.sym("x", 3), ca.SX.sym("y", 2), ca.SX.sym("p", 2), ca.SX.sym("unused", 1)
+    given = ca.fabs(y[0]) < 1e9
+    one = ca.vertcat(ca.sin(x[0]) * p[0], x[1] / p[1] + ca.if_else(given, y[0], 7.0), ca.exp(-ca.fabs(x[2])))
+    return ca.Function("f", [x, y, p, unused], [one, ca.atan2(y[1], x[0])], ["x", "y", "p", "unused"], ["one", "two"])
+
+
+def inputs(count: int, seed: int = 0) -> list[np.ndarray]:
+    rng = np.random.default_rng(seed)
+    x, y = rng.normal(size=(3, count)), rng.normal(size=(2, count))
+    y[0, ::3] = np.nan
+    return [x, y, rng.uniform(1, 2, 2), np.zeros((1, count))]
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+@pytest.mark.parametrize("count", [1, 7, 8, 33])
+def test_c_and_the_virtual_machine_agree(count: int) -> None:
+    few, many = (on_samples(function(), n, ["p"]) for n in (1, 1e12))
+    for one, other in zip(few(*inputs(count)), many(*inputs(count)), strict=True):
+        assert one.shape == other.shape
+        np.testing.assert_allclose(other, one, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(many(*inputs(count))[0][1, 0], inputs(count)[0][1, 0] / inputs(count)[2][1] + 7.0)
+
+
+def test_a_sample_is_the_same_alone_and_among_others() -> None:
+    for expected in (1, 1e12):
+        run = on_samples(function(), expected, ["p"])
+        x, y, p, unused = inputs(21)
+        together = run(x, y, p, unused)
+        alone = run(x[:, 5:6], y[:, 5:6], p, unused[:, 5:6])
+        for whole, part in zip(together, alone, strict=True):
+            np.testing.assert_array_equal(whole[:, 5:6], part)
+
+
+def test_without_a_compiler_it_is_interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object) -> None:
+        raise NoLibrary("the C compiler failed")
+
+    monkeypatch.setattr(samples, "compiler", lambda: "gcc")
+    monkeypatch.setattr(samples, "compiled_for", none)
+    run = on_samples(function(), 1e12, ["p"])
+    expected = on_samples(function(), 1, ["p"])(*inputs(5))
+    for one, other in zip(run(*inputs(5)), expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert native._refused == ["the C compiler failed"]
