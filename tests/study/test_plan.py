@@ -17,6 +17,7 @@ from shipid.hybrid.features import Memory
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
+from shipid.observer import Observer
 from shipid.study.plan import NO_MODEL, build_plan, read_plan
 from shipid.study.prepare import all_windows, obtain
 from shipid.vessel.load import load_vessel
@@ -89,17 +90,24 @@ def test_the_chain_of_the_paper_is_bundled_small() -> None:
 
 
 def test_changing_orders_differ_from_constant_ones_in_the_orders_alone() -> None:
-    """Weather, sea, start, models and amounts are those of the other, and a past comes before the first instant."""
+    """Weather, sea, start, models and amounts are those of the other, and a past comes before the first instant.
+
+    A slow force lasts where orders do.
+    """
     constant, changing = read_plan("constant-orders").study, read_plan("changing-orders").study
     assert constant.truth is not None
     assert changing.truth is not None
     assert constant.truth.run_up == 20.0
     assert constant.truth.model_copy(update={"manoeuvre": changing.truth.manoeuvre}) == changing.truth
     small = read_plan("simulation-small").study
-    for name in ("family", "method", "grid", "split", "prediction"):
+    for name in ("method", "grid", "split", "prediction"):
         assert getattr(constant, name) == getattr(changing, name), name
-    for name in ("grid", "split", "prediction"):
-        assert getattr(constant, name) == getattr(small, name), name
+    for one, other in zip(constant.family, changing.family, strict=True):
+        lasting = one.observer and one.observer.model_copy(update={"fade": Observer().fade})
+        assert one.model_copy(update={"observer": lasting}) == other, one.name
+    assert constant.grid == small.grid
+    assert constant.split == small.split
+    assert constant.prediction.model_copy(update={"integrator": "euler"}) == small.prediction
 
 
 @pytest.mark.parametrize("name", ["constant-orders", "changing-orders"])
