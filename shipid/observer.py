@@ -76,14 +76,14 @@ class Observer(BaseModel):
         tuple[NotNegative, ...], Field(min_length=1, description="levels: change of the force in 1 s, x m g")
     ] = (1e-5, 2e-4)
     model_error: Annotated[
-        NotNegative, Field(description="white acceleration over the change of the slow one, in sqrt(s)")
-    ] = 1.0
+        NotNegative, Field(description="in calm water: white acceleration over the change of the slow one, in sqrt(s)")
+    ] = 10.0
     jump: Annotated[NotNegative, Field(description="share of a change by an order that the physics may miss")] = 1.0
     settle: Annotated[Positive, Field(description="time in which that ends, x sqrt(L / g)")] = 2.0
     current: Annotated[NotNegative, Field(description="standard deviation of the current, x sqrt(g L); 0: none")] = 0.03
     waves: Annotated[
         tuple[NotNegative, ...], Field(min_length=1, description="levels of wave-frequency u and v, x sqrt(g L)")
-    ] = (0.0, 1e-2, 3e-2)
+    ] = (0.0, 1e-2)
     period: Annotated[Positive, Field(description="of the waves met, x sqrt(L / g)")] = 2.9
     damping: Annotated[FiniteFloat, Field(gt=0, lt=1, description="of the wave model: how broad the waves are")] = 0.5
     noise: Annotated[
@@ -144,7 +144,7 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     for change, current, wave in product(settings.change, currents, settings.waves):
         a = change * linear * root, change * linear * root, change * per_yaw * yaw * root
         w = wave * speed + 1e-9, wave * speed + 1e-9, 2.5 * wave / time + 1e-9
-        q = (settings.model_error * x for x in a)
+        q = (0.0 if wave else settings.model_error * x for x in a)  # the motion in waves explains as much
         numbers.append(
             [
                 *(*q, *a, current / 300 * speed, settings.jump),
