@@ -135,6 +135,18 @@ def test_half_a_file_of_arrays_is_a_value_error(length: int, tmp_path: Path) -> 
         files.read_arrays(file)
 
 
+def test_arrays_in_an_unknown_compression_are_a_value_error(tmp_path: Path) -> None:
+    """Method 99 of the zip format, which Python does not know, in both headers of the member."""
+    file = tmp_path / "a.npz"
+    files.write_arrays(file, {"x": np.arange(50.0)})
+    content = bytearray(file.read_bytes())
+    for sign, place in ((b"PK\x03\x04", 8), (b"PK\x01\x02", 10)):
+        content[content.index(sign) + place] = 99
+    file.write_bytes(content)
+    with pytest.raises(ValueError, match=r"a\.npz is not a whole \.npz"):
+        files.read_arrays(file)
+
+
 def test_a_new_document_is_never_written_over(tmp_path: Path) -> None:
     file = tmp_path / "a.toml"
     assert files.write_new("x = 1\n", file) == file

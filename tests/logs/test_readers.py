@@ -82,6 +82,14 @@ def test_matlab_structs_and_matrices(log: pd.DataFrame, tmp_path: Path) -> None:
     assert_is_the_motion(mapping_with(tmp_path, 'kind = "mat"', *changes), tmp_path / "log.mat")
 
 
+def test_a_matlab_file_of_version_7_3_has_its_remedy(tmp_path: Path) -> None:
+    """As MATLAB writes its first 128 bytes: text, no subsystem, version 0x0200, byte order; HDF5 follows."""
+    (tmp_path / "log.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM" + bytes(600))
+    with pytest.raises(DataError, match=r"a MATLAB file of version 7\.3: save it with") as caught:
+        import_log(read_mapping(mapping_with(tmp_path, 'kind = "mat"')), tmp_path / "log.mat")
+    assert caught.value.path == "format.kind"
+
+
 def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
     since = pd.Timestamp("2022-10-27T08:00:00Z")
     log.assign(time=[(since + pd.Timedelta(seconds=t)).isoformat() for t in log["time"]]).to_csv(tmp_path / "log")
