@@ -401,8 +401,4 @@ def _estimates(names: Layout, groups: SX_of) -> dict[str, SX]:
     c, s = ca.cos(now["psi"]), ca.sin(now["psi"])
     north, east = seen["current_north"], seen["current_east"]
     table |= {"observer-current.u": c * north + s * east, "observer-current.v": c * east - s * north}
-    table |= {f"observer-wave.{name}": now[name] - seen[name] for name in (*MOTIONS, "psi")}
-    if "north" in now:
-        north, east = (now[name] - seen[name] for name in ("north", "east"))
-        table |= {"observer-wave.x": c * north + s * east, "observer-wave.y": c * east - s * north}
-    return table
+    return table | {f"observer-wave.{name}": now[name] - seen[name] for name in MOTIONS}

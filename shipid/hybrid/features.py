@@ -133,8 +133,7 @@ class Inputs:
         """Return the inputs (S,) that the physics gives: its error over the last seconds; none without physics."""
         if physics.vessel is None:
             return {}
-        seen = self.memory.observer and physics.observer is not None
-        table = estimates(instants, places=physics.path == "position") if seen else {}
+        table = estimates(instants) if self.memory.observer and physics.observer is not None else {}
         for seconds in self.memory.error:
             errors = past_error(replace(physics, observer=None), instants, seconds)
             table |= {f"error-{seconds:g}.{name}": values for name, values in errors.items()}
@@ -187,23 +186,18 @@ def group_of(name: str) -> str:
     return kind[1] if kind[1] in ("error", "observer", "physics") else "history"
 
 
-def estimates(instants: Instants, *, places: bool = True) -> dict[str, Array]:
+def estimates(instants: Instants) -> dict[str, Array]:
     """Estimates of the observer as inputs (S,), in body axes.
 
     `observer-force.u`, `.v`, `.r` [m/s^2, rad/s^2]; `observer-current.u`, `.v` [m/s]; `observer-wave.u`, `.v`, `.r`
-    [m/s, rad/s] and `.psi` [rad]: measured less filtered. With `places` also `observer-wave.x`, `.y` [m]: the predicted
-    path begins at the filtered position and heading, the true one at the measured.
+    [m/s, rad/s]: the measured velocity less the filtered one.
     """
     known, columns = instants.estimates, instants.columns
     table = {f"observer-force.{motion}": known[f"observer.{name}"] for motion, name in zip(MOTIONS, "XYN", strict=True)}
     c, s = np.cos(columns["psi"]), np.sin(columns["psi"])
     north, east = known["observer.current_north"], known["observer.current_east"]
     table |= {"observer-current.u": c * north + s * east, "observer-current.v": c * east - s * north}
-    table |= {f"observer-wave.{name}": columns[name] - known[f"observer.{name}"] for name in (*MOTIONS, "psi")}
-    if places:
-        north, east = (columns[name] - known[f"observer.{name}"] for name in ("north", "east"))
-        table |= {"observer-wave.x": c * north + s * east, "observer-wave.y": c * east - s * north}
-    return table
+    return table | {f"observer-wave.{name}": columns[name] - known[f"observer.{name}"] for name in MOTIONS}
 
 
 def steps_of(seconds: float, step: float) -> int:
