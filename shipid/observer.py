@@ -56,6 +56,7 @@ COLUMNS = (*MEASURED, "X", "Y", "N", "current_north", "current_east")
 """Estimates as columns, `observer.u`, ...; X, Y, N are the slow force as acceleration, M^-1 tau [m/s^2, rad/s^2]."""
 GRAVITY = 9.81  # m/s^2
 DIVERGED = 1e9  # SI: no state, variance or likelihood of a sound filter is so large
+SPIKE = 300.0  # standard deviations: a measurement as far off is a fault of the log and moves nothing
 CALM = 1e-6  # m/s: keeps the direction of no wind defined
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
@@ -76,14 +77,15 @@ class Observer(BaseModel):
         tuple[NotNegative, ...], Field(min_length=1, description="levels: change of the force in 1 s, x m g")
     ] = (1e-5, 2e-4)
     model_error: Annotated[
-        NotNegative, Field(description="in calm water: white acceleration over the change of the slow one, in sqrt(s)")
+        NotNegative,
+        Field(description="white acceleration over the change of the slow one, sqrt(s); level 0 of `waves` alone"),
     ] = 10.0
     jump: Annotated[NotNegative, Field(description="share of a change by an order that the physics may miss")] = 1.0
     settle: Annotated[Positive, Field(description="time in which that ends, x sqrt(L / g)")] = 2.0
     current: Annotated[NotNegative, Field(description="standard deviation of the current, x sqrt(g L); 0: none")] = 0.03
     waves: Annotated[
         tuple[NotNegative, ...], Field(min_length=1, description="levels of wave-frequency u and v, x sqrt(g L)")
-    ] = (0.0, 1e-2)
+    ] = (0.0, 5e-3, 2e-2)
     period: Annotated[Positive, Field(description="of the waves met, x sqrt(L / g)")] = 2.9
     damping: Annotated[FiniteFloat, Field(gt=0, lt=1, description="of the wave model: how broad the waves are")] = 0.5
     noise: Annotated[
@@ -144,7 +146,7 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     for change, current, wave in product(settings.change, currents, settings.waves):
         a = change * linear * root, change * linear * root, change * per_yaw * yaw * root
         w = wave * speed + 1e-9, wave * speed + 1e-9, 2.5 * wave / time + 1e-9
-        q = (0.0 if wave else settings.model_error * x for x in a)  # the motion in waves explains as much
+        q = (0.0 if wave else settings.model_error * x for x in a)  # in waves their motion takes its place
         numbers.append(
             [
                 *(*q, *a, current / 300 * speed, settings.jump),
@@ -209,16 +211,17 @@ def filter_function(model: Dynamics) -> ca.Function:
     after, left, likelihood = ahead, predicted, likelihood * ca.exp(-dt / number["memory"])
     innovations, spreads = [], []
     for i in range(6):  # one at a time: independent noise, and no matrix to invert
-        given = ca.fabs(measured[i]) < DIVERGED  # false for NaN; x == x would be simplified away
+        given = ca.fabs(measured[i]) < np.inf  # false for NaN; x == x would be simplified away
         innovation = ca.if_else(given, measured[i], output[i]) - output[i]
         innovations.append(innovation)
         spreads.append(rows[i, :] @ predicted @ rows[i, :].T + noise[i] ** 2)
         column = left @ rows[i, :].T
         variance = rows[i, :] @ column + noise[i] ** 2
         surprise = innovation - rows[i, :] @ (after - ahead)
-        share = ca.if_else(given, 1 / variance, 0)
+        square = surprise**2 / variance
+        share = ca.if_else(ca.logic_and(given, square < SPIKE**2), 1 / variance, 0)
         after, left = after + column * (share * surprise), _symmetric(left - column @ column.T * share)
-        likelihood -= ca.if_else(given, (surprise**2 / variance + ca.log(variance)) / 2, 0)
+        likelihood -= ca.if_else(given, (ca.fmin(square, SPIKE**2) + ca.log(variance)) / 2, 0)
     left = ca.reshape(ca.densify(left), -1, 1)
     packed_after = ca.vertcat(after, left, reached, restless, commands, likelihood)
     return ca.Function(
@@ -417,7 +420,7 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None) 
 
 
 def _mixed(results: Sequence[Array], count: int) -> tuple[Array, ...]:
-    """What K = `count` filters of every stretch know together, as in `observer_function`.
+    """What K = `count` filters of every stretch know together: the rule of `observer_function`, in NumPy.
 
     results : of the filters, (., R K) each, those of a stretch side by side. Returns states (n, R K), then estimate,
     innovation and spread (R, .), and weights (R, K).

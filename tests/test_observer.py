@@ -16,6 +16,7 @@ from shipid.data.causal import causal_columns, last_known
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants
 from shipid.engine import samples
+from shipid.engine.native import compiler
 from shipid.errors import DocumentError
 from shipid.hybrid.physics import Physics
 from shipid.observer import (
@@ -31,6 +32,7 @@ from shipid.observer import (
     _waves,
     bank,
     begin,
+    filter_function,
     observe,
     observed_paths,
     observer_function,
@@ -294,8 +296,11 @@ def test_along_a_log_it_is_the_function_that_goes_aboard(monkeypatch: pytest.Mon
     log = Dataset(run, calm().data.metadata)
     ways = []
     for from_here in (np.inf, 0.0):
-        monkeypatch.setattr(samples, "NATIVE_FROM", from_here)
+        monkeypatch.setattr(samples, "COMPILE_FROM", from_here)
         ways.append(observe(vessel, log, filters.settings))
+    one = filter_function(filters.model)
+    assert compiler() is None or samples._library(one, ("parameters",)) is not None
+    assert (ways[0].weights[1:, 2:] == 0).all()  # those that diverged
     step, model = observer_function(filters.model, filters.num_filters), filters.model
     orders, weather = run[list(model.commands)].to_numpy(), run[list(model.environment)].to_numpy()
     measured, values = run[list(MEASURED)].to_numpy(), list(vessel.parameters.values())
@@ -311,6 +316,27 @@ def test_along_a_log_it_is_the_function_that_goes_aboard(monkeypatch: pytest.Mon
             np.testing.assert_allclose(one.weights[k], weights[:, 0], atol=1e-6)
             seen = np.isfinite(measured[k])
             np.testing.assert_allclose(one.innovation[k][seen], innovation[seen, 0], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "wrong"), [("north", 1e3), ("east", -1e6), ("u", 1e4), ("psi", 1e3)])
+def test_a_spike_of_a_sensor_passes(name: str, wrong: float) -> None:
+    """A measurement that cannot be is left out: twenty rows later the estimates are where they would be without it."""
+    vessel, frame = load_vessel("gunnerus-28.9"), sea().data.frame
+    run = frame[frame["run"] == "M000"].iloc[:60].reset_index(drop=True)
+    spiked = run.copy()
+    spiked.loc[30, name] += wrong
+    with_it, without = (observe(vessel, Dataset(log, sea().data.metadata)).columns for log in (spiked, run))
+    for column, scale in (
+        ("north", 1.0),
+        ("east", 1.0),
+        ("psi", 0.05),
+        ("u", 0.2),
+        ("v", 0.2),
+        ("X", 0.02),
+        ("Y", 0.02),
+    ):
+        difference = with_it[f"observer.{column}"][50:] - without[f"observer.{column}"][50:]
+        assert np.abs(difference).max() < scale, column
 
 
 def test_unknown_noise_is_refused() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import math
 import os
 import platform
 import shutil
@@ -51,7 +52,15 @@ _OPERATIONS = {
     ca.OP_FMAX: "v_max({0}, {1})",
     ca.OP_IF_ELSE_ZERO: "((V)(({0} != 0) & (M){1}))",
 }
-C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", lambda value: f"K({value!r})", "NUMBER({0})")
+
+
+def _constant(value: float) -> str:
+    """A plain number as a vector; C has words for what is not finite."""
+    word = "NAN" if math.isnan(value) else repr(value) if math.isfinite(value) else "INFINITY"
+    return f"K(-{word})" if value == -math.inf else f"K({word})"
+
+
+C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", _constant, "NUMBER({0})")
 _SUM_STAGES = (*STAGES, ("state", "memory"))  # what does not depend on the component is computed before the sum
 
 _SIZES = ("parts", "stride", "samples", "steps", "every", "num_rows")
@@ -146,10 +155,10 @@ def target(precision: Precision = DOUBLE) -> Target:
     return best if failure is None else replace(best, prefix="")
 
 
-def _command(command: str, wanted: Target, more: Sequence[str] = ()) -> list[str]:
+def _command(command: str, wanted: Target, further: Sequence[str] = ()) -> list[str]:
     """Command that compiles `{source}` into the shared library `{library}`; later options take precedence."""
     mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
-    return [command, *OPTIONS, *more, *wanted.flags, "{source}", "-o", "{library}", *mvec, "-lm"]
+    return [command, *OPTIONS, *further, *wanted.flags, "{source}", "-o", "{library}", *mvec, "-lm"]
 
 
 @cache
@@ -352,20 +361,20 @@ def _library(model: Dynamics, step: float, method: Method, precision: Precision 
     return compiled_for(lambda: _Source(model, step, method).text(target(precision)))
 
 
-def compiled_for(source: Callable[[], str], more: Sequence[str] = ()) -> Any:
+def compiled_for(source: Callable[[], str]) -> Any:
     """The compiled function `run` of C source; NoLibrary if there is no compiler or it fails."""
     if compiler() is None:
         raise NoLibrary(
             "engines 'native' and 'single' need a C compiler, and there is none: install gcc, or use 'torch'"
         )
     try:
-        return compiled(source(), more)
+        return compiled(source())
     except NoLibrary as error:
         raise NoLibrary(f"{error.message}: use engine 'torch'") from None
 
 
-def compiled(source: str, more: Sequence[str] = ()) -> Any:
-    """The compiled function `run` of C source, from the cache if possible; `more`: further options of the compiler.
+def compiled(source: str, further: Sequence[str] = ()) -> Any:
+    """The compiled function `run` of C source, from the cache if possible; `further`: options of the compiler.
 
     A library in the cache that is damaged or may be another user's is not loaded but compiled anew. NoLibrary if the
     compiler fails or hangs, or where nothing can be written.
@@ -373,7 +382,7 @@ def compiled(source: str, more: Sequence[str] = ()) -> Any:
     command, folder = compiler(), _folder()
     if command is None or folder is None:
         raise NoLibrary("there is no C compiler")
-    words = [source, *OPTIONS, *more, command, compiler_version(command), platform.machine(), *sorted(_processor())]
+    words = [source, *OPTIONS, *further, command, compiler_version(command), platform.machine(), *sorted(_processor())]
     library = folder / f"{hashlib.sha256(chr(10).join(words).encode()).hexdigest()[:24]}.so"
     try:
         return load(library)
@@ -381,7 +390,7 @@ def compiled(source: str, more: Sequence[str] = ()) -> Any:
         pass  # not there
     except NoLibrary as error:
         log.warning("%s: compiled anew", error.message)
-    failure = build(_command(command, target(), more), source, library)
+    failure = build(_command(command, target(), further), source, library)
     if failure is not None:
         raise NoLibrary(f"the C compiler failed ({failure.splitlines()[0]})")
     try:
