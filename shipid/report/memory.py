@@ -99,7 +99,7 @@ def _fade(frame: pd.DataFrame) -> str:
     fade, ahead = float(frame.fade.iloc[0]), float(frame.ahead.iloc[0])
     if fade == 0:
         return "In a prediction the force has no effect: it fades immediately."
-    if not math.isfinite(fade):
+    if ahead < 0.005 * fade:
         return f"In a prediction the force is held over the horizon of {ahead:g} s: it does not fade."
     left = 100 * math.exp(-ahead / fade)
     return (
