@@ -93,7 +93,9 @@ def test_the_observer_says_its_numbers(past: ReportContent) -> None:
     assert rate.y == pytest.approx(np.degrees(0.01))
 
 
-@pytest.mark.parametrize(("fade", "words"), [(0.0, "fades immediately"), (np.inf, "does not fade"), (2e6, "does not fade")])
+@pytest.mark.parametrize(
+    ("fade", "words"), [(0.0, "fades immediately"), (np.inf, "does not fade"), (2e6, "does not fade")]
+)
 def test_the_ends_of_the_fade_are_named(past: ReportContent, fade: float, words: str) -> None:
     figure = memory.observer(replace(past, frames={"observer": along(fade=fade)}))
     assert figure is not None
