@@ -21,6 +21,7 @@ Document = dict[str, Any]
 LARGEST = 20_000_000  # bytes of a document
 DEEPEST = 40  # tables and lists inside one another
 MOST_NUMBER, MOST_INTEGER = 1e24, 10**15
+LEAST_NUMBER = 1e-100  # but for 0: a quotient of two numbers of a document stays finite
 
 
 def bundled_folder(kind: str) -> Path:
@@ -90,7 +91,7 @@ def loads(text: str, file: Path | str | None = None) -> Document:
 def check_values(document: Any, file: Path | str | None) -> None:
     """Raise DocumentError for a value that no document may hold, with its dotted path.
 
-    That is a date, a number beyond 1e24, an integer beyond 1e15, a control character, and deep nesting.
+    That is a date, a number beyond 1e24 or below 1e-100, an integer beyond 1e15, a control character, and deep nesting.
     """
     waiting: list[tuple[str, int, Any]] = [("", 0, document)]
     while waiting:
@@ -112,6 +113,8 @@ def check_values(document: Any, file: Path | str | None) -> None:
             fault = f"an integer of {value.bit_length() * 0.30103:.0f} digits: at most {MOST_INTEGER:.0e}"
         elif isinstance(value, float) and MOST_NUMBER < abs(value) < float("inf"):
             fault = f"{value:g}: larger than {MOST_NUMBER:.0e}: no quantity of a ship in SI units is so large"
+        elif isinstance(value, float) and 0 < abs(value) < LEAST_NUMBER:
+            fault = f"{value:g}: no quantity of a ship in SI units is so near to 0: write 0 or a larger number"
         elif isinstance(value, str) and any(
             unicodedata.category(sign) == "Cc" and sign not in "\n\r\t" for sign in value
         ):

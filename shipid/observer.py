@@ -21,7 +21,7 @@ Estimation with Applications to Tracking and Navigation (2001), ch. 11 (multiple
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
 from typing import Annotated, Any, Literal
@@ -34,6 +34,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, clock_slack, stretches
 from shipid.data.windows import Windows, cut_windows, to_frame
 from shipid.engine.casadi import summed_rates
+from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
 from shipid.engine.samples import on_samples
@@ -57,6 +58,7 @@ COLUMNS = (*MEASURED, "X", "Y", "N", "current_north", "current_east")
 GRAVITY = 9.81  # m/s^2
 DIVERGED = 1e9  # SI: no state, variance or likelihood of a sound filter is so large
 SPIKE = 300.0  # standard deviations: a measurement as far off is a fault of the log and moves nothing
+FADES = (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, None)  # x sqrt(L / g): between which `tune_observer` chooses
 CALM = 1e-6  # m/s: keeps the direction of no wind defined
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
@@ -96,6 +98,10 @@ class Observer(BaseModel):
         NotNegative | None,
         Field(description="time in which the force fades ahead, x sqrt(L / g); 0: no force; none: never"),
     ] = 12.0
+    choose: Annotated[
+        bool,
+        Field(description="levels of waves, current, change, and fade by the error of prediction on training runs"),
+    ] = False
 
 
 @dataclass(frozen=True)
@@ -366,11 +372,12 @@ class Estimates:
     age: Array
 
 
-def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None) -> Estimates:
+def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, *, calls: float = 1) -> Estimates:
     """Run the observer along every unbroken stretch of a dataset, all of them together.
 
-    Wind that is not measured is zero. Raises DocumentError for a vessel that is not of three degrees of freedom,
-    ShipidError for a command that the dataset lacks.
+    Wind that is not measured is zero. `calls` is how many calls of this size are to come in all: for many it pays to
+    compile. Raises DocumentError for a vessel that is not of three degrees of freedom, ShipidError for a command that
+    the dataset lacks.
     """
     filters, frame = bank(vessel, settings), dataset.frame
     model = filters.model
@@ -397,7 +404,7 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None) 
     states = np.concatenate([begin(filters, measured[row], commands[row]) for row in starts], axis=1)
     estimate[starts, :6] = np.where(np.isnan(measured[starts]), 0.0, measured[starts])
     values = np.array(list(vessel.parameters.values()))
-    step = on_samples(filter_function(model), len(frame) * count, shared=["parameters"])
+    step = on_samples(filter_function(model), calls * len(frame) * count, shared=["parameters"])
     order = sorted(range(len(places)), key=lambda i: -len(places[i]))  # those that end first last
     states = np.concatenate([states[:, i * count : (i + 1) * count] for i in order], axis=1)
     places = [places[i] for i in order]
@@ -512,6 +519,7 @@ def observed_paths(
     planned: Mapping[str, Array] | None = None,
     memory: Mapping[str, Array] | None = None,
     path: Literal["position", "velocity"] = "position",
+    engine: str = AUTO,
 ) -> tuple[Array, Array]:
     """Paths (T, S, 2) [m] of the physics with the observer, in the frame (11), and which diverged (S,).
 
@@ -522,11 +530,13 @@ def observed_paths(
     columns : of the instants (S,), measured and `observer.*`; wind that is missing is zero.
     planned : known commands, name -> (T, S); default: held.
     path : as in `cut_windows`.
+    engine : as in `rollout`.
     """
     begun = observed_start(filters, columns, horizon, step, path)
     result = rollout(
         filters.vessel, begun.columns, {**columns, **(planned or {})}, begun.environment, step=step, num_steps=horizon,
         method=method, memory=memory, tau_extra=begun.tau_extra, keep=("north", "east"),
+        engine=engine,
     )  # fmt: skip
     ages, zero = step * np.arange(1, horizon + 1)[:, None], np.zeros(len(columns["u"]))
     north, east = result["north"][1:, 0] + ages * begun.drift[0], result["east"][1:, 0] + ages * begun.drift[1]
@@ -555,39 +565,69 @@ def tune_observer(
     interval: float = 5.0,
     commands: Literal["held", "known"] = "held",
     path: Literal["position", "velocity"] = "position",
+    past: int = 0,
     runs: Sequence[str] | None = None,
 ) -> tuple[Observer, dict[str, float]]:
     """Settings with the least mean error of prediction on training runs: coordinate search over a small grid.
 
-    In turn: whether there is a current, how fast the force changes, and how it fades. Returns the settings and the mean
-    error [m] of each that was tried, by what was changed. Windows that diverge count as twice the worst that does not.
+    In turn: all levels of `waves` or one of them, a current or none, all levels of `change` or one of them; for each of
+    these how the force fades. The given levels are the grid.
+
+    Parameters
+    ----------
+    vessel : the physics, without any method.
+    dataset : runs, of which `runs` are for training; None: all are.
+    settings : the levels, and what is not searched.
+    horizon, step, method, commands, path, past : of the prediction, as in a study; `past` in steps.
+    interval : time between instants of prediction [s].
+
+    Returns
+    -------
+    The settings, with `choose` false, and the mean error [m] of each that was tried, by what was changed. Windows that
+    diverge count as twice the worst that does not.
+
+    Raises
+    ------
+    DataError : if no run is as long as past and horizon.
     """
-    best = settings or Observer()
-    windows = cut_windows(dataset, horizon=horizon, step=step, interval=interval, path=path)
+    first = (settings or Observer()).model_copy(update={"choose": False})
     if runs is not None:
-        windows = windows.select(np.isin(windows.run, list(runs)))
+        dataset = replace(dataset, frame=dataset.frame[dataset.frame["run"].isin(list(runs))].reset_index(drop=True))
+    windows = cut_windows(dataset, horizon=horizon, step=step, interval=interval, path=path, past=past)
+    planned = windows.planned if commands == "known" else None
     tried: dict[str, float] = {}
 
-    def fades(given: Observer, label: str) -> Observer:
-        estimates = observe(vessel, dataset, given)
-        columns = at_windows(dataset, estimates, windows)
-        best = {}
-        for fade in (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, None):
-            one = given.model_copy(update={"fade": fade})
-            paths, diverged = observed_paths(
-                bank(vessel, one), columns, horizon, step, method, path=path,
-                planned=windows.planned if commands == "known" else None,
-            )  # fmt: skip
-            with np.errstate(invalid="ignore", over="ignore"):
-                errors = position_error(paths, windows.future).mean(axis=0)
-            worst = float(errors[~diverged].max(initial=0.0))
-            tried[f"{label}, fade {fade}"] = float(np.where(diverged, 2 * worst, errors).mean())
-            best[tried[f"{label}, fade {fade}"]] = one
-        return best[min(best)]
+    def loss(one: Observer, columns: Mapping[str, Array]) -> float:
+        filters = bank(vessel, one)
+        paths, diverged = observed_paths(
+            filters, columns, horizon, step, method, path=path, planned=planned, engine=REPEATED
+        )
+        with np.errstate(invalid="ignore", over="ignore"):
+            each = position_error(paths, windows.future).mean(axis=0)
+        worst = float(each[~diverged].max(initial=0.0)) if not diverged.all() else np.inf
+        return float(np.where(diverged, 2 * worst, each).mean())
 
-    for name, values in (("current", (best.current, 0.0)), ("change", (best.change, *((c,) for c in best.change)))):
-        options = {f"{name} {value}": best.model_copy(update={name: value}) for value in dict.fromkeys(values)}
-        chosen = {label: fades(option, label) for label, option in options.items()}
-        least = min(chosen, key=lambda label: tried[f"{label}, fade {chosen[label].fade}"])
-        best = chosen[least]
+    def faded(given: Observer, label: str) -> tuple[float, Observer]:
+        alike = samples / bank(vessel, given).num_filters  # the fewer the filters, the smaller the call
+        columns = at_windows(dataset, observe(vessel, dataset, given, calls=alike), windows)
+        options = [given.model_copy(update={"fade": fade}) for fade in FADES]
+        losses = [loss(one, columns) for one in options]
+        tried.update({f"{label}, fade {one.fade}": each for one, each in zip(options, losses, strict=True)})
+        place = int(np.argmin(losses))
+        return losses[place], options[place]
+
+    levels = {"waves": _each(first.waves), "current": (0.0,), "change": _each(first.change)}
+    samples = (1 + sum(map(len, levels.values()))) * bank(vessel, first).num_filters
+    least, best = faded(first, "as given")
+    for name, values in levels.items():
+        begun = best
+        for value in values:
+            if getattr(begun, name) != value:
+                error, one = faded(begun.model_copy(update={name: value}), f"{name} {value}")
+                least, best = (error, one) if error < least else (least, best)
     return best, tried
+
+
+def _each(levels: tuple[float, ...]) -> list[tuple[float, ...]]:
+    """Every level alone, where there are several."""
+    return [(level,) for level in levels] if len(levels) > 1 else []

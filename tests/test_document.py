@@ -158,6 +158,8 @@ def test_a_quoted_key_may_hold_dots() -> None:
         ("a = " + "9" * 400, "a: an integer of 400 digits"),
         ("a = " + "9" * 4301, "has an integer larger than 1e+15"),
         ("a = 1e308", "a: 1e+308: larger than 1e+24"),
+        ("a = 5e-324", "a: 4.94066e-324: no quantity of a ship in SI units is so near to 0"),
+        ("a = [1.0, -1e-101]", "a.1: -1e-101: no quantity of a ship"),
         ('a = "\\u001b[2J"', "a: '\\\\x1b[2J': text with a control character"),
         ('"\\u0007" = 1', "a name with a control character"),
     ],
@@ -172,7 +174,7 @@ def test_values_that_no_document_holds(text: str, remedy: str, tmp_path: Path) -
     assert line.isprintable()
 
 
-@pytest.mark.parametrize("value", ["inf", "-0.0", "1e24", "999999999999999", '"a\\n\\tb"', "[[[1]]]", "true"])
+@pytest.mark.parametrize("value", ["inf", "-0.0", "1e24", "1e-100", "999999999999999", '"a\\n\\tb"', "[[[1]]]", "true"])
 def test_values_that_documents_hold(value: str, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(f"a = {value}")
     assert "a" in documents.read(tmp_path / "a.toml")

@@ -49,13 +49,13 @@ def best_model(results: Results) -> str | None:
 
     Where the judged method learns nothing there is no validation loss, and so no best model.
 
-    Models that were identified are left out where there are others: they were fitted to their validation runs, too, so
+    Models that were fitted to the runs are left out where there are others: their validation runs are among these, so
     their loss says too little. So are families that a study sets aside.
     """
     table = by_model(results)
     table = table[~table["family"].isin(results.plan.aside)]
     top = table[(table["N_D"] == table["N_D"].max()) & (table["family"] != NO_MODEL)]
-    fair = top[~top["family"].isin(results.plan.identified)]
+    fair = top[~top["family"].isin(results.plan.fitted)]
     chosen = top if fair.empty else fair
     return None if chosen["loss"].isna().all() else str(chosen.iloc[int(chosen["loss"].argmin())]["model"])
 
@@ -126,7 +126,7 @@ class Case:
     def fixed(self) -> list[str]:
         """Physics models whose numbers do not depend on the cell and that have a result in every one."""
         names = self.at(self.largest)
-        names = names[~names["family"].isin(self.results.plan.identified)]
+        names = names[~names["family"].isin(self.results.plan.fitted)]
         return [str(m) for m in names["model"] if m in self.table.H and m in self.table.A]
 
 
@@ -438,11 +438,12 @@ def _how_to_read(case: Case) -> list[str]:
             text += f", and {metres(last)} at {runs(case.largest)}" if case.largest > case.smallest else ""
         sentences.append(f"{text}.")
     top = case.at(case.largest)
-    fitted = top[top["family"].isin(plan.identified)]
+    fitted = top[top["family"].isin(plan.fitted)]
     if len(fitted) and not fitted["model"].eq(case.best).any():
         lowest = fitted.iloc[int(fitted["loss"].argmin())]
         sentences.append(
-            "Identified models were fitted to their validation runs, too, so they cannot be called best in validation: "
+            "Models that were identified, or whose observer was chosen, were fitted to their validation runs, too, so "
+            "they cannot be called best in validation: "
             f"{lowest['model']} has {case.H(str(lowest['model']), case.largest)} with {runs(case.largest)}."
         )
     if plan.known and plan.reacting:

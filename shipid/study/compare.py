@@ -78,7 +78,7 @@ def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
     parts = []
     for world, results in enumerate(worlds):
         good = results.cells[results.cells["status"] == "ok"]
-        known = ~good["family"].isin([NO_MODEL, *results.plan.identified])
+        known = ~good["family"].isin([NO_MODEL, *results.plan.fitted])
         alone = good[known].drop_duplicates("foundation").assign(N_D=0, H=lambda rows: rows["A"], method=ALONE)
         means = pd.concat([alone, good]).groupby(["family", "method", "N_D"], sort=False)["H"].mean()
         parts.append(means.reset_index().assign(world=world))

@@ -1,7 +1,8 @@
-"""Foundations of one batch: variants as they are, and those whose numbers are identified first from the same runs."""
+"""Foundations of one batch: variants as they are, and those whose numbers or observer are first fitted to its runs."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -14,9 +15,10 @@ from shipid.errors import ShipidError
 from shipid.metrics import position_error, summary
 from shipid.observer import Estimates
 from shipid.study.plan import Foundation, Plan
-from shipid.study.prepare import Prepared, estimates_of, paths_of
+from shipid.study.prepare import Prepared, chosen_observer, estimates_of, paths_of
 
 if TYPE_CHECKING:
+    from shipid.identification.settings import Identify
     from shipid.identification.solve import Solution
 
 Array = np.ndarray
@@ -26,9 +28,10 @@ Array = np.ndarray
 class Prediction:
     """What a foundation of one batch predicts before any method improves it.
 
-    foundation : with the numbers that were identified, if any were.
+    foundation : with the numbers that were identified and the observer that was chosen, if any.
     paths, test_paths : (T, S, 2) [m] in the frame (11) on the batch's windows and the test's; zeros without physics.
-    sentence : the message of the identification; empty where nothing was identified. seconds : that it took.
+    sentence : the message of the identification; empty where nothing was identified. seconds : core-seconds that
+        identification and choice took.
     estimates : what the observer knows at every row of the runs; None without one.
     """
 
@@ -47,7 +50,7 @@ class Prediction:
 def predictions(
     plan: Plan, prepared: Prepared, runs: tuple[str, ...], device: str, wanted: Collection[str] | None = None
 ) -> dict[str, Prediction]:
-    """Every foundation for some runs of the pool; those to be identified see these runs, and no moment of the test.
+    """Every foundation for some runs of the pool; those to be fitted see these runs, and no moment of the test.
 
     wanted : names of foundations; None: all.
     """
@@ -59,12 +62,12 @@ def predictions(
     for one in prepared.foundations:
         if wanted is not None and one.name not in wanted:
             continue
-        if one.identify is None:
+        if not one.fitted:
             paths = prepared.pool_paths[one.name][:, mask], prepared.test_paths[one.name]
             result[one.name] = Prediction(one, *paths, estimates=prepared.estimates.get(one.name))
         else:
             data = apart(prepared.data, prepared.test) if data is None else data
-            result[one.name] = _identified(plan, prepared, one, runs, data, windows, device, known)
+            result[one.name] = _fitted(plan, prepared, one, runs, data, windows, device, known)
     return result
 
 
@@ -83,7 +86,7 @@ def apart(dataset: Dataset, test: Windows) -> Dataset:
     return replace(dataset, frame=frame, metadata={**dataset.metadata, "flags": names})
 
 
-def _identified(
+def _fitted(
     plan: Plan,
     prepared: Prepared,
     foundation: Foundation,
@@ -93,28 +96,42 @@ def _identified(
     device: str,
     known: dict[Any, Solution],
 ) -> Prediction:
-    """One identified foundation; `known` keeps solutions for foundations that differ in the observer alone."""
-    from shipid.identification.solve import identify  # SciPy's statistics: a quarter of what workers would import
-
-    assert foundation.identify is not None
-    assert foundation.variant is not None
-    assert foundation.vessel is not None
+    """One foundation fitted to the runs; `known` keeps solutions for foundations that differ in the observer alone."""
+    now, sentence, seconds = foundation, "", 0.0
     try:
-        key = foundation.variant.name, foundation.identify.model_dump_json()
-        solution = known.get(key)
-        if solution is None:
-            solution = known[key] = identify(foundation.vessel, data, runs, foundation.identify)
-        if solution.status != "ok":
-            return _nothing(foundation, windows, prepared.test, solution.sentence)
-        values: Mapping[str, float] = {**foundation.variant.values, **solution.values}
-        now = replace(foundation, variant=replace(foundation.variant, values=values))
+        if foundation.identify is not None:
+            solution = _solution(foundation, foundation.identify, runs, data, known)
+            if solution.status != "ok":
+                return _nothing(foundation, windows, prepared.test, solution.sentence)
+            assert foundation.variant is not None
+            values: Mapping[str, float] = {**foundation.variant.values, **solution.values}
+            now = replace(foundation, variant=replace(foundation.variant, values=values))
+            sentence, seconds = solution.sentence, solution.seconds
+        if now.observer is not None and now.observer.choose:
+            begun = time.thread_time()
+            now = replace(now, observer=chosen_observer(plan, now, data, runs))
+            seconds += time.thread_time() - begun
         estimates = estimates_of(plan, now, prepared.data) if now.observer is not None else None
         pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device, estimates)
     except ShipidError as error:
         return _nothing(foundation, windows, prepared.test, error.message)
     if not np.isfinite(pair[0]).all():
-        return _nothing(foundation, windows, prepared.test, "the identified model diverges on training windows")
-    return Prediction(now, *pair, solution.sentence, solution.seconds, estimates)
+        return _nothing(foundation, windows, prepared.test, "the fitted model diverges on training windows")
+    return Prediction(now, *pair, sentence, seconds, estimates)
+
+
+def _solution(
+    foundation: Foundation, settings: Identify, runs: tuple[str, ...], data: Dataset, known: dict[Any, Solution]
+) -> Solution:
+    """What identification from the runs gives, once for a variant and its settings."""
+    from shipid.identification.solve import identify  # SciPy's statistics: a quarter of what workers would import
+
+    assert foundation.variant is not None
+    assert foundation.vessel is not None
+    key = foundation.variant.name, settings.model_dump_json()
+    if key not in known:
+        known[key] = identify(foundation.vessel, data, runs, settings)
+    return known[key]
 
 
 def _nothing(foundation: Foundation, windows: Windows, test: Windows, sentence: str) -> Prediction:

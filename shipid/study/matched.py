@@ -181,7 +181,7 @@ def _cells(results: Results) -> pd.DataFrame:
     known = every["foundation"].isin([name for name, path in results.physics.items() if np.isfinite(path).all()])
     alone = every[known & (every["family"] != NO_MODEL)].reindex(columns=good.columns)
     alone = alone.assign(cell="", method=ALONE, N_D=0, seed=0, H=every["A"], coverage=np.nan, trained=False)
-    alone = alone[~alone["family"].isin(results.plan.identified)]
+    alone = alone[~alone["family"].isin(results.plan.fitted)]
     return pd.concat([alone, good], ignore_index=True).astype({"coverage": float, "H": float, "trained": bool})
 
 

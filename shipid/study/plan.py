@@ -272,6 +272,11 @@ class Foundation:
     observer: Observer | None = None
 
     @property
+    def fitted(self) -> bool:
+        """Whether its numbers or the settings of its observer come from the runs of each batch."""
+        return self.identify is not None or (self.observer is not None and self.observer.choose)
+
+    @property
     def vessel(self) -> Vessel | None:
         """The base with the numbers of the variant."""
         if self.base is None or self.variant is None:
@@ -413,9 +418,9 @@ class Plan:
         return documents.digest({"study": document, **depends})
 
     @property
-    def identified(self) -> set[str]:
-        """Families whose numbers, and so their A, depend on the data of the batch."""
-        return {foundation.family for foundation in self.foundations if foundation.identify is not None}
+    def fitted(self) -> set[str]:
+        """Families whose numbers or observer, and so their A, depend on the data of the batch."""
+        return {foundation.family for foundation in self.foundations if foundation.fitted}
 
     @property
     def aside(self) -> set[str]:
@@ -560,7 +565,7 @@ class Plan:
         return Unit(batch, tuple((name, way.name) for name, way in self.pairs), batch.key)
 
     def _shared(self) -> list[tuple[tuple[str, str], ...]]:
-        """The cells of a batch in groups: one group shares a fit of several foundations, or an identification."""
+        """The cells of a batch in groups: one group shares a fit of several foundations, or one to the runs."""
         known = {one.name: one for one in self.foundations}
         groups: list[tuple[set[Any], list[tuple[str, str]]]] = []
         for name, way in self.pairs:
@@ -568,6 +573,8 @@ class Plan:
             shares: set[Any] = {way.name} if way.method.together else set()
             if one.identify is not None and one.variant is not None:
                 shares.add((one.variant.name, one.identify.model_dump_json()))
+            elif one.fitted:
+                shares.add(one.name)
             pairs = [(name, way.name)]
             for group in [group for group in groups if group[0] & shares]:
                 groups.remove(group)

@@ -29,7 +29,7 @@ from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.logs.segments import kind_of
 from shipid.metrics import Summary, position_error, summary
-from shipid.observer import Estimates, Observer, at_windows, observe
+from shipid.observer import Estimates, Observer, at_windows, observe, tune_observer
 from shipid.simulation.truth import simulate
 from shipid.study.plan import Batch, Foundation, Plan, beside, mapping_of
 from shipid.study.ranges import check_memory
@@ -274,7 +274,7 @@ def _roll_out(
         if (foundation.identify or foundation.observer) and foundation.variant is not None:
             same, paths = finished[foundation.variant.name]
             derived = replace(foundation, variant=same.variant)
-            if derived.observer is not None and derived.identify is None:
+            if derived.observer is not None and not derived.fitted:
                 estimates[derived.name] = known = estimates_of(plan, derived, dataset)
                 paths = paths_of(plan, dataset, parts, derived, device, known)
             finished[foundation.name] = (derived, paths)
@@ -318,7 +318,27 @@ def path_of(plan: Plan) -> Literal["position", "velocity"]:
 def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset) -> Estimates:
     """Estimates of the observer of a foundation at every row of the runs."""
     assert foundation.vessel is not None
-    return observe(foundation.vessel, known_by_then(plan, dataset), foundation.observer)
+    observed = sum(one.observer is not None for one in plan.foundations)
+    return observe(foundation.vessel, known_by_then(plan, dataset), foundation.observer, calls=observed)
+
+
+def chosen_observer(plan: Plan, foundation: Foundation, dataset: Dataset, runs: Sequence[str]) -> Observer:
+    """Settings of the observer of a foundation with which its physics alone predicts these runs best."""
+    assert foundation.vessel is not None
+    ahead = plan.study.prediction
+    settings, _ = tune_observer(
+        foundation.vessel,
+        known_by_then(plan, dataset),
+        foundation.observer,
+        horizon=ahead.horizon,
+        step=ahead.step,
+        method=ahead.integrator,
+        commands=ahead.commands,
+        path=path_of(plan),
+        past=plan.past,
+        runs=runs,
+    )
+    return settings
 
 
 def instants_of(

@@ -191,7 +191,7 @@ def _mended(folder: Path, claims: Claims) -> list[str]:
 
 def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
     """Store what all batches share, so that a report needs nothing else."""
-    fixed = {one.name: prepared.test_paths[one.name] for one in prepared.foundations if one.identify is None}
+    fixed = {one.name: prepared.test_paths[one.name] for one in prepared.foundations if not one.fitted}
     store.write_test(folder, prepared.test, fixed, prepared.naive)
     write_json(
         folder / store.ENVELOPE,
@@ -289,6 +289,7 @@ def run_unit(
     runs = prepared.runs(plan, batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
     known = predictions(plan, prepared, runs, device, {name for name, _ in unit.pairs})
+    adapted = {one.name for one in prepared.foundations if one.fitted}
     shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
     ways = {way.name: replace(way, foundations=unit.foundations(way.name)) for way in plan.methods}
     fitted = {
@@ -308,8 +309,8 @@ def run_unit(
             predictor, paths, outcome = None, None, _failed(one.sentence or "no training converged")
         else:
             predictor = _predictor(plan, prepared, one.foundation, way, batch, result.corrector, windows)
-            if one.foundation.identify is None and result.left_out is not None:
-                errors = result.left_out  # fair: these numbers were not taken from these runs
+            if name not in adapted and result.left_out is not None:
+                errors = result.left_out  # fair: numbers and observer were not taken from these runs
             bands, reason = bands_of(errors, windows, predictor.limits, prepared.kinds)
             known_why = {} if bands is not None else {"no_band": reason}
             predictor = replace(predictor, bands=bands, provenance={**predictor.provenance, **known_why})
@@ -329,15 +330,15 @@ def refitted(
     """Errors (T, S, 2) [m] on the windows of a batch by cells fitted without their runs, and seconds that they took.
 
     For the (foundation, method) pairs that have no such errors for nothing: methods that learn step by step, and
-    foundations identified from the runs of the batch. None of them unless the study has `bands.refits`.
+    foundations fitted to the runs of the batch. None of them unless the study has `bands.refits`.
     """
-    identified = {one.name for one in prepared.foundations if one.identify is not None}
+    adapted = {one.name for one in prepared.foundations if one.fitted}
     pairs = [
         (name, way)
         for name, way in plan.pairs
         if name in fitted.get(way.name, {})
         and fitted[way.name][name].corrector is not None
-        and (name in identified or fitted[way.name][name].left_out is None)
+        and (name in adapted or fitted[way.name][name].left_out is None)
     ]
     refits = plan.refits
     if not refits or not pairs:
@@ -466,7 +467,7 @@ def machine() -> dict[str, Any]:
 
 def _accuracy(foundation: Foundation, prepared: Prepared) -> dict[str, Any]:
     """A, A_90, A_rms [m] of a foundation; not a number without physics, and where it depends on the batch."""
-    if foundation.base is None or foundation.identify is not None:
+    if foundation.base is None or foundation.fitted:
         return dict.fromkeys(ACCURACY, np.nan)
     accuracy: Mapping[str, Any] = prepared.accuracy(foundation.name)
     return {key: accuracy[name] for key, name in ACCURACY.items()}

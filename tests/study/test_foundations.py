@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 from shipid.data.dataset import Dataset, pieces
 from shipid.errors import DocumentError
 from shipid.identification import solve
+from shipid.metrics import position_error
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.advise import answer
@@ -57,9 +59,15 @@ def test_a_wrong_model_finds_the_right_numbers(recorded: Recorded) -> None:
     assert "converged" in foundations["fitted"].sentence
 
 
-def test_other_runs_teach_nothing(recorded: Recorded) -> None:
-    """What the test run and the runs of no batch hold does not change what is identified."""
-    plan, dataset = study(recorded, BOTH)
+CHOOSING = {"choose": True, "waves": [0.0, 0.01], "change": [1e-4], "current": 0.0}
+SEEN = {"name": "seen", "extends": "wrong", "observer": CHOOSING}
+CHAIN = {"name": "chain", "extends": "fitted", "observer": CHOOSING}
+
+
+@pytest.mark.parametrize(("families", "name"), [(BOTH, "fitted"), ([WRONG, SEEN], "seen"), ([*BOTH, CHAIN], "chain")])
+def test_other_runs_teach_nothing(recorded: Recorded, families: list[dict[str, Any]], name: str) -> None:
+    """What the test run and the runs of no batch hold changes neither numbers nor the choice of an observer."""
+    plan, dataset = study(recorded, families)
     prepared = prepare(plan, dataset)
     batch = plan.batches[0]
     seen = set(prepared.runs(plan, batch))
@@ -67,10 +75,28 @@ def test_other_runs_teach_nothing(recorded: Recorded) -> None:
     frame.loc[~frame["run"].isin(seen), "u"] += 0.3
     other = prepare(plan, Dataset(frame, dataset.metadata))
     pair = [
-        predictions(plan, each, each.runs(plan, batch), "cpu")["fitted"].foundation.variant
-        for each in (prepared, other)
+        predictions(plan, each, each.runs(plan, batch), "cpu", {name})[name].foundation for each in (prepared, other)
     ]
-    assert pair[0] == pair[1]
+    assert pair[0].variant == pair[1].variant
+    assert pair[0].observer == pair[1].observer
+    assert pair[0].observer is None or not pair[0].observer.choose
+
+
+def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(recorded: Recorded) -> None:
+    """Among its levels and fades none predicts the training runs better; the page says whose A moves with the data."""
+    plan, dataset = study(recorded, [WRONG, SEEN])
+    assert plan.fitted == {"seen"}
+    prepared = prepare(plan, dataset)
+    runs = prepared.runs(plan, plan.batches[0])
+    known = predictions(plan, prepared, runs, "cpu")["seen"]
+    windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
+    chosen = position_error(known.paths, windows.future).mean()
+    for waves, fade in product(([0.0], [0.01], [0.0, 0.01]), (0.0, 12.0, 40.0)):
+        block = {**CHOOSING, "choose": False, "waves": waves, "fade": fade}
+        other, _ = study(recorded, [WRONG, {**SEEN, "observer": block}])
+        given = predictions(other, prepare(other, dataset), runs, "cpu", {"seen"})["seen"]
+        assert chosen <= position_error(given.paths, windows.future).mean() * 1.02, (waves, fade)
+    assert known.seconds > 0
 
 
 def test_moments_of_the_test_are_cut_out_where_runs_share_a_clock(recorded: Recorded) -> None:
@@ -213,6 +239,6 @@ def test_the_prediction_of_the_study_is_the_default(recorded: Recorded) -> None:
     settings = plan.foundations[1].identify
     assert settings is not None
     assert (settings.horizon, settings.step, settings.method) == (5.0, 1.0, "euler")
-    assert plan.identified == {"fitted"}
+    assert plan.fitted == {"fitted"}
     assert plan.judged == "drawn"
     assert Batch(3, 0) in plan.batches

@@ -44,7 +44,7 @@ def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches
     assert plan.label(NO_MODEL, "plain") == "none + plain"
     bare = [name for name, way in plan.pairs if not way.method.compensates]
     assert len(bare) == alone
-    assert {one.family for one in plan.foundations if one.name in bare} == (plan.identified if alone else set())
+    assert {one.family for one in plan.foundations if one.name in bare} == (plan.fitted if alone else set())
     assert [model.name for model in plan.foundations if model.vessel is None] == [NO_MODEL]
     assert plan.study.question.endswith("?")
 
@@ -377,7 +377,7 @@ def test_an_identified_family_on_an_identified_one_has_the_members_of_the_first(
     assert [one.name for one in plan.foundations] == ["right", "fitted", "again", NO_MODEL]
     right, fitted, again, _ = plan.foundations
     assert right.variant == fitted.variant == again.variant
-    assert plan.identified == {"fitted", "again"}
+    assert plan.fitted == {"fitted", "again"}
     assert fitted.identify is not None
     assert again.identify is not None
     assert (fitted.identify.horizon, again.identify.horizon) == (5.0, 9.0)
