@@ -42,6 +42,7 @@ ROWS: dict[str, Row] = {
     "cluster": Row(clusters.died, 10, "SIGKILL of scheduler or worker", 180.0),
 }
 SMALLEST = 1.0 / 100
+EVERY = 30.0  # s between lines of progress
 
 
 def campaign(scale: float, seed: int, only: tuple[str, ...] = ()) -> dict[str, list[Outcome]]:
@@ -54,11 +55,14 @@ def campaign(scale: float, seed: int, only: tuple[str, ...] = ()) -> dict[str, l
         first = 1_000_000 * seed
         if row.trial.__module__ == folders.__name__:
             folders.reference()  # once, before the trials fork
-        trials = []
+        trials, told = [], begun
         for one in outcomes(row.trial, range(first, first + count), row.limit):
             trials.append(one)
             if one.failed:
                 print(f"{name}, trial {one.trial}: {one.kind}: {one.words}", file=sys.stderr, flush=True)
+            if time.perf_counter() - told > EVERY:
+                told = time.perf_counter()
+                print(f"... {name}: {len(trials)} of {count} trials", file=sys.stderr, flush=True)
         rows[f"{name} ({row.made})"] = trials
         failed = sum(one.failed for one in trials)
         words = f"{count} trials, {failed} failed, {time.perf_counter() - begun:.0f} s"
