@@ -21,7 +21,7 @@ Estimation with Applications to Tracking and Navigation (2001), ch. 11 (multiple
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import product
 from typing import Annotated, Any, Literal
@@ -29,10 +29,10 @@ from typing import Annotated, Any, Literal
 import casadi as ca
 import numpy as np
 from casadi import SX
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, clock_slack, stretches
-from shipid.data.windows import Windows, cut_windows, to_frame
+from shipid.data.windows import Windows, to_frame
 from shipid.engine.casadi import summed_rates
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.integrate import Method
@@ -58,7 +58,8 @@ COLUMNS = (*MEASURED, "X", "Y", "N", "current_north", "current_east")
 GRAVITY = 9.81  # m/s^2
 DIVERGED = 1e9  # SI: no state, variance or likelihood of a sound filter is so large
 SPIKE = 300.0  # standard deviations: a measurement as far off is a fault of the log and moves nothing
-FADES = (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, None)  # x sqrt(L / g): between which `tune_observer` chooses
+FADES = (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, 1e6)  # x sqrt(L / g): between which `tune_observer` chooses
+YAW = 3.0  # change of the moment, x I_z g / L, over that of the force, x m g
 CALM = 1e-6  # m/s: keeps the direction of no wind defined
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
@@ -72,11 +73,15 @@ class Observer(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-    measured: tuple[Motion, ...] = MEASURED
+    measured: Annotated[tuple[Motion, ...], Field(description="columns that are measurements; always `psi`")] = MEASURED
     force: Annotated[NotNegative, Field(description="standard deviation of the slow force at first, x m g")] = 3e-3
     moment: Annotated[NotNegative, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
     change: Annotated[
-        tuple[NotNegative, ...], Field(min_length=1, description="levels: change of the force in 1 s, x m g")
+        tuple[NotNegative, ...],
+        Field(
+            min_length=1,
+            description="levels: change of the force in 1 s, x m g; of the moment 3 times, x I_z g / L",
+        ),
     ] = (1e-5, 2e-4)
     model_error: Annotated[
         NotNegative,
@@ -96,12 +101,23 @@ class Observer(BaseModel):
     memory: Annotated[Positive, Field(description="time in which likelihoods are forgotten, x sqrt(L / g)")] = 20.0
     fade: Annotated[
         NotNegative | None,
-        Field(description="time in which the force fades ahead, x sqrt(L / g); 0: no force; none: never"),
+        Field(description="time in which the force fades ahead, x sqrt(L / g); 0: no force; very large: it lasts"),
     ] = 12.0
     choose: Annotated[
         bool,
         Field(description="levels of waves, current, change, and fade by the error of prediction on training runs"),
     ] = False
+
+    @model_validator(mode="after")
+    def _seen(self) -> Observer:
+        twice = next((name for name in self.measured if self.measured.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"measured names {twice!r} twice: once is enough")
+        if "psi" not in self.measured:
+            raise ValueError("measured lacks 'psi': every force turns with the heading, add it")
+        if self.current and not {"north", "east"} <= set(self.measured):
+            raise ValueError("current cannot be seen without the positions 'north' and 'east' in measured: set it to 0")
+        return self
 
 
 @dataclass(frozen=True)
@@ -142,15 +158,17 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     unknown = next((name for name in settings.noise if name not in MEASURED), None)
     if unknown is not None:
         raise DocumentError(f"no measured column: {choices(unknown, MEASURED)}", path=f"observer.noise.{unknown}")
-    length = float(vessel.document["particulars"]["L_pp"])
+    length = float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
+    if not length:
+        message = f"{vessel.name} has no particulars.L_pp, by which the observer scales its numbers: add it"
+        raise DocumentError(message, file=vessel.file, path="particulars.L_pp")
     time, speed, root = np.sqrt(length / GRAVITY), np.sqrt(GRAVITY * length), 1.0
     linear, yaw = GRAVITY, GRAVITY / length
-    per_yaw = settings.moment / settings.force if settings.force else 3.0
     currents = dict.fromkeys([0.0, settings.current])
     omega = 2 * np.pi / (settings.period * time)
     numbers, first = [], []
     for change, current, wave in product(settings.change, currents, settings.waves):
-        a = change * linear * root, change * linear * root, change * per_yaw * yaw * root
+        a = change * linear * root, change * linear * root, change * YAW * yaw * root
         w = wave * speed + 1e-9, wave * speed + 1e-9, 2.5 * wave / time + 1e-9
         q = (0.0 if wave else settings.model_error * x for x in a)  # in waves their motion takes its place
         numbers.append(
@@ -219,6 +237,8 @@ def filter_function(model: Dynamics) -> ca.Function:
     for i in range(6):  # one at a time: independent noise, and no matrix to invert
         given = ca.fabs(measured[i]) < np.inf  # false for NaN; x == x would be simplified away
         innovation = ca.if_else(given, measured[i], output[i]) - output[i]
+        if MEASURED[i] == "psi":  # a compass counts from 0 again
+            innovation -= 2 * np.pi * ca.floor(innovation / (2 * np.pi) + 0.5)
         innovations.append(innovation)
         spreads.append(rows[i, :] @ predicted @ rows[i, :].T + noise[i] ** 2)
         column = left @ rows[i, :].T
@@ -359,7 +379,8 @@ class Estimates:
     """What the observer knows at every row of a dataset, from that row and those before it alone.
 
     columns : `observer.u`, ... (N,), in the order of the table; see COLUMNS. `observer.test` is the normalised
-        innovation squared over the number of measurements: 1 in the mean where the assumptions hold.
+        innovation squared over the number of measurements, less those left out: 1 in the mean where the assumptions
+        hold.
     innovation, spread : (N, 6), measured less predicted, and its variance; NaN in the first row of a stretch.
     weights : (N, K) of the filters.
     age : time [s] since the first row of the stretch, (N,): the observer needs some 20 sqrt(L / g) to settle.
@@ -370,6 +391,11 @@ class Estimates:
     spread: Array
     weights: Array
     age: Array
+
+    def select(self, rows: Array) -> Estimates:
+        """Estimates at some rows: a mask or indices."""
+        columns = {name: values[rows] for name, values in self.columns.items()}
+        return Estimates(columns, *(part[rows] for part in (self.innovation, self.spread, self.weights, self.age)))
 
 
 def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, *, calls: float = 1) -> Estimates:
@@ -420,9 +446,10 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
         innovation[now] = np.where(np.isnan(measured[now]), np.nan, innovation[now])
         age[now] = age[past] + dt
     columns = {f"observer.{name}": estimate[:, i] for i, name in enumerate(COLUMNS)}
-    given = np.isfinite(innovation)
-    squares = np.where(given, innovation**2 / spread, 0.0).sum(axis=1)
-    columns["observer.test"] = squares / np.maximum(given.sum(axis=1), 1)
+    with np.errstate(invalid="ignore"):
+        squares = innovation**2 / spread
+        given = squares < SPIKE**2  # false for NaN, and for a fault of the log, which moves nothing
+    columns["observer.test"] = np.where(given, squares, 0.0).sum(axis=1) / np.maximum(given.sum(axis=1), 1)
     return Estimates(columns, innovation, spread, weights, age)
 
 
@@ -495,7 +522,7 @@ def observed_start(
     """
     model, zero = filters.model, np.zeros(len(columns["u"]))
     begun = start(columns)
-    if path == "velocity":
+    if path == "velocity" or not {"north", "east"} <= set(filters.settings.measured):
         begun |= {name: columns.get(name, zero) for name in ("north", "east")}
     north, east, psi = columns["observer.current_north"], columns["observer.current_east"], begun["psi"]
     begun["u"] = begun["u"] - north * np.cos(psi) - east * np.sin(psi)
@@ -545,72 +572,69 @@ def observed_paths(
 
 
 def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:
-    """Columns of windows, with the estimates `observer.*` (S,) of the last row at or before each instant."""
+    """Columns of windows, with the estimates `observer.*` (S,) of the last row at or before each instant.
+
+    `estimates` are of the rows of `dataset`. The heading counts full turns as that of the windows does.
+    """
+    if len(estimates.age) != len(dataset.frame):
+        raise ValueError(f"{len(estimates.age)} estimates for {len(dataset.frame)} rows")
     frame, index = dataset.frame, np.zeros(len(windows), dtype=np.intp)
     t, names = frame["t"].to_numpy(), frame["run"].to_numpy()
     for run in windows.spans:
         rows, chosen = np.flatnonzero(names == run), windows.run == run
         index[chosen] = rows[np.searchsorted(t[rows], windows.t[chosen] + clock_slack(t[rows]), side="right") - 1]
-    return {**windows.columns, **{name: values[index] for name, values in estimates.columns.items()}}
+    known = {name: values[index] for name, values in estimates.columns.items()}
+    turns = np.round((windows.columns["psi"] - known["observer.psi"]) / (2 * np.pi))
+    return {**windows.columns, **known, "observer.psi": known["observer.psi"] + 2 * np.pi * turns}
 
 
 def tune_observer(
     vessel: Vessel,
     dataset: Dataset,
+    windows: Windows,
     settings: Observer | None = None,
     *,
-    horizon: int,
-    step: float = 1.0,
     method: Method = "euler",
-    interval: float = 5.0,
     commands: Literal["held", "known"] = "held",
     path: Literal["position", "velocity"] = "position",
-    past: int = 0,
-    runs: Sequence[str] | None = None,
+    memory: Mapping[str, Array] | None = None,
 ) -> tuple[Observer, dict[str, float]]:
     """Settings with the least mean error of prediction on training runs: coordinate search over a small grid.
 
     In turn: all levels of `waves` or one of them, a current or none, all levels of `change` or one of them; for each of
-    these how the force fades. The given levels are the grid.
+    these how the force fades: as given, or by one of `FADES`. The given levels are the grid.
 
     Parameters
     ----------
     vessel : the physics, without any method.
-    dataset : runs, of which `runs` are for training; None: all are.
+    dataset : the training runs, as the observer sees them.
+    windows : of these runs: instants of prediction and true paths.
     settings : the levels, and what is not searched.
-    horizon, step, method, commands, path, past : of the prediction, as in a study; `past` in steps.
-    interval : time between instants of prediction [s].
+    method, commands, path : of the prediction, as in a study.
+    memory : hidden actuator states at the instants, name -> (S,); default: each actuator has reached its order.
 
     Returns
     -------
-    The settings, with `choose` false, and the mean error [m] of each that was tried, by what was changed. Windows that
-    diverge count as twice the worst that does not.
-
-    Raises
-    ------
-    DataError : if no run is as long as past and horizon.
+    The settings, with `choose` false, and the mean error [m] of each that was tried, by what was changed. A window that
+    diverges counts as 1e9 m, so that settings with fewer of them are better.
     """
     first = (settings or Observer()).model_copy(update={"choose": False})
-    if runs is not None:
-        dataset = replace(dataset, frame=dataset.frame[dataset.frame["run"].isin(list(runs))].reset_index(drop=True))
-    windows = cut_windows(dataset, horizon=horizon, step=step, interval=interval, path=path, past=past)
     planned = windows.planned if commands == "known" else None
     tried: dict[str, float] = {}
 
     def loss(one: Observer, columns: Mapping[str, Array]) -> float:
-        filters = bank(vessel, one)
         paths, diverged = observed_paths(
-            filters, columns, horizon, step, method, path=path, planned=planned, engine=REPEATED
-        )
+            bank(vessel, one), columns, windows.horizon, windows.step, method,
+            planned=planned, memory=memory, path=path, engine=REPEATED,
+        )  # fmt: skip
         with np.errstate(invalid="ignore", over="ignore"):
             each = position_error(paths, windows.future).mean(axis=0)
-        worst = float(each[~diverged].max(initial=0.0)) if not diverged.all() else np.inf
-        return float(np.where(diverged, 2 * worst, each).mean())
+        return float(np.where(diverged, DIVERGED, each).mean())
 
     def faded(given: Observer, label: str) -> tuple[float, Observer]:
         alike = samples / bank(vessel, given).num_filters  # the fewer the filters, the smaller the call
         columns = at_windows(dataset, observe(vessel, dataset, given, calls=alike), windows)
-        options = [given.model_copy(update={"fade": fade}) for fade in FADES]
+        options = [given.model_copy(update={"fade": fade}) for fade in dict.fromkeys((given.fade, *FADES))]
         losses = [loss(one, columns) for one in options]
         tried.update({f"{label}, fade {one.fade}": each for one, each in zip(options, losses, strict=True)})
         place = int(np.argmin(losses))

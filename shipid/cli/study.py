@@ -102,13 +102,14 @@ def study_variants(
     if accuracy or save is not None:  # what diverges on training windows is redrawn, so a patch needs the data
         prepared = prepare(plan, obtain(plan))
         models = prepared.foundations
-        known = [model.name for model in models if model.vessel and model.identify is None]
+        known = [model.name for model in models if model.vessel and not model.fitted]
         scores = {name: prepared.accuracy(name)["mean"] for name in known}
     foundations = [
         {
             "foundation": model.name,
             "A": scores.get(model.name),
             "identified": model.identify is not None,
+            "observer_chosen": model.fitted and model.identify is None,
             "factors": model.variant.factors if model.variant and model.identify is None else {},
             "from_zero": model.variant.from_zero if model.variant and model.identify is None else {},
         }
@@ -134,7 +135,9 @@ def _factors(row: dict[str, Any]) -> list[str]:
     words += [f"{value:g} in place of 0" for value in row["from_zero"].values()]
     names = short_names([*row["factors"], *row["from_zero"]])
     shown = ", ".join(f"{name} {word}" for name, word in zip(names, words, strict=True))
-    return [row["foundation"], "-" if row["A"] is None else f"{row['A']:.2f}", str(len(names)), shown]
+    accuracy = "-" if row["A"] is None else f"{row['A']:.2f}"
+    note = "observer chosen from the runs of each cell, so A differs by cell" if row["observer_chosen"] else ""
+    return [row["foundation"], accuracy, str(len(names)), ", ".join(filter(None, (shown, note)))]
 
 
 @app.command("screen")

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shipid.data.dataset import BREAK, Dataset
+from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.errors import ShipidError
 from shipid.metrics import position_error, summary
 from shipid.observer import Estimates
 from shipid.study.plan import Foundation, Plan
-from shipid.study.prepare import Prepared, chosen_observer, estimates_of, paths_of
+from shipid.study.prepare import Prepared, apart, chosen_observer, estimates_of, paths_of
 
 if TYPE_CHECKING:
     from shipid.identification.settings import Identify
@@ -71,21 +71,6 @@ def predictions(
     return result
 
 
-def apart(dataset: Dataset, test: Windows) -> Dataset:
-    """The dataset without the moments that the test windows see, broken there: on a shared clock runs may overlap."""
-    if not test.shared_clock:
-        return dataset
-    t = dataset.frame["t"].to_numpy()
-    seen = np.zeros(len(t), dtype=bool)
-    for start, end in test.spans.values():
-        seen |= (t >= start) & (t <= end)
-    names = list(dict.fromkeys([*dataset.metadata.get("flags", []), BREAK]))
-    after = np.concatenate([[False], seen[:-1]])
-    flags = dataset.frame["flags"] | np.where(after, 1 << names.index(BREAK), 0)
-    frame = dataset.frame.assign(flags=flags)[~seen].reset_index(drop=True)
-    return replace(dataset, frame=frame, metadata={**dataset.metadata, "flags": names})
-
-
 def _fitted(
     plan: Plan,
     prepared: Prepared,
@@ -98,26 +83,32 @@ def _fitted(
 ) -> Prediction:
     """One foundation fitted to the runs; `known` keeps solutions for foundations that differ in the observer alone."""
     now, sentence, seconds = foundation, "", 0.0
+    words = "identification" if foundation.identify is not None else "observer"
     try:
         if foundation.identify is not None:
             solution = _solution(foundation, foundation.identify, runs, data, known)
             if solution.status != "ok":
-                return _nothing(foundation, windows, prepared.test, solution.sentence)
+                return _nothing(foundation, windows, prepared.test, f"{words}: {solution.sentence}")
             assert foundation.variant is not None
             values: Mapping[str, float] = {**foundation.variant.values, **solution.values}
             now = replace(foundation, variant=replace(foundation.variant, values=values))
             sentence, seconds = solution.sentence, solution.seconds
         if now.observer is not None and now.observer.choose:
             begun = time.thread_time()
-            now = replace(now, observer=chosen_observer(plan, now, data, runs))
+            now = replace(now, observer=chosen_observer(plan, now, _of(data, runs), windows))
             seconds += time.thread_time() - begun
-        estimates = estimates_of(plan, now, prepared.data) if now.observer is not None else None
+        estimates = estimates_of(plan, now, prepared.data, prepared.test) if now.observer is not None else None
         pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device, estimates)
     except ShipidError as error:
-        return _nothing(foundation, windows, prepared.test, error.message)
+        return _nothing(foundation, windows, prepared.test, f"{words}: {error.message}")
     if not np.isfinite(pair[0]).all():
-        return _nothing(foundation, windows, prepared.test, "the fitted model diverges on training windows")
+        return _nothing(foundation, windows, prepared.test, f"{words}: the model diverges on training windows")
     return Prediction(now, *pair, sentence, seconds, estimates)
+
+
+def _of(dataset: Dataset, runs: tuple[str, ...]) -> Dataset:
+    """The dataset with these runs alone."""
+    return replace(dataset, frame=dataset.frame[dataset.frame["run"].isin(runs)].reset_index(drop=True))
 
 
 def _solution(
@@ -137,4 +128,4 @@ def _solution(
 def _nothing(foundation: Foundation, windows: Windows, test: Windows, sentence: str) -> Prediction:
     """A foundation without a result: paths that are no numbers, and why."""
     here, there = (np.full_like(part.future, np.nan) for part in (windows, test))
-    return Prediction(foundation, here, there, f"identification: {sentence}")
+    return Prediction(foundation, here, there, sentence)

@@ -15,6 +15,7 @@ from shipid.observer import bank, observe
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.plan import Foundation, Way
+from shipid.study.prepare import known_by_then
 from shipid.study.results import Results, shown_runs, with_gaps
 
 Array = np.ndarray
@@ -54,7 +55,7 @@ def pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list[Pair]:
     for one in foundations:
         rows += [_memory_pair(one, one, way, rival) for way, rival in _rivals(ways, one, one)]
     for observed, original in _observed(foundations):
-        if observed.identify is None:
+        if not observed.fitted:
             label = f"observer: {ALONE}"
             rows.append(Pair("observer", label, (original.name, ALONE), (observed.name, ALONE)))
         for way in ways:
@@ -235,7 +236,7 @@ def observer_frame(results: Results) -> pd.DataFrame:
     frame = results.dataset.frame
     frame = frame[frame["run"].isin(shown_runs(results))].reset_index(drop=True)
     part = replace(results.dataset, frame=frame)
-    known = observe(vessel, part, settings)
+    known = observe(vessel, known_by_then(results.plan, part), settings)
     begins = np.isnan(known.innovation).all(axis=1)
     table = pd.DataFrame({**frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *ALONG]]
     table["observer.test"] = np.where(begins, np.nan, table["observer.test"])
@@ -259,7 +260,7 @@ def orders_frame(results: Results) -> pd.DataFrame:
 def _exemplar(results: Results) -> tuple[str, Predictor] | None:
     """The observed foundation that is shown and a predictor on it: of the first family, the one of middle A."""
     observed = [one for one in results.plan.foundations if one.observer is not None]
-    observed.sort(key=lambda one: one.identify is not None)
+    observed.sort(key=lambda one: one.fitted)
     good = results.cells[results.cells["cell"].isin(list(results.paths))]
     known = [one for one in observed if (good["foundation"] == one.name).any()]
     if not known:

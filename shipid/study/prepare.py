@@ -10,9 +10,10 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from shipid.data.causal import causal_columns
-from shipid.data.dataset import Dataset, pieces, read_dataset
+from shipid.data.dataset import BREAK, Dataset, pieces, read_dataset
 from shipid.data.windows import (
     Instants,
     Windows,
@@ -275,7 +276,7 @@ def _roll_out(
             same, paths = finished[foundation.variant.name]
             derived = replace(foundation, variant=same.variant)
             if derived.observer is not None and not derived.fitted:
-                estimates[derived.name] = known = estimates_of(plan, derived, dataset)
+                estimates[derived.name] = known = estimates_of(plan, derived, dataset, parts[1])
                 paths = paths_of(plan, dataset, parts, derived, device, known)
             finished[foundation.name] = (derived, paths)
         finished.setdefault(foundation.name, (foundation, zeros))
@@ -315,28 +316,65 @@ def path_of(plan: Plan) -> Literal["position", "velocity"]:
     return plan.study.data.path if plan.study.data else "position"
 
 
-def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset) -> Estimates:
-    """Estimates of the observer of a foundation at every row of the runs."""
+def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset, test: Windows) -> Estimates:
+    """Estimates of the observer of a foundation at every row of the runs.
+
+    Where runs share a clock, an observer along another run sees no moment of the test windows.
+    """
     assert foundation.vessel is not None
-    observed = sum(one.observer is not None for one in plan.foundations)
-    return observe(foundation.vessel, known_by_then(plan, dataset), foundation.observer, calls=observed)
+    known = known_by_then(plan, dataset)
+    calls = sum(one.observer is not None for one in plan.foundations)
+    whole = observe(foundation.vessel, known, foundation.observer, calls=calls)
+    kept = outside(dataset, test)
+    rest = np.flatnonzero(kept & ~dataset.frame["run"].isin(list(test.spans)).to_numpy())
+    if kept.all() or not len(rest):
+        return whole
+    others = apart(known, test)
+    mine = ~others.frame["run"].isin(list(test.spans)).to_numpy()
+    part = observe(foundation.vessel, others, foundation.observer, calls=calls).select(mine)
+    for name, values in part.columns.items():
+        whole.columns[name][rest] = values
+    for name in ("innovation", "spread", "weights", "age"):
+        getattr(whole, name)[rest] = getattr(part, name)
+    return whole
 
 
-def chosen_observer(plan: Plan, foundation: Foundation, dataset: Dataset, runs: Sequence[str]) -> Observer:
-    """Settings of the observer of a foundation with which its physics alone predicts these runs best."""
+def outside(dataset: Dataset, test: Windows) -> NDArray[np.bool_]:
+    """Rows (N,) that share no moment with the test windows; all, where every run has its clock."""
+    t = dataset.frame["t"].to_numpy()
+    seen = np.zeros(len(t), dtype=bool)
+    for start, end in test.spans.values() if test.shared_clock else ():
+        seen |= (t >= start) & (t <= end)
+    return ~seen
+
+
+def apart(dataset: Dataset, test: Windows) -> Dataset:
+    """The dataset without the moments that the test windows see, broken there: on a shared clock runs may overlap."""
+    kept = outside(dataset, test)
+    if kept.all():
+        return dataset
+    names = list(dict.fromkeys([*dataset.metadata.get("flags", []), BREAK]))
+    after = np.concatenate([[False], ~kept[:-1]])
+    flags = dataset.frame["flags"] | np.where(after, 1 << names.index(BREAK), 0)
+    frame = dataset.frame.assign(flags=flags)[kept].reset_index(drop=True)
+    return replace(dataset, frame=frame, metadata={**dataset.metadata, "flags": names})
+
+
+def chosen_observer(plan: Plan, foundation: Foundation, dataset: Dataset, windows: Windows) -> Observer:
+    """Settings of the observer of a foundation with which its physics alone predicts these windows best.
+
+    dataset : the runs of the windows.
+    """
     assert foundation.vessel is not None
-    ahead = plan.study.prediction
     settings, _ = tune_observer(
         foundation.vessel,
         known_by_then(plan, dataset),
+        windows,
         foundation.observer,
-        horizon=ahead.horizon,
-        step=ahead.step,
-        method=ahead.integrator,
-        commands=ahead.commands,
+        method=plan.study.prediction.integrator,
+        commands=plan.study.prediction.commands,
         path=path_of(plan),
-        past=plan.past,
-        runs=runs,
+        memory=window_memory(foundation.vessel, dataset, windows),
     )
     return settings
 

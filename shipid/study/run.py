@@ -30,14 +30,16 @@ from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
 from shipid.study.claims import WAIT, Claims, Holder, TakenOver, pause
 from shipid.study.envelope import envelope
-from shipid.study.foundations import Prediction, apart, predictions
+from shipid.study.foundations import Prediction, predictions
 from shipid.study.plan import Batch, Foundation, Plan, Unit, Way
 from shipid.study.prepare import (
     Prepared,
+    apart,
     at_instants,
     describe,
     instants_of,
     obtain,
+    outside,
     physics_of,
     prepare,
     runs_by_amount,
@@ -345,13 +347,15 @@ def refitted(
         return {}
     left_out = {(name, way.name): (np.full_like(windows.future, np.nan), 0.0) for name, way in pairs}
     names = {name for name, _ in pairs}
-    data = apart(prepared.data, prepared.test)
+    data, kept = apart(prepared.data, prepared.test), outside(prepared.data, prepared.test)
+    estimates = {name: known.select(kept) for name, known in prepared.estimates.items()}
     place = np.flatnonzero(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
     for training, judged in refit_folds(windows, refits, batch.seed):
         rest, part = windows.select(training), windows.select(judged)
         inside = replace(
             prepared,
             data=data,
+            estimates=estimates,
             pool=rest,
             test=part,
             pool_paths={name: paths[:, place[training]] for name, paths in prepared.pool_paths.items()},

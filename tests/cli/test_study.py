@@ -39,6 +39,14 @@ def test_studies_and_variants(study: Path) -> None:
     assert re.search(r"^ *right +- +3 +inertia.m x0.90, A_FW x0.009, x_G 2.5 in place of 0", text, re.MULTILINE), text
 
 
+def test_variants_of_a_chosen_observer_have_no_accuracy_yet(study: Path) -> None:
+    family = '[[family]]\nname = "seen"\nextends = "wrong"\n[family.observer]\nchoose = true\n'
+    study.write_text(f"{study.read_text()}\n{family}")
+    words = " ".join(output_of("study", "variants", study).split())
+    assert re.search(r" seen-1 - \d+ ", words)
+    assert words.count("observer chosen from the runs of each cell, so A differs by cell") == 2
+
+
 def test_single_precision_needs_a_compiler(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engines, "compiler", lambda: None)
     with pytest.raises(ShipidError, match="--single: needs a C compiler"):

@@ -13,15 +13,18 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset, pieces
-from shipid.errors import DocumentError
+from shipid.data.windows import Windows
+from shipid.errors import DataError, DocumentError
 from shipid.identification import solve
 from shipid.metrics import position_error
+from shipid.observer import Observer, observe
 from shipid.predictor import Predictor
-from shipid.study import store
+from shipid.study import foundations, run, store
+from shipid.study import prepare as preparing
 from shipid.study.advise import answer
-from shipid.study.foundations import apart, predictions
+from shipid.study.foundations import predictions
 from shipid.study.plan import Batch, Plan
-from shipid.study.prepare import instants_of, prepare
+from shipid.study.prepare import apart, instants_of, prepare
 from shipid.study.results import read_results
 from tests.study.test_commands import weaving
 from tests.study.tiny import run_here
@@ -41,8 +44,8 @@ Recorded = Callable[..., tuple[Plan, Dataset]]
 def study(recorded: Recorded, families: list[dict[str, Any]], **changes: Any) -> tuple[Plan, Dataset]:
     """Runs of the 28.9 m ship itself, commands known: the right numbers leave nothing."""
     ahead = {"ahead": 5.0, "commands": "known"}
-    changes = {"method": METHODS, **changes}
-    return recorded(weaving(), split={"test": ["f"]}, prediction=ahead, family=families, grid={"N_D": [3]}, **changes)
+    changes = {"method": METHODS, "split": {"test": ["f"]}, **changes}
+    return recorded(weaving(), prediction=ahead, family=families, grid={"N_D": [3]}, **changes)
 
 
 def test_a_wrong_model_finds_the_right_numbers(recorded: Recorded) -> None:
@@ -80,6 +83,99 @@ def test_other_runs_teach_nothing(recorded: Recorded, families: list[dict[str, A
     assert pair[0].variant == pair[1].variant
     assert pair[0].observer == pair[1].observer
     assert pair[0].observer is None or not pair[0].observer.choose
+
+
+@pytest.mark.parametrize(("family", "words"), [(SEEN, "observer: "), (FITTED, "identification: ")])
+def test_what_cannot_be_fitted_says_what_it_was(
+    recorded: Recorded, family: dict[str, Any], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: Any, **__: Any) -> Any:
+        raise DataError("no")
+
+    monkeypatch.setattr(foundations, "chosen_observer", fails)
+    monkeypatch.setattr(solve, "identify", fails)
+    plan, dataset = study(recorded, [WRONG, family])
+    prepared = prepare(plan, dataset)
+    known = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")[family["name"]]
+    assert known.sentence == f"{words}no"
+    assert np.isnan(known.paths).all()
+
+
+def test_the_observer_of_a_log_with_causal_columns_is_judged_by_the_true_paths(
+    recorded: Recorded, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Columns that hold their last fix are what it sees, never what is predicted."""
+    plan, dataset = study(recorded, [WRONG, SEEN])
+    blocks = {"dataset": plan.study.data.dataset, "path": "velocity", "causal": ["u", "v"]} if plan.study.data else {}
+    plan, dataset = study(recorded, [WRONG, SEEN], data=blocks)
+    given: list[tuple[Dataset, Windows]] = []
+
+    def tune(
+        _: Any, data: Dataset, windows: Windows, settings: Observer, **__: Any
+    ) -> tuple[Observer, dict[str, float]]:
+        given.append((data, windows))
+        return settings.model_copy(update={"choose": False}), {}
+
+    monkeypatch.setattr(preparing, "tune_observer", tune)
+    prepared = prepare(plan, dataset)
+    runs = prepared.runs(plan, plan.batches[0])
+    predictions(plan, prepared, runs, "cpu", {"seen"})
+    ((data, windows),) = given
+    expected = prepared.pool.select(np.isin(prepared.pool.run, runs))
+    np.testing.assert_array_equal(windows.future, expected.future)
+    assert set(data.frame["run"]) == set(runs)
+    with pytest.raises(AssertionError):
+        np.testing.assert_array_equal(data.frame["u"], dataset.frame["u"][dataset.frame["run"].isin(runs)])
+
+
+def overlapping(dataset: Dataset) -> Dataset:
+    """Runs of 40 s that start 30 s after one another on one clock, some way from one another."""
+    number = dataset.frame["run"].str[0].map(ord) - ord("a")
+    frame = dataset.frame.assign(t=dataset.frame["t"] + 30.0 * number, north=dataset.frame["north"] + 300.0 * number)
+    return Dataset(frame, {**dataset.metadata, "clock": "shared"})
+
+
+PLAIN = {"name": "plain", "extends": "wrong", "observer": {"waves": [0.0], "change": [1e-4], "current": 0.0}}
+
+
+def test_an_observer_along_another_run_sees_no_moment_of_the_test(recorded: Recorded) -> None:
+    """Rows that other runs share with the test windows may hold anything; the rows of the test are all seen."""
+    plan, dataset = study(recorded, [WRONG, PLAIN], split={"test": ["c"]})
+    dataset = overlapping(dataset)
+    prepared = prepare(plan, dataset)
+    ((first, last),) = prepared.test.spans.values()
+    shared = dataset.frame["t"].between(first, last) & (dataset.frame["run"] != "c")
+    frame = dataset.frame.assign(u=dataset.frame["u"] + np.where(shared, 0.5, 0.0))
+    other = prepare(plan, Dataset(frame, dataset.metadata))
+    assert (~shared & (frame["run"] == "d") & (frame["t"] > last)).sum() > 10
+    assert shared.sum() > 10
+    for name, values in prepared.estimates["plain"].columns.items():
+        np.testing.assert_array_equal(values[~shared], other.estimates["plain"].columns[name][~shared], err_msg=name)
+    alone = observe(plan.foundations[1].vessel, dataset, plan.foundations[1].observer)  # type: ignore[arg-type]
+    mine = (frame["run"] == "c").to_numpy()
+    np.testing.assert_array_equal(
+        prepared.estimates["plain"].columns["observer.u"][mine], alone.columns["observer.u"][mine]
+    )
+
+
+def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a shared clock the rows of the test are gone: errors on runs left out are as small as on separate clocks."""
+    kept: list[Any] = []
+    refitted = run.refitted
+    monkeypatch.setattr(run, "refitted", lambda *given: kept.append(refitted(*given)) or kept[-1])
+    method = [{"name": "force", "kind": "learned-force", "units": 3, "iterations": 3, "families": ["wrong", "plain"]}]
+    method.append({**METHODS[0], "families": ["none"]})
+    changes: dict[str, Any] = {"method": method, "bands": {"refits": 2}, "split": {"test": ["b"]}}
+    plan, dataset = study(recorded, [WRONG, PLAIN], **changes)
+    frame, number = dataset.frame, dataset.frame["run"].str[0].map(ord) - ord("a")
+    frame = frame.assign(t=frame["t"] + 100.0 * number, north=frame["north"] + 300.0 * number)
+    errors = []
+    for clock in ("run", "shared"):
+        data = Dataset(frame, {**dataset.metadata, "clock": clock})
+        run.run_batch(plan, prepare(plan, data), plan.batches[0], "cpu")
+        left_out, _ = kept[-1]["plain", "force"]
+        errors.append(float(np.nanmean(np.hypot(left_out[..., 0], left_out[..., 1]))))
+    assert errors[1] == pytest.approx(errors[0], rel=0.1)
 
 
 def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(recorded: Recorded) -> None:

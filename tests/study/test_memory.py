@@ -64,6 +64,13 @@ def test_what_differs_beside_memory_is_named(tmp_path: Path) -> None:
     }
 
 
+def test_physics_alone_that_depends_on_the_cell_is_no_rival(tmp_path: Path) -> None:
+    chosen = [CHANGES["family"][0], {**CHANGES["family"][1], "observer": {"choose": True}}]
+    plan = tiny_plan(tmp_path, {**CHANGES, "family": chosen})
+    compared = {pair.comparison for pair in memory.pairs(plan.foundations, plan.methods)}
+    assert compared == {*COMPARED} - {"observer: physics alone"}
+
+
 def test_other_kinds_are_no_rivals(tmp_path: Path) -> None:
     other = [{"name": "trained", "kind": "path-trained", "trials": 1}, CHANGES["method"][1]]
     plan = tiny_plan(tmp_path, {**CHANGES, "method": other})
