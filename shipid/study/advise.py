@@ -13,9 +13,10 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
+from shipid.report.wording import listed
 from shipid.study.error_table import ALONE, PLAIN, ErrorTable, error_table
 from shipid.study.evidence import Contrasts, contrasts
-from shipid.study.plan import NO_MODEL
+from shipid.study.plan import NO_MODEL, Plan
 from shipid.study.results import Results, judged_cells, naive_summary
 from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, too_few
 from shipid.study.worth import FEWEST_MODELS, Estimate, break_even, runs_without_physics
@@ -176,7 +177,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
         sentences.append((text, "horizon"))
     sentences += [(text, "gain") for text in (*_alone(case), *_trend(case), _floor(case))]
     nominal = every_model[every_model["family"] == claims.nominal] if claims else every_model[:0]
-    sentences += [(text, "gain") for text in _nominal(nominal, largest)]
+    sentences += [(text, "gain") for text in _nominal(nominal, largest, results.plan)]
     return [*sentences, *((text, "cells") for text in _how_to_read(case))]
 
 
@@ -412,12 +413,14 @@ def _floor(case: Case) -> str:
     return f"{begins}: at {runs(case.largest)} {named(others)} {verb} not beat it."
 
 
-def _nominal(nominal: pd.DataFrame, largest: int) -> list[str]:
+def _nominal(nominal: pd.DataFrame, largest: int, plan: Plan) -> list[str]:
     """The error that exact coefficients leave, alone and compensated with the largest amount of data."""
+    causes = ["waves"]
+    causes += ["Euler steps"] if plan.study.prediction.integrator == "euler" else []
+    causes += [] if plan.known else ["held commands"]
     return [
         f"Exact coefficients ({row['model']}) leave {metres(row['A'])} alone, the floor set by what is no "
-        f"coefficient, such as waves, Euler steps and held commands, and {metres(row['H'])} compensated "
-        f"with {runs(largest)}."
+        f"coefficient, such as {listed(causes)}, and {metres(row['H'])} compensated with {runs(largest)}."
         for _, row in nominal[nominal["N_D"] == largest].iterrows()
     ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -246,7 +247,10 @@ def test_the_nominal_model_is_a_floor_and_no_degraded_model(made: Any) -> None:
     assert "(over 2 models)" in advice
     assert advice.count("exact") == 1
     assert "Exact coefficients (exact) leave 0.75 m alone, the floor" in advice
-    assert "and 0.25 m compensated with 30 runs." in advice
+    assert "such as waves, Euler steps and held commands, and 0.25 m compensated with 30 runs." in advice
+    ahead = results.plan.study.prediction.model_copy(update={"integrator": "rk4", "commands": "known"})
+    other = replace(results.plan, study=results.plan.study.model_copy(update={"prediction": ahead}))
+    assert "such as waves, and 0.25 m" in text(replace(results, plan=other))
 
 
 def test_a_long_list_of_names_is_cut(made: Any) -> None:
