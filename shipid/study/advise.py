@@ -416,7 +416,7 @@ def _floor(case: Case) -> str:
 def _nominal(nominal: pd.DataFrame, largest: int, plan: Plan) -> list[str]:
     """The error that exact coefficients leave, alone and compensated with the largest amount of data."""
     causes = ["waves"]
-    causes += ["Euler steps"] if plan.study.prediction.integrator == "euler" else []
+    causes += ["Euler steps"] if plan.euler else []
     causes += [] if plan.known else ["held commands"]
     return [
         f"Exact coefficients ({row['model']}) leave {metres(row['A'])} alone, the floor set by what is no "

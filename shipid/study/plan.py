@@ -490,6 +490,11 @@ class Plan:
         return self.study.prediction.commands
 
     @property
+    def euler(self) -> bool:
+        """Whether the physics takes explicit Euler steps."""
+        return self.study.prediction.integrator == "euler"
+
+    @property
     def known(self) -> bool:
         """Whether the commands of the horizon are known."""
         return self.commands == "known"
