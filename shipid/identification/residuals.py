@@ -167,7 +167,7 @@ def _weather(
     estimated: Sequence[str],
 ) -> list[str]:
     """Environment channels that the data or an override provide and that the fit does not estimate."""
-    given = {name for segment in segments for name, values in segment.columns.items() if np.any(values != 0)}
+    given = {name for name in channels if any(np.any(one.columns[name]) for one in segments if name in one.columns)}
     given |= {path.removeprefix(f"{ENVIRONMENT}.") for values in overridden.values() for path in values}
     return [name for name in channels if name in given and not (estimated and name in ("V_c", "beta_c"))]
 
