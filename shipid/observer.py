@@ -100,7 +100,7 @@ class Observer(BaseModel):
     ] = {}
     memory: Annotated[Positive, Field(description="time in which likelihoods are forgotten, x sqrt(L / g)")] = 20.0
     fade: Annotated[
-        NotNegative | None,
+        NotNegative,
         Field(description="time in which the force fades ahead, x sqrt(L / g); 0: no force; very large: it lasts"),
     ] = 12.0
     choose: Annotated[
@@ -162,13 +162,13 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     if not length:
         message = f"{vessel.name} has no particulars.L_pp, by which the observer scales its numbers: add it"
         raise DocumentError(message, file=vessel.file, path="particulars.L_pp")
-    time, speed, root = np.sqrt(length / GRAVITY), np.sqrt(GRAVITY * length), 1.0
+    time, speed = np.sqrt(length / GRAVITY), np.sqrt(GRAVITY * length)
     linear, yaw = GRAVITY, GRAVITY / length
     currents = dict.fromkeys([0.0, settings.current])
     omega = 2 * np.pi / (settings.period * time)
     numbers, first = [], []
     for change, current, wave in product(settings.change, currents, settings.waves):
-        a = change * linear * root, change * linear * root, change * YAW * yaw * root
+        a = change * linear, change * linear, change * YAW * yaw
         w = wave * speed + 1e-9, wave * speed + 1e-9, 2.5 * wave / time + 1e-9
         q = (0.0 if wave else settings.model_error * x for x in a)  # in waves their motion takes its place
         numbers.append(
@@ -181,8 +181,7 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
         first.append([0.0] * 6 + slow + [current * speed] * 2 + [x / omega for x in w] + [*w])
     sizes = {"north": length, "east": length, "psi": 1.0, "u": speed, "v": speed, "r": 1 / time}
     noise = np.array([settings.noise.get(name, 5e-4 * size) for name, size in sizes.items()])
-    fade = np.inf if settings.fade is None else settings.fade * time
-    return Bank(vessel, settings, np.array(numbers), noise, np.array(first), fade, _mass(vessel))
+    return Bank(vessel, settings, np.array(numbers), noise, np.array(first), settings.fade * time, _mass(vessel))
 
 
 def _mass(vessel: Vessel) -> Array:
