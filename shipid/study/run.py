@@ -291,7 +291,6 @@ def run_unit(
     runs = prepared.runs(plan, batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
     known = predictions(plan, prepared, runs, device, {name for name, _ in unit.pairs})
-    adapted = {one.name for one in prepared.foundations if one.fitted}
     shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
     ways = {way.name: replace(way, foundations=unit.foundations(way.name)) for way in plan.methods}
     fitted = {
@@ -311,7 +310,7 @@ def run_unit(
             predictor, paths, outcome = None, None, _failed(one.sentence or "no training converged")
         else:
             predictor = _predictor(plan, prepared, one.foundation, way, batch, result.corrector, windows)
-            if name not in adapted and result.left_out is not None:
+            if one.foundation.family not in plan.fitted and result.left_out is not None:
                 errors = result.left_out  # fair: numbers and observer were not taken from these runs
             bands, reason = bands_of(errors, windows, predictor.limits, prepared.kinds)
             known_why = {} if bands is not None else {"no_band": reason}

@@ -105,9 +105,8 @@ def test_the_observer_of_a_log_with_causal_columns_is_judged_by_the_true_paths(
     recorded: Recorded, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Columns that hold their last fix are what it sees, never what is predicted."""
-    plan, dataset = study(recorded, [WRONG, SEEN])
-    blocks = {"dataset": plan.study.data.dataset, "path": "velocity", "causal": ["u", "v"]} if plan.study.data else {}
-    plan, dataset = study(recorded, [WRONG, SEEN], data=blocks)
+    block = {"dataset": "log.parquet", "path": "velocity", "causal": ["u", "v"]}
+    plan, dataset = study(recorded, [WRONG, SEEN], data=block)
     given: list[tuple[Dataset, Windows]] = []
 
     def tune(
