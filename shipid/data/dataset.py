@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,10 @@ class Dataset:
     def runs(self) -> list[str]:
         """Names of the runs, in the order of the table."""
         return [str(name) for name in self.frame["run"].unique()]
+
+    def select(self, runs: Iterable[str]) -> Dataset:
+        """Return the dataset with these runs alone, in the order of the table; DataError where none is left."""
+        return replace(self, frame=self.frame[self.frame["run"].isin(list(runs))].reset_index(drop=True))
 
     @property
     def digest(self) -> str:

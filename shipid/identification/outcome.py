@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -282,8 +282,7 @@ def _groups(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ide
 
 def _outputs(pair: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str]) -> pd.DataFrame:
     """Measured outputs against those of the vessels, in the recorded motion."""
-    rows = dataset.frame[dataset.frame["run"].isin(runs)].reset_index(drop=True)
-    part = replace(dataset, frame=rows)
+    part = dataset.select(runs)
     if not common_outputs(pair[AFTER], part):
         return pd.DataFrame(columns=["output", "unit", "measured", *pair])
     tables = {name: compare_outputs(vessel, part) for name, vessel in pair.items()}

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -181,9 +181,7 @@ def first_look(
     DataError : no run is as long as the horizon, or a command of the vessel is missing.
     """
     check_columns(vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(vessel.file))
-    chosen = set(runs)
-    frame = dataset.frame[dataset.frame["run"].isin(chosen)].reset_index(drop=True)
-    part = replace(dataset, frame=frame)
+    part = dataset.select(runs)
     windows = _some(part, max(round(ahead / step), 1), step, path)
     constant = float(position_error(constant_motion(windows), windows.future).mean())
     trial = _Trial(vessel, part, windows, constant)

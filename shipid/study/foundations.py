@@ -95,7 +95,7 @@ def _fitted(
             sentence, seconds = solution.sentence, solution.seconds
         if now.observer is not None and now.observer.choose:
             begun = time.thread_time()
-            now = replace(now, observer=chosen_observer(plan, now, _of(data, runs), windows))
+            now = replace(now, observer=chosen_observer(plan, now, data.select(runs), windows))
             seconds += time.thread_time() - begun
         estimates = estimates_of(plan, now, prepared.data, prepared.test) if now.observer is not None else None
         pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device, estimates)
@@ -104,11 +104,6 @@ def _fitted(
     if not np.isfinite(pair[0]).all():
         return _nothing(foundation, windows, prepared.test, f"{words}: the model diverges on training windows")
     return Prediction(now, *pair, sentence, seconds, estimates)
-
-
-def _of(dataset: Dataset, runs: tuple[str, ...]) -> Dataset:
-    """The dataset with these runs alone."""
-    return replace(dataset, frame=dataset.frame[dataset.frame["run"].isin(runs)].reset_index(drop=True))
 
 
 def _solution(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -233,12 +233,10 @@ def observer_frame(results: Results) -> pd.DataFrame:
     if predictor is None or predictor[1].vessel is None:
         return pd.DataFrame()
     name, vessel, settings = predictor[0], predictor[1].vessel, predictor[1].physics.observer
-    frame = results.dataset.frame
-    frame = frame[frame["run"].isin(shown_runs(results))].reset_index(drop=True)
-    part = replace(results.dataset, frame=frame)
+    part = results.dataset.select(shown_runs(results))
     known = observe(vessel, known_by_then(results.plan, part), settings)
     begins = np.isnan(known.innovation).all(axis=1)
-    table = pd.DataFrame({**frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *ALONG]]
+    table = pd.DataFrame({**part.frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *ALONG]]
     table["observer.test"] = np.where(begins, np.nan, table["observer.test"])
     table = table.assign(model=name, fade=bank(vessel, settings).fade, ahead=results.test.horizon * results.test.step)
     return with_gaps(table, ["run", "model", "fade", "ahead"])

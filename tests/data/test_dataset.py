@@ -124,6 +124,18 @@ def test_read_names_file_and_column(tmp_path: Path) -> None:
     assert (caught.value.file, caught.value.path) == (str(file), "u")
 
 
+def test_some_runs_keep_their_rows_and_their_order() -> None:
+    whole = as_dataset(*(turning(np.arange(9.0), u=u) for u in (3.0, 4.0, 5.0)))
+    part = whole.select(["c", "a", "x"])
+    assert part.runs == ["a", "c"]
+    for name in "ac":
+        rows = (each.frame[each.frame["run"] == name].reset_index(drop=True) for each in (whole, part))
+        pd.testing.assert_frame_equal(*rows)
+    assert part.metadata == whole.metadata
+    with pytest.raises(DataError, match="at least one run"):
+        whole.select("x")
+
+
 def test_pieces_start_at_breaks() -> None:
     frame = turning(T).assign(flags=np.where(np.isin(T, [0.0, 5.0, 12.0]), 1, 0))
     starts = [(run, rows["t"].iloc[0], len(rows)) for run, rows in pieces(as_dataset(frame, turning(T)))]
