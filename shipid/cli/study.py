@@ -430,7 +430,7 @@ def _before_work(
 ) -> tuple[Plan, Path]:
     """The plan of a study and the file of a command's table, after all that can be refused before anything is done."""
     from shipid.files import check_table
-    from shipid.hybrid.training import check_device
+    from shipid.hybrid.device import check_device
     from shipid.study.plan import read_plan
 
     check_device(device)

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from shipid.data.windows import Instants, from_frame, to_frame
+from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance
 from shipid.engine.integrate import Method as Integrator
 from shipid.engine.rollout import Distances, Trajectories, distances, rollout
@@ -19,6 +20,7 @@ from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 MOTION = ("u", "v", "r", "psi")
+WORTH_COMPILING = 20_000  # rate evaluations: who asks for so many at once, in training or on a log, asks again
 Inputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
 """Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
 
@@ -62,7 +64,7 @@ class Physics:
         result, (north, east) = self._rollout(instants, ("north", "east"), parameters, device)
         return np.stack(_in_frame(instants, north, east), axis=-1), result.diverged
 
-    def states(self, instants: Instants, tau_extra: Array | None = None, *, engine: str = "auto") -> dict[str, Array]:
+    def states(self, instants: Instants, tau_extra: Array | None = None, *, engine: str = AUTO) -> dict[str, Array]:
         """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S).
 
         tau_extra : (T, S, n_dof) forces [N, N m] added over the horizon; None adds none. With an observer u and v are
@@ -124,7 +126,7 @@ class Physics:
         future: Array,
         parameters: Array | None = None,
         *,
-        engine: str = "auto",
+        engine: str = AUTO,
         device: str = "cpu",
     ) -> Distances:
         """Distances of V variants to the true paths `future` (T, S, 2) [m] in the frame (11), without keeping paths."""
@@ -153,11 +155,13 @@ class Physics:
         parameters: Array | None,
         device: str,
         tau_extra: Array | None = None,
-        engine: str = "auto",
+        engine: str = AUTO,
     ) -> tuple[Trajectories, tuple[Array, Array]]:
         """Trajectories of the vessel, and north and east (T, V, S) [m] over ground after 1..T steps."""
         assert self.vessel is not None
         start, commands, environment, slow, drift = self._inputs(instants)
+        if engine == AUTO and len(instants) * self.horizon > WORTH_COMPILING:
+            engine = REPEATED
         result = rollout(
             self.vessel,
             start,

@@ -25,6 +25,7 @@ from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import Inputs, choose_features, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
 from shipid.hybrid.mirror import reflection as _reflection
+from shipid.hybrid.products import gram, hidden, matmul
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import seed_of
 from shipid.hybrid.trials import diverged
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 SPARE = 4  # further trials whose errors without each run are kept
 SOUND = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are then right to about 1e-5
+ROUNDING = 1e-3  # of sums of squares in single precision, amply
 
 
 @dataclass(frozen=True)
@@ -159,16 +161,16 @@ def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
         for group in groups[left_out]:
             start = time.process_time()
             seen = group.mirrored if point["mirror"] and group.mirrored is not None else group.plain
-            hidden = _draw(seen, point, method.units, seed_of(task.seed, number))
-            parts = _parts(seen, hidden, group.outputs, device)
-            errors, by_fold, kept = _left_out(parts, ridges, blocks, terms)
+            drawn = _draw(seen, point, method.units, seed_of(task.seed, number))
+            parts = _parts(seen, drawn, group.outputs, device)
+            errors, others, kept = _left_out(parts, ridges, blocks, terms)
             for k, key in enumerate(group.names):
                 ridge = ridges[errors[:, k].argmin()]
                 params = {**point, "mirror": float(seen is group.mirrored), "ridge": ridge}
                 value = float(errors[:, k].min() + faster[key]) / (2 * len(basis) * len(judged))
                 mine = slice(k * terms, (k + 1) * terms)
-                network = partial(_network, seen, hidden, parts, mine, ridge, basis)
-                without = partial(_chosen_without, by_fold[:, :, k], kept, mine)
+                network = partial(_network, seen, drawn, parts, mine, ridge, basis)
+                without = partial(_chosen_without, others[:, :, k], kept, mine)
                 best[key].consider(params, value, network, without)
                 rows[key] = {"number": number, "params": params, "value": value, "state": "complete"}
             seconds = (time.process_time() - start) / len(group.names)
@@ -251,6 +253,14 @@ class _Block:
     def rows(self) -> Tensor:
         return self.out.take_along_dim(self.judged, dim=1)
 
+    @property
+    def all_judged(self) -> bool:
+        return self.judged.shape == self.out.shape
+
+    def of_judged(self, errors: Tensor) -> Tensor:
+        """Those of errors (folds, b, K r) of what is left out that are judged, (folds, j, K r)."""
+        return errors if self.all_judged else errors.take_along_dim(self.judged[:, :, None], dim=1)
+
 
 def _blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -> list[_Block]:
     """What each fold leaves out, and which of it is judged, equal sizes together."""
@@ -290,14 +300,14 @@ def _draw(seen: _Inputs, point: Mapping[str, float], units: int, seed: int) -> t
     return (normal[:, :-1] / scales).T, normal[:, -1] * point["offset"]
 
 
-def _parts(seen: _Inputs, hidden: tuple[Array, Array], outputs: Sequence[Tensor], device: str) -> list[_Part]:
+def _parts(seen: _Inputs, drawn: tuple[Array, Array], outputs: Sequence[Tensor], device: str) -> list[_Part]:
     """Features of a trial with the targets of x and y: even and odd ones in the mirror, else the same for both."""
-    weight, offset = (_tensor(part, device) for part in hidden)
+    weight, offset = (_tensor(part, device) for part in drawn)
     size = len(offset) ** 0.5
-    features = torch.addmm(offset, seen.values, weight).tanh_()
+    features = hidden(seen.values, weight, offset)
     if seen.reflection is None:
         return _with_axes(features.div_(size), outputs)
-    image = torch.addmm(offset, seen.values, _tensor(seen.reflection, device) @ weight).tanh_()
+    image = hidden(seen.values, _tensor(seen.reflection, device) @ weight, offset)
     even = (features + image).div_(2**0.5 * size)
     odd = features.sub_(image).div_(2**0.5 * size)
     return _with_axes(even, outputs[:1]) + _with_axes(odd, outputs[1:])
@@ -306,13 +316,13 @@ def _parts(seen: _Inputs, hidden: tuple[Array, Array], outputs: Sequence[Tensor]
 def _with_axes(features: Tensor, outputs: Sequence[Tensor]) -> list[_Part]:
     """Coordinates that are made of the same features."""
     eigenvalues, axes = _decompose(features)
-    rotated = features @ axes
-    return [_Part(rotated, eigenvalues, axes, side, rotated.T @ side) for side in outputs]
+    rotated = matmul(features, axes)
+    return [_Part(rotated, eigenvalues, axes, side, matmul(rotated.T, side)) for side in outputs]
 
 
 def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
     """Eigenvalues and axes of the Gram matrix; rounding makes no eigenvalue negative."""
-    eigenvalues, axes = torch.linalg.eigh(features.T @ features)
+    eigenvalues, axes = torch.linalg.eigh(gram(features))
     return eigenvalues.clamp(min=0.0), axes
 
 
@@ -344,28 +354,43 @@ def _left_out(
 ) -> tuple[Array, Array, _Errors]:
     """Errors over judged windows, each block without itself; `terms` is r.
 
-    Returns sums of squares (ridges, K) [m^2] over all folds, the same of each fold (ridges, F, K), and the errors.
+    A run left out is never predicted better than with itself in the fit. So a ridge whose fit already misses more than
+    another ridge does on runs left out is passed over: it would not be chosen, whichever fold is left out.
+
+    Returns sums of squares (ridges, K) [m^2] over all folds, those over all folds but one (ridges, F, K), and the
+    errors. The sums of a ridge that is passed over are infinite.
     """
-    targets = parts[0].targets
-    num_folds = sum(len(block.out) for block in blocks)
-    by_fold = targets.new_zeros(len(ridges), num_folds, targets.shape[1] // terms)
+    targets, ends = parts[0].targets, np.cumsum([len(block.out) for block in blocks])
+    pieces = [
+        _Piece(sides, slice(end - len(block.out), end), block, _solver(part, block))
+        for sides, part in _alike(parts)
+        for end, block in zip(ends, blocks, strict=True)
+    ]
+    sums = targets.new_full((len(ridges), targets.shape[1] // terms), torch.inf)
+    others = targets.new_full((len(ridges), ends[-1], targets.shape[1] // terms), torch.inf)
     errors = _Errors((targets.shape[0], targets.shape[1]), len(ridges))
-    for sides, part in _alike(parts):
-        first = 0
-        for block in blocks:
-            folds, rows = slice(first, first + len(block.out)), block.rows
-            without = _FewRows if block.out.shape[1] <= part.rotated.shape[1] else _many_rows
-            solved = without(part, block)
-            for i in sorted(range(len(ridges)), key=ridges.__getitem__, reverse=True):
-                error = solved(part.eigenvalues + ridges[i])
-                if block.judged.shape != block.out.shape:
-                    error = error.take_along_dim(block.judged[:, :, None], dim=1)
-                squares = error.square().sum(dim=1).reshape(len(error), len(sides), -1, terms)
-                by_fold[i, folds] += squares.sum(dim=(1, 3))
-                errors.keep(i, folds, rows, sides, error)
-            first += len(block.out)
-    sums = by_fold.cpu().numpy()
-    return sums.sum(axis=1), sums, errors
+    bounded = all(block.all_judged for block in blocks)  # what is left out is, not every part of it
+
+    def but_one(made: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+        """Sums of squares over all folds, (K,), and over all but one, (F, K)."""
+        by_fold = torch.zeros_like(others[0])
+        for piece, one in zip(pieces, made, strict=True):
+            squares = one.square().sum(dim=1).reshape(len(one), len(piece.sides), -1, terms)
+            by_fold[piece.folds] += squares.sum(dim=(1, 3))
+        return by_fold.sum(dim=0), by_fold.sum(dim=0) - by_fold
+
+    for i in sorted(range(len(ridges)), key=ridges.__getitem__):
+        missed = [piece.solver.missed(ridges[i]) for piece in pieces]
+        if bounded and (but_one(missed)[1] > (1 + ROUNDING) * others.amin(dim=0)).all():
+            continue
+        made = [
+            piece.block.of_judged(piece.solver.without(ridges[i], one))
+            for piece, one in zip(pieces, missed, strict=True)
+        ]
+        sums[i], others[i] = but_one(made)
+        for piece, one in zip(pieces, made, strict=True):
+            errors.keep(i, piece.folds, piece.block.rows, piece.sides, one)
+    return sums.cpu().numpy(), others.cpu().numpy(), errors
 
 
 def _alike(parts: Sequence[_Part]) -> Iterator[tuple[tuple[int, ...], _Part]]:
@@ -378,49 +403,61 @@ def _alike(parts: Sequence[_Part]) -> Iterator[tuple[tuple[int, ...], _Part]]:
         first += len(some)
 
 
-def _chosen_without(by_fold: Array, errors: _Errors, columns: slice) -> _LeftOut:
-    """A trial without each fold in turn, on some columns: by_fold (ridges, F) [m^2]."""
-    others = by_fold.sum(axis=1, keepdims=True) - by_fold
+@dataclass(frozen=True)
+class _Piece:
+    """Some sides, x and y, of the folds of a block. folds : their places among all folds."""
+
+    sides: tuple[int, ...]
+    folds: slice
+    block: _Block
+    solver: _FewRows | _ManyRows
+
+
+def _solver(part: _Part, block: _Block) -> _FewRows | _ManyRows:
+    return (_FewRows if block.out.shape[1] <= part.rotated.shape[1] else _ManyRows)(part, block)
+
+
+def _chosen_without(others: Array, errors: _Errors, columns: slice) -> _LeftOut:
+    """A trial without each fold in turn, on some columns: others (ridges, F) [m^2] over all folds but that one."""
     return _LeftOut(others.min(axis=0), errors.of(others.argmin(axis=0), columns))
 
 
 class _FewRows:
-    """Errors (folds, b, K r) of blocks without themselves, by their part H_bb of the hat matrix, (b, b); of a diagonal.
+    """Errors (folds, b, K r) of blocks without themselves, by their part H_bb of the hat matrix, (b, b).
 
-    In single precision, which is twice as fast, as long as that is sound. Call it for the greatest ridge first: the
-    smaller the ridge, the worse is the condition, so what is not sound once is not tried for smaller ones.
+    In single precision, which is twice as fast, where that is sound: the smaller the ridge, the worse is the condition.
     """
 
     def __init__(self, part: _Part, block: _Block) -> None:
-        self.part, self.block, self.shape, self.sound = part, block, block.out.shape, True
+        self.part, self.block, self.shape = part, block, block.out.shape
         out = block.out.flatten()
         self.flat, self.targets = part.rotated[out].float(), part.targets[out].float()
         self.rows = self.flat.view(*self.shape, -1)
         self.columns = self.rows.mT.contiguous()
         self.unit = torch.eye(self.shape[1], device=out.device)
 
-    def __call__(self, diagonal: Tensor) -> Tensor:
-        single = self._single(diagonal) if self.sound else None
-        self.sound = single is not None
-        return self._double(diagonal) if single is None else single
+    def missed(self, ridge: float) -> Tensor:
+        """What the fit of all windows misses of the targets, (folds, b, K r), in single precision."""
+        weights = (self.part.product / (self.part.eigenvalues + ridge)[:, None]).float()
+        return (self.targets - matmul(self.flat, weights)).view(*self.shape, -1)
 
-    def _single(self, diagonal: Tensor) -> Tensor | None:
-        """By Cholesky's factors of I - H_bb; None where a squared pivot is below `SOUND`, which limits the digits."""
-        remainder = torch.baddbmm(self.unit, self.rows, self.columns * (1 / diagonal).float()[:, None], alpha=-1)
+    def without(self, ridge: float, missed: Tensor) -> Tensor:
+        """What a fit without each block misses of it; by Cholesky's factors of I - H_bb.
+
+        In double precision where a squared pivot is below `SOUND`, which limits the digits.
+        """
+        diagonal = self.part.eigenvalues + ridge
+        remainder = self.unit - matmul(self.rows, self.columns * (1 / diagonal).float()[:, None])
         lower, failed = torch.linalg.cholesky_ex(remainder)
         if failed.any() or lower.diagonal(dim1=1, dim2=2).min() ** 2 < SOUND:
-            return None
-        inverse = torch.linalg.solve_triangular(lower, self.unit.expand_as(lower), upper=False)
-        weights = (self.part.product / diagonal[:, None]).float()
-        missed = torch.addmm(self.targets, self.flat, weights, alpha=-1).view(*self.shape, -1)
-        return torch.bmm(torch.bmm(inverse.mT, inverse), missed)
+            return self._double(diagonal)
+        return matmul(torch.cholesky_inverse(lower), missed)
 
     def _double(self, diagonal: Tensor) -> Tensor:
         rows, targets = self._exact
         weighted = rows / diagonal
-        solved: Tensor = torch.linalg.solve(
-            self.unit.double() - weighted @ rows.mT, targets - weighted @ self.part.product
-        )
+        remainder = self.unit.double() - matmul(weighted, rows.mT)
+        solved: Tensor = torch.linalg.solve(remainder, targets - matmul(weighted, self.part.product))
         return solved
 
     @cached_property
@@ -429,18 +466,30 @@ class _FewRows:
         return self.part.rotated[self.block.out], self.part.targets[self.block.out]
 
 
-def _many_rows(part: _Part, block: _Block) -> Callable[[Tensor], Tensor]:
-    """The same by solving for the output weights without each block, (M, M)."""
-    rows, targets = part.rotated[block.out], part.targets[block.out]  # (folds, b, M), (folds, b, K r)
-    gram, product = rows.mT @ rows, part.product - rows.mT @ targets
-    return lambda diagonal: targets - rows @ torch.linalg.solve(torch.diag(diagonal) - gram, product)
+class _ManyRows:
+    """As `_FewRows`, by the output weights without each block, (M, M): for blocks of more windows than features."""
+
+    def __init__(self, part: _Part, block: _Block) -> None:
+        self.part = part
+        self.rows, self.targets = part.rotated[block.out], part.targets[block.out]  # (folds, b, M), (folds, b, K r)
+        self.within = matmul(self.rows.mT, self.rows)
+        self.other = part.product - matmul(self.rows.mT, self.targets)
+
+    def missed(self, ridge: float) -> Tensor:
+        """What the fit of all windows misses of the targets, (folds, b, K r)."""
+        return self.targets - matmul(self.rows, self.part.product / (self.part.eigenvalues + ridge)[:, None])
+
+    def without(self, ridge: float, _: Tensor) -> Tensor:
+        """What a fit without each block misses of it."""
+        gram = torch.diag(self.part.eigenvalues + ridge) - self.within
+        return self.targets - matmul(self.rows, torch.linalg.solve(gram, self.other))
 
 
 def _network(
-    seen: _Inputs, hidden: tuple[Array, Array], parts: Sequence[_Part], columns: slice, ridge: float, basis: Array
+    seen: _Inputs, drawn: tuple[Array, Array], parts: Sequence[_Part], columns: slice, ridge: float, basis: Array
 ) -> Network:
     """The network whose targets are some columns of a trial, solved with all windows."""
-    weight, offset = hidden
+    weight, offset = drawn
     x, y = (
         (part.axes @ (part.product[:, columns] / (part.eigenvalues + ridge)[:, None])).cpu().numpy()
         / len(offset) ** 0.5

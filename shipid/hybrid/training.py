@@ -16,8 +16,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shipid.errors import ShipidError
-
 Array = NDArray[np.float64]
 Layers = tuple[tuple[Array, Array], ...]
 Stack = Sequence[tuple[Tensor, Tensor]]
@@ -253,21 +251,3 @@ def dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence
 
 def _tensor(values: object, device: str) -> Tensor:
     return torch.as_tensor(np.asarray(values), dtype=torch.float32, device=device)
-
-
-def check_device(device: str) -> None:
-    """Raise ShipidError unless PyTorch can compute on the device, such as `cpu` or `cuda:0`."""
-    try:
-        torch.zeros(1, device=device)
-    except (RuntimeError, AssertionError, NotImplementedError):
-        raise ShipidError("PyTorch has no such device here: use cpu", path=f"--device {device}") from None
-
-
-def vectors() -> str:
-    """Name of the vector instructions that PyTorch uses on this processor, such as AVX512."""
-    return str(torch.backends.cpu.get_cpu_capability())
-
-
-def use_threads(count: int) -> None:
-    """Set the threads of PyTorch in this process: networks this small lose time on more than one."""
-    torch.set_num_threads(count)

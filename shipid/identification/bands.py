@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtrit
 
 from shipid.document import short_names
 from shipid.errors import DataError, ShipidError
@@ -94,7 +94,7 @@ def bands(
     free = np.flatnonzero(~(solution.at_bound | solution.held))
     best = judged.covariances[judged.chosen]
     axes = principal(best.matrix)
-    quantile = float(stats.t.ppf(0.5 + level / 2, np.median(best.freedom)))
+    quantile = float(stdtrit(np.median(best.freedom), 0.5 + level / 2))
     at, unknown = vessel.with_values(solution.values), unknowns(vessel, solution.settings)
     sides = []
     for axis in axes.T:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtrit
 
 from shipid.identification.statistics import LEVEL, Statistics, declared_error
 
@@ -112,7 +112,7 @@ def profile(
     bounds : lower and upper bound of the factor.
     """
     curve = _Curve(path, refit, ratio, {float(factors[index]): (objective, np.asarray(factors, dtype=float))})
-    limit = float(stats.t.ppf(0.5 + LEVEL / 2, freedom) ** 2)
+    limit = float(stdtrit(freedom, 0.5 + LEVEL / 2) ** 2)
     step = STEP * (half_width if 0 < half_width < FARTHEST else 1.0)
     ends: dict[int, float] = {}
     least = np.inf

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import chdtrc, stdtrit
 
 from shipid.document import short_names
 from shipid.errors import ShipidError
@@ -148,7 +148,7 @@ class Covariance:
     @property
     def half_widths(self) -> Array:
         """Half-widths (n,) of the 95 % intervals."""
-        return np.asarray(self.errors * stats.t.ppf(0.5 + LEVEL / 2, self.freedom))
+        return np.asarray(self.errors * stdtrit(self.freedom, 0.5 + LEVEL / 2))
 
 
 @dataclass(frozen=True)
@@ -334,7 +334,7 @@ def _colour(runs: Sequence[Array]) -> tuple[float, float]:
     rho = autocorrelation(runs)
     sums = rho[1:-1:2] + rho[2::2]
     until = int(np.argmax(sums <= 0)) if (sums <= 0).any() else len(sums)
-    return float(stats.chi2.sf(statistic, freedom)), float(max(1 + 2 * sums[:until].sum(), 1.0))
+    return float(chdtrc(freedom, statistic)), float(max(1 + 2 * sums[:until].sum(), 1.0))
 
 
 def autocorrelation(runs: Sequence[Array]) -> Array:
@@ -461,7 +461,7 @@ def _alone(fit: LinearFit, best: Covariance, plain: Covariance, colours: Mapping
     inverse, unseen = inverted(fit.jacobian.T @ fit.jacobian)
     influence = (levels[:, None] * fit.jacobian) @ inverse
     widened = np.where(plain.errors > 0, best.errors / np.where(plain.errors > 0, plain.errors, 1.0), 1.0)
-    quantile = stats.t.ppf(0.5 + LEVEL / 2, best.freedom)
+    quantile = stdtrit(best.freedom, 0.5 + LEVEL / 2)
     return np.asarray(np.where(unseen, np.inf, np.sqrt((influence**2).sum(axis=0)) * widened * quantile))
 
 

@@ -135,7 +135,9 @@ def _straight(rows: pd.DataFrame, first: int, last: int) -> Iterator[tuple[str, 
         return
     part = rows.iloc[first : last + 1]
     shafts = [name for name in map(str, rows.columns) if is_shaft(name)]
-    watched = part[shafts or ["u"]]  # the speed through the water is no sign: it changes after every turn, too
-    change = watched.quantile(0.98) - watched.quantile(0.02)
-    moved = bool((change > CHANGE * watched.abs().median().clip(lower=1e-9)).any())
+    # The speed through the water is no sign where shafts are logged: it changes after every turn, too.
+    watched = part[shafts or ["u"]].to_numpy()
+    low, high = np.quantile(watched, (0.02, 0.98), axis=0)
+    usual = np.maximum(np.median(np.abs(watched), axis=0), 1e-9)
+    moved = bool((high - low > CHANGE * usual).any())
     yield ("speed run" if moved else "transit"), (first, last)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.special import betaincinv, stdtrit
 
 from shipid.hybrid.bands import Region
 from shipid.predictor import NO_BAND
@@ -34,8 +35,6 @@ def share_interval(held: Array, run: Array) -> tuple[float, float]:
     ----------
     held : (S,) whether each window lies in its band. run : its run, (S,).
     """
-    from scipy.stats import beta, t
-
     _, place = np.unique(run, return_inverse=True)
     sizes = np.bincount(place)
     runs, windows = len(sizes), len(held)
@@ -44,11 +43,11 @@ def share_interval(held: Array, run: Array) -> tuple[float, float]:
     if runs > 1 and 0 < share < 1:
         excess = np.bincount(place, held - share)
         variance = runs / (runs - 1) * float((excess**2).sum()) / windows**2
-        freedom = (t.ppf(tail, max(windows - 1, 1)) / t.ppf(tail, runs - 1)) ** 2
+        freedom = (stdtrit(max(windows - 1, 1), tail) / stdtrit(runs - 1, tail)) ** 2
         count = float(np.clip(freedom * share * (1 - share) / max(variance, 1e-12), runs, windows))
     inside = share * count
-    low = 0.0 if inside == 0 else float(beta.ppf(tail, inside, count - inside + 1))
-    high = 1.0 if inside >= count else float(beta.ppf(1 - tail, inside + 1, count - inside))
+    low = 0.0 if inside == 0 else float(betaincinv(inside, count - inside + 1, tail))
+    high = 1.0 if inside >= count else float(betaincinv(inside + 1, count - inside, 1 - tail))
     return low, high
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from scipy.special import stdtrit
 
 from shipid.metrics import over_time, position_error
 from shipid.study.evidence import mean_errors
@@ -140,7 +140,7 @@ def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapp
     row |= {"difference": float(values.sum() / weights.sum()), "low": low, "high": high, "worlds": len(worlds)}
     row |= {"better": int((values < 0).sum()), "least": float(means.min()), "greatest": float(means.max())}
     if len(worlds) >= LEAST:
-        wide = float(stats.t.ppf((1 + CONFIDENCE) / 2, len(worlds) - 1) * means.std(ddof=1) / len(worlds) ** 0.5)
+        wide = float(stdtrit(len(worlds) - 1, (1 + CONFIDENCE) / 2) * means.std(ddof=1) / len(worlds) ** 0.5)
         row |= {"world_low": float(means.mean()) - wide, "world_high": float(means.mean()) + wide}
     return row
 

@@ -21,10 +21,10 @@ from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.native import engine
 from shipid.files import make_folder, read_json, write_json
+from shipid.hybrid.device import check_device, use_threads, vectors
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Case, Corrector, Fitted, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.training import check_device, use_threads, vectors
 from shipid.metrics import position_error, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store

@@ -38,7 +38,7 @@ def import_for_workers() -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with _one_thread():
-            forkserver.set_forkserver_preload(["shipid.study.run"])
+            forkserver.set_forkserver_preload(["shipid.study.run", "shipid.hybrid.training", "shipid.hybrid.ridge"])
             forkserver.ensure_running()
     finally:
         signal.signal(signal.SIGINT, before)

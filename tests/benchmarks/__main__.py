@@ -13,7 +13,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from shipid.hybrid.training import use_threads
+from shipid.hybrid.device import use_threads
 from shipid.study.run import machine
 from tests.benchmarks.compare import RECORDED, TOLERANCE, Ratio, accepted, best, compare, read_recorded
 

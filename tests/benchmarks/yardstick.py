@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 
 from shipid.hybrid import gradient
+from shipid.hybrid.device import use_threads
 from shipid.hybrid.method import Case, Method, Task
 from shipid.hybrid.path_trained import PathTrained
-from shipid.hybrid.training import use_threads
 from shipid.metrics import position_error, summary
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import Prepared, instants_of, obtain, physics_of, prepare

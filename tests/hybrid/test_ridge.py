@@ -94,14 +94,13 @@ def part_of(features, targets):
 
 
 def test_single_precision_ends_where_digits_would():
-    """And is not tried again after that."""
     rng = np.random.default_rng(0)
     part = part_of(rng.normal(size=(len(ALL), 300)), rng.normal(size=(len(ALL), 4)))
     (block, *_) = _blocks(FOLDS, ALL, "cpu")
     few = _FewRows(part, block)
-    for ridge, single in ((1e4, True), (1e-6, False), (1e4, False)):
-        errors = few(part.eigenvalues + ridge)
-        assert (errors.dtype == torch.float32) == few.sound == single, ridge
+    for ridge, single in ((1e4, True), (1e-6, False)):
+        errors = few.without(ridge, few.missed(ridge))
+        assert (errors.dtype == torch.float32) == single, ridge
 
 
 @pytest.mark.parametrize("units", [12, 300])  # fewer and more than windows
@@ -125,13 +124,37 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(units, ridge, kind
             weights = np.linalg.solve(gram, seen[training].T @ made[training])
             expected += np.square(made[judged] - seen[judged] @ weights).reshape(-1, 3, 2).sum(axis=(0, 2))
     parts = [part_of(*pair) for pair in zip(features, wanted, strict=True)]
-    rms, by_fold, errors = _left_out(parts, [ridge], _blocks(folds, ALL, "cpu"), 2)
-    np.testing.assert_allclose(rms[0], expected, rtol=rtol)
-    np.testing.assert_allclose(by_fold[0].sum(axis=0), expected, rtol=rtol)
+    sums, others, errors = _left_out(parts, [ridge], _blocks(folds, ALL, "cpu"), 2)
+    np.testing.assert_allclose(sums[0], expected, rtol=rtol)
+    np.testing.assert_allclose(others[0].sum(axis=0), (len(folds) - 1) * expected, rtol=rtol)
     judged = np.unique(np.concatenate([part for _, part in folds]))
     kept = errors.of(np.zeros(len(folds), dtype=int), slice(None))
     squares = np.square(kept[:, judged].double().numpy()).reshape(2, len(judged), 3, 2)
     np.testing.assert_allclose(squares.sum(axis=(0, 1, 3)), expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("part_judged", [False, True])
+def test_a_ridge_that_is_passed_over_would_not_be_chosen(seed, part_judged):
+    """Not by all folds, nor by all but one; of windows that are judged in part no such bound is known."""
+    rng = np.random.default_rng(seed)
+    units, noise = int(rng.integers(3, 60)), rng.uniform(0.01, 1.0)
+    folds = [(np.setdiff1d(ALL, run), run[: len(run) // 2] if part_judged else run) for run in RUNS]
+    features = [rng.normal(size=(len(ALL), units)) * np.geomspace(1.0, 1e-2, units) for _ in range(2)]
+    wanted = [seen @ rng.normal(size=(units, 6)) + noise * rng.normal(size=(len(ALL), 6)) for seen in features]
+    parts, blocks = [part_of(*pair) for pair in zip(features, wanted, strict=True)], _blocks(folds, ALL, "cpu")
+    ridges = list(np.geomspace(1e-4, 1e4, 9))
+    sums, others, errors = _left_out(parts, ridges, blocks, 2)
+    alone = [_left_out(parts, [ridge], blocks, 2) for ridge in ridges]
+    one_by_one, but_one = (np.concatenate([one[place] for one in alone]) for place in (0, 1))
+    passed = np.isinf(sums).any(axis=1)
+    assert (~np.isinf(sums[~passed])).all()
+    assert passed.any() != part_judged
+    np.testing.assert_array_equal(sums[~passed], one_by_one[~passed])
+    np.testing.assert_array_equal(sums.argmin(axis=0), one_by_one.argmin(axis=0))
+    np.testing.assert_array_equal(others.argmin(axis=0), but_one.argmin(axis=0))
+    kept = errors.of(others[:, :, 0].argmin(axis=0), slice(0, 2))
+    assert np.isfinite(kept[:, np.concatenate([judged for _, judged in folds])].numpy()).all()
 
 
 @pytest.mark.parametrize("mirror", [0.0, 1.0])
@@ -172,7 +195,8 @@ def test_a_run_has_no_part_in_the_choice_of_the_ridge_that_judges_it():
     errors = _Errors((4, 2), 2)
     for ridge in (0, 1):
         errors.keep(ridge, slice(0, 2), torch.tensor([[0, 1], [2, 3]]), (0, 1), torch.full((2, 2, 4), float(ridge)))
-    left_out = _chosen_without(np.array([[1.0, 5.0], [4.0, 2.0]]), errors, slice(None))
+    by_fold = np.array([[1.0, 5.0], [4.0, 2.0]])
+    left_out = _chosen_without(by_fold.sum(axis=1, keepdims=True) - by_fold, errors, slice(None))
     np.testing.assert_array_equal(left_out.others, [2.0, 1.0])
     np.testing.assert_array_equal(left_out.errors[0, :, 0], [1.0, 1.0, 0.0, 0.0])
 
