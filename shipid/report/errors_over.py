@@ -210,7 +210,7 @@ def _visible(x: Floats, y: Floats) -> Indices:
     if not np.isfinite(y).all() or len(y) < 3:
         return np.arange(len(y))
     span = [max(float(np.ptp(values)), 1e-9) for values in (x, y)]
-    return thinned(np.column_stack([x / span[0], y / span[1]]), 1 / PIXELS)
+    return thinned([np.column_stack([x / span[0], y / span[1]])], 1 / PIXELS)[0]
 
 
 def _changes(values: Floats) -> Indices:

@@ -37,7 +37,7 @@ def manoeuvres(content: ReportContent) -> Figure | None:
     for name in sorted(names, key=lambda name: (set_colour(name) == category(TEST), names.index(name))):
         for run, mine in tracks[tracks["set"] == name].groupby("run", sort=False):
             points = mine[["east", "north"]].to_numpy(dtype=float)
-            points = points[thinned(points, extent / PIXELS)]
+            points = points[thinned([points], extent / PIXELS)[0]]
             ink = {"color": set_colour(name), "width": 2.2 if set_colour(name) == category(TEST) else 1.2}
             traces.append(line(str(run), points[:, 0], points[:, 1], [f"set:{name}"], line=ink))
             traces[-1]["hovertemplate"] = f"{label(str(run))} ({label(name)})<extra></extra>"

@@ -144,6 +144,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     lines: dict[tuple[str, str], int] = {}
     detail = _detail([window for windows in runs.values() for window in windows])
     packed: dict[str, list[dict[str, Any]]] = {}
+    tracks = _Tracks()
     for run, windows in runs.items():
         packed[run] = []
         for window in windows:
@@ -153,18 +154,21 @@ def window_data(content: ReportContent) -> dict[str, Any]:
                     continue
                 which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
                 at = counts.index(size) if source == "cooperative" else -1
-                paths.append([which, at, *_drawable(points, detail), _rounded(_end_error(window, points), 0.001)])
+                paths.append([which, at, *tracks.columns(points), _rounded(_end_error(window, points), 0.001)])
                 if (model, source, size) in window.bands:
-                    paths[-1] += _drawable(window.bands[model, source, size], detail)
+                    paths[-1] += tracks.columns(window.bands[model, source, size])
             wind = None if window.wind is None else [round(value, 3) for value in window.wind]
             packed[run].append(
-                {"t": window.t, "psi": round(window.psi_end, 4), "wind": wind, "truth": _drawable(window.truth, detail)}
+                {"t": window.t, "psi": round(window.psi_end, 4), "wind": wind, "truth": tracks.columns(window.truth)}
                 | {"paths": paths}
             )
+    tracks.fill(detail)
     first = next(iter(runs.values()))[0] if runs else None
     return {
         "runs": list(packed.values()),
-        "outline": _drawable(first.outline, 0.0) if first else [[], []],
+        "outline": [[_rounded(value, 0.0) for value in column] for column in np.transpose(first.outline)]
+        if first
+        else [[], []],
         "lines": [_line(content, model, source) for model, source in lines],
         "truth": {"color": TRUTH, "width": 9},
         "layout": plane("y, to starboard [m]", "x, ahead [m]"),
@@ -279,12 +283,27 @@ def _detail(windows: list[Snapshot]) -> float:
     return float(np.median(extents)) / PIXELS if extents else 0.0
 
 
-def _drawable(points: Floats, detail: float) -> list[list[float | None]]:
-    """Reduce a path (n, 2) to [x, y] of the points that differ by `detail` [m]; one that diverged keeps its gaps."""
-    path = np.asarray(points, dtype=float)
-    if detail > 0 and np.isfinite(path).all():
-        path = path[thinned(path, detail)]
-    return [[_rounded(value, detail) for value in column] for column in path.T]
+class _Tracks:
+    """Columns x and y of many paths, handed out empty and filled together: it takes a fifth of the time."""
+
+    def __init__(self) -> None:
+        self.paths: list[Floats] = []
+        self.handed: list[tuple[list[float | None], list[float | None]]] = []
+
+    def columns(self, path: Floats) -> tuple[list[float | None], list[float | None]]:
+        """Lists for x and y of a path (n, 2), empty until `fill`."""
+        self.paths.append(np.asarray(path, dtype=float))
+        self.handed.append(([], []))
+        return self.handed[-1]
+
+    def fill(self, detail: float) -> None:
+        """Fill them with the points that differ by `detail` [m]; a path that diverged keeps its gaps."""
+        sound = [i for i, path in enumerate(self.paths) if detail > 0 and np.isfinite(path).all()]
+        for i, kept in zip(sound, thinned([self.paths[i] for i in sound], detail), strict=True):
+            self.paths[i] = self.paths[i][kept]
+        for path, columns in zip(self.paths, self.handed, strict=True):
+            for column, values in zip(columns, path.T, strict=True):
+                column += [_rounded(value, detail) for value in values.tolist()]
 
 
 def _rounded(value: float, detail: float) -> float | None:

@@ -100,29 +100,29 @@ def trained(content: ReportContent) -> pd.DataFrame:
     return means.merge(good.groupby(["model", "N_D"], as_index=False).agg(seeds=("seed", "nunique")))
 
 
-def thinned(points: Floats, tolerance: float) -> Indices:
-    """Find the points of a line, by index, that differ visibly on a screen (Ramer 1972; Douglas and Peucker 1973).
+def thinned(lines: Sequence[Floats], tolerance: float) -> list[Indices]:
+    """Find the points of each line, by index, that differ visibly on a screen (Ramer 1972; Douglas and Peucker 1973).
 
     Parameters
     ----------
-    points : (n, 2), in the same unit as tolerance.
+    lines : points (n, 2) of each, in the same unit as tolerance; at least one point a line.
     tolerance : largest distance of a dropped point from the line that is kept.
     """
+    if not lines:
+        return []
+    points, ends = np.concatenate(lines), np.cumsum([len(line) for line in lines])
     keep = np.zeros(len(points), dtype=bool)
-    keep[[0, -1]] = True
-    pieces = [(0, len(points) - 1)]
-    while pieces:
-        first, last = pieces.pop()
-        if last - first < 2:
-            continue
-        along = points[last] - points[first]
-        inner = points[first + 1 : last] - points[first]
+    keep[ends - 1] = keep[np.concatenate([[0], ends[:-1]])] = True
+    while True:  # all pieces between points that are kept at once; from one line to the next there is nothing between
+        kept = np.flatnonzero(keep)
+        piece = np.cumsum(keep) - 1
+        along = np.diff(points[kept], axis=0, append=points[-1:])
+        from_start, mine = points - points[kept[piece]], along[piece]
         # Distance from the segment, not from its line: a track may come back to where it began.
-        share = np.minimum(np.maximum(inner @ along / max(float(along @ along), 1e-12), 0.0), 1.0)
-        away = np.hypot(inner[:, 0] - share * along[0], inner[:, 1] - share * along[1])
-        worst = int(np.argmax(away))
-        if away[worst] > tolerance:
-            middle = first + 1 + worst
-            keep[middle] = True
-            pieces += [(first, middle), (middle, last)]
-    return np.flatnonzero(keep)
+        share = (from_start * mine).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)[piece]
+        away = np.hypot(*(from_start - np.clip(share, 0.0, 1.0)[:, None] * mine).T)
+        worst = np.maximum.reduceat(away, kept)[piece]
+        far = np.flatnonzero((away == worst) & (worst > tolerance))
+        if not len(far):
+            return [np.flatnonzero(one) for one in np.split(keep, ends[:-1])]
+        keep[far[np.unique(piece[far], return_index=True)[1]]] = True  # of equal distances the first

@@ -226,7 +226,8 @@ def _thinned(points: Floats) -> Floats:
     """Points (n, 2) without those that no eye misses, piece by piece between what is no number."""
     known = np.isfinite(points).all(axis=1)
     pieces = np.split(points, np.flatnonzero(np.diff(known)) + 1)
-    return np.concatenate([piece[thinned(piece, 1.0)] if np.isfinite(piece[0]).all() else piece for piece in pieces])
+    kept = iter(thinned([piece for piece in pieces if np.isfinite(piece[0]).all()], 1.0))
+    return np.concatenate([piece[next(kept)] if np.isfinite(piece[0]).all() else piece for piece in pieces])
 
 
 def _joined(points: Floats) -> str:

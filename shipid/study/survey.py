@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,8 +68,11 @@ def survey(dataset: Dataset) -> Survey:
     return Survey(pd.DataFrame(list(runs.values()), index=list(runs)), step, _factor(dataset))
 
 
-def kinds_of(dataset: Dataset) -> dict[str, str]:
-    """Run -> kind of manoeuvre: as the mapping says, else as the words in its name say, else by orders and motion."""
+def kinds_of(dataset: Dataset, runs: Container[str] | None = None) -> dict[str, str]:
+    """Run -> kind of manoeuvre: as the mapping says, else as the words in its name say, else by orders and motion.
+
+    runs : those wanted; all by default. What is slow or stopped is said by all runs.
+    """
     stretches: dict[str, list[pd.DataFrame]] = {}
     for run, rows in pieces(dataset):
         stretches.setdefault(run, []).append(rows)
@@ -81,6 +85,7 @@ def kinds_of(dataset: Dataset) -> dict[str, str]:
     return {
         run: declared.get(run) or declared_kind(run) or seen_kind(_longest(parts), speed, shaft)
         for run, parts in stretches.items()
+        if runs is None or run in runs
     }
 
 

@@ -36,7 +36,7 @@ def test_cells_without_result_do_not_enter_the_mean(full_scale):
 @given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), min_size=2, max_size=40), st.floats(0.01, 5))
 def test_no_dropped_point_is_farther_than_the_tolerance(points, tolerance):
     line = np.asarray(points)
-    kept = thinned(line, tolerance)
+    (kept,) = thinned([line], tolerance)
     assert kept[0] == 0
     assert kept[-1] == len(line) - 1
     for first, last in itertools.pairwise(kept):
@@ -49,6 +49,12 @@ def test_no_dropped_point_is_farther_than_the_tolerance(points, tolerance):
 
 def test_a_straight_line_needs_two_points_and_a_loop_more():
     straight = np.column_stack([np.arange(100.0), 2 * np.arange(100.0)])
-    assert list(thinned(straight, 0.1)) == [0, 99]
+    assert list(thinned([straight], 0.1)[0]) == [0, 99]
     angle = np.linspace(0, 2 * np.pi, 200)
-    assert 10 < len(thinned(np.column_stack([np.cos(angle), np.sin(angle)]), 0.01)) < 60
+    loop = np.column_stack([np.cos(angle), np.sin(angle)])
+    assert 10 < len(thinned([loop], 0.01)[0]) < 60
+    together = thinned([straight, loop, straight[:1]], 0.1)
+    alone = [thinned([line], 0.1)[0] for line in (straight, loop, straight[:1])]
+    for one, other in zip(together, alone, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert thinned([], 0.1) == []
