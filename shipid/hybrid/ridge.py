@@ -55,16 +55,21 @@ class _Inputs:
 
 @dataclass(frozen=True)
 class _Part:
-    """One coordinate, x or y: features on the axes of their Gram matrix, and what they have to make.
+    """One coordinate, x or y: features with the axes of their Gram matrix, and what they have to make.
 
-    rotated : (S, M); eigenvalues : (M,); axes : (M, M); targets : (S, K r) [m]; product = rotated.T @ targets.
+    features : (S, M); eigenvalues : (M,), rising; axes : (M, M); targets : (S, K r) [m];
+    product : (M, K r), features on the axes by targets.
     """
 
-    rotated: Tensor
+    features: Tensor
     eigenvalues: Tensor
     axes: Tensor
     targets: Tensor
     product: Tensor
+
+    def rotated(self, windows: Tensor) -> Tensor:
+        """Features of some windows (...) on the axes, (..., M)."""
+        return matmul(self.features[windows], self.axes)
 
 
 @dataclass(frozen=True)
@@ -316,8 +321,7 @@ def _parts(seen: _Inputs, drawn: tuple[Array, Array], outputs: Sequence[Tensor],
 def _with_axes(features: Tensor, outputs: Sequence[Tensor]) -> list[_Part]:
     """Coordinates that are made of the same features."""
     eigenvalues, axes = _decompose(features)
-    rotated = matmul(features, axes)
-    return [_Part(rotated, eigenvalues, axes, side, matmul(rotated.T, side)) for side in outputs]
+    return [_Part(features, eigenvalues, axes, side, matmul(axes.T, matmul(features.T, side))) for side in outputs]
 
 
 def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
@@ -395,7 +399,7 @@ def _left_out(
 
 def _alike(parts: Sequence[_Part]) -> Iterator[tuple[tuple[int, ...], _Part]]:
     """Sides with the same features as one part, their targets side by side."""
-    same = [parts] if all(part.rotated is parts[0].rotated for part in parts) else [[part] for part in parts]
+    same = [parts] if all(part.features is parts[0].features for part in parts) else [[part] for part in parts]
     first = 0
     for some in same:
         targets, product = (torch.cat([getattr(part, name) for part in some], dim=1) for name in ("targets", "product"))
@@ -414,7 +418,7 @@ class _Piece:
 
 
 def _solver(part: _Part, block: _Block) -> _FewRows | _ManyRows:
-    return (_FewRows if block.out.shape[1] <= part.rotated.shape[1] else _ManyRows)(part, block)
+    return (_FewRows if block.out.shape[1] <= part.features.shape[1] else _ManyRows)(part, block)
 
 
 def _chosen_without(others: Array, errors: _Errors, columns: slice) -> _LeftOut:
@@ -431,7 +435,7 @@ class _FewRows:
     def __init__(self, part: _Part, block: _Block) -> None:
         self.part, self.block, self.shape = part, block, block.out.shape
         out = block.out.flatten()
-        self.flat, self.targets = part.rotated[out].float(), part.targets[out].float()
+        self.flat, self.targets = matmul(part.features[out].float(), part.axes.float()), part.targets[out].float()
         self.rows = self.flat.view(*self.shape, -1)
         self.columns = self.rows.mT.contiguous()
         self.unit = torch.eye(self.shape[1], device=out.device)
@@ -463,7 +467,7 @@ class _FewRows:
     @cached_property
     def _exact(self) -> tuple[Tensor, Tensor]:
         """Features (folds, b, M) and targets (folds, b, K r) of the blocks."""
-        return self.part.rotated[self.block.out], self.part.targets[self.block.out]
+        return self.part.rotated(self.block.out), self.part.targets[self.block.out]
 
 
 class _ManyRows:
@@ -471,7 +475,7 @@ class _ManyRows:
 
     def __init__(self, part: _Part, block: _Block) -> None:
         self.part = part
-        self.rows, self.targets = part.rotated[block.out], part.targets[block.out]  # (folds, b, M), (folds, b, K r)
+        self.rows, self.targets = part.rotated(block.out), part.targets[block.out]  # (folds, b, M), (folds, b, K r)
         self.within = matmul(self.rows.mT, self.rows)
         self.other = part.product - matmul(self.rows.mT, self.targets)
 

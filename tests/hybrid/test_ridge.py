@@ -89,8 +89,7 @@ def part_of(features, targets):
     """A coordinate as the search holds it."""
     features, targets = torch.tensor(features), torch.tensor(targets)
     eigenvalues, axes = _decompose(features)
-    rotated = features @ axes
-    return _Part(rotated, eigenvalues, axes, targets, rotated.T @ targets)
+    return _Part(features, eigenvalues, axes, targets, (features @ axes).T @ targets)
 
 
 def test_single_precision_ends_where_digits_would():
