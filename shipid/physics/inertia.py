@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Annotated
 
 import casadi as ca
@@ -40,6 +41,15 @@ def added_mass(**derivatives: Annotated[SX, ADDED_MASS]) -> SX:
         row, column = AXES.index(name[0]), "uvwpqr".index(name[2])
         M_A[row, column] = -value
     return M_A
+
+
+@lru_cache(maxsize=64)
+def mass(inertia: tuple[str, ...], added: tuple[str, ...]) -> ca.Function:
+    """M_RB + M_A [6 x 6] as a function of one vector: the named arguments of `rigid_body`, then of `added_mass`."""
+    values = SX.sym("values", len(inertia) + len(added))
+    known, derivatives = ca.vertsplit(values)[: len(inertia)], ca.vertsplit(values)[len(inertia) :]
+    M = rigid_body(**dict(zip(inertia, known, strict=True))) + added_mass(**dict(zip(added, derivatives, strict=True)))
+    return ca.Function("mass", [values], [ca.densify(M)])
 
 
 def coriolis(M: SX, nu: SX) -> SX:

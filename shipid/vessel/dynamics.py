@@ -17,7 +17,7 @@ from shipid.physics.frames import current, heave_rate, kinematics, vector
 from shipid.physics.helm import Helmsman
 from shipid.physics.inertia import added_mass, coriolis, rigid_body
 from shipid.physics.signals import named, units
-from shipid.vessel.bindings import Binding, bindings
+from shipid.vessel.bindings import Binding
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import BEHIND, actuators, behind, signals, structural, term_blocks, term_parameters
 from shipid.vessel.schema import parameters as declared
@@ -121,7 +121,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     environment, weather = _symbols("environment", _environment(vessel))
     parameters, value_of = _symbols("parameters", list(vessel.parameters))
     tau_extra, dt = SX.sym("tau_extra", len(axes)), SX.sym("dt")
-    bound = bindings(vessel.document)
+    bound = vessel.bound
 
     helm: dict[str, SX] = {name: SX.sym(name) for name in (helmsman.memory if helmsman else ())}
     orders, helm_after = dict(input_of), list(helm.values())

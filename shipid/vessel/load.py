@@ -18,10 +18,10 @@ from shipid.document import Document
 from shipid.errors import DocumentError, choices
 from shipid.physics import TERMS
 from shipid.physics.grammar import AXES
-from shipid.physics.inertia import added_mass, rigid_body
+from shipid.physics.inertia import mass
 from shipid.physics.signals import row_of
 from shipid.physics.waves import TABLES
-from shipid.vessel.bindings import bindings, units
+from shipid.vessel.bindings import Binding, bindings, units
 from shipid.vessel.ranges import UNUSUAL, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
@@ -69,6 +69,11 @@ class Vessel:
         return DOFS[self.document["dof"]]
 
     @cached_property
+    def bound(self) -> dict[str, Binding]:
+        """Dotted path of every block that the equations use -> what binds its numbers to a physics function."""
+        return bindings(self.document)
+
+    @cached_property
     def units(self) -> dict[str, str]:
         """Dotted path -> unit of every parameter, in document order of use."""
         return units(self.document)
@@ -94,7 +99,7 @@ class Vessel:
             except DocumentError:
                 return check_vessel(document, self.file)
             vessel = Vessel(document, self.file, documents.digest(document))
-            vessel.__dict__["units"] = self.units
+            vessel.__dict__.update(bound=self.bound, units=self.units, structure=self.structure)
             vessel.__dict__["parameters"] = self.parameters | {path: float(value) for path, value in values.items()}
             _check_numbers(vessel)
             return vessel
@@ -377,14 +382,11 @@ def _check_units(vessel: Vessel) -> None:
 
 def _check_inertia(vessel: Vessel) -> None:
     """DocumentError if mass plus added mass is not positive definite in the degrees of freedom of the vessel."""
-    bound, value_of = bindings(vessel.document), vessel.parameters
-    known: dict[str, dict[str, Any]] = {
-        block: {key: value_of[target] if isinstance(target, str) else target for key, target in bound[block].items()}
-        for block in ("inertia", "added_mass")
-    }
-    M = rigid_body(**known["inertia"]) + added_mass(**known["added_mass"])
-    mass = np.array([[float(M[i, j]) for j in vessel.axes] for i in vessel.axes])
-    if np.linalg.eigvalsh(mass + mass.T)[0] <= 0:
+    blocks, value_of = [vessel.bound[name] for name in ("inertia", "added_mass")], vessel.parameters
+    targets = [target for block in blocks for target in block.values()]
+    numbers = [value_of[one] if isinstance(one, str) else one for one in targets if isinstance(one, str | int | float)]
+    M = np.asarray(mass(*(tuple(block) for block in blocks))(numbers))[np.ix_(vessel.axes, vessel.axes)]
+    if np.linalg.eigvalsh(M + M.T)[0] <= 0:
         remedy = (
             "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
         )

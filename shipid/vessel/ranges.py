@@ -87,9 +87,9 @@ def out_of_range(
         if not least <= abs(value) <= most and not _is_meant(path, meant):
             return path, f"{value:g}: expected {limits.words} ({least:.3g} to {most:.3g}); {_remedy(path)}"
     tables: dict[str, list[float]] = {}
-    for name, unit in units.items():
+    for name in (name for name, unit in units.items() if unit == "deg"):
         path, _, place = name.rpartition(".")
-        if unit == "deg" and place.isdecimal():
+        if place.isdecimal():
             tables.setdefault(path, []).append(abs(values[name]))
     for path, angles in tables.items():
         if len(angles) > 1 and max(angles) <= TURN and not _is_meant(path, meant):
