@@ -147,16 +147,16 @@ def _size_control(counts: Sequence[int]) -> Control:
 
 def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str, unit: str = "m") -> list[Trace]:
     looks, pure, traces = close_styles(content), data_driven(content), []
+    # What has no physics first: thick ink must not cover the others.
     groups = sorted(means.groupby(["model", "source"], sort=False), key=lambda group: group[0][0] != pure)
-    for key, mine in groups:  # what has no physics first: thick ink must not cover the others
+    visible = _visible([mine[[across, column]].to_numpy(dtype=float) for _, mine in groups])
+    for (key, _), points in zip(groups, visible, strict=True):
         model, source = (str(part) for part in key)
-        x, y = mine[across].to_numpy(dtype=float), mine[column].to_numpy(dtype=float)
         ink = {"color": NAIVE, "width": 1.5} if source == "naive" else {"color": looks[model].colour}
         ink = {"width": looks[model].width if source == "cooperative" else 1.5, **ink} if model else ink
         name = "constant velocity" if source == "naive" else model if model == pure else f"{model}, {_word(source)}"
         keys = [f"source:{source}"] + ([f"model:{model}"] if model else [])
-        keep = _visible(x, y)
-        traces.append(line(name, x[keep], y[keep], keys, unit, line={"dash": DASHES[source], **ink}))
+        traces.append(line(name, points[:, 0], points[:, 1], keys, unit, line={"dash": DASHES[source], **ink}))
         if model and source == "cooperative":
             mark = {"symbol": looks[model].symbol, "size": 7, "color": ink["color"], "maxdisplayed": 9}
             traces[-1].update(mode="lines+markers", marker=mark)
@@ -205,12 +205,14 @@ def _word(source: str) -> str:
     return "compensated" if source == "cooperative" else "physics alone"
 
 
-def _visible(x: Floats, y: Floats) -> Indices:
-    """Indices of the points of a line that differ visibly at the height of the plot; a line with gaps keeps all."""
-    if not np.isfinite(y).all() or len(y) < 3:
-        return np.arange(len(y))
-    span = [max(float(np.ptp(values)), 1e-9) for values in (x, y)]
-    return thinned([np.column_stack([x / span[0], y / span[1]])], 1 / PIXELS)[0]
+def _visible(lines: Sequence[Floats]) -> list[Floats]:
+    """Points of lines (n, 2) that differ visibly at the height of the plot; a line with gaps keeps all."""
+    kept = list(lines)
+    whole = [i for i, line in enumerate(lines) if len(line) and np.isfinite(line).all()]
+    unit = [lines[i] / np.maximum(np.ptp(lines[i], axis=0), 1e-9) for i in whole]
+    for i, chosen in zip(whole, thinned(unit, 1 / PIXELS), strict=True):
+        kept[i] = lines[i][chosen]
+    return kept
 
 
 def _changes(values: Floats) -> Indices:
