@@ -76,6 +76,16 @@ def test_importing_is_light() -> None:
     assert result.stdout == "[]\n"
 
 
+def test_a_study_is_prepared_and_reported_without_pytorch() -> None:
+    """It takes two seconds to import: the workers do that meanwhile. So does nothing else that takes long."""
+    code = (
+        "import sys, shipid.study.run, shipid.study.contents, shipid.identification.solve; "
+        "print(sorted({'torch', 'scipy.stats', 'sklearn', 'distributed'} & set(sys.modules)))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout == "[]\n"
+
+
 def blocks(page: str) -> list[str]:
     """Blocks of Python of a page of the documentation."""
     text = (ROOT / "docs" / page).read_text(encoding="utf-8")

@@ -11,16 +11,21 @@ import torch
 from torch import Tensor
 
 
+def by_numpy(values: Tensor) -> bool:
+    """Whether NumPy computes with a tensor: it is on the processor."""
+    return values.device.type == "cpu"
+
+
 def matmul(left: Tensor, right: Tensor) -> Tensor:
     """Return left @ right, of matrices or stacks of them."""
-    if left.device.type != "cpu":
+    if not by_numpy(left):
         return left @ right
     return torch.from_numpy(np.matmul(left.numpy(), right.numpy()))
 
 
 def gram(values: Tensor) -> Tensor:
     """Return values.T @ values of (S, M), at half of the price of a product."""
-    if values.device.type != "cpu":
+    if not by_numpy(values):
         return values.T @ values
     array = values.numpy()
     return torch.from_numpy(array.T @ array)  # NumPy sees that one is the other's transpose
@@ -28,7 +33,7 @@ def gram(values: Tensor) -> Tensor:
 
 def hidden(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
     """Return tanh(values @ weight + offset): units (S, M) of inputs (S, d) by weights (d, M) and offsets (M,)."""
-    if values.device.type != "cpu":
+    if not by_numpy(values):
         return torch.addmm(offset, values, weight).tanh_()
     units = np.matmul(values.numpy(), weight.numpy())
     units += offset.numpy()
