@@ -359,7 +359,7 @@ def _left_out(
     """Errors over judged windows, each block without itself; `terms` is r.
 
     A run left out is never predicted better than with itself in the fit. So a ridge whose fit already misses more than
-    another ridge does on runs left out is passed over: it would not be chosen, whichever fold is left out.
+    other ridges do on runs left out is passed over: it would not be chosen, neither by all folds nor by all but one.
 
     Returns sums of squares (ridges, K) [m^2] over all folds, those over all folds but one (ridges, F, K), and the
     errors. The sums of a ridge that is passed over are infinite.
@@ -385,7 +385,10 @@ def _left_out(
 
     for i in sorted(range(len(ridges)), key=ridges.__getitem__):
         missed = [piece.solver.missed(ridges[i]) for piece in pieces]
-        if bounded and (but_one(missed)[1] > (1 + ROUNDING) * others.amin(dim=0)).all():
+        if bounded and all(
+            (least > (1 + ROUNDING) * known.amin(dim=0)).all()
+            for least, known in zip(but_one(missed), (sums, others), strict=True)
+        ):
             continue
         made = [
             piece.block.of_judged(piece.solver.without(ridges[i], one))
