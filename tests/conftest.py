@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 import typer.testing
 from hypothesis import settings
 
 from shipid.data.dataset import Dataset
 from shipid.document import bundled
+from shipid.hybrid.device import use_threads
 from shipid.logs.importing import import_log, read_mapping
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
-torch.set_num_threads(1)  # the machine is shared
+use_threads(1)  # the machine is shared
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 typer.testing._get_command = typer.main.get_command = cache(typer.main.get_command)  # 0.1 s each time otherwise

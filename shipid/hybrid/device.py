@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from threadpoolctl import threadpool_limits
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from shipid.errors import ShipidError
 
@@ -21,9 +21,10 @@ def check_device(device: str) -> None:
 
 
 def vectors() -> str:
-    """Names of the vector instructions that NumPy found on this processor, such as X86_V4."""
-    found = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
-    return " ".join(found) or "no further vectors"
+    """Vector instructions that NumPy found on this processor, and the kernels of its BLAS, such as X86_V4, Zen."""
+    found = np.show_config(mode="dicts").get("SIMD Extensions", {}).get("found", [])
+    kernels = [str(library["architecture"]) for library in threadpool_info() if "architecture" in library]
+    return ", ".join(filter(None, [" ".join(found), *dict.fromkeys(kernels)])) or "no further vectors"
 
 
 def use_threads(count: int) -> None:
@@ -31,6 +32,7 @@ def use_threads(count: int) -> None:
 
     Networks and matrices as small as these lose time on more than one, and the last digit of a product depends on it.
     """
+    import scipy.linalg  # noqa: F401  - a BLAS can be limited once it is loaded
     import torch
 
     torch.set_num_threads(count)

@@ -20,7 +20,7 @@ from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 MOTION = ("u", "v", "r", "psi")
-WORTH_COMPILING = 20_000  # rate evaluations: who asks for so many at once, in training or on a log, asks again
+WORTH_COMPILING = 20_000  # steps of single windows: who asks for so many at once, in training or on a log, asks again
 Inputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
 """Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
 
@@ -69,7 +69,7 @@ class Physics:
 
         tau_extra : (T, S, n_dof) forces [N, N m] added over the horizon; None adds none. With an observer u and v are
         those through the water.
-        engine : as in `rollout`.
+        engine : as in `rollout`; `auto` takes C from `WORTH_COMPILING` steps on.
         """
         result, (north, east) = self._rollout(instants, ("north", "east", *MOTION), None, "cpu", tau_extra, engine)
         x, y = _in_frame(instants, north[:, 0], east[:, 0])

@@ -1,7 +1,8 @@
 """Products of matrices for tensors of PyTorch: by NumPy on the processor, by PyTorch on every other device.
 
-A tensor on the processor is also an array of NumPy, at the same place in memory. On AMD the products and functions of
-NumPy take half to three quarters of the time of those of PyTorch: docs/performance.md, "A trial".
+A tensor on the processor is also an array of NumPy, at the same place in memory. On AMD products and functions of NumPy
+take a third to nine tenths of the time of those of PyTorch: docs/performance.md, "Where the time goes". Tensors have no
+gradients here.
 """
 
 from __future__ import annotations

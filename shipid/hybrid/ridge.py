@@ -438,7 +438,7 @@ class _FewRows:
     def __init__(self, part: _Part, block: _Block) -> None:
         self.part, self.block, self.shape = part, block, block.out.shape
         out = block.out.flatten()
-        self.flat, self.targets = matmul(part.features[out].float(), part.axes.float()), part.targets[out].float()
+        self.flat, self.targets = part.rotated(out).float(), part.targets[out].float()
         self.rows = self.flat.view(*self.shape, -1)
         self.columns = self.rows.mT.contiguous()
         self.unit = torch.eye(self.shape[1], device=out.device)
@@ -488,8 +488,8 @@ class _ManyRows:
 
     def without(self, ridge: float, _: Tensor) -> Tensor:
         """What a fit without each block misses of it."""
-        gram = torch.diag(self.part.eigenvalues + ridge) - self.within
-        return self.targets - matmul(self.rows, torch.linalg.solve(gram, self.other))
+        without = torch.diag(self.part.eigenvalues + ridge) - self.within
+        return self.targets - matmul(self.rows, torch.linalg.solve(without, self.other))
 
 
 def _network(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -284,10 +284,15 @@ def _roll_out(
     return foundations, {one.name: finished[one.name][1] for one in foundations}
 
 
-def kinds_of_runs(dataset: Dataset) -> dict[str, str]:
-    """Kind of manoeuvre of every run: as its mapping declares it, else as its longest unbroken piece looks."""
+def kinds_of_runs(dataset: Dataset, runs: Container[str] | None = None) -> dict[str, str]:
+    """Kind of manoeuvre of every run: as its mapping declares it, else as its longest unbroken piece looks.
+
+    runs : those wanted; all by default.
+    """
     longest: dict[str, pd.DataFrame] = {}
     for run, rows in pieces(dataset):
+        if runs is not None and run not in runs:
+            continue
         if run not in longest or np.ptp(rows["t"]) > np.ptp(longest[run]["t"]):
             longest[run] = rows
     declared: Mapping[str, str] = dataset.metadata.get("manoeuvres", {})

@@ -71,7 +71,7 @@ def survey(dataset: Dataset) -> Survey:
 def kinds_of(dataset: Dataset, runs: Container[str] | None = None) -> dict[str, str]:
     """Run -> kind of manoeuvre: as the mapping says, else as the words in its name say, else by orders and motion.
 
-    runs : those wanted; all by default. What is slow or stopped is said by all runs.
+    runs : those wanted; all by default. The usual speeds come from all runs.
     """
     stretches: dict[str, list[pd.DataFrame]] = {}
     for run, rows in pieces(dataset):

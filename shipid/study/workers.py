@@ -19,6 +19,8 @@ from shipid.errors import ShipidError
 from shipid.interrupts import uninterrupted
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # of multiprocessing; forks are less safe elsewhere
+PRELOADED = ["shipid.study.run", "shipid.hybrid.training", "shipid.hybrid.ridge"]
+"""Modules that workers need, PyTorch with them: a name that cannot be imported is passed over without a word."""
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  # read at import
 
 Task = TypeVar("Task")
@@ -38,7 +40,7 @@ def import_for_workers() -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with _one_thread():
-            forkserver.set_forkserver_preload(["shipid.study.run", "shipid.hybrid.training", "shipid.hybrid.ridge"])
+            forkserver.set_forkserver_preload(PRELOADED)
             forkserver.ensure_running()
     finally:
         signal.signal(signal.SIGINT, before)

@@ -383,8 +383,10 @@ def _check_units(vessel: Vessel) -> None:
 def _check_inertia(vessel: Vessel) -> None:
     """DocumentError if mass plus added mass is not positive definite in the degrees of freedom of the vessel."""
     blocks, value_of = [vessel.bound[name] for name in ("inertia", "added_mass")], vessel.parameters
-    targets = [target for block in blocks for target in block.values()]
-    numbers = [value_of[one] if isinstance(one, str) else one for one in targets if isinstance(one, str | int | float)]
+    numbers = []
+    for target in (target for block in blocks for target in block.values()):
+        assert isinstance(target, str | int | float)  # neither function takes a list or a table
+        numbers.append(value_of[target] if isinstance(target, str) else target)
     M = np.asarray(mass(*(tuple(block) for block in blocks))(numbers))[np.ix_(vessel.axes, vessel.axes)]
     if np.linalg.eigvalsh(M + M.T)[0] <= 0:
         remedy = (

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+import shipid.hybrid.physics as physics_module
 from shipid.data.windows import Instants, Windows, cut_windows, to_frame
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, ShipidError
@@ -165,3 +167,22 @@ def test_water_and_air_that_move_together_carry_the_path_along() -> None:
     one = physics.paths(Instants(calm, estimates=still))
     other = physics.paths(Instants(windy, estimates=stream))
     np.testing.assert_allclose((other - one)[:, 0], 0.4 * np.arange(1, 7)[:, None] * [0.0, 1.0], atol=1e-9)
+
+
+@pytest.mark.parametrize(("count", "engine"), [(10, "auto"), (21, "repeated")])
+def test_many_steps_at_once_run_as_c(count: int, engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[str] = []
+
+    def noted(*arguments: Any, engine: str, **more: Any) -> Any:
+        taken.append(engine)
+        return rollout(*arguments, engine="casadi", **more)
+
+    monkeypatch.setattr(physics_module, "WORTH_COMPILING", 100)
+    monkeypatch.setattr(physics_module, "rollout", noted)
+    vessel = load_vessel("gunnerus-28.9")
+    zero = np.zeros(count)
+    names = ("north", "east", "psi", "u", "v", "r", *dynamics(vessel).commands)
+    physics = Physics(vessel, 5, 1.0)
+    physics.paths(Instants(dict.fromkeys(names, zero)))
+    physics.states(Instants(dict.fromkeys(names, zero)), engine="casadi")
+    assert taken == [engine, "casadi"]

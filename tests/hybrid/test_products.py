@@ -7,8 +7,6 @@ import torch
 
 from shipid.hybrid import products
 
-torch.set_num_threads(1)
-
 
 @pytest.fixture(params=["NumPy", "PyTorch"], autouse=True)
 def library(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,18 +12,16 @@ from shipid.hybrid.ridge import (
     _Best,
     _blocks,
     _chosen_without,
-    _decompose,
     _Errors,
     _FewRows,
     _left_out,
     _LeftOut,
-    _Part,
     _reflection,
+    _with_axes,
     smooth_basis,
 )
 from tests.hybrid.tasks import compensation, tune
 
-torch.set_num_threads(1)
 TWINS = ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
 RUDDER = ("engine.n", "rudder.delta")
 SMALL = PathDrawn(trials=6, units=24, terms=4)
@@ -87,9 +85,8 @@ def predicted(fits, columns):
 
 def part_of(features, targets):
     """A coordinate as the search holds it."""
-    features, targets = torch.tensor(features), torch.tensor(targets)
-    eigenvalues, axes = _decompose(features)
-    return _Part(features, eigenvalues, axes, targets, (features @ axes).T @ targets)
+    (part,) = _with_axes(torch.tensor(features), [torch.tensor(targets)])
+    return part
 
 
 def test_single_precision_ends_where_digits_would():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import multiprocessing
 import os
@@ -13,7 +14,7 @@ import time
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.study.workers import METHOD, ONE_THREAD, import_for_workers, on_workers
+from shipid.study.workers import METHOD, ONE_THREAD, PRELOADED, import_for_workers, on_workers
 
 forked = pytest.mark.skipif(METHOD != "forkserver", reason="workers are forked on Linux only")
 
@@ -103,3 +104,12 @@ except KeyboardInterrupt:
             process.kill()
         out, err = process.communicate(timeout=60)
         assert (out, err) == (b"interrupted\n" if sent == signal.SIGINT else b"", b"")
+
+
+def test_what_workers_need_is_imported_before_they_are_forked() -> None:
+    """The source of the workers passes over a name that it cannot import."""
+    for name in PRELOADED:
+        importlib.import_module(name)
+    code = f"import sys, {', '.join(PRELOADED)}; print('torch' in sys.modules)"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout == "True\n"
