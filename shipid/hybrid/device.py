@@ -23,8 +23,8 @@ def check_device(device: str) -> None:
 def vectors() -> str:
     """Vector instructions that NumPy found on this processor, and the kernels of its BLAS, such as X86_V4, Zen."""
     found = np.show_config(mode="dicts").get("SIMD Extensions", {}).get("found", [])
-    kernels = [str(library["architecture"]) for library in threadpool_info() if "architecture" in library]
-    return ", ".join(filter(None, [" ".join(found), *dict.fromkeys(kernels)])) or "no further vectors"
+    kernels = {str(library["architecture"]) for library in threadpool_info() if "architecture" in library}
+    return ", ".join(filter(None, [" ".join(found), *sorted(kernels)])) or "no further vectors"
 
 
 def use_threads(count: int) -> None:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 SPARE = 4  # further trials whose errors without each run are kept
 SOUND = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are then right to about 1e-5
-ROUNDING = 1e-3  # of sums of squares in single precision, amply
+ROUNDING = 1e-3  # by which a sum of squares must be greater to be so for sure: a hundred times what `SOUND` leaves
 
 
 @dataclass(frozen=True)
@@ -488,8 +488,8 @@ class _ManyRows:
 
     def without(self, ridge: float, _: Tensor) -> Tensor:
         """What a fit without each block misses of it."""
-        without = torch.diag(self.part.eigenvalues + ridge) - self.within
-        return self.targets - matmul(self.rows, torch.linalg.solve(without, self.other))
+        remainder = torch.diag(self.part.eigenvalues + ridge) - self.within
+        return self.targets - matmul(self.rows, torch.linalg.solve(remainder, self.other))
 
 
 def _network(

@@ -146,8 +146,8 @@ def drawn_parts(seed):
     return parts, runs, windows
 
 
-@pytest.mark.parametrize("part_judged", [False, True])
-def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged):
+@pytest.mark.parametrize(("part_judged", "least", "most"), [(False, 100, 800), (True, 0, 0)])
+def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged, least, most):
     """Not by all folds, nor by all but one; of windows that are judged in part no such bound is known.
 
     In draw 3026 the ridge that is best over both folds is best over neither of them.
@@ -167,7 +167,7 @@ def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged):
         np.testing.assert_array_equal(others.argmin(axis=0), but_one.argmin(axis=0))
         kept = errors.of(others[:, :, 0].argmin(axis=0), slice(0, 2))
         assert np.isfinite(kept[:, np.concatenate([judged for _, judged in folds])].numpy()).all()
-    assert (passed_over > 100) != part_judged
+    assert least <= passed_over <= most
 
 
 @pytest.mark.parametrize("mirror", [0.0, 1.0])
