@@ -181,15 +181,7 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
         first.append([0.0] * 6 + slow + [current * speed] * 2 + [x / omega for x in w] + [*w])
     sizes = {"north": length, "east": length, "psi": 1.0, "u": speed, "v": speed, "r": 1 / time}
     noise = np.array([settings.noise.get(name, 5e-4 * size) for name, size in sizes.items()])
-    return Bank(vessel, settings, np.array(numbers), noise, np.array(first), settings.fade * time, _mass(vessel))
-
-
-def _mass(vessel: Vessel) -> Array:
-    """Inertia (3, 3) with added mass, from the equations: tau = mass @ acceleration."""
-    model, tau = dynamics(vessel), SX.sym("tau", 3)
-    zeros = [SX.zeros(len(names)) for names in (model.memory, model.commands, model.environment)]
-    rates = model.rates(SX.zeros(6), *zeros, SX(list(vessel.parameters.values())), tau)
-    return np.linalg.inv(np.array(ca.Function("inverse", [], [ca.jacobian(rates[3:6], tau)])()["o0"]))
+    return Bank(vessel, settings, np.array(numbers), noise, np.array(first), settings.fade * time, vessel.mass)
 
 
 @lru_cache(maxsize=16)

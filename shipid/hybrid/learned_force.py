@@ -35,7 +35,6 @@ SCALES = ("u_scale", "v_scale", "r_scale")
 LIMITS = ("X_max", "Y_max", "N_max")
 HIDDEN = ("w_u", "w_v", "w_r", "w_0")
 OUTPUT = ("c_X", "c_Y", "c_N")
-PROBE = 1.0  # N and N m
 START_RIDGE = 1e-5
 MOST = 0.95  # of the limit that a force may have at the start
 LEAST_SCALE = 1e-3  # m/s and rad/s: of a motion that does not vary
@@ -176,7 +175,8 @@ class LearnedForce(Searched):
 
 def started(block: Mapping[str, Array], physics: Physics, at: Instants, missing: Array) -> dict[str, Array]:
     """The block with output weights from the accelerations (N, 3) that single steps of the physics miss at `at`."""
-    force = missing @ mass(physics, at.select([0])).T
+    assert physics.vessel is not None
+    force = missing @ mass(physics.vessel).T
     weights = [block[key][:, None] for key in ("w_u", "w_v", "w_r")]
     u, v, r = (at.columns[motion] / block[scale] for motion, scale in zip(("u", "v", "r"), SCALES, strict=True))
     along = weights[0] * u + block["w_0"][:, None]
@@ -190,18 +190,10 @@ def started(block: Mapping[str, Array], physics: Physics, at: Instants, missing:
     return initial
 
 
-def mass(physics: Physics, at: Instants) -> Array:
-    """Mass with added mass (3, 3) of surge, sway and yaw, from what unit forces do to one step of one instant."""
-    assert physics.vessel is not None
-    axes = physics.vessel.axes
-    rows = [axes.index(axis) for axis in (0, 1, 5)]
-    forces = np.zeros((1, 3, len(axes)))
-    forces[0, range(3), rows] = PROBE
-    single = replace(physics, horizon=1, integrator="euler", observer=None)
-    pushed = single.states(at.select([0, 0, 0]), tau_extra=forces)
-    calm = single.states(at)
-    moved = np.stack([pushed[name][0] - calm[name][0] for name in ("u", "v", "r")])  # (3, forces)
-    return np.asarray(np.linalg.inv(moved / (PROBE * physics.step)))
+def mass(vessel: Vessel) -> Array:
+    """Mass plus added mass (3, 3) [kg, kg m, kg m^2] that a force in surge, sway and yaw moves; others move freely."""
+    rows = [vessel.axes.index(axis) for axis in (0, 1, 5)]
+    return np.asarray(np.linalg.inv(np.linalg.inv(vessel.mass)[np.ix_(rows, rows)]))
 
 
 def limits(vessel: Vessel, speed: float, factor: float) -> dict[str, Array]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FiniteFloat
 
 from shipid import document as documents
@@ -82,6 +83,16 @@ class Vessel:
     def parameters(self) -> dict[str, float]:
         """Dotted path -> value of every number that the equations use."""
         return {path: float(documents.get(self.document, path)) for path in self.units}
+
+    @cached_property
+    def mass(self) -> NDArray[np.float64]:
+        """Mass plus added mass (n, n) [kg, kg m, kg m^2] in the degrees of freedom of the vessel."""
+        blocks, numbers = [self.bound[name] for name in ("inertia", "added_mass")], []
+        for target in (target for block in blocks for target in block.values()):
+            assert isinstance(target, str | int | float)  # neither function takes a list or a table
+            numbers.append(self.parameters[target] if isinstance(target, str) else target)
+        M = np.asarray(mass(*(tuple(block) for block in blocks))(numbers))
+        return M[np.ix_(self.axes, self.axes)]
 
     @cached_property
     def structure(self) -> str:
@@ -382,13 +393,7 @@ def _check_units(vessel: Vessel) -> None:
 
 def _check_inertia(vessel: Vessel) -> None:
     """DocumentError if mass plus added mass is not positive definite in the degrees of freedom of the vessel."""
-    blocks, value_of = [vessel.bound[name] for name in ("inertia", "added_mass")], vessel.parameters
-    numbers = []
-    for target in (target for block in blocks for target in block.values()):
-        assert isinstance(target, str | int | float)  # neither function takes a list or a table
-        numbers.append(value_of[target] if isinstance(target, str) else target)
-    M = np.asarray(mass(*(tuple(block) for block in blocks))(numbers))[np.ix_(vessel.axes, vessel.axes)]
-    if np.linalg.eigvalsh(M + M.T)[0] <= 0:
+    if np.linalg.eigvalsh(vessel.mass + vessel.mass.T)[0] <= 0:
         remedy = (
             "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
         )

@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from shipid.engine.rollout import rollout
 from shipid.hybrid.learned_force import LearnedForce, mass
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.hybrid.worlds import fitted, world
 
@@ -14,13 +17,19 @@ def test_home_a_missing_cross_flow():
     assert here.removed(fitted(LearnedForce(trials=1, ridge=1e-5), here)) > 0.8
 
 
-def test_the_mass_is_that_of_the_equations():
-    here = world(load_vessel("gunnerus-33.9"), load_vessel("gunnerus-33.9"), runs=2, seconds=20)
-    document = here.physics.vessel.document
-    inertia = mass(here.physics, here.test.instants().select([0]))
-    for axis, key in enumerate(("X_udot", "Y_vdot", "N_rdot")):
-        rigid = document["inertia"]["I_z" if axis == 2 else "m"]
-        assert inertia[axis, axis] == pytest.approx(rigid - document["added_mass"][key], rel=1e-6)
+@pytest.mark.parametrize("name", ["gunnerus-33.9", "gunnerus-28.9-6dof", "kvlcc2-l7"])
+def test_the_mass_is_what_unit_forces_feel_in_one_step(name):
+    """Against the equations of motion: a force of 1 kN and 1 kN m for one Euler step of 1 s, from rest."""
+    vessel = load_vessel(name)
+    model = dynamics(vessel)
+    rows = [vessel.axes.index(axis) for axis in (0, 1, 5)]
+    forces = np.zeros((1, 4, len(vessel.axes)))
+    forces[0, range(3), rows] = 1e3
+    zeros = {kind: {key: np.zeros(4) for key in getattr(model, kind)} for kind in ("state", "commands", "environment")}
+    begun = zeros["state"], zeros["commands"], zeros["environment"]
+    after = rollout(vessel, *begun, step=1.0, num_steps=1, tau_extra=forces, engine="casadi")
+    moved = np.stack([after[motion][-1, 0] for motion in ("u", "v", "r")])
+    np.testing.assert_allclose(mass(vessel) @ (moved[:, :3] - moved[:, 3:]), 1e3 * np.eye(3), atol=1e-4)
 
 
 def test_the_start_in_closed_form_is_better_than_no_force():
