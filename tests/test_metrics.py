@@ -12,6 +12,18 @@ def paths():
     return true + rng.normal(size=true.shape), true
 
 
+def test_lengths_are_those_of_hypot_in_every_layout_and_size() -> None:
+    rng = np.random.default_rng(3)
+    plain = rng.normal(size=(7, 33, 2)) * 10.0 ** rng.uniform(-150, 150, (7, 33, 1))
+    plain[0, 0], plain[0, 1], plain[0, 2] = (np.nan, 1.0), (np.inf, np.nan), (0.0, 0.0)
+    expected = np.hypot(plain[..., 0], plain[..., 1])
+    for vectors in (plain, np.asfortranarray(plain), plain.repeat(2, axis=1)[:, ::2]):
+        np.testing.assert_allclose(metrics.lengths(vectors), expected, rtol=4 * np.finfo(float).eps)
+        np.testing.assert_array_equal(metrics.lengths(vectors), metrics.lengths(plain))
+    short = np.float32([[3.0, 4.0]])
+    assert metrics.lengths(short).tolist() == [5.0]
+
+
 def test_position_error_by_hand():
     predicted = np.array([[[3.0, 4.0], [1.0, 1.0]]])
     assert metrics.position_error(predicted, np.zeros((1, 2, 2))) == pytest.approx(np.array([[5.0, 2**0.5]]))

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.errors import DataError, ResultError, choices
+from shipid.metrics import lengths
 
 Array = NDArray[np.float64]
 LEVELS = np.arange(1, 100) / 100
@@ -51,8 +52,7 @@ class Region:
     def reach(self, errors: Array) -> Array:
         """How far errors (T, S, 2) [m] from the predicted path reach, (T, S): 1 at the border of the region."""
         along, across = turned(errors, self.ahead)
-        reach: Array = np.hypot(along / self.along, across / self.across)
-        return reach
+        return lengths(np.stack([along / self.along, across / self.across], axis=-1))
 
     def holds(self, errors: Array) -> NDArray[np.bool_]:
         """Whether the whole path, with errors (T, S, 2) [m], lies in its band, (S,)."""
@@ -226,7 +226,7 @@ def track(paths: Array) -> Array:
     """Unit vectors (T, S, 2) along paths (T, S, 2) that start at the origin; ahead where a path does not move."""
     first = np.concatenate([np.zeros_like(paths[:1]), paths[:-1]])
     chords = np.concatenate([paths[1:] - first[:-1], paths[-1:] - first[-1:]])
-    size = np.hypot(chords[..., 0], chords[..., 1])
+    size = lengths(chords)
     moves = size > 1e-12 * np.max(size, axis=0, initial=0.0)
     ahead: Array = np.where(moves[..., None], chords / np.where(moves, size, 1.0)[..., None], [1.0, 0.0])
     return ahead
@@ -250,7 +250,7 @@ def traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array,
     marks = np.array([-(-horizon * part // 3) - 1 for part in (1, 2, 3)])
     points = np.concatenate([np.zeros_like(paths[:1]), paths[marks]])
     chords = np.diff(points, axis=0)
-    size = np.hypot(chords[..., 0], chords[..., 1])
+    size = lengths(chords)
     cross = chords[:-1, :, 0] * chords[1:, :, 1] - chords[:-1, :, 1] * chords[1:, :, 0]
     dot = (chords[:-1] * chords[1:]).sum(axis=-1) + 0.0  # a ship at rest does not turn: 0 and not -0
     angles = np.arctan2(cross, dot)

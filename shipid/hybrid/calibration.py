@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.hybrid.bands import FEWEST, LEVELS, TRAITS, Bands, nearest, track, traits, turned
+from shipid.metrics import lengths
 
 Array = NDArray[np.float64]
 FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
@@ -52,8 +53,8 @@ class _Runs:
 
     def means(self, values: Array) -> Array:
         """Means (G, ...) over the windows of each run, of values (S, ...)."""
-        sums = np.zeros((self.count, *values.shape[1:]))
-        np.add.at(sums, self.place, values)
+        order = np.argsort(self.place, kind="stable")
+        sums: Array = np.add.reduceat(values[order], np.cumsum(self.sizes) - self.sizes, axis=0)
         return sums / self.sizes.reshape(-1, *[1] * (values.ndim - 1))
 
 
@@ -87,7 +88,7 @@ def calibrated(
     far = max(float(away.max()), 1e-9)
     thirds = np.array([-(-len(paths) * part // 3) - 1 for part in (1, 2, 3)])
     chords = np.diff(np.concatenate([np.zeros_like(paths[:1]), paths[thirds]]), axis=0)
-    length = max(float(np.hypot(chords[..., 0], chords[..., 1]).sum(axis=0) @ runs.weight), 1e-9)
+    length = max(float(lengths(chords).sum(axis=0) @ runs.weight), 1e-9)
     seen = traits(paths, columns, step, away, length)
     middle = runs.weight @ seen
     deviation = np.sqrt(runs.weight @ (seen - middle) ** 2)
@@ -188,12 +189,12 @@ class _Fit:
 def _fitted(runs: _Runs, apart: Array, normal: Array, circle: bool) -> _Fit:
     """Scale and growth from all runs, and scores of each run by those of the others."""
     if circle:
-        apart = np.broadcast_to(np.hypot(apart[..., :1], apart[..., 1:]) / np.sqrt(2.0), apart.shape)
+        apart = np.broadcast_to(lengths(apart)[..., None] / np.sqrt(2.0), apart.shape)
     means = runs.means(apart.transpose(1, 0, 2))  # (G, T, 2)
     total = means.sum(axis=0)
     scale = _floored(total / runs.count)
     others = _floored((total - means) / (runs.count - 1))[runs.place].transpose(1, 0, 2)  # (T, S, 2)
-    plain = np.hypot(apart[..., 0] / others[..., 0], apart[..., 1] / others[..., 1])
+    plain = lengths(apart / others)
     slopes, without = _slopes(runs, normal, plain.max(axis=0))
     return _Fit(scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
 

@@ -84,8 +84,9 @@ def over_time(content: ReportContent) -> Figure | None:
     means = over_seeds(frame[frame.run.isin(runs)], [*BY, "run", "t"], ["error"])
     counts = sizes(means.N_D)
     # Controls show run first: it is what a reader looks for.
+    by_run = dict(iter(means.groupby("run", sort=False)))
     views = {
-        f"{i}-{j}": [Panel(_with_commands(content, means[means.run.eq(run) & means.N_D.isin([0, size])], run))]
+        f"{i}-{j}": [Panel(_with_commands(content, by_run[run][by_run[run].N_D.isin([0, size])], run))]
         for (i, run), (j, size) in itertools.product(enumerate(runs), enumerate(counts))
     }
     left = content.over_time.run.nunique() - len(runs)
@@ -148,8 +149,10 @@ def _size_control(counts: Sequence[int]) -> Control:
 def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: str, unit: str = "m") -> list[Trace]:
     looks, pure, traces = close_styles(content), data_driven(content), []
     # What has no physics first: thick ink must not cover the others.
-    groups = sorted(means.groupby(["model", "source"], sort=False), key=lambda group: group[0][0] != pure)
-    visible = _visible([mine[[across, column]].to_numpy(dtype=float) for _, mine in groups])
+    places: dict[Any, Any] = dict(means.groupby(["model", "source"], sort=False).indices)
+    groups = sorted(places.items(), key=lambda group: (group[0][0] != pure, group[1][0]))
+    every = means[[across, column]].to_numpy(dtype=float)
+    visible = _visible([every[mine] for _, mine in groups])
     for (key, _), points in zip(groups, visible, strict=True):
         model, source = (str(part) for part in key)
         ink = {"color": NAIVE, "width": 1.5} if source == "naive" else {"color": looks[model].colour}

@@ -177,7 +177,7 @@ def _first_sketches(figures: Sequence[Figure]) -> dict[str, list[Markup]]:
     """Sketch of each panel of the first figure, by its id; empty where the page draws it from its windows."""
     for figure in figures[:1]:
         panels = figure.views.get("-".join(str(control.start) for control in figure.controls), ())
-        return {figure.id: [sketch(panel.figure, figure.height) for panel in panels]}
+        return {figure.id: [sketch(panel.plot, figure.height) for panel in panels]}
     return {}
 
 

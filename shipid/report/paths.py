@@ -302,14 +302,19 @@ class _Tracks:
         for i, kept in zip(sound, thinned([self.paths[i] for i in sound], detail), strict=True):
             self.paths[i] = self.paths[i][kept]
         for path, columns in zip(self.paths, self.handed, strict=True):
-            for column, values in zip(columns, path.T, strict=True):
-                column += [_rounded(value, detail) for value in values.tolist()]
+            whole = np.isfinite(path).all()
+            for column, values in zip(columns, np.round(path.T, _decimals(detail)).tolist(), strict=True):
+                column += values if whole else [value if math.isfinite(value) else None for value in values]
 
 
 def _rounded(value: float, detail: float) -> float | None:
-    """Round to as many decimals as `detail` needs (to the millimetre where it is 0); None for what is not finite."""
-    decimals = max(0, math.ceil(-math.log10(detail or 0.001)))
-    return round(float(value), decimals) if math.isfinite(value) else None
+    """Round to as many decimals as `detail` needs; None for what is not finite."""
+    return round(float(value), _decimals(detail)) if math.isfinite(value) else None
+
+
+def _decimals(detail: float) -> int:
+    """As many decimals as a length [m] needs; those of a millimetre where it is 0."""
+    return max(0, math.ceil(-math.log10(detail or 0.001)))
 
 
 def _end_error(window: Snapshot, points: Floats) -> float:

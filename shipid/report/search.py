@@ -81,14 +81,12 @@ def spoken(name: str) -> str:
 
 def importance(frame: pd.DataFrame, name: str) -> float:
     """Rank correlation of the error with a hyperparameter within cells, mean over cells; NaN where nothing varies."""
-    known = frame[frame.value.notna() & frame[name].notna()]
-    cells = known.groupby("cell")
-    ranks = pd.DataFrame({"x": cells[name].rank(), "y": cells["value"].rank()})
-    ranks -= ranks.groupby(known.cell).transform("mean")
-    products = pd.DataFrame({"xy": ranks.x * ranks.y, "xx": ranks.x**2, "yy": ranks.y**2})
-    sums = products.groupby(known.cell).sum()
-    sums = sums[(cells.size() > 2) & (sums.xx > 0) & (sums.yy > 0)]
-    return float((sums.xy / np.sqrt(sums.xx * sums.yy)).mean()) if len(sums) else math.nan
+    cells = frame[frame.value.notna() & frame[name].notna()].groupby("cell")
+    cell, counts = cells.ngroup().to_numpy(), cells.size().to_numpy()
+    x, y = cells[[name, "value"]].rank().to_numpy().T - (counts[cell] + 1) / 2
+    xy, xx, yy = (np.bincount(cell, product, len(counts)) for product in (x * y, x * x, y * y))
+    judged = (counts > 2) & (xx > 0) & (yy > 0)
+    return float((xy[judged] / np.sqrt(xx * yy)[judged]).mean()) if judged.any() else math.nan
 
 
 def _relative(trials: pd.DataFrame) -> pd.DataFrame:
@@ -131,7 +129,8 @@ def _panel(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> Plot:
 
 
 def _dots(mine: pd.DataFrame, name: str, what: str, keys: list[str], marker: dict[str, Any]) -> Trace:
-    y = mine.ratio.clip(upper=CEILING).fillna(FAILED).to_numpy(dtype=float)
+    ratio = mine.ratio.to_numpy(dtype=float)
+    y = np.where(np.isnan(ratio), FAILED, np.minimum(ratio, CEILING))
     trace = line(what, mine[name].to_numpy(dtype=float), np.round(y, 3), keys, mode="markers", marker=marker)
     known = "" if what == "diverged" else ", %{y:.2f} times the best of its cell"
     trace["hovertemplate"] = f"{label(what)}: {label(spoken(name))} %{{x:.3g}}{known}<extra></extra>"

@@ -5,15 +5,15 @@ from __future__ import annotations
 import html
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
 from shipid.report.content import Floats
+from shipid.report.figure import Plot
 from shipid.report.palette import GRID, INK
 from shipid.report.selection import thinned
 
@@ -21,7 +21,21 @@ UNITS = 1000  # side of the square in which marks and lines are drawn, stretched
 CHARACTER, TITLE = 7.0, 30  # width of a character at the axis, and of its title [px]
 ROOM = 0.055  # share of what is drawn that an axis leaves free beyond it
 STEPS = 6  # most steps of an axis without given ticks
+GROUPS = ("line", "marker", "font", "title", "error_x", "error_y")  # options that hold options
 DASHES = {"dash": "6 4", "dot": "2 3", "dashdot": "6 3 2 3"}
+
+
+class Options:
+    """Options of a trace or of the layout as attributes; None for one that is not given."""
+
+    def __init__(self, given: Mapping[str, Any]) -> None:
+        self._given = given
+
+    def __getattr__(self, name: str) -> Any:
+        value = self._given.get(name)
+        if name in GROUPS:
+            value = value or {}
+        return Options(value) if isinstance(value, Mapping) else value
 
 
 @dataclass(frozen=True)
@@ -50,35 +64,36 @@ class Axis:
         return [(place, name) for place, name in zip(places, self.names, strict=True) if -1e-9 <= place <= 1 + 1e-9]
 
 
-def sketch(figure: go.Figure, height: int) -> Markup:
-    """Draw bars, lines, points and texts of a figure with one pair of axes of numbers; of others nothing.
+def sketch(plot: Plot, height: int) -> Markup:
+    """Draw bars, lines, points and texts of a plot with one pair of axes of numbers; of others nothing.
 
     Parameters
     ----------
-    figure : with colours as CSS variables.
+    plot : with colours as CSS variables.
     height : of the whole, with margins [px]; it is as wide as its place on the page.
     """
-    traces = [trace for trace in figure.data if trace.type != "scatter" or (trace.x is not None and len(trace.x))]
+    layout, every = Options(plot.layout), map(Options, plot.traces)
+    traces = [trace for trace in every if trace.type != "scatter" or (trace.x is not None and len(trace.x))]
     if not traces or not all(map(_simple, traces)):
         return Markup("")
     spread = any(trace.type == "bar" or "markers" in trace.mode for trace in traces)
-    across = _axis(figure.layout.xaxis, [_ends(trace, "x") for trace in traces], ROOM if spread else 0.0)
-    up = _axis(figure.layout.yaxis, [_ends(trace, "y") for trace in traces], ROOM)
-    margin = figure.layout.margin
+    across = _axis(layout.xaxis, [_ends(trace, "x") for trace in traces], ROOM if spread else 0.0)
+    up = _axis(layout.yaxis, [_ends(trace, "y") for trace in traces], ROOM)
+    margin = layout.margin
     longest = max((len(_plain(name)) for _, name in up.ticks), default=0)
     left = max(margin.l, TITLE * bool(up.title) + CHARACTER * longest)
     tall = height - margin.t - margin.b
     wide, from_left = f"100% - {left + margin.r:g}px", f"{left:g}px"
     size = f"width: calc({wide}); height: {tall:g}px"
-    if figure.layout.xaxis.scaleanchor:
+    if layout.xaxis.scaleanchor:
         ratio = (across.high - across.low) / (up.high - up.low)
         fitted = f"min({wide}, {tall * ratio:g}px)"
         size = f"width: {fitted}; aspect-ratio: {ratio:g}"
         from_left = f"calc({left:g}px + ({wide} - {fitted}) / 2)"  # in the middle of its place
     place = f"display: block; position: relative; left: {from_left}; top: {margin.t:g}px; {size}; overflow: visible"
-    inside = [*_grid(across, up), *_rules(figure, across, up)]
+    inside = [*_grid(across, up), *_rules(layout, across, up)]
     inside += [mark for trace in traces for mark in _marks(trace, across, up)]
-    texts = [*_texts(figure, across, up), *_tick_names(across, up), *_titles(across, up, left)]
+    texts = [*_texts(layout, across, up), *_tick_names(across, up), *_titles(across, up, left)]
     stretched = f'viewBox="0 0 {UNITS} {UNITS}" width="100%" height="100%" preserveAspectRatio="none"'
     return Markup(
         f'<svg class="sketch" aria-hidden="true" style="{place}">'
@@ -86,16 +101,16 @@ def sketch(figure: go.Figure, height: int) -> Markup:
     )
 
 
-def _simple(trace: Any) -> bool:
+def _simple(trace: Options) -> bool:
     """Whether a trace has numbers on the first pair of axes."""
     if trace.type not in ("scatter", "bar") or {trace.xaxis or "x", trace.yaxis or "y"} != {"x", "y"}:
         return False
     return trace.orientation != "h" and all(np.asarray(column).dtype.kind in "fiu" for column in (trace.x, trace.y))
 
 
-def _ends(trace: Any, name: str) -> Floats:
+def _ends(trace: Options, name: str) -> Floats:
     """All values of a trace along an axis, with the reach of bars and intervals."""
-    values = np.asarray(trace[name], dtype=float)
+    values = np.asarray(getattr(trace, name), dtype=float)
     if trace.type == "bar" and name == "x":
         return np.concatenate([values - np.asarray(trace.width) / 2, values + np.asarray(trace.width) / 2])
     if trace.type == "bar":
@@ -103,9 +118,9 @@ def _ends(trace: Any, name: str) -> Floats:
     return np.concatenate([values, *_reach(trace, name)])
 
 
-def _reach(trace: Any, name: str) -> list[Floats]:
+def _reach(trace: Options, name: str) -> list[Floats]:
     """Lower and upper ends of the intervals of a trace along an axis; empty without."""
-    values, interval = np.asarray(trace[name], dtype=float), trace[f"error_{name}"]
+    values, interval = np.asarray(getattr(trace, name), dtype=float), getattr(trace, f"error_{name}")
     if interval.array is None:
         return []
     more = np.asarray(interval.array, dtype=float)
@@ -113,7 +128,7 @@ def _reach(trace: Any, name: str) -> list[Floats]:
     return [values - less, values + more]
 
 
-def _axis(axis: Any, drawn: Sequence[Floats], room: float) -> Axis:
+def _axis(axis: Options, drawn: Sequence[Floats], room: float) -> Axis:
     logarithmic = axis.type == "log"
     values = np.concatenate(drawn)
     if logarithmic:
@@ -166,10 +181,10 @@ def _grid(across: Axis, up: Axis) -> list[str]:
     return [_path("".join([*flat, *upright]), GRID, 1)] if flat or upright else []
 
 
-def _rules(figure: go.Figure, across: Axis, up: Axis) -> list[str]:
+def _rules(layout: Options, across: Axis, up: Axis) -> list[str]:
     """Lines across the whole plot, from side to side or from top to bottom."""
     rules = []
-    for rule in figure.layout.shapes:
+    for rule in map(Options, layout.shapes or ()):
         if rule.type == "line" and rule.xref == "paper":
             rules.append((f"M0 {UNITS * (1 - up.share(rule.y0)):.1f}H{UNITS}", rule.line))
         elif rule.type == "line" and rule.yref == "paper":
@@ -177,7 +192,7 @@ def _rules(figure: go.Figure, across: Axis, up: Axis) -> list[str]:
     return [_path(points, ink.color, ink.width, ink.dash) for points, ink in rules]
 
 
-def _marks(trace: Any, across: Axis, up: Axis) -> Iterable[str]:
+def _marks(trace: Options, across: Axis, up: Axis) -> Iterable[str]:
     if trace.type == "bar":
         yield from _bars(trace, across, up)
         return
@@ -188,7 +203,7 @@ def _marks(trace: Any, across: Axis, up: Axis) -> Iterable[str]:
             low, high = (UNITS * (side + (1 - 2 * side) * axis.share(end)) for end in ends)
             pairs = [points.copy(), points.copy(), np.full_like(points, np.nan)]
             pairs[0][:, side], pairs[1][:, side] = low, high
-            yield _path(_joined(np.stack(pairs, axis=1).reshape(-1, 2)), trace[f"error_{name}"].color, 1.5)
+            yield _path(_joined(np.stack(pairs, axis=1).reshape(-1, 2)), getattr(trace, f"error_{name}").color, 1.5)
     shade = {} if trace.opacity is None else {"opacity": trace.opacity}
     if "lines" in trace.mode:
         if trace.line.shape == "hv":
@@ -199,7 +214,7 @@ def _marks(trace: Any, across: Axis, up: Axis) -> Iterable[str]:
         yield from _points(trace, points[np.isfinite(points).all(axis=1)], shade)
 
 
-def _bars(trace: Any, across: Axis, up: Axis) -> Iterable[str]:
+def _bars(trace: Options, across: Axis, up: Axis) -> Iterable[str]:
     colours, edge = trace.marker.color, trace.marker.line
     for i, (x, y, base, width) in enumerate(zip(trace.x, trace.y, trace.base, trace.width, strict=True)):
         low, high = (UNITS * across.share(end) for end in (x - width / 2, x + width / 2))
@@ -210,7 +225,7 @@ def _bars(trace: Any, across: Axis, up: Axis) -> Iterable[str]:
         yield f'<rect {box} vector-effect="non-scaling-stroke" {ink}/>'
 
 
-def _points(trace: Any, points: Floats, shade: dict[str, float]) -> Iterable[str]:
+def _points(trace: Options, points: Floats, shade: dict[str, float]) -> Iterable[str]:
     """Points of a trace as round or square dots: lines without length, whose caps no stretching distorts."""
     marker = trace.marker
     size, symbol = marker.size or 6, str(marker.symbol or "circle")
@@ -251,10 +266,10 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2f}%"
 
 
-def _texts(figure: go.Figure, across: Axis, up: Axis) -> list[str]:
+def _texts(layout: Options, across: Axis, up: Axis) -> list[str]:
     """Notes in the plot, and those beside it."""
     shown = []
-    for note in figure.layout.annotations:
+    for note in map(Options, layout.annotations or ()):
         x = note.x if note.xref == "paper" else float(across.share(note.x))
         y = _percent(1 - float(up.share(note.y)))
         shift = f'dx="{note.xshift or 0}" dy="{4 - (note.yshift or 0):g}"'

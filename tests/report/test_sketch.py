@@ -6,12 +6,11 @@ import re
 from xml.etree import ElementTree as XML
 
 import numpy as np
-import plotly.graph_objects as go
 
 from shipid.report import ReportContent
 from shipid.report.error_map import error_map
 from shipid.report.errors_over import over_time
-from shipid.report.figure import axis, label, layout, line, logarithmic, plane
+from shipid.report.figure import Plot, axis, label, layout, line, logarithmic, plane
 from shipid.report.page import render
 from shipid.report.sketch import sketch
 
@@ -19,25 +18,26 @@ from shipid.report.sketch import sketch
 def test_the_map_has_a_box_for_every_cell_and_every_name(simulation: ReportContent) -> None:
     figure = error_map(simulation)
     assert figure is not None
-    plot = figure.views["0"][0].figure
+    plot = figure.views["0"][0].plot
     drawn = XML.fromstring(sketch(plot, figure.height))
     boxes = drawn.findall(".//rect")
-    assert len(boxes) == sum(len(trace.x) for trace in plot.data if trace.type == "bar")
+    assert len(boxes) == sum(len(trace["x"]) for trace in plot.traces if trace["type"] == "bar")
     assert all(
         float(box.attrib["x"]) >= 0 and float(box.attrib["x"]) + float(box.attrib["width"]) <= 1000 for box in boxes
     )
     assert all(float(box.attrib["height"]) > 0 for box in boxes)
     words = {text.text for text in drawn.findall(".//text")}
     assert {*simulation.models.model[simulation.models.A.notna()], "10", "30", "100"} <= words
-    points = [trace for trace in plot.data if trace.type == "scatter" and len(trace.x)]
-    marks = sum(("lines" in trace.mode) + ("markers" in trace.mode) for trace in points)
-    assert len(drawn.findall(".//path")) == 1 + len(plot.layout.shapes) + marks, "one path is the grid"
+    points = [trace for trace in plot.traces if trace["type"] == "scatter" and len(trace["x"])]
+    marks = sum(("lines" in trace["mode"]) + ("markers" in trace["mode"]) for trace in points)
+    assert len(drawn.findall(".//path")) == 1 + len(plot.layout["shapes"]) + marks, "one path is the grid"
 
 
 def test_points_lie_where_the_axes_say_and_gaps_stay() -> None:
     ticks = {"range": [0.0, 10.0], "tickvals": [0, 10]}
-    plot = go.Figure([line("a", [0, 5, 6, 10], [0, 5, float("nan"), 10], [], line={"color": "var(--ink)", "width": 1})])
-    plot.update_layout(layout(axis(label("t <s> [s]"), **ticks), axis("x [m]", **ticks)))
+    ink = {"color": "var(--ink)", "width": 1}
+    traces = [line("a", [0, 5, 6, 10], [0, 5, float("nan"), 10], [], line=ink)]
+    plot = Plot(traces, layout(axis(label("t <s> [s]"), **ticks), axis("x [m]", **ticks)))
     drawn = XML.fromstring(sketch(plot, 300))
     assert drawn.findall(".//path")[-1].attrib["d"] == "M0.0 1000.0L500.0 500.0M1000.0 0.0"
     assert "t <s> [s]" in {text.text for text in drawn.findall(".//text")}
@@ -47,7 +47,7 @@ def test_an_axis_without_range_holds_all_and_has_few_round_ticks() -> None:
     rng = np.random.default_rng(0)
     for _ in range(50):
         values = rng.normal(rng.normal(scale=100), 10 ** rng.uniform(-3, 4), (2, 7))
-        plot = go.Figure([line("a", *values, [], mode="markers")], layout(axis("a [m]"), axis("b [m]")))
+        plot = Plot([line("a", *values, [], mode="markers")], layout(axis("a [m]"), axis("b [m]")))
         drawn = XML.fromstring(sketch(plot, 300))
         dots = re.findall(r"M(\S+) (\S+)h0", drawn.findall(".//path")[-1].attrib["d"])
         assert len(dots) == 7
@@ -60,22 +60,22 @@ def test_an_axis_without_range_holds_all_and_has_few_round_ticks() -> None:
 def test_logarithmic_axes_equal_axes_and_intervals() -> None:
     ends = {"range": [0.0, 2.0]}
     dots = line("a", [1.0, 10.0, 100.0], [1.0, 2.0, 3.0], [], mode="markers", error_y={"array": [1.0, 1.0, 0.5]})
-    plot = go.Figure([dots], layout(logarithmic("a [m]", **ends), axis("b [m]", range=[0.0, 4.0], tickvals=[0, 2])))
+    plot = Plot([dots], layout(logarithmic("a [m]", **ends), axis("b [m]", range=[0.0, 4.0], tickvals=[0, 2])))
     bars, points = XML.fromstring(sketch(plot, 300)).findall(".//path")[-2:]
     assert points.attrib["d"] == "M0.0 750.0h0M500.0 500.0h0M1000.0 250.0h0"
     assert bars.attrib["d"] == "M0.0 1000.0L0.0 500.0M500.0 750.0L500.0 250.0M1000.0 375.0L1000.0 125.0"
-    plot = go.Figure([line("a", [0.0, 4.0], [0.0, 2.0], [])], plane("a [m]", "b [m]", [(0.0, 4.0), (0.0, 2.0)]))
+    plot = Plot([line("a", [0.0, 4.0], [0.0, 2.0], [])], plane("a [m]", "b [m]", [(0.0, 4.0), (0.0, 2.0)]))
     assert "aspect-ratio: 1.86207" in sketch(plot, 300), "4.32 over 2.32: as wide as it is in metres"
 
 
 def test_of_what_has_no_numbers_or_two_axes_nothing_is_drawn(simulation: ReportContent) -> None:
     axes = layout(axis("a [m]"), axis("b [m]"))
-    assert sketch(go.Figure([], axes), 300) == ""
-    assert sketch(go.Figure([{"type": "heatmap", "z": [[1.0]]}], axes), 300) == ""
-    assert sketch(go.Figure([{"type": "scatter", "x": ["one", "two"], "y": [1, 2], "mode": "lines"}], axes), 300) == ""
+    assert sketch(Plot([], axes), 300) == ""
+    assert sketch(Plot([{"type": "heatmap", "z": [[1.0]]}], axes), 300) == ""
+    assert sketch(Plot([{"type": "scatter", "x": ["one", "two"], "y": [1, 2], "mode": "lines"}], axes), 300) == ""
     figure = over_time(simulation)
     assert figure is not None
-    assert sketch(figure.views["0-0"][0].figure, 300) == "", "commands lie on axes of their own"
+    assert sketch(figure.views["0-0"][0].plot, 300) == "", "commands lie on axes of their own"
 
 
 def test_the_first_figure_of_every_kind_of_page_is_sketched(
