@@ -237,6 +237,8 @@ def replace(document: Any, changes: Mapping[str, Any]) -> Any:
 
 def plain(value: Any) -> Any:
     """A value as a TOML document holds it: NumPy numbers and arrays become numbers and lists, in tables too."""
+    if type(value) is float:  # most are
+        return value
     if isinstance(value, Mapping):
         return {key: plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -47,12 +47,15 @@ class Vessel:
 
     document : plain nested data, after any patch.
     file : where it was read from.
-    digest : of the document, so that a patch knows its base.
     """
 
     document: Document
     file: str
-    digest: str = field(default="")
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the document, so that a patch knows its base."""
+        return documents.digest(self.document)
 
     @property
     def name(self) -> str:
@@ -68,6 +71,11 @@ class Vessel:
     def axes(self) -> tuple[int, ...]:
         """Rows of the six degrees of freedom that this vessel moves in."""
         return DOFS[self.document["dof"]]
+
+    @cached_property
+    def schema(self) -> type[BaseModel]:
+        """Pydantic model of documents with the terms of this one."""
+        return model_for(self.document)
 
     @cached_property
     def bound(self) -> dict[str, Binding]:
@@ -104,13 +112,13 @@ class Vessel:
         """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document."""
         values = {path: documents.plain(value) for path, value in values.items()}
         document = documents.replace(self.document, values)
-        if values.keys() <= self.units.keys():  # numbers alone: names and units are as they were
+        if values.keys() <= self.units.keys():  # numbers alone: terms, names and units are as they were
             try:
-                documents.parse(model_for(document), document, self.file)
+                documents.parse(self.schema, document, self.file)
             except DocumentError:
                 return check_vessel(document, self.file)
-            vessel = Vessel(document, self.file, documents.digest(document))
-            vessel.__dict__.update(bound=self.bound, units=self.units, structure=self.structure)
+            vessel = Vessel(document, self.file)
+            vessel.__dict__.update(schema=self.schema, bound=self.bound, units=self.units, structure=self.structure)
             vessel.__dict__["parameters"] = self.parameters | {path: float(value) for path, value in values.items()}
             _check_numbers(vessel)
             return vessel
@@ -254,8 +262,8 @@ def check_vessel(document: Document, file: str) -> Vessel:
     """Check a complete document; DocumentError with file, dotted path and remedy for the first problem."""
     for path, group, block in components(document):
         _check_component(path, group, block, file)
-    documents.parse(model_for(document), document, file)
-    vessel = Vessel(document, file, documents.digest(document))
+    vessel = Vessel(document, file)
+    documents.parse(vessel.schema, document, file)
     paths: dict[str, str] = {}
     for path, key, block in term_blocks(document):
         name = path.rsplit(".", 1)[-1]

@@ -79,11 +79,14 @@ def out_of_range(
     """
     meant = document.get(UNUSUAL, [])
     size = _size(document, values)
+    ends: dict[int, tuple[float, float]] = {}  # of the ranges so far: many numbers share one
     for path, value in values.items():
         limits = _range(path, units[path])
         if limits is None:
             continue
-        least, most = limits.least(size), limits.most(size)
+        if id(limits) not in ends:
+            ends[id(limits)] = limits.least(size), limits.most(size)
+        least, most = ends[id(limits)]
         if not least <= abs(value) <= most and not _is_meant(path, meant):
             return path, f"{value:g}: expected {limits.words} ({least:.3g} to {most:.3g}); {_remedy(path)}"
     tables: dict[str, list[float]] = {}

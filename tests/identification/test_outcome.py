@@ -112,7 +112,7 @@ def test_measures_before_and_after_are_those_of_the_vessels(
 
 @pytest.mark.usefixtures("one_manoeuvre")
 def test_a_manoeuvre_that_cannot_be_is_a_note() -> None:
-    without = Vessel({key: value for key, value in SHIP.document.items() if key != "particulars"}, SHIP.file, "x")
+    without = Vessel({key: value for key, value in SHIP.document.items() if key != "particulars"}, SHIP.file)
     table = outcome._manoeuvres({BEFORE: without, AFTER: SHIP})
     assert table["before"].isna().all()
     assert np.isfinite(table["after"]).all()
