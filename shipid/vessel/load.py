@@ -73,11 +73,6 @@ class Vessel:
         return DOFS[self.document["dof"]]
 
     @cached_property
-    def schema(self) -> type[BaseModel]:
-        """Pydantic model of documents with the terms of this one."""
-        return model_for(self.document)
-
-    @cached_property
     def bound(self) -> dict[str, Binding]:
         """Dotted path of every block that the equations use -> what binds its numbers to a physics function."""
         return bindings(self.document)
@@ -114,11 +109,11 @@ class Vessel:
         document = documents.replace(self.document, values)
         if values.keys() <= self.units.keys():  # numbers alone: terms, names and units are as they were
             try:
-                documents.parse(self.schema, document, self.file)
+                documents.parse(model_for(document), document, self.file)
             except DocumentError:
                 return check_vessel(document, self.file)
             vessel = Vessel(document, self.file)
-            vessel.__dict__.update(schema=self.schema, bound=self.bound, units=self.units, structure=self.structure)
+            vessel.__dict__.update(bound=self.bound, units=self.units, structure=self.structure)
             vessel.__dict__["parameters"] = self.parameters | {path: float(value) for path, value in values.items()}
             _check_numbers(vessel)
             return vessel
@@ -262,8 +257,8 @@ def check_vessel(document: Document, file: str) -> Vessel:
     """Check a complete document; DocumentError with file, dotted path and remedy for the first problem."""
     for path, group, block in components(document):
         _check_component(path, group, block, file)
+    documents.parse(model_for(document), document, file)
     vessel = Vessel(document, file)
-    documents.parse(vessel.schema, document, file)
     paths: dict[str, str] = {}
     for path, key, block in term_blocks(document):
         name = path.rsplit(".", 1)[-1]
