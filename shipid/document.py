@@ -237,7 +237,7 @@ def replace(document: Any, changes: Mapping[str, Any]) -> Any:
 
 def plain(value: Any) -> Any:
     """A value as a TOML document holds it: NumPy numbers and arrays become numbers and lists, in tables too."""
-    if type(value) is float:  # most are
+    if type(value) is float:  # the usual case, first for speed
         return value
     if isinstance(value, Mapping):
         return {key: plain(inner) for key, inner in value.items()}

@@ -28,7 +28,12 @@ class Summary(TypedDict):
 
 
 def lengths(vectors: Array) -> Array:
-    """Return the length (...) of vectors (..., 2): `numpy.hypot` but for the last digit, in a tenth of its time."""
+    """Return the length (...) of vectors (..., 2), as `numpy.hypot` to 4 units in the last place, ten times as fast.
+
+    Raises ValueError for another shape.
+    """
+    if vectors.shape[-1:] != (2,):
+        raise ValueError(f"vectors must be (..., 2), got {vectors.shape}")
     pairs = np.ascontiguousarray(vectors, dtype=float)
     return np.abs(pairs.view(np.complex128)[..., 0])
 

@@ -46,6 +46,11 @@ class _Runs:
         """Number of windows of each run, (G,)."""
         return np.bincount(self.place, minlength=self.count)
 
+    @cached_property
+    def order(self) -> NDArray[np.int64]:
+        """Windows sorted by their run, (S,)."""
+        return np.argsort(self.place, kind="stable")
+
     def by_run(self, order: NDArray[np.int64]) -> NDArray[np.int64]:
         """Sort windows in some order by their run, and within a run in that order."""
         few = self.place.astype(np.uint16 if self.count < 2**16 else np.int64)  # short numbers are sorted by radix
@@ -53,8 +58,7 @@ class _Runs:
 
     def means(self, values: Array) -> Array:
         """Means (G, ...) over the windows of each run, of values (S, ...)."""
-        order = np.argsort(self.place, kind="stable")
-        sums: Array = np.add.reduceat(values[order], np.cumsum(self.sizes) - self.sizes, axis=0)
+        sums: Array = np.add.reduceat(values[self.order], np.cumsum(self.sizes) - self.sizes, axis=0)
         return sums / self.sizes.reshape(-1, *[1] * (values.ndim - 1))
 
 

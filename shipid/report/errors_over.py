@@ -80,7 +80,7 @@ def over_time(content: ReportContent) -> Figure | None:
     if content.over_time.empty:
         return None
     frame = _settled(content.over_time, content)
-    runs = spread(sorted(frame.run.unique()), FEW_RUNS)
+    runs = spread(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS)
     means = over_seeds(frame[frame.run.isin(runs)], [*BY, "run", "t"], ["error"])
     counts = sizes(means.N_D)
     # Controls show run first: it is what a reader looks for.

@@ -302,8 +302,10 @@ class _Tracks:
         for i, kept in zip(sound, thinned([self.paths[i] for i in sound], detail), strict=True):
             self.paths[i] = self.paths[i][kept]
         for path, columns in zip(self.paths, self.handed, strict=True):
-            whole = np.isfinite(path).all()
-            for column, values in zip(columns, np.round(path.T, _decimals(detail)).tolist(), strict=True):
+            with np.errstate(over="ignore"):  # a path that diverged: its points are left out
+                rounded = np.round(path.T, _decimals(detail))
+            whole = np.isfinite(rounded).all()
+            for column, values in zip(columns, rounded.tolist(), strict=True):
                 column += values if whole else [value if math.isfinite(value) else None for value in values]
 
 
@@ -313,7 +315,7 @@ def _rounded(value: float, detail: float) -> float | None:
 
 
 def _decimals(detail: float) -> int:
-    """As many decimals as a length [m] needs; those of a millimetre where it is 0."""
+    """Number of decimals that show a difference of `detail` [m]; 3 where it is 0."""
     return max(0, math.ceil(-math.log10(detail or 0.001)))
 
 

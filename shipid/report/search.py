@@ -81,9 +81,9 @@ def spoken(name: str) -> str:
 
 def importance(frame: pd.DataFrame, name: str) -> float:
     """Rank correlation of the error with a hyperparameter within cells, mean over cells; NaN where nothing varies."""
-    cells = frame[frame.value.notna() & frame[name].notna()].groupby("cell")
+    cells = frame[frame.value.notna() & frame[name].notna() & frame.cell.notna()].groupby("cell")
     cell, counts = cells.ngroup().to_numpy(), cells.size().to_numpy()
-    x, y = cells[[name, "value"]].rank().to_numpy().T - (counts[cell] + 1) / 2
+    x, y = cells[[name, "value"]].rank().to_numpy(dtype=float).T - (counts[cell] + 1) / 2
     xy, xx, yy = (np.bincount(cell, product, len(counts)) for product in (x * y, x * x, y * y))
     judged = (counts > 2) & (xx > 0) & (yy > 0)
     return float((xy[judged] / np.sqrt(xx * yy)[judged]).mean()) if judged.any() else math.nan

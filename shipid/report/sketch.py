@@ -21,17 +21,22 @@ UNITS = 1000  # side of the square in which marks and lines are drawn, stretched
 CHARACTER, TITLE = 7.0, 30  # width of a character at the axis, and of its title [px]
 ROOM = 0.055  # share of what is drawn that an axis leaves free beyond it
 STEPS = 6  # most steps of an axis without given ticks
-GROUPS = ("line", "marker", "font", "title", "error_x", "error_y")  # options that hold options
+GROUPS = ("line", "marker", "font", "title", "error_x", "error_y")  # that hold options and may be left out
 DASHES = {"dash": "6 4", "dot": "2 3", "dashdot": "6 3 2 3"}
 
 
 class Options:
-    """Options of a trace or of the layout as attributes; None for one that is not given."""
+    """Options of a trace or of the layout as attributes.
+
+    An option that is not given is None; one of `GROUPS` is empty `Options`, so that its options are None.
+    """
 
     def __init__(self, given: Mapping[str, Any]) -> None:
         self._given = given
 
     def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
         value = self._given.get(name)
         if name in GROUPS:
             value = value or {}

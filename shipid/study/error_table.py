@@ -141,5 +141,6 @@ def intervals_frame(results: Results) -> pd.DataFrame:
 def _by_run(path: Array, true: Array, place: NDArray[np.int64], metric: Metric = "H") -> Array:
     """(R,) mean error, or 90th percentile, [m] of a path in each test manoeuvre; place : (S,) that of each window."""
     error = position_error(path, true)
-    parts = [error[:, place == k] for k in range(place.max() + 1)]
-    return np.array([part.mean() if metric == "H" else np.quantile(part, 0.9) for part in parts])
+    if metric == "H":
+        return np.bincount(place, error.mean(axis=0)) / np.bincount(place)
+    return np.array([np.quantile(error[:, place == k], 0.9) for k in range(place.max() + 1)])

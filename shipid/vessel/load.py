@@ -45,7 +45,7 @@ LEAST_BLOCK, MOST_BLOCK = 0.05, 2.0  # m / (rho L_pp B T): far beyond any ship a
 class Vessel:
     """A checked vessel document.
 
-    document : plain nested data, after any patch.
+    document : plain nested data, after any patch; not to be changed.
     file : where it was read from.
     """
 

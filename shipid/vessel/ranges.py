@@ -79,7 +79,7 @@ def out_of_range(
     """
     meant = document.get(UNUSUAL, [])
     size = _size(document, values)
-    ends: dict[int, tuple[float, float]] = {}  # of the ranges so far: many numbers share one
+    ends: dict[int, tuple[float, float]] = {}  # least and most of each range, by its id: many numbers share one
     for path, value in values.items():
         limits = _range(path, units[path])
         if limits is None:

@@ -270,7 +270,7 @@ def test_views_exist_for_every_choice(sections):
 
 
 def test_every_plot_is_one_that_plotly_takes(sections):
-    """Plots are plain data; Plotly's classes refuse an option that there is not."""
+    """Of every view of a study; the first views of all other pages in these tests are checked by conftest.py."""
     for section in sections:
         for item in section.items:
             for panels in item.views.values() if isinstance(item, Figure) else ():

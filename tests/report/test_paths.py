@@ -33,6 +33,15 @@ def test_windows_hold_truth_and_paths_closer_than_a_pixel(full_scale, away):
             assert end == pytest.approx(np.hypot(*(source.paths[key] - source.truth)[-1]), abs=0.0051)
 
 
+def test_points_that_are_no_numbers_are_gaps():
+    tracks = paths._Tracks()
+    sound = tracks.columns(np.array([[0.0, 0.0], [1.2345, -2.0]]))
+    wild = tracks.columns(np.array([[0.0, np.nan], [1e306, 2.0], [np.inf, 3.0004]]))
+    tracks.fill(0.001)
+    assert sound == ([0.0, 1.234], [0.0, -2.0])
+    assert wild == ([0.0, None, None], [None, 2.0, 3.0])
+
+
 def test_axes_are_equal_and_in_metres(content):
     layout = window_data(content)["layout"]
     assert layout["xaxis"]["scaleanchor"] == "y"

@@ -4,6 +4,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import spearmanr
 
 from shipid.report.search import CEILING, FAILED, importance, searched, table
 from shipid.report.search import search as drawn_anew
@@ -66,6 +67,20 @@ def test_the_rank_correlation_is_within_cells():
     assert importance(trials, "rate") == pytest.approx(-1)
     assert importance(trials.assign(value=[5, 1, 4, 2, 3] * 2), "rate") == pytest.approx(-0.3)
     assert np.isnan(importance(trials.assign(value=np.nan), "rate"))
+
+
+def test_the_rank_correlation_is_scipys_mean_over_cells():
+    rng = np.random.default_rng(5)
+    for _ in range(30):
+        cell = rng.choice(["a", "b", "c", None], 40)
+        rate = np.where(rng.random(40) < 0.1, np.nan, rng.integers(0, 4, 40))
+        value = np.where(rng.random(40) < 0.1, np.nan, rng.normal(size=40).round(1))
+        trials = pd.DataFrame({"cell": cell, "rate": rate, "value": value})
+        parts = [part for _, part in trials.dropna().groupby("cell")]
+        parts = [part for part in parts if len(part) > 2 and part.rate.nunique() > 1 and part.value.nunique() > 1]
+        expected = np.mean([spearmanr(part.rate, part.value).statistic for part in parts])
+        assert importance(trials, "rate") == pytest.approx(expected)
+        assert importance(trials.astype({"rate": "Int64"}), "rate") == pytest.approx(expected)
 
 
 def test_takeaway_names_what_goes_with_the_error(simulation):
