@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
-from shipid.metrics import lengths
 from shipid.report.content import DATA_DRIVEN, Floats, Indices, ReportContent
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
@@ -121,7 +120,8 @@ def thinned(lines: Sequence[Floats], tolerance: float) -> list[Indices]:
         from_start, mine = points - points[kept[piece]], along[piece]
         # Distance from the segment, not from its line: a track may come back to where it began.
         share = (from_start * mine).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)[piece]
-        away = lengths(from_start - np.clip(share, 0.0, 1.0)[:, None] * mine)
+        apart = from_start - np.clip(share, 0.0, 1.0)[:, None] * mine
+        away = np.sqrt(np.square(apart).sum(axis=1))
         worst = np.maximum.reduceat(away, kept)[piece]
         far = np.flatnonzero((away == worst) & (worst > tolerance))
         if not len(far):
