@@ -29,7 +29,7 @@ from shipid.files import whole
 from shipid.hybrid.method import Row, Space
 
 COUNT = "trials"  # attribute of a study: how many it will have
-FIXED, NUMBER = "fixed", "number"  # attributes of a trial: settings that are not searched, its place in the search
+FIXED, NUMBER = "fixed", "number"  # attributes of a trial: all settings in order, null if searched; its place
 
 
 class Journal:
@@ -100,10 +100,10 @@ def distributions(space: Space) -> dict[str, BaseDistribution]:
 
 
 def frozen(row: Row, where: Mapping[str, BaseDistribution]) -> FrozenTrial:
-    """A trial that ended, as Optuna keeps it; what is not searched is an attribute."""
+    """A trial that ended, as Optuna keeps it; an attribute holds what is not searched, and the order of all."""
     searched = {name: value for name, value in row["params"].items() if name in where}
     complete = row["state"] == "complete"
-    fixed = {name: value for name, value in row["params"].items() if name not in where}
+    fixed = {name: None if name in where else value for name, value in row["params"].items()}
     return create_trial(
         state=TrialState.COMPLETE if complete else TrialState.FAIL,
         value=row["value"] if complete else None,

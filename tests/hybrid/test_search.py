@@ -76,13 +76,13 @@ class Stopping(Journal):
 
 
 def digits(fits: Any, here: World, kind: str) -> dict[str, Any]:
-    """What a fit gave, without what a clock measured."""
+    """What a fit gave, without what a clock measured; rows as text, for files keep the order of settings too."""
     instants = here.test.instants(known=True)
     digits_of = {}
     for name, physics in cases_of(here, kind).items():
         fitted = fits[name]
         rows = [{key: value for key, value in row.items() if key != "seconds"} for row in fitted.trials]
-        digits_of[name] = rows, fitted.corrector.predict(physics, instants, physics.paths(instants)).tobytes()
+        digits_of[name] = repr(rows), fitted.corrector.predict(physics, instants, physics.paths(instants)).tobytes()
     return digits_of
 
 
