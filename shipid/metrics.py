@@ -5,7 +5,7 @@ Errors have the shape (T, S): horizon step first, window last. A divergence is r
 
 from __future__ import annotations
 
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,14 +78,27 @@ def tally(error: Array) -> NDArray[np.uint32]:
 
 def tally_quantile(counts: NDArray[np.uint32], share: float) -> Array:
     """Return the quantile [m] for a share (0 to 1) from counts (..., BINS) of `tally`; accurate to a bin, 0.2 %."""
-    running = np.cumsum(counts, axis=-1, dtype=float)
-    place = share * (running[..., -1:] - 1)
-    bin_index = (running <= place).sum(axis=-1, keepdims=True)
-    here = np.take_along_axis(counts, bin_index, axis=-1)
-    inside = (place - np.take_along_axis(running, bin_index, axis=-1) + here + 0.5) / here
-    octave, step = np.divmod(bin_index + np.clip(inside, 0, 1), BINS_AN_OCTAVE)
+    octaves = counts.reshape(*counts.shape[:-1], -1, BINS_AN_OCTAVE)
+    place = share * (counts.sum(axis=-1, keepdims=True, dtype=float) - 1)
+    octave, running, here = _passing(octaves.sum(axis=-1), place)
+    within = np.take_along_axis(octaves, octave[..., None], axis=-2)[..., 0, :]
+    step, running, here = _passing(within, place, running - here)
+    inside = (place - running + here + 0.5) / here
+    octave, step = np.divmod(octave * BINS_AN_OCTAVE + step + np.clip(inside, 0, 1), BINS_AN_OCTAVE)
     quantile: Array = (2.0 ** (octave + OCTAVES[0]) * (1 + step / BINS_AN_OCTAVE))[..., 0]
     return quantile
+
+
+def _passing(
+    counts: NDArray[Any], place: Array, before: Array | float = 0.0
+) -> tuple[NDArray[np.intp], Array, NDArray[Any]]:
+    """First entry with which a running sum of counts (..., K), begun at `before`, passes a place (..., 1).
+
+    Its index (..., 1), the sum with it, and its count.
+    """
+    running = before + np.cumsum(counts, axis=-1, dtype=float)
+    index = (running <= place).sum(axis=-1, keepdims=True)
+    return index, np.take_along_axis(running, index, axis=-1), np.take_along_axis(counts, index, axis=-1)
 
 
 def over_horizon(error: Array) -> dict[str, Array]:

@@ -442,7 +442,8 @@ def measure_native(
     tally = np.zeros((num_variants, num_parts(batch, precision), BINS), dtype=np.uint32)
     there = _packed(goal, target(precision).lanes, precision)
     _run(model, batch, job, precision, worst=worst, goal=there, sums=sums, tally=tally)
-    return sums[:, :num_samples].astype(float), tally.sum(axis=1, dtype=np.uint32), worst[:, :num_samples]
+    whole = tally[:, 0] if tally.shape[1] == 1 else tally.sum(axis=1, dtype=np.uint32)
+    return sums[:, :num_samples].astype(float), whole, worst[:, :num_samples]
 
 
 def run_single(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 
 import casadi as ca
 from casadi import SX
@@ -89,12 +89,18 @@ class Grammar:
 
     def check(self, names: Iterable[str]) -> None:
         """Raise ValueError for the first invalid name, or for a second name of one monomial."""
-        seen: dict[object, str] = {}
-        for name in names:
-            formula = self.check_name(name).canonical
-            if formula in seen:
-                raise ValueError(f"{name!r} and {seen[formula]!r} name the same monomial: keep one")
-            seen[formula] = name
+        _check_names(self, tuple(names))
+
+
+@lru_cache(maxsize=256)
+def _check_names(grammar: Grammar, names: tuple[str, ...]) -> None:
+    """See `Grammar.check`: once for all members of a family, whose names are equal."""
+    seen: dict[object, str] = {}
+    for name in names:
+        formula = grammar.check_name(name).canonical
+        if formula in seen:
+            raise ValueError(f"{name!r} and {seen[formula]!r} name the same monomial: keep one")
+        seen[formula] = name
 
 
 def derivative(name: str) -> Monomial:

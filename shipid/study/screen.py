@@ -7,6 +7,7 @@ on the way.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import reduce
 
 import numpy as np
 import pandas as pd
@@ -23,7 +24,7 @@ from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, Variant, members
 
 Array = np.ndarray
-MEMBERS = 64  # of a block
+MEMBERS = 256  # of a block
 NUMBERS = 4_000_000  # that a block keeps, a sum per window and a tally per member: fewer members where windows are many
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
 FIXED = ("family", "member", "A", "A_90", "diverged")
@@ -88,28 +89,30 @@ def _rows(
 ) -> pd.DataFrame:
     """A row per member of a block."""
     values = np.array([variant.parameters for variant in variants])
-    total, failed = np.zeros(len(variants)), np.zeros(len(variants))
-    counts = np.zeros((len(variants), BINS), dtype=np.uint32)
+    mean, p90, diverged = (np.empty(len(variants)) for _ in range(3))
+    num_windows = sum(map(len, parts))
     for same in _equal_lags(base, values):
         vessel = base.with_values(dict(zip(base.parameters, values[same[0]].tolist(), strict=True)))
-        for windows in parts:
-            distances = physics_of(plan, vessel).distances(
+        measured = [
+            physics_of(plan, vessel).distances(
                 instants_of(plan, vessel, dataset, windows),
                 windows.future,
                 values[same],
                 engine=engine,
                 device=device,
             )
-            total[same] += distances.total.sum(axis=1)
-            counts[same] += distances.tally
-            failed[same] += distances.diverged.sum(axis=1)
-    whole, num_windows = failed == 0, sum(map(len, parts))
+            for windows in parts
+        ]
+        mean[same] = sum(one.total.sum(axis=1) for one in measured) / (num_windows * parts[0].horizon)
+        p90[same] = tally_quantile(reduce(np.add, (one.tally for one in measured)), 0.9)
+        diverged[same] = sum(one.diverged.sum(axis=1) for one in measured) / num_windows
+    whole = diverged == 0
     rows = {
         "family": [variant.family for variant in variants],
         "member": [variant.name for variant in variants],
-        "A": np.where(whole, total / (num_windows * parts[0].horizon), np.nan),
-        "A_90": np.where(whole, tally_quantile(counts, 0.9), np.nan),
-        "diverged": failed / num_windows,
+        "A": np.where(whole, mean, np.nan),
+        "A_90": np.where(whole, p90, np.nan),
+        "diverged": diverged,
     }
     return pd.concat([pd.DataFrame(rows), pd.DataFrame([dict(variant.factors) for variant in variants])], axis=1)
 

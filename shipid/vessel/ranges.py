@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from shipid import document as documents
@@ -79,25 +80,42 @@ def out_of_range(
     """
     meant = document.get(UNUSUAL, [])
     size = _size(document, values)
-    ends: dict[int, tuple[float, float]] = {}  # least and most of each range, by its id: many numbers share one
-    for path, value in values.items():
-        limits = _range(path, units[path])
-        if limits is None:
-            continue
-        if id(limits) not in ends:
-            ends[id(limits)] = limits.least(size), limits.most(size)
-        least, most = ends[id(limits)]
+    ranges, limited, tables = _judged(tuple(units.items()))
+    ends = [(limits.least(size), limits.most(size)) for limits in ranges]
+    for path, number in limited:
+        least, most = ends[number]
+        value = values[path]
         if not least <= abs(value) <= most and not _is_meant(path, meant):
-            return path, f"{value:g}: expected {limits.words} ({least:.3g} to {most:.3g}); {_remedy(path)}"
-    tables: dict[str, list[float]] = {}
-    for name in (name for name, unit in units.items() if unit == "deg"):
-        path, _, place = name.rpartition(".")
-        if place.isdecimal():
-            tables.setdefault(path, []).append(abs(values[name]))
-    for path, angles in tables.items():
-        if len(angles) > 1 and max(angles) <= TURN and not _is_meant(path, meant):
-            return path, f"angles up to {max(angles):.3g}: expected degrees, are these radians? {_remedy(path)}"
+            words = f"{value:g}: expected {ranges[number].words} ({least:.3g} to {most:.3g})"
+            return path, f"{words}; {_remedy(path)}"
+    for path, names in tables:
+        widest = max(abs(values[name]) for name in names)
+        if widest <= TURN and not _is_meant(path, meant):
+            return path, f"angles up to {widest:.3g}: expected degrees, are these radians? {_remedy(path)}"
     return None
+
+
+@lru_cache(maxsize=64)
+def _judged(
+    units: tuple[tuple[str, str], ...],
+) -> tuple[list[Range], list[tuple[str, int]], list[tuple[str, list[str]]]]:
+    """What is judged of the numbers of these paths and units: once for all members of a family.
+
+    Ranges; paths, each with the place of its range among them; tables of angles, each with its paths.
+    """
+    ranges: list[Range] = []
+    limited: list[tuple[str, int]] = []
+    tables: dict[str, list[str]] = {}
+    for path, unit in units:
+        limits = _range(path, unit)
+        if limits is not None:
+            if limits not in ranges:
+                ranges.append(limits)
+            limited.append((path, ranges.index(limits)))
+        table, _, place = path.rpartition(".")
+        if unit == "deg" and place.isdecimal():
+            tables.setdefault(table, []).append(path)
+    return ranges, limited, [(table, paths) for table, paths in tables.items() if len(paths) > 1]
 
 
 def _range(path: str, unit: str) -> Range | None:

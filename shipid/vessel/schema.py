@@ -300,10 +300,15 @@ def components(document: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
         yield f"thruster.{name}", "thruster", entry
 
 
+@cache
+def _groups(terms: tuple[str, ...]) -> tuple[str, ...]:
+    """Blocks of a document in which these terms lie."""
+    return tuple(dict.fromkeys(key.split(".")[0] for key in terms))
+
+
 def term_blocks(document: Mapping[str, Any], off: bool = False) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
     """Dotted path, TERMS key and block of every term of a vessel document that acts, or of those that are off."""
-    groups = dict.fromkeys(key.split(".")[0] for key in TERMS)
-    for group in groups:
+    for group in _groups(tuple(TERMS)):
         block = document.get(group)
         if not isinstance(block, Mapping):
             continue
