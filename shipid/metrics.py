@@ -78,7 +78,7 @@ def tally(error: Array) -> NDArray[np.uint32]:
 
 def tally_quantile(counts: NDArray[np.uint32], share: float) -> Array:
     """Return the quantile [m] for a share (0 to 1) from counts (..., BINS) of `tally`; accurate to a bin, 0.2 %."""
-    octaves = counts.reshape(*counts.shape[:-1], -1, BINS_AN_OCTAVE)
+    octaves = counts.reshape(*counts.shape[:-1], BINS // BINS_AN_OCTAVE, BINS_AN_OCTAVE)
     place = share * (counts.sum(axis=-1, keepdims=True, dtype=float) - 1)
     octave, running, here = _passing(octaves.sum(axis=-1), place)
     within = np.take_along_axis(octaves, octave[..., None], axis=-2)[..., 0, :]

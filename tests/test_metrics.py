@@ -125,6 +125,10 @@ def test_a_tally_has_every_error_in_its_bin() -> None:
     assert (ends[0], ends[-1], ends.sum()) == (3, 2, 5)
 
 
+def test_tallies_of_no_member_have_no_quantile() -> None:
+    assert tally_quantile(np.zeros((0, BINS), dtype=np.uint32), 0.9).shape == (0,)
+
+
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
 @pytest.mark.parametrize("count", [1, 2, 10, 5000])
 def test_quantiles_of_a_tally(share: float, count: int) -> None:

@@ -76,11 +76,13 @@ def horizon(content: ReportContent) -> Figure | None:
 
 
 def over_time(content: ReportContent) -> Figure | None:
-    """Error per instant of prediction of a test run, the commands below on the same axis; None without rows."""
+    """Error per instant of prediction of a test run, the commands below on the same axis; None without times."""
     if content.over_time.empty:
         return None
     frame = _settled(content.over_time, content)
     runs = spread(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS)
+    if not runs:
+        return None
     means = over_seeds(frame[frame.run.isin(runs)], [*BY, "run", "t"], ["error"])
     counts = sizes(means.N_D)
     # Controls show run first: it is what a reader looks for.

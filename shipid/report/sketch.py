@@ -177,7 +177,7 @@ def _path(points: str, colour: str, width: float | None, dash: str | None = None
     ink = {"fill": "none", "stroke": colour, "stroke-width": 2 if width is None else width}
     if dash in DASHES:
         ink["stroke-dasharray"] = DASHES[dash]
-    return f'<path d="{points}" vector-effect="non-scaling-stroke" {_style(**ink, **more)}/>'
+    return f'<path d="{points}" vector-effect="non-scaling-stroke" {_style(**(ink | more))}/>'
 
 
 def _grid(across: Axis, up: Axis) -> list[str]:

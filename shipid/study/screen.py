@@ -25,7 +25,9 @@ from shipid.vessel.perturb import Family, Variant, members
 
 Array = np.ndarray
 MEMBERS = 256  # of a block
-NUMBERS = 4_000_000  # that a block keeps, a sum per window and a tally per member: fewer members where windows are many
+NUMBERS = (
+    4_000_000  # sums of windows and tallies of a block, for each of pool and test: fewer members if windows are many
+)
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
 FIXED = ("family", "member", "A", "A_90", "diverged")
 

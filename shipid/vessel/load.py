@@ -272,6 +272,7 @@ def check_vessel(document: Document, file: str) -> Vessel:
     _check_behind(vessel)
     _check_units(vessel)
     _check_numbers(vessel)
+    vessel.__dict__["digest"] = documents.digest(document)  # of what was checked, whatever becomes of the document
     return vessel
 
 

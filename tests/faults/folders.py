@@ -12,6 +12,7 @@ import shutil
 import signal
 import tempfile
 import time
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -319,7 +320,8 @@ def _damage(folder: Path, rng: random.Random) -> str:
         file.unlink()
         file.symlink_to("/nowhere" if rng.random() < 0.5 else "/dev/null")
     else:
-        _edit(file, rng)
+        with suppress(ValueError, OSError, EOFError, zipfile.BadZipFile):  # an earlier damage made it unreadable
+            _edit(file, rng)
     return f"{name} {kind}"
 
 

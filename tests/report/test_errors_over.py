@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shipid.report.errors_over import _changes, horizon, over_time
+from shipid.report.page import render
 
 
 def lines(figure, view):
@@ -100,6 +101,12 @@ def test_commands_share_the_time_axis_but_not_the_unit(full_scale):
     assert domains[0][0] > domains[1][1] > domains[1][0] > domains[2][1] > domains[2][0] >= 0
     assert {trace.xaxis for trace in plot.data} <= {None, "x"}
     assert {chip.label for chip in figure.chips} >= {"port azimuth", "starboard shaft"}
+
+
+def test_runs_without_times_have_no_figure_over_time(full_scale):
+    untimed = replace(full_scale, over_time=full_scale.over_time.assign(t=np.nan))
+    assert over_time(untimed) is None
+    assert "Error over time" not in render(untimed)
 
 
 def test_takeaway_names_the_worst_instant(simulation):

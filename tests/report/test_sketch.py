@@ -68,6 +68,15 @@ def test_logarithmic_axes_equal_axes_and_intervals() -> None:
     assert "aspect-ratio: 1.86207" in sketch(plot, 300), "4.32 over 2.32: as wide as it is in metres"
 
 
+def test_a_band_is_an_area_of_its_colour() -> None:
+    outline = line("a", [0.0, 10.0, 10.0], [0.0, 0.0, 10.0], [], fill="toself", fillcolor="var(--band)")
+    plot = Plot([outline], layout(axis("t [s]", range=[0.0, 10.0]), axis("x [m]", range=[0.0, 10.0])))
+    drawn = XML.fromstring(sketch(plot, 300)).findall(".//path")[-1].attrib
+    assert drawn["d"] == "M0.0 1000.0L1000.0 1000.0L1000.0 0.0"
+    assert "fill: var(--band)" in drawn["style"]
+    assert drawn["style"].count("fill:") == 1
+
+
 def test_of_what_has_no_numbers_or_two_axes_nothing_is_drawn(simulation: ReportContent) -> None:
     axes = layout(axis("a [m]"), axis("b [m]"))
     assert sketch(Plot([], axes), 300) == ""

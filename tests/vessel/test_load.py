@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import copy
 import re
 from pathlib import Path
 
@@ -82,6 +83,17 @@ def test_structure_is_what_compiles() -> None:
     assert len(structures | {base.structure}) == len(other) + 1
     crossflow = load_vessel("gunnerus-33.9")
     assert crossflow.with_values({"hull.crossflow.strips": 16}).structure != crossflow.structure
+
+
+def test_the_digest_is_that_of_the_document_that_was_checked() -> None:
+    """Whoever changes the document afterwards has other numbers beside old parameters; the digest stays with these."""
+    document = copy.deepcopy(load_vessel("gunnerus-28.9").document)
+    digests = {}
+    for _ in range(3):
+        vessel = check_vessel(document, "ship.toml")
+        document["inertia"]["m"] *= 1.1
+        digests[vessel.digest] = vessel.parameters["inertia.m"]
+    assert len(digests) == 3
 
 
 def test_the_digest_changes_with_every_number() -> None:
