@@ -106,6 +106,13 @@ class Vessel:
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
         """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document."""
         values = {path: documents.plain(value) for path, value in values.items()}
+        least, most = documents.LEAST_NUMBER, documents.MOST_NUMBER
+        odd = {
+            path: value
+            for path, value in values.items()
+            if type(value) is not float or not least < abs(value) < most  # 0 among them; most are not: quick
+        }
+        documents.check_values(odd, self.file)
         document = documents.replace(self.document, values)
         if values.keys() <= self.units.keys():  # numbers alone: terms, names and units are as they were
             try:

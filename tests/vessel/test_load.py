@@ -181,6 +181,14 @@ def test_every_term_of_a_bundled_vessel_names_its_source(bundled_vessel: Vessel)
     assert all(len(source) > 10 for source in sources(bundled_vessel).values())
 
 
+@pytest.mark.parametrize("value", [None, 1e308, -1e30, 10**400, 1e-200])
+@pytest.mark.parametrize("path", ["inertia.m", "particulars.L_pp", "constants.rho", "hull.derivatives.N_v"])
+def test_a_new_value_that_no_document_may_hold_is_named(path: str, value: object) -> None:
+    with pytest.raises(DocumentError) as raised:
+        load_vessel("gunnerus-28.9").with_values({path: value})
+    assert raised.value.path == path
+
+
 @pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "mariner", "gunnerus-33.9"])
 def test_numbers_of_numpy_are_numbers(name: str) -> None:
     """Equations assembled from them first hold every term, and the document is the one of plain numbers."""
