@@ -119,6 +119,9 @@ def runs_of(source: Source, log: Path) -> dict[str, Path]:
     """Return run -> file: every file of the folder that fits `source.runs`; without that pattern, the log itself."""
     if source.runs is None:
         return {log.stem: log}
+    if not log.is_dir():
+        fault = "is a file, and the mapping takes a folder of runs" if log.is_file() else "there is no such folder"
+        raise DataError(f"{fault}: files {source.runs!r}", file=log, path="source.runs")
     left = {log / name for name in source.skip}
     files = sorted(file for file in log.glob(source.runs) if file.is_file() and file not in left)
     if not files:

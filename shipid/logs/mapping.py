@@ -428,5 +428,9 @@ def _in_si(repair: Repair, clock: float, file: Path, path: str) -> Repair:
 
 def _factor(unit: str, si: str, file: Path, path: str) -> float:
     if unit not in UNITS[si]:
-        raise DocumentError(f"unknown unit {unit!r}: valid here: {', '.join(UNITS[si])}", file=file, path=path)
+        share = ""
+        if unit in ("%", "percent", "pct") and "rev/s" in UNITS[si]:
+            share = '; of a share of full speed write `unit = "rev/s"` and, as `factor`, the rev/s of 1 %'
+        message = f"unknown unit {unit!r}: valid here: {', '.join(UNITS[si])}{share}"
+        raise DocumentError(message, file=file, path=path)
     return UNITS[si][unit]

@@ -267,7 +267,7 @@ def _with_commands(content: ReportContent, means: pd.DataFrame, run: str) -> Plo
         axes[f"yaxis{row}"] = axis(f"{shared} [{unit}]", domain=[low, low + COMMAND / total], anchor="x", nticks=4)
     # The time axis belongs to the lowest row, so that it is drawn at the bottom and shared by all.
     lowest = "y" if not units else f"y{len(units) + 1}"
-    x = axis("time of the recording [s]", anchor=lowest)
+    x = axis("time in the run [s]", anchor=lowest)
     y = axis("position error [m]", rangemode="tozero", domain=[1 - ERROR / total, 1.0])
     return Plot(traces, layout(x, y, hovermode="x unified", **axes))
 

@@ -156,7 +156,7 @@ def _along(frame: pd.DataFrame, moments: Floats, rows: Sequence[Row]) -> Plot:
             traces.append(line(name, t, values, [f"key:{key}"], unit, line=ink, xaxis="x", yaxis=f"y{suffix}"))
         axes[f"yaxis{suffix}"] = axis(row.title, domain=_domain(place, len(rows)), anchor="x", nticks=4)
     y = axes.pop("yaxis")
-    x = axis("time of the recording [s]", anchor=f"y{len(rows)}")
+    x = axis("time in the run [s]", anchor=f"y{len(rows)}")
     return Plot(traces, layout(x, y, hovermode="x unified", shapes=_upright(moments), **axes))
 
 
@@ -328,7 +328,7 @@ def _window_lines(frame: pd.DataFrame, moments: Floats) -> Plot:
         line(second, t, after, ["side:with"], line=ink),
         line("difference", t, after - before, ["side:with"], line=ink, yaxis="y2"),
     ]
-    x = axis("time of the recording [s]", anchor="y2")
+    x = axis("time in the run [s]", anchor="y2")
     y = axis("position error [m]", rangemode="tozero", domain=[0.45, 1.0])
     below = axis("difference [m]", domain=[0.0, 0.36], anchor="x", nticks=5, zeroline=True, zerolinecolor=INK)
     inside = moments[(moments >= t.min()) & (moments <= t.max())]

@@ -71,7 +71,10 @@ class Controls:
         if not self._effects[1]:
             what = ": a manoeuvre needs that of a rudder or an azimuth unit"
             if self.differential:
-                what = f", its shafts do: the kinds `turning` and `steps` order each one ({self.drives[0]}_rpm)"
+                what = (
+                    ", its shafts do: in the manoeuvres of a study ([[truth.manoeuvre]]) the kinds `turning` and "
+                    f"`steps` order each one ({self.drives[0]}_rpm)"
+                )
             message = f"no angle command turns {self.vessel.name}{what}"
             raise DocumentError(message, file=self.vessel.file, path="thruster")
         return self._effects[1]

@@ -142,7 +142,6 @@ def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent
     shaft = np.zeros(len(record.t)) if record.shaft is None else record.shaft
     read = LEVELS.get(chosen.kind)
     steady = read(record) if read else Levels(np.empty(0), np.empty(0), 0)
-    sizes = ship.document["particulars"]
     return ManoeuvreContent(
         title=f"{ship.name}: {chosen.title}",
         name=chosen.kind,
@@ -150,7 +149,7 @@ def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent
         log=pd.DataFrame({**columns, "shaft": shaft}),
         measures=pd.DataFrame(measured.measures),
         criteria=pd.DataFrame(measured.criteria),
-        outline=ship_outline(sizes.get("L_oa", sizes["L_pp"]), sizes.get("B", sizes["L_pp"] / 6)),
+        outline=ship_outline(ship.document["particulars"]),
         levels=pd.DataFrame({"helm": steady.helm, "rate": steady.rate}),
         provenance={
             "Vessel": f"{ship.name}, digest {ship.digest}",

@@ -49,7 +49,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
     for name, frame in FRAMES.items():
         if say is not None:
             say(f"{results.plan.name}: table {name.replace('_', ' ')} of {len(results.cells)} cells")
-        frames[name] = frame(results)
+        frames[name] = parts.in_the_run(results, frame(results))
     if say is not None:
         say(f"{results.plan.name}: answer, findings and errors of {len(results.cells)} cells")
     answer = advise.answer(results, verdicts(frames["methods"])), bands.answer(results)
@@ -64,8 +64,8 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         factors=parts.factors_frame(results),
         trials=parts.trials_frame(results),
         horizon=parts.horizon_frame(results),
-        over_time=parts.time_frame(results),
-        commands=parts.commands_frame(results),
+        over_time=parts.in_the_run(results, parts.time_frame(results)),
+        commands=parts.in_the_run(results, parts.commands_frame(results)),
         snapshots=[Snapshot(**snapshot) for snapshot in parts.snapshots(results)],
         tracks=parts.tracks_frame(results),
         envelope=parts.envelope_frame(results),

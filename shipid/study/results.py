@@ -42,6 +42,7 @@ MOST_TEST_RUNS = 40  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 STRIDE = 20  # cells read between words on how far it is
 MOST_KEPT = 2**30  # bytes of predicted paths in memory
+CLOCK = 6  # digits after the point of a time in a run [s]
 INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
 
 
@@ -334,6 +335,17 @@ def time_frame(results: Results) -> pd.DataFrame:
     return with_gaps(pd.concat(parts, ignore_index=True), ["run", "model", "N_D", "source"])
 
 
+def in_the_run(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
+    """Rows of runs with the time `t` [s] since the begin of each; other frames as they are.
+
+    Figures are in single precision, in which a clock that counts from 1970 has steps of two minutes.
+    """
+    if not {"run", "t"} <= set(frame.columns):
+        return frame
+    begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
+    return frame.assign(t=(frame["t"] - frame["run"].map(begins).astype(float)).round(CLOCK))
+
+
 def with_gaps(frame: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     """A row without numbers wherever time jumps within a group, so that no line is drawn across what is not there."""
     step = frame.groupby(keys, sort=False)["t"].diff()
@@ -369,7 +381,8 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     particulars: Mapping[str, float] = next(
         (one.base.document.get("particulars", {}) for one in results.plan.foundations if one.base), {}
     )
-    outline = ship_outline(particulars.get("L_oa", 30.0), particulars.get("B", 8.0))
+    outline = ship_outline(particulars)
+    begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
     seed, test = int(results.cells["seed"].min()), results.test
     rows, naive, cells = [], constant_motion(test), _shown_cells(results)
     level, edges = results.plan.level, {}
@@ -399,7 +412,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
             rows.append(
                 {
                     "run": run,
-                    "t": float(test.t[index]),
+                    "t": round(float(test.t[index] - begins[run]), CLOCK),
                     "outline": outline,
                     "psi_end": _final_heading(results, run, float(test.t[index])),
                     "truth": np.concatenate([origin, test.future[:, index]]),

@@ -64,7 +64,7 @@ def survey(dataset: Dataset) -> Survey:
             "straying": run in straying,
         }
     steps = np.concatenate([np.diff(part["t"]) for parts in stretches.values() for part in parts])
-    step = float(np.median(steps)) if len(steps) else 1.0
+    step = round(float(np.median(steps)), 6) if len(steps) else 1.0
     return Survey(pd.DataFrame(list(runs.values()), index=list(runs)), step, _factor(dataset))
 
 

@@ -156,8 +156,14 @@ def test_one_run_a_file(tmp_path: Path) -> None:
     assert dataset.runs == ["10_10", "20_20"]
     assert dataset.metadata["clock"] == "run"
     assert dataset.metadata["rows"] == 2 * len(T)
+    empty = tmp_path / "empty"
+    empty.mkdir()
     with pytest.raises(DataError, match="no file 'Z_"):
+        import_log(read_mapping(mapping), empty)
+    with pytest.raises(DataError, match=r"elsewhere.*no such folder.*Z_"):
         import_log(read_mapping(mapping), tmp_path / "elsewhere")
+    with pytest.raises(DataError, match=r"Z_10_10\.csv.*is a file.*takes a folder of runs"):
+        import_log(read_mapping(mapping), tmp_path / "Z_10_10.csv")
 
 
 def test_lever_arm_moves_position_and_velocity(tmp_path: Path) -> None:

@@ -82,6 +82,7 @@ def test_parameters_of_repairs_are_in_si(plain_mapping: Write) -> None:
     [
         ('digest = "x"\n', None, "digest", "computed, not written"),
         ("", ('unit = "rpm"', 'unit = "deg"'), "columns.propeller.n.unit", "unknown unit 'deg'"),
+        ("", ('unit = "rpm"', 'unit = "%"'), "columns.propeller.n.unit", "share of full speed .* `factor`"),
         ("", ("[columns.psi]", "[columns.head]"), "columns.head", "unknown column"),
         ('[columns.wobble]\nfrom = "u"\nunit = "m"\n', None, "columns.wobble", "unknown column"),
         ('[columns.V_w]\nfrom = "u"\nunit = "m/s"\n', None, "columns", "wind needs both"),

@@ -17,6 +17,7 @@ from shipid.errors import ShipidError
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import results as frames
 from shipid.study import store
+from shipid.study.contents import report_content
 from shipid.study.plan import build_plan, read_plan
 from shipid.study.results import Results, read_cells, read_results
 
@@ -97,6 +98,20 @@ def test_snapshots_start_at_the_ship_and_end_at_its_heading(read: Results, tiny_
             assert not path[0].any()
         naive = snapshot["paths"]["", "naive", 0]
         assert np.hypot(*naive[1]) == pytest.approx(np.hypot(start["u"], start["v"]), rel=1e-3)
+
+
+def test_the_report_does_not_depend_on_when_a_log_was_recorded(read: Results) -> None:
+    """Figures are in single precision, in which a clock that counts seconds from 1970 has steps of two minutes."""
+    data, test, later = read.dataset, read.test, float(2**31)  # exact: no time loses a digit
+    moved = data.frame.assign(t=data.frame["t"] + later)
+    epoch = replace(read, dataset=Dataset(moved, data.metadata), test=replace(test, t=test.t + later))
+    expected, content = report_content(read), report_content(epoch)
+    for name in ("over_time", "commands", "tracks"):
+        pd.testing.assert_frame_equal(getattr(content, name), getattr(expected, name))
+    for name, frame in expected.frames.items():
+        pd.testing.assert_frame_equal(content.frames[name], frame)
+    assert [one.t for one in content.snapshots] == [one.t for one in expected.snapshots]
+    assert content.over_time["t"].min() >= 0.0
 
 
 def test_the_heading_at_the_end_does_not_depend_on_where_north_is(read: Results) -> None:
