@@ -15,7 +15,8 @@ import pandas as pd
 import pymap3d
 
 from shipid.errors import ShipidError
-from shipid.logs.guess.columns import LIKELY, Guess, guess
+from shipid.logs.guess.clues import LIKELY
+from shipid.logs.guess.columns import Guess, guess
 from shipid.logs.guess.draft import draft_mapping
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping

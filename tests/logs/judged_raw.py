@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from shipid.errors import ShipidError
-from shipid.logs.guess.clues import Finding, Suggestion
-from shipid.logs.guess.columns import LIKELY, Guess, guess
+from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
+from shipid.logs.guess.columns import Guess, guess
 from shipid.logs.guess.draft import ENABLED, draft_mapping
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping, to_si

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from shipid.logs.guess.clues import State, Suggestion, unit_of_another
+from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
 from shipid.logs.guess.words import parts_of, side_of
 from shipid.physics.signals import is_command, is_shaft, row_of, signal_of
 from shipid.simulation.approach import Controls
@@ -28,6 +28,7 @@ def name_commands(state: State, vessel: Vessel) -> None:
     controls = Controls(vessel)
     helm = () if controls.differential else tuple(controls.helm)
     idle = {name for name in controls.commands if name not in controls.drives and name not in helm}
+    _drop_guesses(state, {signal_of(name) for name in controls.commands})
     _take_tunnels(state, [name for name in controls.commands if name in idle and is_shaft(name)])
     components: dict[str, str] = {}
     named: list[Suggestion] = []
@@ -45,6 +46,18 @@ def name_commands(state: State, vessel: Vessel) -> None:
     named.sort(key=lambda one: order.index(one.source) if one.source in order else len(order))
     state.suggestions[:] = [_renamed(one, components) for one in kept]
     state.suggestions += named
+
+
+def _drop_guesses(state: State, signals: set[str]) -> None:
+    """Take back what the names do not say and the vessel does not have, such as a rudder."""
+    doubted = [
+        one
+        for one in state.suggestions
+        if is_command(one.name) and signal_of(one.name) not in signals and one.confidence < LIKELY
+    ]
+    for one in doubted:
+        state.suggestions.remove(one)
+        state.taken.discard(one.source)
 
 
 def _pairs(

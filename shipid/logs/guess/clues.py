@@ -38,6 +38,7 @@ FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db
 """Units of quantities that no column of a dataset has, in lower case."""
 
 
+LIKELY = 0.6  # confidence from which a suggestion is not marked as unsure
 NEARLY, STRONG = 0.1, 0.65  # how much worse than its best meaning a name may fit another; a name that says something
 
 

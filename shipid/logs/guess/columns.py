@@ -30,8 +30,6 @@ from shipid.logs.guess.words import parts_of, wind_kind
 from shipid.physics.signals import named
 from shipid.vessel.load import Vessel
 
-LIKELY = 0.6
-
 
 @dataclass(frozen=True)
 class Guess:

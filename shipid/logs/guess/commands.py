@@ -10,26 +10,30 @@ import numpy as np
 from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.twins import choose_twins, twins
 from shipid.logs.guess.words import fits, is_order, parts_of, side_of
 from shipid.logs.mapping import to_si
-from shipid.physics.signals import SIGNALS, named, steers
+from shipid.physics.signals import SIGNALS, is_command, is_shaft, named, steers
 
 AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name has no side
 SCREW = SIGNALS["n"].component  # of a shaft speed or pitch without a side: that of the azimuth unit where there is one
 SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which its sign is taken
 FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
 ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
+TOGETHER = 0.2  # of the range of a column: how far twin rudders are apart
 TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 USUAL = np.radians(20.0)  # rudder angle of a usual turn
 NEAR = 15.0  # times from that: a unit further off is doubted
 
 
 def choose_commands(state: State) -> None:
-    """Choose angles that steer, then shafts and pitches."""
+    """Choose angles that steer, then shafts and pitches; without any, throttles of two sides."""
     r = state.r if state.r is not None else np.gradient(state.psi, state.t) if state.psi is not None else None
     used: dict[str, int] = {}
     azimuth = _steering(state, r, used)
     _thrust(state, azimuth, used)
+    if not any(is_command(one.name) and is_shaft(one.name) for one in state.suggestions):
+        choose_twins(state, r)
 
 
 def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
@@ -40,7 +44,12 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
     by_name = bool(angles)
     if not angles and r is not None:
         # an order is held at its largest value; a response such as roll is not
-        strength = {name: power[name] * _held(state.columns[name]) for name in power if _small(state.columns[name])}
+        screws = _screws(state)
+        strength = {
+            name: power[name] * _held(state.columns[name])
+            for name in power
+            if _small(state.columns[name]) and name not in screws
+        }
         likely = max(strength, key=lambda name: abs(strength[name]), default="")
         angles = [(likely, "delta")] if likely and abs(strength[likely]) > SEEN else []
     azimuth = any(SIGNALS[signal].component == AZIMUTH for _, signal in angles)
@@ -73,6 +82,18 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
             component = f"{side_of(name)}_rudder"
         state.suggest(unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
     return azimuth
+
+
+def _screws(state: State) -> set[str]:
+    """Columns that are no rudder: their names say a screw, or the two sides do not move together as twin rudders do."""
+    columns = state.columns
+    apart = {
+        name
+        for pair in twins(state)
+        if np.ptp(columns[pair[0]] - columns[pair[1]]) > TOGETHER * max(np.ptp(columns[name]) for name in pair)
+        for name in pair
+    }
+    return apart | {name for signal in named("command") if not steers(signal) for name in state.called(signal)}
 
 
 def _centred(state: State, name: str, signal: str) -> bool:

@@ -12,8 +12,8 @@ import tomlkit
 
 from shipid.errors import ShipidError
 from shipid.logs import segments as cutting
-from shipid.logs.guess.clues import Finding, Suggestion
-from shipid.logs.guess.columns import LIKELY, Guess
+from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
+from shipid.logs.guess.columns import Guess
 from shipid.logs.importing import import_log, sha256_of
 from shipid.logs.mapping import Mapping, Segment, read_mapping, to_si
 from shipid.logs.readers import LARGE, date_of

@@ -377,6 +377,12 @@ def side_of(name: str) -> str | None:
 
 
 @cache
+def words_of_side(side: str) -> frozenset[str]:
+    """Return the words that say a side, such as `port`."""
+    return frozenset(SIDE_WORDS[side].split("|"))
+
+
+@cache
 def fits(name: str) -> dict[str, float]:
     """Return how well a name fits each meaning, 0 to 1: `{"psi": 1.0}`; the empty meaning is a column of no use.
 

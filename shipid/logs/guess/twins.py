@@ -1,0 +1,91 @@
+"""Screws of two sides whose columns name no shaft speed: throttles, shares of full speed, pulses of a servo.
+
+Two columns with one name but for the side, whose difference turns the ship, order the screws of a craft that steers by
+their difference. Neither full speed nor, where the ship was never at rest, the value of a stopped screw is in the log.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from shipid.logs.guess import evidence
+from shipid.logs.guess.clues import STRONG, State, unit_in_name, unit_of_another
+from shipid.logs.guess.words import fits, is_order, parts_of, side_of, words_of_side
+
+OF_THROTTLES = frozenset("throttle throttles thrust thruster motor motors engine esc pwm power gas".split())
+SEEN = 4.0  # t value of the effect of the difference on the yaw rate
+REST, STILL, ALIKE = 0.05, 5, 0.02  # of the usual speed; windows at rest; of the range: how much alike values there are
+CONFIDENCE = 0.5
+
+
+def choose_twins(state: State, r: np.ndarray | None) -> None:
+    """Suggest shaft speeds from one pair of free columns, port and starboard, whose difference turns the ship."""
+    if r is None:
+        return
+    span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
+    found = {
+        pair: evidence.effect(state.t, r, state.columns[pair[0]] - state.columns[pair[1]], 0.4 * span)
+        for pair in twins(state)
+        if all(_may_be_a_throttle(name) for name in pair)
+    }
+    pair = max(found, key=lambda one: abs(found[one]), default=None)
+    if pair is None or abs(found[pair]) < SEEN:
+        return
+    turned = "starboard" if found[pair] > 0 else "port"
+    why = f"by its side; the difference to the other side turns the ship to {turned} (t value {abs(found[pair]):.0f})"
+    both = f"{pair[0]!r} and {pair[1]!r}"
+    state.ask(("n",), f"{both} turn the ship by their difference. Of which shaft speed is a value of 1? Write factor")
+    stopped = _at_rest(state, pair)
+    if stopped is None:
+        state.ask(("n",), f"which value of {both} is a stopped screw? 0 is a guess: write offset = -factor * value")
+    for side, name in zip(("port", "starboard"), pair, strict=True):
+        extra: dict[str, Any] = {"factor": 1.0}
+        said = why
+        if stopped is not None and stopped[side] != 0.0:
+            extra["offset"] = -stopped[side]
+            said = f"{why}; {stopped[side]:g} while the ship is at rest"
+        state.suggest(f"{side}.n", name, "rpm", CONFIDENCE, said, **extra)
+    if found[pair] < 0:
+        sentence = f"more of {pair[0]!r} turns the ship to port: are the sides swapped, or the yaw rate's sign?"
+        state.find("sides of the screws", pair, 0.6, sentence)
+
+
+def twins(state: State) -> list[tuple[str, str]]:
+    """Return the pairs of free columns, port and starboard, whose names are equal but for the side."""
+    sides: dict[tuple[str, ...], dict[str, str]] = {}
+    for name in state.free():
+        side = side_of(name)
+        if side in ("port", "starboard"):
+            key = tuple(part for part in parts_of(name) if part not in words_of_side(side))
+            sides.setdefault(key, {}).setdefault(side, name)
+    return [
+        (pair["port"], pair["starboard"])
+        for pair in sides.values()
+        if len(pair) == 2 and any(np.ptp(state.columns[name]) > 0 for name in pair.values())
+    ]
+
+
+def _may_be_a_throttle(name: str) -> bool:
+    """Whether a name says an order, a throttle or per cent, or nothing at all; and no unit of another quantity."""
+    said = is_order(name) or bool(OF_THROTTLES & set(parts_of(name))) or unit_in_name(name, "rev/s") == "%"
+    fit = fits(name)
+    foreign = unit_of_another(name, "n") is not None or (fit.get("", 0.0) >= STRONG and not said)
+    return not foreign and (said or not fit)
+
+
+def _at_rest(state: State, pair: tuple[str, str]) -> dict[str, float] | None:
+    """Return side -> value of its column at rest; None if the ship always moves, or values differ."""
+    if state.position is None:
+        return None
+    span = state.t[state.chosen.last] - state.t[state.chosen.first]
+    speed = np.abs(state.chosen.change(state.position)) / span
+    still = state.chosen.first[speed < REST * np.quantile(speed, 0.9)]
+    if len(still) < STILL:
+        return None
+    values = {side: state.columns[name][still] for side, name in zip(("port", "starboard"), pair, strict=True)}
+    usual = {side: float(np.median(value)) for side, value in values.items()}
+    width = max(float(np.ptp(state.columns[name])) for name in pair)
+    alike = all(float(np.median(np.abs(values[side] - usual[side]))) < ALIKE * width for side in values)
+    return usual if alike else None

@@ -1,0 +1,112 @@
+"""Screws of two sides whose columns name no shaft speed, on craft that steer by their difference, drawn by seed."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.engine.rollout import rollout
+from shipid.logs.guess.clues import State
+from shipid.logs.guess.commands import choose_commands
+from shipid.logs.guess.evidence import windows
+from shipid.logs.guess.twins import twins
+from shipid.vessel.load import load_vessel
+
+STEP = 0.2
+NAMES = (
+    ("cmd_port_pct", "cmd_stbd_pct"),
+    ("throttle left", "throttle right"),
+    ("Motor BB Soll", "Motor StB Soll"),
+    ("esc_port", "esc_starboard"),
+    ("Port thruster cmd [%]", "Starboard thruster cmd [%]"),
+    ("pwm_port", "pwm_stbd"),
+)
+SCALES = ((50.0, 50.0), (0.0, 100.0), (1500.0, 500.0), (0.0, 1.0))  # value of a stopped screw, and how far it goes
+
+
+@cache
+def craft(seed: int) -> pd.DataFrame:
+    """A log of the Otter, SI units: at rest, then orders of both screws that change every 6 to 20 s."""
+    random = np.random.default_rng(seed)
+    share = [np.zeros((150, 2))]
+    for _ in range(30):
+        mean, apart = random.uniform(0.2, 0.7), random.uniform(-0.25, 0.25)
+        share.append(np.tile([mean + apart, mean - apart], (int(random.uniform(30, 100)), 1)))
+    orders = np.concatenate(share)
+    top = 15.0  # rev/s
+    commands = {name: top * orders[:, place, None] for place, name in enumerate(("port.n", "starboard.n"))}
+    start = {name: np.zeros(1) for name in ("north", "east", "psi", "u", "v", "r")}
+    wind = {name: np.zeros((len(orders), 1)) for name in ("V_w", "beta_w")}
+    path = rollout(load_vessel("otter"), start, commands, wind, step=STEP, num_steps=len(orders), method="rk4")
+    frame = pd.DataFrame({name: path[name][:-1, 0, 0] for name in start})
+    noise = {"north": 0.1, "east": 0.1, "psi": 3e-3, "r": 3e-3}
+    noisy = {name: frame[name] + random.normal(0, std, len(frame)) for name, std in noise.items()}
+    return frame.assign(t=STEP * np.arange(len(frame)), port=orders[:, 0], starboard=orders[:, 1], **noisy)
+
+
+def guessed(log: pd.DataFrame, columns: dict[str, np.ndarray]) -> State:
+    t = log["t"].to_numpy()
+    position = log["north"].to_numpy() + 1j * log["east"].to_numpy()
+    state = State(t, "s", columns, windows(t), position=position, psi=log["psi"].to_numpy(), r=log["r"].to_numpy())
+    choose_commands(state)
+    return state
+
+
+def drawn(seed: int) -> tuple[pd.DataFrame, tuple[str, str], float, dict[str, np.ndarray]]:
+    """A log, the names of its two columns, the value of a stopped screw, and its columns in any order."""
+    log, random = craft(seed), np.random.default_rng(1000 + seed)
+    names, (still, far) = NAMES[random.integers(len(NAMES))], SCALES[random.integers(len(SCALES))]
+    pair = {name: still + far * log[side].to_numpy() for name, side in zip(names, ("port", "starboard"), strict=True)}
+    columns = pair | {"batt_V": 25 - log["t"].to_numpy() / 1000, "temp": random.normal(20, 1, len(log))}
+    order = random.permutation(list(columns))
+    return log, names, still, {name: columns[name] for name in order}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_each_side_has_its_screw_with_the_value_of_a_stopped_one(seed: int) -> None:
+    log, names, still, columns = drawn(seed)
+    state = guessed(log, columns)
+    found = {one.name: one for one in state.suggestions}
+    assert {name: one.source for name, one in found.items()} == dict(zip(("port.n", "starboard.n"), names, strict=True))
+    assert [one.extra.get("offset", 0.0) for one in found.values()] == pytest.approx([-still, -still])
+    assert "Of which shaft speed" in state.questions[0].sentence
+    assert not state.findings
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("names", [("rpm_port", "rpm_starboard"), ("A port", "A starboard")])
+def test_a_screw_of_one_side_is_no_rudder(seed: int, names: tuple[str, str]) -> None:
+    log = craft(seed)
+    columns = {name: 60.0 * log[side].to_numpy() for name, side in zip(names, ("port", "starboard"), strict=True)}
+    assert not [one.name for one in guessed(log, columns).suggestions if one.name.endswith("delta")]
+
+
+def test_swapped_sides_are_reported() -> None:
+    log = craft(0)
+    columns = {"throttle left": log["starboard"].to_numpy(), "throttle right": log["port"].to_numpy()}
+    assert [one.kind for one in guessed(log, columns).findings] == ["sides of the screws"]
+
+
+def test_a_craft_that_is_never_at_rest_is_asked_for_the_value_of_a_stopped_screw() -> None:
+    log = craft(1).iloc[300:].reset_index(drop=True)
+    columns = {f"throttle {side}": 50 + 50 * log[side].to_numpy() for side in ("port", "starboard")}
+    state = guessed(log, columns)
+    assert [set(one.extra) for one in state.suggestions] == [{"factor"}, {"factor"}]
+    assert any("which value of" in one.sentence for one in state.questions)
+
+
+@pytest.mark.parametrize("names", [("batt port V", "batt stbd V"), ("draft port", "draft stbd"), ("temp P", "temp S")])
+def test_what_is_no_throttle_is_left(names: tuple[str, str]) -> None:
+    log = craft(2)
+    columns = {name: log[side].to_numpy() for name, side in zip(names, ("port", "starboard"), strict=True)}
+    assert guessed(log, columns).suggestions == []
+
+
+def test_two_columns_are_twins_where_only_the_side_differs() -> None:
+    log = craft(0)
+    values = {name: log["port"].to_numpy() for name in ("cmd port", "cmd stbd", "temp port", "gas stbd", "cmd")}
+    t = log["t"].to_numpy()
+    assert twins(State(t, "s", values, windows(t))) == [("cmd port", "cmd stbd")]
