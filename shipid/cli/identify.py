@@ -318,9 +318,13 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
             *(row["unit"], row["note"]),
         ]
         for row in outcome.manoeuvres.to_dict("records")
+        if row["measure"]
     ]
     heads = ["calm water", "measure", "before", "after", *["band"] * banded, "unit", "note"]
-    answer.rows("manoeuvres", outcome.manoeuvres, table(heads, compared))
+    answer.rows("manoeuvres", outcome.manoeuvres, table(heads, compared) if compared else None)
+    refused = outcome.manoeuvres[outcome.manoeuvres["measure"] == ""]
+    for note, titles in refused.groupby("note", sort=False)["manoeuvre"]:
+        typer.echo(f"note: no {', '.join(titles)}: {note}", err=True)
     beyond = list(outcome.beyond)
     answer.say("\n".join(f"extrapolated: {sentence}" for sentence in beyond), extrapolated=beyond)
     if len(outcome.groups):

@@ -391,26 +391,35 @@ def _estimates(vessel: Vessel, solution: Solution, judged: Statistics) -> pd.Dat
 def _manoeuvres(pair: Mapping[str, Vessel], logs: dict[str, pd.DataFrame] | None = None) -> pd.DataFrame:
     """Manoeuvre measures of both vessels; where a vessel cannot perform one: NaN, and the reason in `note`.
 
+    A manoeuvre that neither performs is one row without a measure.
+
     logs : takes the log of the last vessel in each manoeuvre, by title.
     """
     rows = []
     for kind, angles in TRIED:
         title = _title(kind, angles)
         values: dict[str, dict[str, dict[str, Any]]] = {}
-        notes = []
+        notes: dict[str, str] = {}
         for name, vessel in pair.items():
             try:
                 values[name] = _measured(vessel, kind, angles, logs if name == AFTER else None)
             except ShipidError as error:
                 values[name] = {}
-                notes.append(f"{name}: {error.message}")
+                notes[name] = error.message
+        said = [f"{name}: {message}" for name, message in notes.items()]
+        if len(notes) == len(pair):
+            why = list(dict.fromkeys(notes.values()))
+            nothing = dict.fromkeys(pair, float("nan"))
+            note = why[0] if len(why) == 1 else "; ".join(said)
+            rows.append({"manoeuvre": title, "measure": "", "unit": "", **nothing, "note": note})
+            continue
         for measure in COMPARED[kind]:
             label = measure.replace("_", " ")
             measured = {name: values[name].get(label) for name in pair}
             unit = next((row["unit"] for row in measured.values() if row is not None), "")
             numbers = {name: float("nan") if row is None else row["value"] for name, row in measured.items()}
             why = [f"{name}: {row['note']}" for name, row in measured.items() if row is not None and row["note"]]
-            note = "; ".join([*notes, *why])
+            note = "; ".join([*said, *why])
             rows.append({"manoeuvre": title, "measure": label, "unit": unit, **numbers, "note": note})
     return pd.DataFrame(rows)
 

@@ -113,6 +113,26 @@ def _reached(ratio: Callable[[float], float | None], end: float, rising: bool) -
     return high if abs(high) < FARTHEST / 2 else math.copysign(math.inf, high)
 
 
+def outside(vessel: Vessel, values: Mapping[str, float]) -> set[str]:
+    """Paths among `values` with which the number is outside the range that ships have.
+
+    Parameters
+    ----------
+    values : dotted path -> value of all numbers that were changed; the others are the vessel's.
+    """
+    numbers = {**vessel.parameters, **values}
+    judged = {path: _judged(vessel, path, numbers) for path in values}
+    return {path for path, seen in judged.items() if seen is not None and not seen[0].low <= seen[1] <= seen[0].high}
+
+
+def _judged(vessel: Vessel, path: str, numbers: Mapping[str, float]) -> tuple[Kind, float] | None:
+    """Kind of a number and its ratio; None where no range is known."""
+    kind = next((one for one in KINDS if re.fullmatch(one.pattern, path)), None)
+    length = vessel.document.get("particulars", {}).get("L_pp")
+    ratio = kind.ratio(numbers[path], numbers, length) if kind is not None else None
+    return None if kind is None or ratio is None else (kind, ratio)
+
+
 def verdict(vessel: Vessel, path: str, values: Mapping[str, float]) -> str:
     """Why a number cannot be that of a ship, or that it is at an end of the range; empty where it may.
 
@@ -120,14 +140,11 @@ def verdict(vessel: Vessel, path: str, values: Mapping[str, float]) -> str:
     ----------
     values : dotted path -> value of all numbers that were changed; the others are the vessel's.
     """
-    kind = next((one for one in KINDS if re.fullmatch(one.pattern, path)), None)
-    if kind is None:
-        return ""
     numbers = {**vessel.parameters, **values}
-    length = vessel.document.get("particulars", {}).get("L_pp")
-    ratio = kind.ratio(numbers[path], numbers, length)
-    if ratio is None:
+    seen = _judged(vessel, path, numbers)
+    if seen is None:
         return ""
+    kind, ratio = seen
     sentence = f"{path} = {numbers[path]:.4g}: {kind.words} is {ratio:.3g}"
     usual = f"of ships {_number(kind.low)} to {_number(kind.high)}" if math.isfinite(kind.low) else "of ships below 0"
     if not kind.low <= ratio <= kind.high:

@@ -18,12 +18,14 @@ from shipid.identification.plausible import within
 from shipid.physics.signals import is_output, named
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import select
+from shipid.vessel.schema import SHARED
 
 Array = NDArray[np.float64]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 BLOCK = "identify"
 POSITIVE = 1e-3  # least factor of a number that must not be 0: a mass, a diameter, a resistance
 ENVIRONMENT = "environment"
+DIMENSIONS = frozenset((*SHARED, "x_aft", "x_fwd"))  # and constants: no pattern selects them
 SIGNALS = {"u": ("u",), "v": ("v",), "r": ("r",), "psi": ("psi",), "position": ("north", "east")}
 """Name in `weights` -> columns of the data that it fits."""
 NUISANCES: dict[str, dict[str, float]] = {
@@ -55,7 +57,7 @@ class Identify(documents.Checked, BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     parameters: Annotated[list[str], Field(min_length=1)] = Field(
-        description="dotted paths; * and [order >= 3] select, as in a family"
+        description="dotted paths; * and [order >= 3] select, as in a family, but no constants and no dimensions"
     )
     fixed: list[str] = Field(default=[], description="selections taken out again")
     together: list[Annotated[list[str], Field(min_length=1)]] = Field(
@@ -171,7 +173,8 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     def chosen(patterns: Sequence[str], key: str) -> list[str]:
         return select(patterns, base, file, f"{BLOCK}.{key}")
 
-    asked = chosen(settings.parameters, "parameters")
+    selected = chosen(settings.parameters, "parameters")
+    asked = _without_dimensions(selected, settings.parameters, file)
 
     def reached(pattern: str, key: str, among: Collection[str]) -> list[str]:
         paths = [path for path in chosen([pattern], key) if path in among]
@@ -182,7 +185,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
             raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
         return paths
 
-    fixed = {path for pattern in settings.fixed for path in reached(pattern, "fixed", asked)}
+    fixed = {path for pattern in settings.fixed for path in reached(pattern, "fixed", selected)}
     free = [path for path in asked if path not in fixed]
     if not free:
         raise DocumentError(
@@ -222,6 +225,19 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
         for path in reached(pattern, "prior", place):
             prior[place[path]] = width
     return Unknowns(tuple(groups), tuple(scales), centre, low, high, prior)
+
+
+def _without_dimensions(asked: Sequence[str], patterns: Sequence[str], file: str) -> list[str]:
+    """The paths without dimensions and constants, which are measured or known; with those that are written in full."""
+    known = {
+        path
+        for path in asked
+        if path.rpartition(".")[2] in DIMENSIONS and ".actuator." not in path and path not in patterns
+    }
+    if known == set(asked):
+        message = f"selects dimensions and constants only: to fit them all the same, write {', '.join(sorted(known))}"
+        raise DocumentError(message, file=file, path=f"{BLOCK}.parameters")
+    return [path for path in asked if path not in known]
 
 
 @dataclass(frozen=True)

@@ -86,11 +86,11 @@ def _ratio(a: Array, b: Array) -> tuple[float, float]:
     return share, error
 
 
-def _helm(vessel: Vessel, dataset: Dataset, log: pd.DataFrame) -> Array:
-    """Mean magnitude (N,) [rad] of the angles that steer, at the rows of the free runs."""
+def _helm(vessel: Vessel, dataset: Dataset, log: pd.DataFrame) -> Array | None:
+    """Mean magnitude (N,) [rad] of the angles that steer, at the rows of the free runs; None where no angle steers."""
     names = [name for name in dynamics(vessel).commands if steers(name)]
     if not names:
-        return np.zeros(len(log))
+        return None
     helm = np.zeros(len(log))
     for run, rows in log.groupby("run", sort=False):
         of_run = dataset.frame[dataset.frame["run"] == run]
@@ -101,19 +101,19 @@ def _helm(vessel: Vessel, dataset: Dataset, log: pd.DataFrame) -> Array:
 
 
 def _groups(
-    seen: NDArray[np.bool_], r: Array, helm: Array, speed: Array
+    seen: NDArray[np.bool_], r: Array, helm: Array | None, speed: Array
 ) -> Iterator[tuple[str, str, NDArray[np.bool_]]]:
     least = TURNING * (np.abs(r[seen]).max(initial=0.0))
     sides = {"starboard": seen & (r > least), "port": seen & (r < -least)}
     yield from (("all", side, mask) for side, mask in sides.items())
-    edges = np.array(LEVELS) * DEGREE
-    level = np.digitize(helm, edges)
-    for number in range(len(edges) + 1):
-        here = level == number
-        if (here & seen).sum() < FEWEST:
-            continue
-        name = f"helm about {np.median(helm[here & seen]) / DEGREE:.0f} deg"
-        yield from ((name, side, mask & here) for side, mask in sides.items())
+    if helm is not None:
+        level = np.digitize(helm, np.array(LEVELS) * DEGREE)
+        for number in range(len(LEVELS) + 1):
+            here = level == number
+            if (here & seen).sum() < FEWEST:
+                continue
+            name = f"helm about {np.median(helm[here & seen]) / DEGREE:.0f} deg"
+            yield from ((name, side, mask & here) for side, mask in sides.items())
     thirds = np.quantile(speed[seen], [1 / 3, 2 / 3]) if seen.any() else np.zeros(2)
     for number in range(3):
         here = seen & (np.digitize(speed, thirds) == number)

@@ -296,9 +296,10 @@ def _all_first(frame: pd.DataFrame) -> list[tuple[str, str]]:
 
 def manoeuvres(content: IdentificationContent) -> Table | None:
     """Measures of standard manoeuvres before and after; None where there are none."""
-    if content.manoeuvres.empty:
+    performed = content.manoeuvres[content.manoeuvres["measure"] != ""]
+    if performed.empty:
         return None
-    noted = bool(content.manoeuvres["note"].ne("").any())
+    noted = bool(performed["note"].ne("").any())
     banded = "low" in content.manoeuvres
     rows = [
         [
@@ -308,7 +309,7 @@ def manoeuvres(content: IdentificationContent) -> Table | None:
             text(row["unit"]),
             *[Cell(str(row["note"]), str(row["note"]), bad=bool(row["note"]))] * noted,
         ]
-        for row in content.manoeuvres.to_dict("records")
+        for row in performed.to_dict("records")
     ]
     head = ["manoeuvre", "measure", BEFORE, AFTER, *["band from", "to"] * banded, "unit", *["why missing"] * noted]
     takeaway = "Simulated in calm deep water, from U_0 of the vessel or a Froude number of 0.2."

@@ -22,6 +22,7 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows, cut_windows
 from shipid.errors import DocumentError
 from shipid.hybrid.physics import Physics, check_columns
+from shipid.identification.plausible import outside
 from shipid.metrics import position_error
 from shipid.physics.signals import is_shaft, steers
 from shipid.simulation.approach import acceleration
@@ -293,10 +294,13 @@ def _refined(
 def _least(
     trial: _Trial, groups: Mapping[Group, Sequence[str]], options: Sequence[dict[Group, float]]
 ) -> tuple[dict[Group, float], float] | None:
-    """The option with the least error, of those that the vessel's checks accept."""
+    """The option with the least error, of those that the vessel's checks accept and whose numbers a ship can have."""
     rows, kept = [], []
     for option in options:
         values = _values(trial.vessel, groups, option)
+        before = {path: trial.vessel.parameters[path] for path in values}
+        if outside(trial.vessel, values) - outside(trial.vessel, before):
+            continue
         try:
             trial.vessel.with_values(values)
         except DocumentError:

@@ -119,6 +119,16 @@ def test_a_manoeuvre_that_cannot_be_is_a_note() -> None:
     assert table["note"].str.contains("L_pp").all()
 
 
+def test_manoeuvres_that_neither_vessel_performs_are_one_row_each() -> None:
+    """A craft without an angle that steers has no zigzag: said once, not for every measure and both vessels."""
+    craft = load_vessel("otter")
+    table = outcome._manoeuvres({BEFORE: craft, AFTER: craft})
+    assert list(table["manoeuvre"]) == [outcome._title(kind, angles) for kind, angles in outcome.TRIED]
+    assert (table["measure"] == "").all()
+    assert table["note"].nunique() == 1
+    assert not table["note"].str.contains("before").any()
+
+
 def test_a_patch_is_the_identified_vessel_and_says_where_it_is_from(identified: Identified, tmp_path: Path) -> None:
     base = tmp_path / "base.toml"
     base.write_text('base = "gunnerus-28.9"\n[set]\n' + "".join(f'"{p}" = {off().parameters[p]!r}\n' for p in FEW))

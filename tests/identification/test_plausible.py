@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from shipid.identification.plausible import KINDS, NEAR, verdict, within
+from shipid.identification.plausible import KINDS, NEAR, outside, verdict, within
 from shipid.vessel.load import Vessel, load_vessel
 
 
@@ -73,3 +73,11 @@ def test_only_what_is_near_an_end_is_said_to_be_at_it(path: str) -> None:
 def test_what_has_no_range_has_no_bounds() -> None:
     low, high = within(load_vessel("kvlcc2-l7"), "hull.mmg.Y_vvr")
     assert (low, high) == (-float("inf"), float("inf"))
+
+
+@pytest.mark.parametrize("factor", [0.02, 0.3, 0.9, 1.1, 3.0, 30.0, -1.0])
+def test_outside_is_what_the_verdict_says_no_ship_has(factor: float) -> None:
+    ship = load_vessel("kvlcc2-l7")
+    for path, base in ship.parameters.items():
+        values = {path: factor * base}
+        assert (outside(ship, values) == {path}) == ("no ship has that" in verdict(ship, path, values))

@@ -68,3 +68,20 @@ def test_overrides_belong_to_one_run() -> None:
         overrides(settings, ["b"], SHIP, ["V_w"])
     with pytest.raises(DocumentError, match="cannot be set for a run"):
         overrides(settings, ["a"], SHIP, [])
+
+
+def test_a_pattern_selects_no_constant_and_no_dimension() -> None:
+    """Density and length are known; a fit to them and to their coefficient has no answer."""
+    otter = load_vessel("otter")
+    paths = unknowns(otter, Identify(parameters=["hull.*"])).paths
+    assert "hull.crossflow.C_d" in paths
+    assert not {f"hull.crossflow.{name}" for name in ("rho", "T", "x_aft", "x_fwd")} & set(paths)
+    some = Identify(parameters=["hull.*", "hull.crossflow.T"], fixed=["hull.crossflow.x_*"])
+    assert set(unknowns(otter, some).paths) - set(paths) == {"hull.crossflow.T"}
+    with pytest.raises(DocumentError, match=r"dimensions and constants only.*hull\.crossflow\.x_aft"):
+        unknowns(otter, Identify(parameters=["hull.crossflow.x_*"]))
+
+
+def test_the_time_constant_of_an_actuator_is_no_draught() -> None:
+    paths = unknowns(load_vessel("otter"), Identify(parameters=["thruster.*.actuator.*"])).paths
+    assert {"thruster.port.actuator.n.T", "thruster.starboard.actuator.n.T"} <= set(paths)

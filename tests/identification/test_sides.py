@@ -124,3 +124,13 @@ def test_the_error_of_a_ratio_of_equal_pieces_is_that_of_a_mean(count: int) -> N
     assert share == pytest.approx(values.mean())
     assert error == pytest.approx(values.std(ddof=1) / count**0.5)
     assert np.isinf(_ratio(values[:1], np.ones(1))[1])
+
+
+def test_a_craft_without_an_angle_has_no_groups_by_helm() -> None:
+    t = STEP * np.arange(ROWS)
+    motion = {"run": "A", "piece": 0, "t": t, "u": 1.0, "v": 0.0, "r": 0.1 * np.sign(np.sin(t / 8))}
+    series = pd.concat([pd.DataFrame({**motion, "model": name}) for name in ("measured", "after")])
+    still = dict.fromkeys(("north", "east", "psi", "u", "v", "r", "port.n", "starboard.n"), 0.0)
+    log = Dataset(pd.DataFrame({"run": "A", "t": t, **still, "flags": 0}), {"clock": "run", "flags": []})
+    groups = by_group(series, "after", load_vessel("otter"), log)
+    assert {name.split()[0] for name in groups["group"]} == {"all", "speed"}

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
+from shipid.identification.plausible import outside
 from shipid.simulation.manoeuvre import TurningCircle, Zigzag
 from shipid.simulation.perform import perform
 from shipid.study.first_look import GROUPS, Look, _backwards, _members, _some, _Trial, first_look, steady_speed
@@ -94,3 +95,16 @@ def test_groups_share_no_number() -> None:
         paths = [path for group in GROUPS for path in _members(load_vessel(name), group)]
         assert len(paths) == len(set(paths)) > 3, name
     assert np.all([group.low < 1 < group.high for group in GROUPS])
+
+
+def test_no_number_is_proposed_that_no_ship_has(log: Dataset) -> None:
+    """With a log three times as slow to turn, the first look stays within the ranges of ships."""
+    truth = load_vessel(SHIP)
+    wrong = {
+        path: value * (0.35 if ".Y_v" in path or "R_0" in path else 1.0) for path, value in truth.parameters.items()
+    }
+    view = look(truth.with_values({path: value for path, value in wrong.items() if ".actuator" not in path}), log)
+    assert view.changes
+    assert outside(view.vessel, view.values) <= outside(
+        view.vessel, {path: view.vessel.parameters[path] for path in view.values}
+    )
