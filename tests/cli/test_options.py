@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,6 +19,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+import shipid
 from shipid.cli import app
 from shipid.errors import DocumentError, ShipidError
 from tests.cli.running import BAD
@@ -247,6 +249,9 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Logs, folders and devices as if they were there."""
     monkeypatch.chdir(tmp_path)
     Path("begin.toml").write_text("[identify]\nstep = 0.25\n")
+    for module in ("cli", "study"):  # what is imported later would keep a stand-in for good
+        for found in iter_modules([str(Path(shipid.__file__).parent / module)], f"shipid.{module}."):
+            import_module(found.name)
     stand_ins: dict[str, Callable[..., Any]] = {
         "shipid.predictor:Predictor.load": lambda *given: given[0],
         "shipid.data.dataset:read_dataset": lambda *_: LOG,
