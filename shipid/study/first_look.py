@@ -48,6 +48,8 @@ STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading and of the speed over the
 TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from which the turning is judged
 FEW = 3  # windows
 MODEST = 5.0  # factor
+UNITS = (60.0, 1 / 60.0)  # rev/s read as rpm, and rpm as rev/s
+ALIKE = 1.5  # factor within which a speed is explained by a unit
 OFF = 1.15  # a factor by which speed or turning may differ before it is reported
 
 _HULL = r"hull\.(?:derivatives|prime_derivatives|mmg|abkowitz)\."
@@ -187,8 +189,10 @@ def first_look(
     constant = float(position_error(constant_motion(windows), windows.future).mean())
     trial = _Trial(vessel, part, windows, constant)
     alone = trial.errors([{}])[0]
-    facts = tuple(_facts(vessel, windows, trial.instants()))
-    changes = _explained(trial, alone)
+    share = _turning(vessel, windows, trial.instants())
+    facts = tuple(_facts(vessel, windows, share))
+    mistaken = share is not None and share < 0  # a sign, which no factor mends
+    changes = [] if mistaken else _explained(trial, alone)
     if changes and changes[-1].error > (1 - SAVING) * alone:
         changes = []
     return Look(vessel, windows.horizon * step, alone, constant, facts, tuple(changes))
@@ -327,29 +331,50 @@ def _values(vessel: Vessel, groups: Mapping[Group, Sequence[str]], factors: Mapp
     }
 
 
-def _facts(vessel: Vessel, windows: Windows, instants: Instants) -> Iterable[str]:
-    """Sentences on speed against shaft, and turning against helm."""
+def _turning(vessel: Vessel, windows: Windows, instants: Instants) -> float | None:
+    """How far the vessel turns over how far the ship of the log does, median; None where the ship hardly turns."""
     turned = windows.states["psi"][-1] - windows.columns["psi"]
-    steady = _steady_speeds(vessel, windows, turned)
-    if steady is not None:
-        rpm, seen, held = steady
-        if held > OFF * seen or seen > OFF * held:
-            yield f"at {rpm:.4g} rpm the log runs {seen:.3g} m/s and the vessel {held:.3g} m/s"
-    backwards = _backwards(windows)
-    yield from (f"{name} is negative where the ship of the log goes ahead: is its sign right?" for name in backwards)
     predicted = Physics(vessel, windows.horizon, windows.step, "rk4").states(instants)["psi"][-1]
     predicted = predicted - windows.columns["psi"]
     much = (np.abs(turned) > LEAST_TURN) & np.isfinite(predicted)
-    if much.sum() >= TURNS:
-        share = float(np.median(predicted[much] / turned[much]))
-        if share < 0:
-            yield "the vessel turns the other way than the ship of the log: is the sign of the angle right?"
-        elif not 1 / OFF < share < OFF:
-            yield f"over {windows.horizon * windows.step:g} s the vessel turns {share:.2g} times as far as the ship"
+    return float(np.median(predicted[much] / turned[much])) if much.sum() >= TURNS else None
 
 
-def _steady_speeds(vessel: Vessel, windows: Windows, turned: Array) -> tuple[float, float, float] | None:
-    """Shaft speed [rpm], speed of the log and steady speed of the vessel [m/s] where the log goes straight; or None."""
+def _facts(vessel: Vessel, windows: Windows, share: float | None) -> Iterable[str]:
+    """Sentences on speed against shaft, and turning against helm; share : as of `_turning`."""
+    turned = windows.states["psi"][-1] - windows.columns["psi"]
+    steady = _steady_speeds(vessel, windows, turned)
+    if steady is not None:
+        seen, orders = steady
+        held = steady_speed(vessel, orders)
+        if held > OFF * seen or seen > OFF * held:
+            rpm = max(value for name, value in orders.items() if is_shaft(name)) / RPM
+            unit = _unit(vessel, seen, orders)
+            yield f"at {rpm:.4g} rpm the log runs {seen:.3g} m/s and the vessel {held:.3g} m/s{unit}"
+    backwards = _backwards(windows)
+    yield from (f"{name} is negative where the ship of the log goes ahead: is its sign right?" for name in backwards)
+    if share is None:
+        return
+    if share < 0:
+        angle = any(steers(name) for name in dynamics(vessel).commands)
+        what = "the sign of the angle" if angle else "port and starboard of the shafts"
+        yield f"the vessel turns the other way than the ship of the log: check {what}, and of heading and yaw rate"
+    elif not 1 / OFF < share < OFF:
+        yield f"over {windows.horizon * windows.step:g} s the vessel turns {share:.2g} times as far as the ship"
+
+
+def _unit(vessel: Vessel, seen: float, orders: Mapping[str, float]) -> str:
+    """Question about the unit of the shaft, where another one explains the speed of the log and this one is far off."""
+    for factor in UNITS:
+        other = {name: value * factor if is_shaft(name) else value for name, value in orders.items()}
+        if 1 / ALIKE < steady_speed(vessel, other) / seen < ALIKE:
+            read, right = ("rpm", "rev/s") if factor > 1 else ("rev/s", "rpm")
+            return f" (is the shaft speed in {right}, and the mapping says {read}?)"
+    return ""
+
+
+def _steady_speeds(vessel: Vessel, windows: Windows, turned: Array) -> tuple[float, dict[str, float]] | None:
+    """Speed of the log [m/s], and its commands [SI], where it goes straight at its fastest; or None."""
     commands = dynamics(vessel).commands
     shafts = [name for name in commands if is_shaft(name) and name in windows.planned]
     if not shafts:
@@ -366,7 +391,7 @@ def _steady_speeds(vessel: Vessel, windows: Windows, turned: Array) -> tuple[flo
     if straight.sum() < FEW:
         return None
     held = {name: 0.0 if steers(name) else float(np.median(windows.planned[name][0, straight])) for name in commands}
-    return float(np.median(driving[straight])) / RPM, float(np.median(u[-1, straight])), steady_speed(vessel, held)
+    return float(np.median(u[-1, straight])), held
 
 
 def steady_speed(vessel: Vessel, commands: Mapping[str, float], most: float = 40.0) -> float:

@@ -9,7 +9,7 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.identification.plausible import outside
-from shipid.simulation.manoeuvre import TurningCircle, Zigzag
+from shipid.simulation.manoeuvre import Steps, TurningCircle, Zigzag
 from shipid.simulation.perform import perform
 from shipid.study.first_look import GROUPS, Look, _backwards, _members, _some, _Trial, first_look, steady_speed
 from shipid.vessel.load import Vessel, load_vessel
@@ -58,8 +58,30 @@ def test_a_screw_too_large_is_reported_and_explained(log: Dataset) -> None:
 def test_a_rudder_of_the_other_sign_is_reported(log: Dataset) -> None:
     mirrored = Dataset(log.frame.assign(**{"rudder.delta": -log.frame["rudder.delta"]}), log.metadata)
     view = look(load_vessel(SHIP), mirrored)
-    assert any("turns the other way" in fact for fact in view.facts)
+    assert any("turns the other way" in fact and "the sign of the angle" in fact for fact in view.facts)
+    assert not view.changes, "no factor mends a sign"
     assert view.wrong
+
+
+@pytest.mark.parametrize(("factor", "read", "right"), [(60.0, "rev/s", "rpm"), (1 / 60, "rpm", "rev/s")])
+def test_a_shaft_in_another_unit_is_asked_for(log: Dataset, factor: float, read: str, right: str) -> None:
+    wrong = Dataset(log.frame.assign(**{"propeller.n": factor * log.frame["propeller.n"]}), log.metadata)
+    view = look(load_vessel(SHIP), wrong)
+    assert any(f"is the shaft speed in {right}, and the mapping says {read}?" in fact for fact in view.facts)
+
+
+def test_swapped_sides_of_a_craft_that_steers_by_them_are_reported() -> None:
+    craft = load_vessel("otter")
+    orders = {"port.n_rpm": (300.0, 900.0), "starboard.n_rpm": (300.0, 900.0)}
+    kinds = [Steps(name=f"steps {seed}", duration=90.0, orders=orders, seed=seed) for seed in (1, 2)]
+    frame = perform(craft, kinds, step=0.1, interval=0.5)
+    frame = frame[[name for name in frame if not str(name).startswith("actual.")]]
+    swapped = frame.rename(columns={"port.n": "starboard.n", "starboard.n": "port.n"})
+    logs = [Dataset(one.astype({"run": "str"}), {"clock": "run", "flags": []}) for one in (frame, swapped)]
+    right, wrong = (first_look(craft, one, one.runs, ahead=5.0, step=0.5) for one in logs)
+    assert not right.facts
+    assert any("port and starboard of the shafts" in fact for fact in wrong.facts)
+    assert not wrong.changes
 
 
 def test_a_trial_errs_as_the_vessel_with_its_numbers(log: Dataset) -> None:
