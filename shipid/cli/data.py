@@ -161,6 +161,32 @@ def data_segment(
         answer.say(f"{len(segments)} segments -> {file}", file=file)
 
 
+@app.command("join")
+def data_join(
+    datasets: Annotated[
+        list[Path], typer.Argument(help="datasets of one vessel, two or more", autocompletion=files(".parquet"))
+    ],
+    out: Annotated[Path, typer.Option(help="dataset (Parquet) to write")],
+    as_json: Json = False,
+) -> None:
+    """Join datasets of one vessel, such as those of several days or recorders."""
+    from shipid.data.dataset import read_dataset, write_dataset
+    from shipid.logs.joining import join
+
+    if out.suffix != ".parquet":
+        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
+    given = [file.resolve() for file in [*datasets, out]]
+    twice = next((file for file in [*datasets, out] if given.count(file.resolve()) > 1), None)
+    if twice is not None:
+        raise ShipidError("is named twice: give each dataset once, and another file to write", file=twice)
+    joined, notes = join({file: read_dataset(file) for file in datasets})
+    file = write_dataset(joined, out)
+    with answering(as_json) as answer:
+        answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
+        counts = {"rows": len(joined.frame), "runs": len(joined.runs)}
+        answer.say(f"{counts['rows']} rows in {counts['runs']} runs -> {file}", file=file, **counts)
+
+
 @app.command("check")
 def data_check(
     dataset: Annotated[

@@ -159,7 +159,7 @@ def _alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) 
             kept.pop(file)
         else:
             continue
-        skipped[file.relative_to(folder).as_posix()] = f"{reason}: guess it alone"
+        skipped[file.relative_to(folder).as_posix()] = f"{reason}: guess it alone, then `shipid data join`"
     if not kept:
         raise DataError("no two files have the same columns: guess them one by one", file=folder)
     return kept

@@ -1,0 +1,187 @@
+"""Join datasets of one vessel: recordings of several days, or of recorders that write in several ways."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.data.dataset import Dataset, units_of
+from shipid.errors import DataError
+
+EPOCH = 1e8  # s: a clock that counts from 1970
+PAUSE = 3600.0  # s put between recordings whose clocks overlap but count from no common moment
+
+
+def join(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
+    """Return one dataset with all runs, and notes on what was changed.
+
+    Positions have the origin of the first dataset. Columns that not all have are left out, unless they are commands.
+    Names of runs that clash get the name of their file before them.
+
+    Parameters
+    ----------
+    datasets : file -> dataset, two or more; the names in messages and in the metadata are those of the files.
+
+    Raises
+    ------
+    DataError : the commands or the vessels differ, positions have no common origin, or clocks cannot be one.
+    """
+    if len(datasets) < 2:
+        raise DataError(f"{len(datasets)} dataset: joining needs two or more")
+    _check_alike(datasets)
+    notes: list[str] = []
+    columns = _columns(datasets, notes)
+    names = _names(datasets, notes)
+    clock, delays = _clock(datasets, notes)
+    flags = list(dict.fromkeys(name for one in datasets.values() for name in one.metadata.get("flags", [])))
+    frames = []
+    for file, one in datasets.items():
+        north, east = _moved(datasets, file)
+        frame = one.frame[columns].assign(run=one.frame["run"].map(names[file]), flags=_flags(one, flags))
+        frame = frame.assign(north=frame["north"] + north, east=frame["east"] + east, t=frame["t"] + delays[file])
+        frames.append(frame.astype({"run": "str"}))
+        if np.hypot(north, east) > 0:
+            notes.append(f"{file.name}: positions moved by {north:.1f} m north, {east:.1f} m east, to the first origin")
+    frame = pd.concat(frames, ignore_index=True)
+    return Dataset(frame, _metadata(datasets, names, flags, clock, list(frame.columns))), notes
+
+
+def _check_alike(datasets: Mapping[Path, Dataset]) -> None:
+    (first, wanted), *others = datasets.items()
+    for file, one in others:
+        for here, there, place in ((wanted, one, file), (one, wanted, first)):
+            lacking = [name for name in here.commands if name not in there.commands]
+            if lacking:
+                sentence = f"no command {', '.join(lacking)}, which {first.name if place is file else file.name} has"
+                raise DataError(f"{sentence}: name the columns alike in both mappings, and import again", file=place)
+        vessels = {str(data.metadata["vessel"]) for data in (wanted, one) if data.metadata.get("vessel")}
+        if len(vessels) > 1:
+            raise DataError(f"of another vessel than {first.name}: {' and '.join(sorted(vessels))}", file=file)
+
+
+def _columns(datasets: Mapping[Path, Dataset], notes: list[str]) -> list[str]:
+    """Columns that all have, in the order of the first."""
+    everywhere = set.intersection(*({str(name) for name in one.frame.columns} for one in datasets.values()))
+    if not {"V_w", "beta_w"} <= everywhere:
+        everywhere -= {"V_w", "beta_w"}
+    first = next(iter(datasets.values())).frame.columns
+    known = dict.fromkeys(str(name) for one in datasets.values() for name in one.frame.columns)
+    left = [name for name in known if name not in everywhere]
+    if left:
+        notes.append(f"left out, because not all have them: {', '.join(left)}")
+    return [str(name) for name in first if name in everywhere]
+
+
+def _names(datasets: Mapping[Path, Dataset], notes: list[str]) -> dict[Path, dict[str, str]]:
+    """File -> run -> its name in the whole."""
+    runs = [run for one in datasets.values() for run in one.runs]
+    if len(set(runs)) == len(runs):
+        return {file: {run: run for run in one.runs} for file, one in datasets.items()}
+    stems = [file.stem for file in datasets]
+    if len(set(stems)) < len(stems):
+        stems = [f"{stem} {number}" for number, stem in enumerate(stems, 1)]
+    notes.append(f"runs of one name in several files: names begin with {', '.join(stems)}")
+    named = zip(stems, datasets.items(), strict=True)
+    return {file: {run: f"{stem} {run}" for run in one.runs} for stem, (file, one) in named}
+
+
+def _clock(datasets: Mapping[Path, Dataset], notes: list[str]) -> tuple[str, dict[Path, float]]:
+    """Clock of the whole, and what is added to the times of each file [s]."""
+    delays = dict.fromkeys(datasets, 0.0)
+    if any(one.metadata.get("clock", "shared") == "run" for one in datasets.values()):
+        for file, one in datasets.items():
+            if one.metadata.get("clock", "shared") != "run":
+                _check_apart(file, one)
+        return "run", delays
+    spans = {file: (float(one.frame["t"].min()), float(one.frame["t"].max())) for file, one in datasets.items()}
+    dated = all(begin > EPOCH for begin, _ in spans.values())
+    if dated or not any(a < d and c < b for (a, b), (c, d) in combinations(spans.values(), 2)):
+        return "shared", delays
+    end = -np.inf
+    for file, (begin, last) in spans.items():
+        delays[file] = max(0.0, float(np.ceil(end + PAUSE - begin))) if np.isfinite(end) else 0.0
+        end = last + delays[file]
+    notes.append("clocks overlap and have no date: each recording is put after the one before it")
+    return "shared", delays
+
+
+def _check_apart(file: Path, one: Dataset) -> None:
+    """Raise DataError where two runs of one recording share moments, which clocks of runs do not say."""
+    spans = one.frame.groupby("run", sort=False)["t"].agg(["min", "max"]).sort_values("min")
+    over = np.flatnonzero(spans["max"].cummax().to_numpy()[:-1] >= spans["min"].to_numpy()[1:])
+    if len(over):
+        name = spans.index[over[0] + 1]
+        sentence = f"run {name!r} shares moments with another, and the other datasets have a clock for each run"
+        raise DataError(f"{sentence}: cut the segments of this mapping apart, and import again", file=file)
+
+
+def _moved(datasets: Mapping[Path, Dataset], file: Path) -> tuple[float, float]:
+    """North and east [m] of the origin of a dataset, seen from that of the first."""
+    (first, wanted), *_ = datasets.items()
+    here, there = (one.metadata.get("origin") for one in (datasets[file], wanted))
+    if here == there:
+        return 0.0, 0.0
+    if not here or not there:
+        bare = file if here is None else first
+        sentence = "positions have no origin on the Earth, those of the other datasets have"
+        raise DataError(f"{sentence}: import all with latitude and longitude, or none", file=bare, path="origin")
+    from pymap3d import geodetic2ned
+
+    north, east, _ = geodetic2ned(here["latitude"], here["longitude"], 0.0, there["latitude"], there["longitude"], 0.0)
+    return float(north), float(east)
+
+
+def _flags(one: Dataset, flags: list[str]) -> np.ndarray:
+    """Flags of the rows with the bits of the whole."""
+    before = one.frame["flags"].to_numpy()
+    result = np.zeros_like(before)
+    for bit, name in enumerate(one.metadata.get("flags", [])):
+        result |= ((before >> bit) & 1) << flags.index(name)
+    return result
+
+
+def _metadata(
+    datasets: Mapping[Path, Dataset],
+    names: Mapping[Path, Mapping[str, str]],
+    flags: list[str],
+    clock: str,
+    columns: list[str],
+) -> dict[str, Any]:
+    first = next(iter(datasets.values())).metadata
+    vessel = next((one.metadata["vessel"] for one in datasets.values() if one.metadata.get("vessel")), None)
+    result: dict[str, Any] = {
+        "vessel": vessel,
+        "source": {"joined": ", ".join(f"{file.name} ({one.digest})" for file, one in datasets.items())},
+        "parts": [
+            {
+                "file": file.name,
+                "digest": one.digest,
+                "source": one.metadata.get("source"),
+                "mapping": one.metadata.get("mapping"),
+            }
+            for file, one in datasets.items()
+        ],
+        "rows": sum(int(one.metadata.get("rows", len(one.frame))) for one in datasets.values()),
+        "clock": clock,
+        "units": units_of(columns),
+        "flags": flags,
+        "repairs": [
+            {**row, "note": f"{file.name}: {row.get('note', '')}"}
+            for file, one in datasets.items()
+            for row in one.metadata.get("repairs", [])
+        ],
+    }
+    kinds = {
+        names[file][run]: kind
+        for file, one in datasets.items()
+        for run, kind in one.metadata.get("manoeuvres", {}).items()
+        if run in names[file]
+    }
+    return (
+        result | ({"origin": first["origin"]} if first.get("origin") else {}) | ({"manoeuvres": kinds} if kinds else {})
+    )

@@ -1,0 +1,137 @@
+"""Datasets of one vessel joined: every run keeps its rows, and nothing that must agree is guessed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import BREAK, Dataset, pieces, read_dataset, write_dataset
+from shipid.data.windows import cut_windows
+from shipid.errors import DataError
+from shipid.logs.joining import PAUSE, join
+from tests.cli.running import ended, output_of
+
+ORIGIN = {"latitude": 54.0, "longitude": 10.0}
+
+
+def recording(seed: int, runs: tuple[str, ...] = ("a", "b"), begin: float = 0.0, **metadata: Any) -> Dataset:
+    """Runs of 20 to 40 rows, one after another, with drawn motion; the second flag marks a break."""
+    random, frames, t0 = np.random.default_rng(seed), [], begin
+    for run in runs:
+        count = int(random.integers(20, 40))
+        t = t0 + np.arange(count, dtype=float)
+        names = ("north", "east", "psi", "u", "v", "r", "rudder.delta", "propeller.n")
+        motion = {name: random.normal(size=count).cumsum() / 9 for name in names}
+        frames.append(pd.DataFrame({"run": run, "t": t, **motion, "flags": 2 * (np.arange(count) == 7)}))
+        t0 = t[-1] + 5.0
+    flags = ["despiked", BREAK] if seed % 2 else ["scale", BREAK]
+    whole = pd.concat(frames, ignore_index=True).astype({"run": "str", "flags": "int64"})
+    return Dataset(whole, {"flags": flags, "clock": "shared", "manoeuvres": {runs[0]: "zigzag"}, **metadata})
+
+
+def joined(*parts: Dataset) -> tuple[Dataset, list[str]]:
+    return join({Path(f"day {number}.parquet"): part for number, part in enumerate(parts)})
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_run_keeps_its_rows_its_breaks_and_its_windows(seed: int) -> None:
+    parts = recording(seed), recording(seed + 1, ("c", "d", "e"), begin=1000.0)
+    whole, notes = joined(*parts)
+    assert notes == []
+    assert whole.runs == ["a", "b", "c", "d", "e"]
+    assert whole.metadata["manoeuvres"] == {"a": "zigzag", "c": "zigzag"}
+    for part in parts:
+        again = whole.select(part.runs)
+        pd.testing.assert_frame_equal(again.frame.drop(columns="flags"), part.frame.drop(columns="flags"))
+        assert [len(rows) for _, rows in pieces(again)] == [len(rows) for _, rows in pieces(part)]
+        cut = [cut_windows(one, horizon=5, step=1.0, interval=2.0) for one in (again, part)]
+        np.testing.assert_array_equal(cut[0].future, cut[1].future)
+
+
+def test_joining_is_associative() -> None:
+    a, b, c = recording(1), recording(2, ("c",), begin=500.0), recording(3, ("d", "e"), begin=900.0)
+    left, right = joined(joined(a, b)[0], c)[0], joined(a, joined(b, c)[0])[0]
+    pd.testing.assert_frame_equal(left.frame.drop(columns="flags"), right.frame.drop(columns="flags"))
+    assert [len(rows) for _, rows in pieces(left)] == [len(rows) for _, rows in pieces(right)]
+
+
+def test_runs_of_one_name_are_told_apart_by_their_files() -> None:
+    whole, notes = joined(recording(1), recording(2, begin=900.0))
+    assert whole.runs == ["day 0 a", "day 0 b", "day 1 a", "day 1 b"]
+    assert whole.metadata["manoeuvres"] == {"day 0 a": "zigzag", "day 1 a": "zigzag"}
+    assert "names begin with day 0, day 1" in notes[0]
+    same = join({Path("one/log.parquet"): recording(1), Path("two/log.parquet"): recording(2, begin=900.0)})[0]
+    assert same.runs == ["log 1 a", "log 1 b", "log 2 a", "log 2 b"]
+
+
+def test_positions_have_the_first_origin() -> None:
+    """A minute of latitude is a nautical mile, 1852 m, within half a per cent."""
+    there = recording(2, ("c",), begin=900.0, origin={"latitude": 54.0 + 1 / 60, "longitude": 10.0})
+    whole, notes = joined(recording(1, origin=ORIGIN), there)
+    moved = whole.select(["c"]).frame["north"] - there.frame["north"]
+    np.testing.assert_allclose(moved, 1852.0, rtol=5e-3)
+    np.testing.assert_allclose(whole.select(["c"]).frame["east"], there.frame["east"], atol=1e-6)
+    assert "positions moved by" in notes[0]
+    assert whole.metadata["origin"] == ORIGIN
+    with pytest.raises(DataError, match=r"day 1.parquet: origin: positions have no origin"):
+        joined(recording(1, origin=ORIGIN), recording(2, ("c",), begin=900.0))
+
+
+def test_clocks_that_overlap_follow_each_other_unless_they_have_dates() -> None:
+    whole, notes = joined(recording(1), recording(2, ("c",)))
+    spans = whole.frame.groupby("run", sort=False)["t"].agg(["min", "max"])
+    assert spans.loc["c", "min"] >= spans.loc["b", "max"] + PAUSE
+    assert "clocks overlap" in notes[0]
+    dated = [recording(seed, runs, begin=1.7e9) for seed, runs in ((1, ("a",)), (2, ("c",)))]
+    assert joined(*dated)[1] == [], "two recorders of one hour: windows of one moment stay apart from each other"
+    assert joined(*dated)[0].frame["t"].min() == 1.7e9
+
+
+def test_a_clock_for_each_run_stays_one() -> None:
+    whole, _ = joined(recording(1, clock="run"), recording(2, ("c", "d")))
+    assert whole.metadata["clock"] == "run"
+    over = recording(2, ("c", "d"))
+    over = Dataset(over.frame.assign(t=over.frame.groupby("run").cumcount().astype(float)), over.metadata)
+    with pytest.raises(DataError, match="run 'd' shares moments"):
+        joined(recording(1, clock="run"), over)
+
+
+def test_what_not_all_have_is_left_out_and_said() -> None:
+    windy = recording(2, ("c",), begin=900.0)
+    windy = Dataset(windy.frame.assign(V_w=3.0, beta_w=1.0), windy.metadata)
+    whole, notes = joined(recording(1), windy)
+    assert "V_w" not in whole.frame
+    assert notes == ["left out, because not all have them: V_w, beta_w"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda one: {"frame": one.frame.rename(columns={"rudder.delta": "stern.delta"})}, "no command rudder.delta"),
+        (lambda one: {"frame": one.frame.assign(**{"bow.n": 0.0})}, "day 0.parquet: no command bow.n, which day 1"),
+        (lambda one: {"metadata": one.metadata | {"vessel": "another"}}, "another vessel"),
+    ],
+)
+def test_what_must_agree_is_not_guessed(change: Any, message: str) -> None:
+    other = recording(2, ("c",), begin=900.0)
+    other = Dataset(**{"frame": other.frame, "metadata": other.metadata, **change(other)})
+    with pytest.raises(DataError, match=message):
+        joined(recording(1, vessel="this"), other)
+
+
+def test_the_command_writes_one_dataset_and_none_over_another(tmp_path: Path) -> None:
+    files = [write_dataset(recording(seed), tmp_path / f"{name}.parquet") for seed, name in ((1, "mon"), (2, "tue"))]
+    said = output_of("data", "join", *files, "--out", tmp_path / "both.parquet")
+    assert "note: clocks overlap" in said
+    assert read_dataset(tmp_path / "both.parquet").runs == ["mon a", "mon b", "tue a", "tue b"]
+    before = files[0].read_bytes()
+    for words in ([files[0], files[0], "--out", tmp_path / "x.parquet"], [*files, "--out", files[0]]):
+        status, _, error = ended("data", "join", *words)
+        assert status == 1
+        assert "is named twice" in error
+    assert files[0].read_bytes() == before
+    assert "needs two or more" in ended("data", "join", files[0], "--out", tmp_path / "x.parquet")[2]
