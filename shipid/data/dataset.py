@@ -27,6 +27,7 @@ STANDARD_DEVIATIONS = {"u": "std_u", "v": "std_v", "r": "std_r"}
 BREAK = "break"
 """Name of the flag on the first row after a break: nothing connects it to the row before."""
 
+DATED = 1e8  # s: a clock that is farther is one of dates, seconds since 1970
 MOST_FLAGS = 62  # bits of an integer
 _KEY = b"shipid"
 

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.data.dataset import Dataset, units_of
+from shipid.data.dataset import DATED, Dataset, units_of
 from shipid.errors import DataError
 
-EPOCH = 1e8  # s: a clock that counts from 1970
 PAUSE = 3600.0  # s put between recordings whose clocks overlap but count from no common moment
 
 
@@ -99,7 +98,7 @@ def _clock(datasets: Mapping[Path, Dataset], notes: list[str]) -> tuple[str, dic
                 _check_apart(file, one)
         return "run", delays
     spans = {file: (float(one.frame["t"].min()), float(one.frame["t"].max())) for file, one in datasets.items()}
-    dated = all(begin > EPOCH for begin, _ in spans.values())
+    dated = all(begin > DATED for begin, _ in spans.values())
     if dated or not any(a < d and c < b for (a, b), (c, d) in combinations(spans.values(), 2)):
         return "shared", delays
     end = -np.inf

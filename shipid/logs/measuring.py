@@ -8,12 +8,15 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from shipid.data.dataset import Dataset, pieces
+from shipid.data.dataset import DATED, Dataset, pieces
 from shipid.errors import DataError, choices
 from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.rows import criterion_rows, measure_rows
+from shipid.physics.signals import is_command, steers
+
+NO_HELM = "no angle steers: zigzags and turning circles are measured by the helm, and the shafts are not reversed"
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +33,8 @@ class Measured:
 
 def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | None = None) -> Measured:
     """Measure every run; a run with breaks is measured in its unbroken pieces, named `run/1`, `run/2`, ...
+
+    Instants are those of the log; where its clock has dates, they count from the begin of the piece.
 
     Parameters
     ----------
@@ -49,10 +54,13 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
         if len(rows) < 2:
             left[name] = "it has one row"
             continue
-        record = record_of({str(column): rows[column].to_numpy() for column in rows if column != "run"})
+        columns = {str(column): rows[column].to_numpy() for column in rows if column != "run"}
+        if columns["t"][0] > DATED:
+            columns["t"] = columns["t"] - columns["t"][0]
+        record = record_of(columns)
         kinds, why = kinds_of(record) if kind is None else ((kind,), "")
         if not kinds:
-            left[name] = why
+            left[name] = why if any(is_command(column) and steers(column) for column in columns) else NO_HELM
         for seen in kinds:
             result = MEASURES[seen](record)
             measures += [{"run": name, "kind": seen, **row} for row in measure_rows(result, length)]

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.causal import causal_columns
-from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
+from shipid.data.dataset import DATED, Dataset, clock_slack, pieces, read_dataset, sample
 from shipid.data.windows import Instants, from_frame, past_of, to_frame, travelled
 from shipid.errors import DataError
 from shipid.files import check_table, write_table
@@ -26,7 +26,6 @@ from shipid.study.apply import Band, along_run
 from shipid.study.prepare import states_along
 
 Array = np.ndarray
-DATED = 1e8  # s: a clock that is farther is one of dates, seconds since 1970
 TRACK = ["run", "t", "north", "east"]
 AHEAD = 5  # moments of the horizon that the summary shows
 STANDARD = (0.5, 0.8, 0.9, 0.95)  # levels that the summary judges beside the one that was asked for

@@ -8,7 +8,7 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.logs.measuring import measure_dataset
+from shipid.logs.measuring import NO_HELM, measure_dataset
 from shipid.measures import zigzag
 from tests.measures.made_records import RECORDS, every
 
@@ -51,3 +51,18 @@ def test_a_kind_may_be_declared(dataset: Dataset) -> None:
         measure_dataset(dataset, "zigzap")
     with pytest.raises(DataError, match="--length"):
         measure_dataset(dataset, length=0.0)
+
+
+def test_measures_do_not_depend_on_the_year(dataset: Dataset) -> None:
+    """A clock with dates counts from 1970; an execute at 1748938848.8 s says nothing."""
+    dated = Dataset(dataset.frame.assign(t=dataset.frame["t"] + 2.0**31), dataset.metadata)
+    here, there = (measure_dataset(one, length=50.0) for one in (dataset, dated))
+    late = here.measures["run"].eq("T/2") & here.measures["measure"].eq("execute")
+    pd.testing.assert_frame_equal(here.measures[~late], there.measures[~late])
+    pd.testing.assert_frame_equal(here.criteria, there.criteria)
+
+
+def test_a_log_without_a_helm_says_what_is_missing() -> None:
+    frame = rows_of("zigzag", "Z").rename(columns={"rudder.delta": "port.n"})
+    log = Dataset(frame.assign(**{"port.n": 3.0}), {"clock": "run", "flags": ["break"]})
+    assert measure_dataset(log).left == {"Z": NO_HELM}
