@@ -23,6 +23,7 @@ from shipid.data.dataset import (
     required,
     sample,
     units_of,
+    wraps,
 )
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
@@ -33,6 +34,7 @@ from shipid.physics.signals import is_command, is_output
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 
+JUMP = 1.75 * np.pi  # rad: of an angle from row to row, beyond which it counts from 0 again
 Records = list[dict[str, Any]]
 Begins = list[tuple[float, str]]
 Channel = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -160,7 +162,7 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
     others = [repair for repair in mapping.repair if not isinstance(repair, WrapInterpolation)]
     rows, records = apply_repairs(rows, wrapping, off, file)
-    rows = _unwrapped(rows, mapping.columns)
+    rows = _unwrapped(rows, mapping.columns, file)
     rows, origin = _projected(rows, mapping) if "latitude" in rows else (rows, None)
     rows, gaps = _close_gaps(rows, mapping.clock.max_gap, file)
     rows = _in_body(rows, mapping.columns)
@@ -482,10 +484,12 @@ def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str
     return numbers
 
 
-def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:
-    """Unwrap angles, and turn winds "from" into "towards"."""
+def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column], file: Path) -> pd.DataFrame:
+    """Unwrap angles, and turn winds "from" into "towards"; DataError for a jump of one that does not wrap."""
     turned: dict[str, NDArray[np.float64]] = {}
     for name, column in columns.items():
+        if (wraps(name) or name == "course") and not column.wrap:
+            _check_whole(rows, name, column.source, file)
         if column.direction != "from" and not column.wrap:
             continue
         values = rows[name].to_numpy().copy()
@@ -501,6 +505,16 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:
                 values -= 2 * np.pi * np.round(np.median(values[known]) / (2 * np.pi))
         turned[name] = values
     return rows.assign(**turned)
+
+
+def _check_whole(rows: pd.DataFrame, name: str, source: str, file: Path) -> None:
+    """Raise DataError where an angle jumps by nearly a whole turn from row to row: the mean of 359 and 1 deg is 0."""
+    known = rows[["t", name]].dropna()
+    places = np.flatnonzero(np.abs(np.diff(known[name].to_numpy())) > JUMP)
+    if len(places):
+        times = "once" if len(places) == 1 else f"{len(places)} times, first"
+        sentence = f"{source!r} jumps by a whole turn, {times} at t = {known['t'].iloc[places[0] + 1]:.10g} s"
+        raise DataError(f"{sentence}: write wrap = true", file=file, path=f"columns.{name}")
 
 
 def _unwrap(values: NDArray[np.float64]) -> None:

@@ -129,6 +129,16 @@ def test_units_wrapping_and_names(plain_mapping: Write, tmp_path: Path) -> None:
     assert dataset.metadata["repairs"] == []
 
 
+def test_a_heading_that_counts_from_0_again_is_refused_without_wrap(plain_mapping: Write, tmp_path: Path) -> None:
+    """The mean of 359 and 1 deg would be 180: the ship would look back between two rows."""
+    motion = turning(T)
+    plain = plain_mapping("", ("wrap = true", "wrap = false"))
+    with pytest.raises(DataError, match=r"columns.psi: .* jumps by a whole turn, once at t = .* write wrap = true"):
+        imported(motion, plain, tmp_path)
+    straight = motion.assign(psi=1.0 + 0.1 * np.sin(motion["t"]))
+    np.testing.assert_allclose(imported(straight, plain, tmp_path).frame["psi"], straight["psi"], atol=1e-9)
+
+
 def test_segments_may_overlap(plain_mapping: Write, tmp_path: Path) -> None:
     more = '\n[[segment]]\nrun = "a"\nstart = 10\nend = 20\n[[segment]]\nrun = "b"\nstart = 15\nend = 30\n'
     frame = imported(turning(T), plain_mapping(more), tmp_path).frame
