@@ -36,15 +36,23 @@ def bundled(kind: str) -> dict[str, Path]:
     return {file.stem: file for file in sorted(bundled_folder(kind).glob("*.toml"), key=lambda file: file.stem)}
 
 
-def find(name: str, kind: str, relative_to: Path | None = None) -> Path:
-    """File of a document: a bundled name, or a path if it contains a slash or ends in `.toml`.
+def find(name: str | Path, kind: str, relative_to: Path | None = None) -> Path:
+    """File of a document: a bundled name, or a path if it contains a slash, ends in `.toml` or is a `Path`.
 
     A relative path is tried from the folder of the document that names it, then from the working folder.
     """
+    if not isinstance(name, str | Path):
+        raise DocumentError(f"{name!r} is no name of a document, nor a path of one: give a text or a Path")
+    if isinstance(name, Path):
+        name = str(name) if "/" in str(name) or "\\" in str(name) or name.suffix == ".toml" else f"./{name}"
+    if not name:
+        raise DocumentError("an empty name: give a bundled name, or the path of a document")
     if "/" in name or "\\" in name or name.endswith(".toml"):
         for folder in filter(None, (relative_to, Path())):
             if (folder / name).is_file():
                 return folder / name
+            if (folder / name).is_dir():
+                raise DocumentError("is a folder: name a document in it", file=name)
         raise DocumentError("no such file", file=name)
     available = bundled(kind)
     if name not in available:
@@ -64,7 +72,7 @@ def read(file: Path | str) -> Document:
             raise DocumentError("cannot be read: it is no file", file=file)
         if Path(file).stat().st_size > LARGEST:
             raise DocumentError(f"is larger than {LARGEST / 1e6:g} MB, the limit of a document", file=file)
-        text = Path(file).read_bytes().decode("utf-8")
+        text = Path(file).read_bytes().decode("utf-8").removeprefix("\ufeff")  # the mark that some editors write
     except UnicodeDecodeError as error:
         raise DocumentError(f"not UTF-8 text (byte {error.start}): save it as UTF-8", file=file) from None
     except OSError as error:

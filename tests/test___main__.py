@@ -23,3 +23,15 @@ def test_a_mistake_is_one_line_and_status_1() -> None:
     assert result.stderr.startswith("error: ")
     assert "did you mean 'mariner'?" in result.stderr
     assert len(result.stderr.splitlines()) == 1
+
+
+def test_ctrl_c_during_the_imports_ends_quietly() -> None:
+    code = (
+        "import sys, builtins; real = builtins.__import__\n"
+        "def stop(name, *rest):\n"
+        "    if name == 'shipid.cli': raise KeyboardInterrupt\n"
+        "    return real(name, *rest)\n"
+        "import shipid.__main__ as m; builtins.__import__ = stop; m.run()"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert (result.returncode, result.stderr) == (130, "interrupted\n")

@@ -188,3 +188,22 @@ def test_folder_and_file_are_synced_before_and_after_the_change(
     monkeypatch.setattr(files.os, "replace", lambda one, other: (calls.append("replace"), replace(one, other)))
     files.write_text(tmp_path / "new" / "a.txt", "x")
     assert calls == [f"sync {tmp_path.name}", "sync a.txt", "replace", "sync new"]
+
+
+def test_a_link_stays_and_leads_to_the_new_file(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    link, real = tmp_path / "link.txt", tmp_path / "there" / "real.txt"
+    link.symlink_to(real)
+    files.write_text(link, "new")
+    assert link.is_symlink()
+    assert real.read_text() == "new"
+
+
+def test_devices_pipes_and_circles_are_refused(tmp_path: Path) -> None:
+    """As root, a file would replace a device for every program of the machine."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "circle").symlink_to(tmp_path / "circle")
+    for place, why in ((tmp_path / "pipe", "a device or a pipe"), (tmp_path / "circle", "leads to itself")):
+        with pytest.raises(OSError, match=why):
+            files.write_text(place, "new")
+        assert not place.is_file()

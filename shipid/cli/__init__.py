@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from shipid.cli import data, export, identify, predict, replay, schema, simulation, study, vessel
+from shipid.cli.outputs import Guarded
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError
 
@@ -70,8 +71,10 @@ def _of(names: Collection[str], *, hollow: bool = False) -> typer.Typer:
     app.callback(invoke_without_command=True)(_before)
     for name, command in COMMANDS.items():
         if name in names:
-            app.command(name)(command)
+            app.command(name, cls=Guarded)(command)
     for name, group in GROUPS.items():
+        for registered in group.registered_commands:
+            registered.cls = Guarded
         if name in names:
             app.add_typer(typer.Typer(help=group.info.help) if hollow else group, name=name)
     return app

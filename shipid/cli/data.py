@@ -10,6 +10,7 @@ import typer
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import beginning, bundled_or_file, files
 from shipid.cli.options import MappingName
+from shipid.cli.outputs import check_output
 from shipid.cli.terminal import criterion_table, measure_table, reading, table
 from shipid.errors import ShipidError
 
@@ -84,9 +85,13 @@ def data_import(
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
     declared = read_mapping(mapping)
     source = log or fetch(mapping)
+    out = out or Path(f"{Path(mapping).stem}.parquet")
+    check_output(out, [source, Path(mapping)], "--out")
+    if source.is_dir():
+        check_output(out, source.glob("*"), "--out")
     with reading(source) as progress:
         dataset = import_log(declared, source, without=without or (), progress=progress)
-    file = write_dataset(dataset, out or Path(f"{Path(mapping).stem}.parquet"))
+    file = write_dataset(dataset, out)
     repairs = dataset.metadata.get("repairs", [])
     with answering(as_json) as answer:
         rows = ((r["kind"], r["column"], str(r["count"]), r["note"]) for r in repairs)
@@ -175,10 +180,9 @@ def data_join(
 
     if out.suffix != ".parquet":
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
-    given = [file.resolve() for file in [*datasets, out]]
-    twice = next((file for file in [*datasets, out] if given.count(file.resolve()) > 1), None)
+    twice = next((file for file in datasets if [one.resolve() for one in datasets].count(file.resolve()) > 1), None)
     if twice is not None:
-        raise ShipidError("is named twice: give each dataset once, and another file to write", file=twice)
+        raise ShipidError("is named twice: name each dataset once", file=twice)
     joined, notes = join({file: read_dataset(file) for file in datasets})
     file = write_dataset(joined, out)
     with answering(as_json) as answer:

@@ -47,7 +47,7 @@ def replay(
         check_table(csv)
     ship, log = load_vessel(vessel), read_dataset(dataset)
     chosen, _ = pick_runs(log, runs or ())
-    settings = Identify(parameters=[next(iter(ship.parameters))], step=step)
+    settings = Identify(parameters=[next(iter(ship.parameters))], step=step, horizon=0.0)
     replayed = free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
     rows = [
         [row["run"], *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"]))]

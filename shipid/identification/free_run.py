@@ -22,6 +22,7 @@ from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 CHANNELS = ("north", "east", "psi", "u", "v", "r")
+MOST_STEPS = 1e7  # of all runs together
 MEASURED, ALL = "measured", "all"
 """The log among the models of a series, and all runs together among the runs of a table of errors."""
 
@@ -55,6 +56,12 @@ def free_runs(
     a new run. Raises DataError for a length shorter than two steps, and what `residuals.build` raises.
     """
     check_length(settings, length)
+    spans = dataset.select(runs).frame.groupby("run")["t"]
+    steps = float((spans.max() - spans.min()).sum()) / settings.step
+    if steps > MOST_STEPS:
+        raise DataError(
+            f"{settings.step:g} s makes {steps:.2g} steps of these runs: at most {MOST_STEPS:.0e}", path="step"
+        )
     overrides = {key: value for key, value in documents.leaves(settings.runs) if _belongs(key, runs)}
     first = next(iter(vessels.values()))
     asked = {"horizon": length, "nuisance": [], "runs": overrides}

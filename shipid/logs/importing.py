@@ -28,7 +28,7 @@ from shipid.data.dataset import (
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Parts, Segment, Source, read_mapping, to_si
-from shipid.logs.readers import Format, Progress, TextFormat, dated, read_table, require_file, seconds
+from shipid.logs.readers import Format, Progress, TextFormat, dated, moment_of, read_table, require_file, seconds
 from shipid.logs.repairs import FLAGS, REPAIRS, Latency, WrapInterpolation, apply_repairs, interpolate_at
 from shipid.physics.signals import is_command, is_output
 
@@ -324,9 +324,11 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
         if not np.isfinite(t[row]):
             what = "no time here: remove the row"
         elif t[row] == t[row - 1]:
-            what = f"time {t[row]:g} s appears twice: remove one of the rows, or set [clock] repeated = 'drop'"
+            what = (
+                f"the time {moment_of(t[row])} appears twice: remove one of the rows, or set [clock] repeated = 'drop'"
+            )
         else:
-            what = f"time goes back from {t[row - 1]:g} to {t[row]:g} s: sort or split the log"
+            what = f"time goes back from {moment_of(t[row - 1])} to {moment_of(t[row])}: sort or split the log"
         raise DataError(what, file=file, path=f"row {row + 1}")
     return t
 
@@ -649,7 +651,8 @@ def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Pat
         start, end = segment.start * unit, segment.end * unit
         inside = (t >= start - slack) & (t <= end + slack)
         if start < t[0] - step - slack or end > t[-1] + step + slack or inside.sum() < 2:
-            message = f"run {segment.run!r}, {start:g} to {end:g} s, is not in the log, {t[0]:g} to {t[-1]:g} s"
+            asked, there = (f"{moment_of(a)} to {moment_of(b)}" for a, b in ((start, end), (t[0], t[-1])))
+            message = f"run {segment.run!r}, {asked}, is not in the log, which has {there}"
             raise DataError(message, file=file, path=f"segment.{index}")
         part = rows if inside.all() else rows.loc[inside].reset_index(drop=True)
         runs.append(_named(part, segment.run))

@@ -22,7 +22,7 @@ import pyarrow
 import pyarrow.parquet
 from pydantic import Field, field_validator
 
-from shipid.data.dataset import Array
+from shipid.data.dataset import DATED, Array
 from shipid.errors import DataError
 from shipid.logs.repairs import Strict
 from shipid.units import KNOT
@@ -139,6 +139,8 @@ def seconds(dates: pd.Series[Any]) -> Array:
     Read are ISO 8601, dates of pandas, day.month.year and year/month/day with a time; a time of day goes on after
     midnight. NaN where there is none.
     """
+    if pd.api.types.is_timedelta64_dtype(dates.dtype):
+        return np.array(dates.dt.total_seconds(), dtype=np.float64)
     if pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object:
         texts = dates.dropna().astype(str)
         if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
@@ -154,6 +156,11 @@ def seconds(dates: pd.Series[Any]) -> Array:
 def date_of(moment: float) -> str:
     """A moment in seconds since 1970 as date and time in UTC, the reverse of `seconds`."""
     return datetime.fromtimestamp(moment, UTC).strftime("%Y-%m-%d %H:%M:%S")
+
+
+def moment_of(t: float) -> str:
+    """A time [s] of a log in words: a date where it counts from 1970, else seconds."""
+    return f"{date_of(t)} UTC" if t > DATED else f"{t:.10g} s"
 
 
 def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
@@ -400,7 +407,9 @@ def _decimal(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
 
 def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:
     try:
-        table: pd.DataFrame = pyarrow.parquet.read_table(file).to_pandas(ignore_metadata=True)  # an index is a column
+        stored = pyarrow.parquet.read_table(file)
+        nested = [field.name for field in stored.schema if pyarrow.types.is_nested(field.type)]
+        table: pd.DataFrame = stored.drop_columns(nested).to_pandas(ignore_metadata=True)  # an index is a column
         return table
     except (pyarrow.ArrowException, ValueError):
         raise DataError("not a Parquet file, or damaged: set [format] kind", file=file, path="format.kind") from None

@@ -26,6 +26,8 @@ from shipid.vessel.load import Vessel
 
 FROUDE, GRAVITY = 0.2, 9.81  # default speed: U = 0.2 sqrt(g L)
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
+LEAST_STEPS, MOST_STEPS = 10, 1e7  # steps for a ship length, and of a manoeuvre
+MOST_HELM, MOST_HEADING = 90.0, 180.0  # deg; the first angle of a reverse spiral is a rate in deg/s
 HALVINGS, MOST_RPM = 60, 6000.0
 APPROACHES = ("steady", "helmsman", "rest")
 ROUND = ("turning", "pull-out", "spiral", "reverse-spiral")
@@ -89,11 +91,15 @@ def standard(
         raise ShipidError(f"{name} takes {most or 'no'} {'angle' if most == 1 else 'angles'}", path="ANGLES")
     if any(angle <= 0 for angle in angles):
         raise ShipidError("angles are positive: --side gives the direction of the first turn", path="ANGLES")
+    for place, angle in enumerate(angles):
+        greatest = MOST_HEADING if place else MOST_HELM
+        if not angle <= greatest:
+            raise ShipidError(f"{angle:g}: give up to {greatest:g}", path="ANGLES")
     if approach not in APPROACHES:
         raise ShipidError(f"{approach!r} is no approach: {choices(approach, APPROACHES)}", path="--approach")
     for option, value in (("--duration", duration), ("--step", step)):
-        if value is not None and not value > 0:
-            raise ShipidError(f"{value:g} s must be positive", path=option)
+        if value is not None and not 0 < value < np.inf:
+            raise ShipidError(f"{value:g} s must be positive and finite", path=option)
     length = length_of(vessel)
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
@@ -104,7 +110,14 @@ def standard(
     lead = float(np.ceil(LEAD * passing / interval) * interval)
     course = 0.0 if name in ROUND else 90.0  # straight tracks are drawn from left to right
     how = {"n_rpm": n_rpm, "execute_at": lead, "course_deg": course, "approach": approach}
+    if step is not None and step > passing / LEAST_STEPS:
+        words = f"{step:g} s is too long for this ship, which runs a length in {passing:.3g} s"
+        raise ShipidError(f"{words}: give {passing / LEAST_STEPS:.3g} s or less", path="--step")
     manoeuvre = build(angles, side, duration, passing, how)
+    steps = manoeuvre.length / interval * STEPS
+    if steps > MOST_STEPS:
+        option = "--duration" if step is None else "--step"
+        raise ShipidError(f"{steps:.2g} steps of {interval / STEPS:g} s: at most {MOST_STEPS:.0e}", path=option)
     return Standard(name, _title(name, manoeuvre), manoeuvre, float(asked), interval / STEPS, interval)
 
 
@@ -130,7 +143,7 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     ------
     ShipidError : the speed is not positive, or no shaft speed up to 6000 rpm gives it.
     """
-    if speed <= 0:
+    if not 0 < speed < np.inf:
         raise ShipidError(f"{speed:g} m/s: the speed of the approach must be positive", path="--speed")
 
     def surplus(n: float) -> float:

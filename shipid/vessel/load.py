@@ -127,7 +127,7 @@ class Vessel:
         return check_vessel(document, self.file)
 
 
-def load_vessel(name: str, relative_to: Path | None = None) -> Vessel:
+def load_vessel(name: str | Path, relative_to: Path | None = None) -> Vessel:
     """Read a bundled vessel by name, or a vessel or patch document by path.
 
     A patch has `base` (a vessel), optionally `base_digest`, and `[set]` with dotted paths; see `shipid.vessel.perturb`.

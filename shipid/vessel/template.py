@@ -7,6 +7,7 @@ square root of the scale (Froude). The result is a normal vessel document: bette
 
 from __future__ import annotations
 
+import json
 import math
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
@@ -107,7 +108,7 @@ class Particulars:
     @property
     def units(self) -> int:
         """Number of screws."""
-        return self.shafts or (1 if self.propulsor == "propeller-rudder" else 2)
+        return (1 if self.propulsor == "propeller-rudder" else 2) if self.shafts is None else self.shafts
 
     @property
     def reduction(self) -> float:
@@ -628,7 +629,8 @@ def _block(path: str, values: Values, **words: str) -> Iterator[str]:
 
 
 def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    """A string of TOML: that of JSON, but for DEL."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _accelerations(vessel: Vessel) -> Callable[[tuple[float, float, float], float], np.ndarray]:

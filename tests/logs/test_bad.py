@@ -16,8 +16,8 @@ LOGS = {  # file -> (place, remedy)
     "column_twice.csv": ("columns.u.from", "appears twice in the log: rename one"),
     "text_in_number_column.csv": ("row 8", "'stopped' is no number (column 'u'; 1 such rows): correct it"),
     "nan_stretch.csv": ("row 11, clock.max_gap", "set max_gap to interpolate"),
-    "time_backwards.csv": ("row 12", "time goes back from 5.5 to 5 s: sort or split"),
-    "time_twice.csv": ("row 11", "time 4.5 s appears twice: remove one"),
+    "time_backwards.csv": ("row 12", "time goes back from 5.5 s to 5 s: sort or split"),
+    "time_twice.csv": ("row 11", "the time 4.5 s appears twice: remove one"),
     "time_missing.csv": ("row 11", "no time here: remove the row"),
     "semicolons.csv": ("clock.from", "is the separator right?"),
     "decimal_comma.csv": ("format.separator", "check separator and skip_rows"),
@@ -60,7 +60,7 @@ MAPPINGS = {
 
 AGAINST_LOG = {
     "not_in_log": ("columns.propeller.n.from", "did you mean 'rpm'?"),
-    "segment_outside_log": ("segment.1", "is not in the log, 0 to 20 s"),
+    "segment_outside_log": ("segment.1", "is not in the log, which has 0 s to 20 s"),
     "wrong_names": ("format.names", "2 names for the 8 columns"),
     "other_file": ("source.sha256", "fetch that file"),
     "skips_everything": ("format.skip_rows", "no line is left after 100 skipped lines"),

@@ -333,7 +333,7 @@ def test_rows_that_repeat_a_time_are_left_out_where_the_mapping_asks(plain_mappi
     motion = turning(T)
     twice = motion.iloc[np.sort(np.append(np.arange(len(T)), [7, 50, 51]))]
     log = as_log(twice, tmp_path / "log.csv")
-    with pytest.raises(DataError, match=r"row 9: time 3\.5 s appears twice: .* repeated = 'drop'"):
+    with pytest.raises(DataError, match=r"row 9: the time 3\.5 s appears twice: .* repeated = 'drop'"):
         import_log(read_mapping(plain_mapping()), log)
     dataset = import_log(read_mapping(plain_mapping("", ('from = "time"', 'from = "time"\nrepeated = "drop"'))), log)
     assert counts(dataset)["repeated"] == 3

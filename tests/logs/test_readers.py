@@ -12,7 +12,7 @@ from scipy.io import savemat
 from shipid.errors import DataError, DocumentError
 from shipid.logs import readers
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.readers import WIDEST, TextFormat, date_of, read_table, require_file, seconds, widest
+from shipid.logs.readers import WIDEST, ParquetFormat, TextFormat, date_of, read_table, require_file, seconds, widest
 from tests.logs.conftest import PLAIN, as_log, turning
 
 Write = Callable[..., Path]
@@ -352,3 +352,14 @@ def test_a_line_of_very_many_cells_is_refused(separator: str, cells: int, refuse
 def test_a_moment_and_its_date() -> None:
     text = "2022-11-30 09:15:02"
     assert date_of(float(seconds(pd.Series([text]))[0])) == text
+
+
+def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: Path) -> None:
+    """A list in every row is no column of a log; a clock that counts from the begin is one."""
+    steps = np.arange(40) * 0.5
+    plain = {"t": pd.to_timedelta(steps, unit="s"), "u": np.sin(steps)}
+    frame = pd.DataFrame({**plain, "cells": [[1.0, 2.0]] * 40, "box": [{"a": 1}] * 40})
+    frame.to_parquet(tmp_path / "log.parquet")
+    table = read_table(tmp_path / "log.parquet", ParquetFormat(kind="parquet"), "t")
+    assert list(table.columns) == ["t", "u"]
+    np.testing.assert_allclose(seconds(table["t"]), steps)

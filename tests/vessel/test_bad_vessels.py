@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from shipid.document import bundled
 from shipid.errors import DocumentError
 from shipid.vessel.load import load_vessel
 
@@ -109,13 +110,13 @@ def test_broken(name: str) -> None:
 
 
 def test_missing_file_and_folder(tmp_path: Path) -> None:
-    for name in (str(tmp_path / "gone.toml"), str(tmp_path)):
-        with pytest.raises(DocumentError, match="no such file") as caught:
+    for name, why in ((str(tmp_path / "gone.toml"), "no such file"), (str(tmp_path), "is a folder")):
+        with pytest.raises(DocumentError, match=why) as caught:
             load_vessel(name)
         assert name in str(caught.value)
     folder = tmp_path / "folder.toml"
     folder.mkdir()
-    with pytest.raises(DocumentError, match="no such file"):
+    with pytest.raises(DocumentError, match="is a folder"):
         load_vessel(str(folder))
 
 
@@ -140,3 +141,18 @@ def test_table_that_is_switched_off_is_read_all_the_same(tmp_path: Path) -> None
     document.write_text(text.replace("tables/gone.csv", (FOLDER / "tables" / "whole.csv").as_posix()) + "off = true\n")
     calm = load_vessel(str(document))
     assert calm.document["waves"]["first_order"]["table"]["omega"][-1] == 2.0
+
+
+def test_a_path_is_a_path_whatever_its_type(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A `Path` never is the name of a bundled vessel; a text that is neither is refused in words."""
+    monkeypatch.chdir(tmp_path)
+    Path("ship.toml").write_bytes(b"\xef\xbb\xbf" + (bundled("models")["mariner"]).read_bytes())  # as some editors do
+    by_path, by_text = load_vessel(Path("ship.toml")), load_vessel("./ship.toml")
+    assert by_path.digest == by_text.digest == load_vessel("mariner").digest
+    with pytest.raises(DocumentError, match="no such file"):
+        load_vessel(Path("mariner"))
+    for wrong in (None, 3, []):
+        with pytest.raises(DocumentError, match="is no name of a document"):
+            load_vessel(wrong)  # type: ignore[arg-type]
+    with pytest.raises(DocumentError, match="an empty name"):
+        load_vessel("")

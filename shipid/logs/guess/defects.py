@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from shipid.data.dataset import Array
+from shipid.data.dataset import DATED, Array
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.mapping import to_si
+from shipid.logs.readers import date_of
 from shipid.physics.signals import is_shaft
 
 VISITS = 6  # to its largest value, before a signal counts as clipped
@@ -140,14 +141,19 @@ def _jumps(state: State, path: Complex) -> None:
         sentence = f"the position jumps {count} of the files and does not come back: `data check` shows where"
         state.find("position jumps", (), 0.9, sentence)
     elif stay:
-        words = ", ".join(f"t = {start / unit:.6g} to {end / unit:.6g} ({far:.0f} m)" for start, end, far in stay[:6])
+        words = ", ".join(f"{_when(state, start)} to {_when(state, end)} ({far:.0f} m)" for start, end, far in stay[:6])
         repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
         state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
     if spikes:
-        words = ", ".join(f"{(start + end) / 2 / unit:.6g}" for start, end, _ in spikes[:6])
-        words = f"at {len(spikes)} place{'s' * (len(spikes) > 1)} of the files" if state.joined else f"near t = {words}"
+        words = ", ".join(_when(state, (start + end) / 2) for start, end, _ in spikes[:6])
+        words = f"at {len(spikes)} place{'s' * (len(spikes) > 1)} of the files" if state.joined else f"near {words}"
         repair = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
         state.find("position spikes", (), 0.8, f"the position leaves and comes back {words}", repair)
+
+
+def _when(state: State, t: float) -> str:
+    """A time [s] as the clock of the log has it: a date, or a number."""
+    return date_of(t) if state.clock_unit == "date" and t > DATED else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
 
 
 def _heading_offset(state: State) -> None:

@@ -58,7 +58,7 @@ DEFECTS: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
     "lever arm": (lambda frame: moved(frame, 9.0, -3.0), r"\+(8\.9|9\.\d) m forward and -(2\.9|3\.\d) m to starboard"),
     "position jumps": (
         lambda frame: frame.assign(E=frame["E"] + np.where(frame["time"] >= 300.0, 80.0, 0.0)),
-        r"does not come back: t = 29\d\S* to 30\d\S* \((79|80|81) m\)",
+        r"does not come back: t = 29\d\S* to t = 30\d\S* \((79|80|81) m\)",
     ),
     "position spikes": (
         lambda frame: frame.assign(N=frame["N"] + np.where(frame["time"] == 300.0, 90.0, 0.0)),

@@ -1,0 +1,55 @@
+"""What a command writes must not be what it reads: checked for every command, before it begins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import typer.core
+
+from shipid.errors import ShipidError
+
+OUTPUTS = ("out", "csv", "html", "log")
+"""Names of options that say what to write."""
+
+
+class Guarded(typer.core.TyperCommand):
+    """A command that is refused where one file is named to be read and to be written, or to be written twice."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; ShipidError for a file named twice, or for a device or pipe as an output."""
+        options = {one.name for one in self.params if one.param_type_name == "option"}
+        written = {name: value for name, value in ctx.params.items() if name in OUTPUTS and name in options and value}
+        read = [one for name, value in ctx.params.items() if name not in written for one in _files(value)]
+        for name, value in written.items():
+            check_output(Path(value), read, f"--{name}")
+            read.append(Path(value))
+        return super().invoke(ctx)
+
+
+def check_output(file: Path, read: Iterable[Path], option: str) -> None:
+    """Raise ShipidError where a file to write is one of those that are read, or no file."""
+    if any(_same(file, one) for one in read):
+        message = "is named twice, and would be written over: name another file to write"
+        raise ShipidError(message, file=file, path=option)
+    if file.exists() and not (file.is_file() or file.is_dir()):
+        raise ShipidError("is a device or a pipe: name a file to write", file=file, path=option)
+
+
+def _files(value: Any) -> Iterator[Path]:
+    """Files that exist among the values of a parameter."""
+    for one in value if isinstance(value, list | tuple) else [value]:
+        if isinstance(one, Path | str) and one and len(str(one)) < 4096 and "\0" not in str(one):
+            try:
+                if Path(one).is_file():
+                    yield Path(one)
+            except OSError:  # no name of a file
+                continue
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return one.resolve() == other.resolve() or one.samefile(other)
+    except (OSError, RuntimeError):  # not there, or a link to itself
+        return False

@@ -1,0 +1,108 @@
+"""No command writes over what it reads, whatever it is called by; and nothing is lost by the attempt."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+import typer.main
+
+from shipid.cli import app
+from shipid.cli.outputs import OUTPUTS, Guarded
+from shipid.document import bundled
+from tests.cli.running import ended, output_of
+
+SHIP = "otter"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a vessel and a dataset."""
+    folder = tmp_path_factory.mktemp("made")
+    shutil.copy(bundled("models")["mariner"], folder / "ship.toml")
+    words = ["zigzag", "10", "10", "--out", folder / "page.html", "--log", folder / "log.parquet"]
+    output_of("manoeuvre", folder / "ship.toml", *words)
+    return folder
+
+
+@pytest.fixture
+def there(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(shutil.copytree(made, tmp_path / "there"))
+    Path("link.html").symlink_to("ship.toml")
+    Path("link.parquet").symlink_to("log.parquet")
+    return tmp_path / "there"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "manoeuvre ./ship.toml zigzag 20 20 --out ship.toml",
+        "manoeuvre ./ship.toml zigzag 20 20 --out link.html",
+        "manoeuvre ./ship.toml zigzag 20 20 --out a.html --csv a.html",
+        "data measures log.parquet --csv log.parquet",
+        "data measures log.parquet --csv ../there/log.parquet",
+        "data measures link.parquet --csv log.parquet",
+        "replay ./ship.toml log.parquet --csv log.parquet",
+        "data check log.parquet --vessel ./ship.toml --html log.parquet",
+    ],
+)
+def test_what_is_read_is_not_written(words: str, there: Path) -> None:
+    before = {file.name: file.read_bytes() for file in there.iterdir()}
+    status, _, error = ended(*words.split())
+    assert status == 1
+    assert "is named twice" in error
+    assert {file.name: file.read_bytes() for file in there.iterdir()} == before
+
+
+@pytest.mark.usefixtures("there")
+def test_an_import_does_not_replace_the_log() -> None:
+    """The default name is that of the mapping, and a draft has the name of its log."""
+    Path("log.toml").write_text(
+        """name = "log"
+[format]
+kind = "parquet"
+[clock]
+from = "t"
+unit = "s"
+"""
+        + "".join(
+            f'[columns.{name}]\nfrom = "{name}"\nunit = "{unit}"\n'
+            for name, unit in (
+                ("north", "m"),
+                ("east", "m"),
+                ("psi", "rad"),
+                ("u", "m/s"),
+                ("v", "m/s"),
+                ("r", "rad/s"),
+            )
+        )
+    )
+    before = Path("log.parquet").read_bytes()
+    status, _, error = ended("data", "import", "log.toml", "log.parquet")
+    assert status == 1
+    assert "--out: is named twice" in error
+    assert Path("log.parquet").read_bytes() == before
+    assert "-> set.parquet" in output_of("data", "import", "log.toml", "log.parquet", "--out", "set.parquet")
+
+
+def test_a_pipe_is_no_page(there: Path) -> None:
+    os.mkfifo(there / "pipe.html")
+    status, _, error = ended("manoeuvre", "./ship.toml", "zigzag", "10", "10", "--out", "pipe.html")
+    assert status == 1
+    assert "a device or a pipe" in error
+    assert not (there / "pipe.html").is_file()
+
+
+def test_every_command_is_guarded() -> None:
+    """Also one that is added later, if its output has one of the names."""
+
+    def commands(group: object) -> list[object]:
+        inner = list(getattr(group, "commands", {}).values())
+        return [leaf for one in inner for leaf in commands(one)] if inner else [group]
+
+    leaves = commands(typer.main.get_command(app))
+    assert len(leaves) > 20
+    assert all(isinstance(one, Guarded) for one in leaves)
+    assert {name for one in leaves for param in one.params for name in [param.name] if name in OUTPUTS} == set(OUTPUTS)
