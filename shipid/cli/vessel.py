@@ -99,11 +99,13 @@ def vessel_new(
         raise ShipidError("a vessel is a TOML file: let the name end in .toml", file=out)
     if out.exists():
         raise ShipidError("exists already: choose another name", file=out)
+    from shipid.document import check_values
     from shipid.files import write_text
     from shipid.schemas import with_schema
     from shipid.simulation.measured import trials
     from shipid.vessel.template import Particulars, first_guess
 
+    check_values({"name": name or ""}, "vessel new")
     given = Particulars(
         length, beam, draught, block, speed, propulsor, ship_type, frontal_area, lateral_area, rpm, shafts,
         propeller_diameter, rudder_area, rudder_span, rudder_rate, tunnel_thruster, scale, density,
