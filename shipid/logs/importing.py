@@ -29,7 +29,16 @@ from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Parts, Segment, Source, read_mapping, to_si
 from shipid.logs.readers import Format, Progress, TextFormat, dated, moment_of, read_table, require_file, seconds
-from shipid.logs.repairs import FLAGS, REPAIRS, Latency, WrapInterpolation, apply_repairs, interpolate_at
+from shipid.logs.repairs import (
+    FLAGS,
+    REPAIRS,
+    Despike,
+    Latency,
+    Scale,
+    WrapInterpolation,
+    apply_repairs,
+    interpolate_at,
+)
 from shipid.physics.signals import is_command, is_output
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
@@ -59,9 +68,10 @@ def import_log(
 ) -> Dataset:
     """Turn a log into a dataset as its mapping declares; nothing is repaired that is not declared.
 
-    Order: units, resampling of channels, repair of wrapping channels, unwrapping, position on the Earth to north and
-    east, gaps, speed and course or earth-fixed to body velocities, the other repairs in the order of the mapping,
-    estimation of u, v, r, apparent to true wind, runs, resampling. `metadata["repairs"]` counts every repair, `flags`
+    Order: units, resampling of channels, repair of wrapping channels, unwrapping, `despike` and `scale` of speed,
+    course, latitude or longitude, position on the Earth to north and east, gaps, speed and course or earth-fixed to
+    body velocities, the other repairs in the order of the mapping, estimation of u, v, r, apparent to true wind, runs,
+    resampling. `metadata["repairs"]` counts every repair, `flags`
     marks its rows.
 
     Parameters
@@ -160,9 +170,12 @@ def sha256_of(file: Path) -> str:
 def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Progress | None) -> Imported:
     rows, first, read, begins = _columns(mapping, file, progress)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
-    others = [repair for repair in mapping.repair if not isinstance(repair, WrapInterpolation)]
+    early = [repair for repair in mapping.repair if isinstance(repair, Despike | Scale) and repair.of_inputs]
+    others = [repair for repair in mapping.repair if repair not in [*wrapping, *early]]
     rows, records = apply_repairs(rows, wrapping, off, file)
     rows = _unwrapped(rows, mapping.columns, file)
+    rows, mended = apply_repairs(rows, early, off, file)
+    records += mended
     rows, origin = _projected(rows, mapping) if "latitude" in rows else (rows, None)
     rows, gaps = _close_gaps(rows, mapping.clock.max_gap, file)
     rows = _in_body(rows, mapping.columns)

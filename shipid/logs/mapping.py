@@ -13,6 +13,7 @@ from shipid.data.dataset import STANDARD_DEVIATIONS, optional, required, unit_of
 from shipid.errors import DocumentError, choices
 from shipid.logs.readers import READERS, Format, TextFormat
 from shipid.logs.repairs import (
+    INPUTS,
     REPAIRS,
     Break,
     ColumnRepair,
@@ -27,7 +28,7 @@ from shipid.physics.signals import is_command, is_output, named
 from shipid.units import DEGREE, KNOT, RPM
 
 UNITS: dict[str, dict[str, float]] = {
-    "s": {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "date": 1.0},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "date": 1.0},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6},
     "rad": {"rad": 1.0, "deg": DEGREE},
@@ -41,8 +42,6 @@ UNITS: dict[str, dict[str, float]] = {
 
 `date` is read as seconds since 1970 (UTC).
 """
-INPUTS = {"latitude": "rad", "longitude": "rad", "speed": "m/s", "course": "rad"}
-"""Columns of a mapping that become others: position on the Earth north and east, speed and course over ground u, v."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
 ESTIMATED = ("u", "v", "r")
 Manoeuvre = Literal[
@@ -226,6 +225,9 @@ def read_mapping(name: str | Path) -> Mapping:
                     file=file,
                     path=f"repair.{index}.columns",
                 )
+            if isinstance(repair, ColumnRepair) and repair.of_inputs and column not in mapping.columns:
+                message = f"{column!r} is made of columns that this repair mends: write two repairs"
+                raise DocumentError(message, file=file, path=f"repair.{index}.columns")
             if isinstance(repair, WrapInterpolation) and not (
                 column in mapping.columns and mapping.columns[column].wrap
             ):
@@ -418,7 +420,7 @@ def _in_si(repair: Repair, clock: float, file: Path, path: str) -> Repair:
         case HeadingOffset():
             return repair.model_copy(update={"offset": repair.offset * _factor(repair.unit, "rad", file, path)})
         case Despike(unit=str(unit)):
-            factors = [_factor(unit, unit_of(name) or "", file, path) for name in repair.columns]
+            factors = [_factor(unit, INPUTS.get(name) or unit_of(name) or "", file, path) for name in repair.columns]
             return repair.model_copy(update={"threshold": repair.threshold * factors[0]})
         case Break():
             intervals = tuple((clock * start, clock * end) for start, end in repair.intervals)

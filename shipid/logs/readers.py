@@ -32,8 +32,12 @@ NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day
 LOOKED_AT = 300  # lines that a guess at the format looks at
 WIDEST, LONGEST_LINE = 10_000, 8_000_000  # cells and bytes of a line: more is no log
 LARGE = 32_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
-TIME_OF_DAY = r"\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?\s*"
-DOTTED = ("%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d.%m.%Y %H:%M", "%Y/%m/%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S")
+TIME_OF_DAY = r"\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?(\s*[AaPp][Mm])?\s*"
+DAY_OF = r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)"
+"""A date without a time."""
+DAYS = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y", "%d-%m-%Y", "%m-%d-%Y")
+HOURS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S.%f %p", "%I:%M:%S %p", "%I:%M %p")
+SAMPLES = 60  # texts by which the way of writing is looked for
 _SENTENCE = re.compile(r"\$[A-Z]{2}[A-Z]{3},")
 Progress = Callable[[float], None]
 
@@ -136,8 +140,9 @@ def read_table(
 def seconds(dates: pd.Series[Any]) -> Array:
     """Return dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
 
-    Read are ISO 8601, dates of pandas, day.month.year and year/month/day with a time; a time of day goes on after
-    midnight. NaN where there is none.
+    Read are ISO 8601, dates and durations of pandas, and `DAYS` with `HOURS`; of day/month and month/day that which
+    every row can be, else that with which the log is shorter, else day/month. A time of day goes on after midnight. NaN
+    where there is none.
     """
     if pd.api.types.is_timedelta64_dtype(dates.dtype):
         return np.array(dates.dt.total_seconds(), dtype=np.float64)
@@ -145,12 +150,32 @@ def seconds(dates: pd.Series[Any]) -> Array:
         texts = dates.dropna().astype(str)
         if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
             return _since_midnight(dates)
-        for pattern in DOTTED:
-            moments = pd.to_datetime(dates, format=pattern, utc=True, errors="coerce")
-            if len(texts) and moments.notna().mean() > 0.5:
-                rest = pd.to_datetime(dates, format=pattern.replace(".%f", ""), utc=True, errors="coerce")
-                return _since_1970(moments.fillna(rest))
+        texts = texts.str.strip().str.replace(",", ".")
+        written = _written(texts)
+        if written:
+            moments = min((_moments(texts, one) for one in written), key=_unlikely)
+            return _since_1970(moments.reindex(dates.index))
     return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))
+
+
+def _written(texts: pd.Series[Any]) -> list[str]:
+    """Ways in which dates (N,) of text may be written: most of a sample can be read so."""
+    some = texts.iloc[:: max(1, len(texts) // SAMPLES)]
+    some = some[some.str.fullmatch(rf"(?:{DAY_OF})\s+{TIME_OF_DAY}")]
+    ways = [f"{day} {hour}" for day in DAYS for hour in HOURS] if len(some) else []
+    return [one for one in ways if pd.to_datetime(some, format=one, utc=True, errors="coerce").notna().mean() > 0.5]
+
+
+def _moments(texts: pd.Series[Any], way: str) -> pd.Series[Any]:
+    moments = pd.to_datetime(texts, format=way, utc=True, errors="coerce")
+    if ".%f" in way:  # a whole second may be written without a fraction
+        moments = moments.fillna(pd.to_datetime(texts, format=way.replace(".%f", ""), utc=True, errors="coerce"))
+    return moments
+
+
+def _unlikely(moments: pd.Series[Any]) -> tuple[int, float]:
+    """Rows that are no dates, then the time between the first and the last."""
+    return int(moments.isna().sum()), float((moments.max() - moments.min()).total_seconds())
 
 
 def date_of(moment: float) -> str:
@@ -175,9 +200,14 @@ def _since_1970(moments: pd.Series[Any]) -> Array:
 
 
 def _since_midnight(times: pd.Series[Any]) -> Array:
-    parts = times.astype("string").str.strip().str.replace(",", ".").str.split(":", expand=True)
+    texts = times.astype("string").str.strip().str.replace(",", ".")
+    half = texts.str[-2:].str.lower()
+    of_twelve = half.isin(["am", "pm"]).to_numpy(dtype=bool, na_value=False)
+    parts = texts.where(~of_twelve, texts.str[:-2]).str.split(":", expand=True)
     numbers = parts.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
     since = np.nansum(numbers * [3600.0, 60.0, 1.0][: numbers.shape[1]], axis=1)
+    afternoon = half.eq("pm").to_numpy(dtype=bool, na_value=False)
+    since[of_twelve] = since[of_twelve] % HALF_DAY + HALF_DAY * afternoon[of_twelve]  # 12:30 AM is half past midnight
     since[np.isnan(numbers[:, 0])] = np.nan
     return np.asarray(since + DAY * np.cumsum(np.diff(since, prepend=since[:1]) < -NEXT_DAY), dtype=np.float64)
 

@@ -19,6 +19,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from shipid.data.dataset import BREAK
 from shipid.errors import DataError
 
+INPUTS = {"latitude": "rad", "longitude": "rad", "speed": "m/s", "course": "rad"}
+"""Columns of a mapping that become others: position on the Earth north and east, speed and course over ground u, v."""
 Mask = NDArray[np.bool_]
 Interval = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
 
@@ -41,6 +43,11 @@ class ColumnRepair(Repair):
     """A repair of columns that it names; the others act on columns that their formula names."""
 
     columns: Annotated[tuple[str, ...], Field(min_length=1)]
+
+    @property
+    def of_inputs(self) -> bool:
+        """Whether it mends columns that become others, and so comes before them."""
+        return bool(set(self.columns) & set(INPUTS))
 
 
 class WrapInterpolation(ColumnRepair):
@@ -138,14 +145,15 @@ def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
 def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
     """Replace x where |x - median(x over the window)| > threshold by interpolation of the rest.
 
-    Windows are whole and do not reach over a break: the median of half a window is biased for a moving ship.
+    Windows are whole and do not reach over a break: the median of half a window is biased for a moving ship. Missing
+    values in them are interpolated for the median.
     """
     t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
     width = 2 * round(repair.window / 2 / float(np.median(np.diff(t)))) + 1
     stretch = np.cumsum((rows["flags"].to_numpy() >> FLAGS.index(BREAK)) & 1)
     healed = {}
     for name in repair.columns:
-        pieces = rows[name].groupby(stretch)
+        pieces = rows[name].interpolate(limit_area="inside").groupby(stretch)
         median = pieces.transform(lambda piece: piece.rolling(width, center=True, min_periods=width).median())
         spikes = (rows[name] - median).abs().to_numpy() > repair.threshold
         healed[name] = interpolate_at(t, rows[name].to_numpy(), spikes)

@@ -24,7 +24,7 @@ def test_bundled_mappings_are_valid_and_have_a_source(name: str) -> None:
 
 
 DEFINED = {  # from the definitions: an inch is 25.4 mm, a nautical mile 1852 m, a turn 2 pi
-    "s": {"s": 1, "ms": 1 / 1000, "min": 60, "h": 60 * 60, "date": 1},
+    "s": {"s": 1, "ms": 1 / 1000, "us": 1 / 1000**2, "ns": 1 / 1000**3, "min": 60, "h": 60 * 60, "date": 1},
     "m": {"m": 1, "cm": 1 / 100, "mm": 1 / 1000, "km": 1000, "ft": 12 * 0.0254, "nmi": 1852},
     "m/s": {"m/s": 1, "kn": 1852 / 3600, "km/h": 1000 / 3600},
     "rad": {"rad": 1, "deg": 2 * math.pi / 360},

@@ -104,7 +104,13 @@ def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
         ("%d.%m.%Y %H:%M:%S.%f", True),
         ("%Y/%m/%d %H:%M:%S.%f", True),
         ("%Y-%m-%d %H:%M:%S.%f", True),
+        ("%d.%m.%y %H:%M:%S.%f", True),
+        ("%d/%m/%Y %H:%M:%S.%f", True),
+        ("%m/%d/%Y %H:%M:%S.%f", True),
+        ("%m/%d/%Y %I:%M:%S.%f %p", True),
+        ("%d-%m-%Y %I:%M:%S.%f %p", True),
         ("%H:%M:%S.%f", False),
+        ("%I:%M:%S.%f %p", False),
     ],
 )
 def test_dates_as_they_are_written(style: str, unix: bool) -> None:
@@ -112,6 +118,23 @@ def test_dates_as_they_are_written(style: str, unix: bool) -> None:
     moments = pd.Timestamp("2022-10-26T23:59:30.5") + pd.to_timedelta(T, "s")
     times = seconds(pd.Series(moments.strftime(style)))
     np.testing.assert_allclose(times, T + (1666828770.5 if unix else 86370.5), atol=1e-5)
+
+
+@pytest.mark.parametrize("style", ["%d/%m/%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S"])
+def test_of_day_and_month_that_is_taken_with_which_the_log_is_short(style: str) -> None:
+    """From 5 June to 6 June, not from 6 May; and where nothing decides, the day comes first."""
+    moments = pd.Timestamp("2025-06-05T23:59:00") + pd.to_timedelta(10.0 * np.arange(20), "s")
+    times = seconds(pd.Series(moments.strftime(style)))
+    np.testing.assert_allclose(np.diff(times), 10.0)
+    day = style.startswith("%d")
+    one_day = seconds(pd.Series(["05/06/2025 10:00:00", "05/06/2025 10:00:01"]))
+    assert date_of(one_day[0]) == "2025-06-05 10:00:00"
+    assert date_of(times[0]) == ("2025-06-05 23:59:00" if day else date_of(times[0]))
+
+
+def test_noon_and_midnight_of_twelve_hours() -> None:
+    texts = ["12:00:00 AM", "12:30:00 am", "1:00:00 AM", "12:00:00 PM", "12:15:00PM", "11:59:59 pm"]
+    np.testing.assert_allclose(seconds(pd.Series(texts)), [0, 1800, 3600, 43200, 44100, 86399])
 
 
 def test_what_is_no_date_is_not_a_number() -> None:

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import BREAK, Dataset, flag_bit, pieces
-from shipid.errors import DataError
+from shipid.errors import DataError, DocumentError
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.repairs import FLAGS, Latency, apply_repairs
 from tests.logs.conftest import as_log, turning
@@ -183,3 +183,28 @@ def test_a_repair_that_leaves_no_row_is_named(first: bool, plain_mapping: Callab
     with pytest.raises(DataError, match=r"log\.csv: repair\.break: no row is left .*--without break"):
         import_log(mapping, log)
     assert len(import_log(mapping, log, without=("break",)).frame) > 400
+
+
+def test_a_speed_over_ground_is_mended_before_it_becomes_u_and_v(tmp_path: Path) -> None:
+    """A rotten speed would be in u and v for good, and beside a missing value, too."""
+    speed, course = np.hypot(MOTION["u"], MOTION["v"]), MOTION["psi"] + np.arctan2(MOTION["v"], MOTION["u"])
+    log = pd.DataFrame({"t": T, "x": MOTION["north"], "y": MOTION["east"], "psi": MOTION["psi"], "r": MOTION["r"]})
+    log = log.assign(sog=speed.where(~np.isin(T, [61.0])), cog=course)
+    log.loc[np.isin(T, [60.5, 100.0]), "sog"] = 99.9
+    log.to_csv(tmp_path / "log.csv", index=False)
+    columns = {"north": ("x", "m"), "east": ("y", "m"), "psi": ("psi", "rad"), "r": ("r", "rad/s")}
+    columns |= {"speed": ("sog", "m/s"), "course": ("cog", "rad")}
+    text = 'name = "m"\n[clock]\nfrom = "t"\nunit = "s"\nmax_gap = 3\n'
+    text += "".join(
+        f'[columns.{name}]\nfrom = "{source}"\nunit = "{unit}"\n' for name, (source, unit) in columns.items()
+    )
+    repair = '[[repair]]\nkind = "despike"\ncolumns = {}\nwindow = 3\nthreshold = 100\nunit = "kn"\nreason = "r"\n'
+    mapping = tmp_path / "m.toml"
+    mapping.write_text(text + repair.format('["speed"]'))
+    dataset = import_log(read_mapping(mapping), tmp_path / "log.csv")
+    assert dataset.metadata["repairs"][0]["count"] == 2
+    for name in ("u", "v"):
+        np.testing.assert_allclose(dataset.frame[name], MOTION[name], atol=0.01)
+    mapping.write_text(text + repair.format('["speed", "u"]'))
+    with pytest.raises(DocumentError, match=r"repair.0.columns: 'u' is made of columns .* two repairs"):
+        read_mapping(mapping)

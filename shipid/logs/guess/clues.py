@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.logs.guess.evidence import Complex, Windows
 from shipid.logs.guess.words import fits, is_order, parts_of, units_in
-from shipid.logs.mapping import INPUTS, UNITS
+from shipid.logs.mapping import UNITS
+from shipid.logs.repairs import INPUTS
 from shipid.physics.signals import SIGNALS
 
 UNIT_WORDS = {
@@ -152,6 +154,7 @@ class State:
     t : time [s], (N,). clock_unit : unit of the log's clock. columns : name -> values as logged, (N,).
     chosen : windows over which changes are compared. taken : columns of the log that already have a meaning.
     joined : whether t runs over several files, so that it is the clock of none of them.
+    spikes : column -> rows that leave it and come back at once, and the least by how much; `columns` have none of them.
     position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
@@ -161,6 +164,7 @@ class State:
     columns: dict[str, Array]
     chosen: Windows
     joined: bool = False
+    spikes: dict[str, tuple[NDArray[np.intp], float]] = field(default_factory=dict)
     taken: set[str] = field(default_factory=set)
     suggestions: list[Suggestion] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)

@@ -19,7 +19,7 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
 from shipid.logs.guess.clues import Finding, Question, State, Suggestion, unit_in_name
 from shipid.logs.guess.commands import choose_commands, likely_unit
-from shipid.logs.guess.defects import defects_of_motion, defects_of_rows
+from shipid.logs.guess.defects import defects_of_motion, defects_of_rows, defects_of_spikes, take_spikes
 from shipid.logs.guess.motion import choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import Frame, choose_pose
@@ -83,7 +83,8 @@ def guess(
     source = read_source(Path(path), names)
     sniffed = source.sniffed
     columns = evidence.filled(sniffed.t, sniffed.columns.items())
-    state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), len(source.files) > 1)
+    spiky = take_spikes(sniffed.t, columns)
+    state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), len(source.files) > 1, spiky)
     numbering = tuple(
         name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])
     )
@@ -105,6 +106,7 @@ def guess(
         name_commands(state, vessel)
     _others(state)
     defects_of_rows(state, sniffed)
+    defects_of_spikes(state)
     defects_of_motion(state)
     left = reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)

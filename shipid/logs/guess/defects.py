@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipid.data.dataset import DATED, Array
 from shipid.logs.guess import evidence
@@ -15,6 +16,9 @@ from shipid.logs.mapping import to_si
 from shipid.logs.readers import date_of
 from shipid.physics.signals import is_shaft
 
+POSITIONS = ("latitude", "longitude", "north", "east")
+SPIKY = ("speed", "u", "v", "r", "psi", "phi", "V_w")
+FEW = 4  # times that a sentence names
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 
@@ -172,3 +176,44 @@ def _heading_offset(state: State) -> None:
         sentence += ": heading off, or wind and current"
         repair = {"kind": "heading_offset", "offset": round(angle, 4), "unit": "rad"}
         state.find("heading offset", ("psi",), 0.6, sentence, repair)
+
+
+def _times(state: State, rows: NDArray[np.intp]) -> str:
+    """Where some rows are, in words: the first times, or how many in the files."""
+    count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
+    if state.joined:
+        return f"in {count} of the files"
+    words = ", ".join(_when(state, float(state.t[row])) for row in rows[:FEW])
+    return f"near {words}" if len(rows) <= FEW else f"in {count}, the first near {words}"
+
+
+def take_spikes(t: Array, columns: dict[str, Array]) -> dict[str, tuple[NDArray[np.intp], float]]:
+    """Interpolate spikes of columns (N,) in place; column -> their rows, and the least of their sizes."""
+    found: dict[str, tuple[NDArray[np.intp], float]] = {}
+    for name, values in columns.items():
+        wild = evidence.spikes(values)
+        if wild.any():
+            healed = np.interp(t, t[~wild], values[~wild])
+            found[name] = np.flatnonzero(wild), float(np.abs(values - healed)[wild].min())
+            columns[name] = healed
+    return found
+
+
+def defects_of_spikes(state: State) -> None:
+    """Report spikes of what was measured, with the repair; an order that is given for a moment is none."""
+    step = float(np.median(np.diff(state.t)))
+    places = [one for one in state.suggestions if one.name in POSITIONS and one.source in state.spikes]
+    if places:
+        rows = np.unique(np.concatenate([state.spikes[one.source][0] for one in places]))
+        repair: dict[str, Any] = {"kind": "despike", "columns": ["north", "east"]}
+        repair |= {"window": 10.0, "threshold": 10.0, "unit": "m"}
+        words = f"the position leaves and comes back {_times(state, rows)}"
+        state.find("position spikes", (), 0.9, words, repair)
+    for one in state.suggestions:
+        if one.name in SPIKY and one.source in state.spikes:
+            rows, size = state.spikes[one.source]
+            threshold = float(f"{size / 2:.2g}")
+            least = f"{size:.3g} {one.unit}{' or more' * (len(rows) > 1)}"
+            sentence = f"{one.source!r} leaves its course by {least} and comes back {_times(state, rows)}"
+            repair = {"kind": "despike", "columns": [one.name], "window": round(max(5 * step, 1e-3), 3)}
+            state.find("spikes", (one.source,), 0.9, sentence, repair | {"threshold": threshold, "unit": one.unit})

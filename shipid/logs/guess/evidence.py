@@ -304,6 +304,28 @@ def _roundness(values: Array, multipliers: Array, quantum: float) -> Array:
     return np.asarray(np.hypot(np.cos(phases).mean(axis=1), np.sin(phases).mean(axis=1)))
 
 
+def spikes(values: Array) -> NDArray[np.bool_]:
+    """Return the rows (N,) of a signal that leave it and come back within two rows, as no ship and no order does.
+
+    They leave the median of five rows by more than all else the signal ever does, or, of a signal that moves in
+    most rows, by twenty times what 99 of 100 rows do. Angles that count from 0 again, and signals of which more than
+    one row in fifty does so, have none.
+    """
+    none = np.zeros(len(values), dtype=bool)
+    low, high = np.percentile(values, [0.5, 99.5])
+    if (
+        len(values) < 50
+        or not high > low
+        or any(0.94 < float(np.ptp(values)) / turn < 1.01 for turn in (360, 2 * np.pi))
+    ):
+        return none
+    off = np.abs(values - pd.Series(values).rolling(5, center=True, min_periods=1).median().to_numpy())
+    moves = float(np.mean(np.diff(values) != 0)) > 0.5  # an order is held, and may be given for a moment
+    noisy = off > max(20 * float(np.percentile(off, 99)), 0.02 * (high - low)) if moves else none
+    wild = np.asarray(noisy | (off > 1.0 * (high - low)))
+    return wild if 0 < wild.mean() <= 0.02 else none
+
+
 def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:
     """Return the columns with missing values interpolated in time; good enough for these tests, not for a dataset."""
     result = {}

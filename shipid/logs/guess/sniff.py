@@ -19,6 +19,7 @@ from shipid.errors import DataError
 from shipid.logs.guess.words import is_run, parts_of
 from shipid.logs.importing import even_clock, repeated_rows, rounding_of
 from shipid.logs.readers import (
+    DAY_OF,
     LONGEST_LINE,
     LOOKED_AT,
     READERS,
@@ -46,7 +47,11 @@ CLOCK_WORDS = frozenset(
         "gmt"
     ).split()
 )
-DATE = r"\d{4}[-/]\d\d[-/]\d\d|\d\d\.\d\d\.\d{4}"
+FINE = {
+    "ns": (1e-9, 1e17, ("ns", "nsec", "nanos", "nanosec", "nanoseconds")),
+    "us": (1e-6, 1e14, ("us", "usec", "micros", "microsec", "microseconds")),
+}
+"""Unit -> factor to s, least number that counts from 1970 in it, and words at the end of a name."""
 NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
 _UNIT = re.compile(
     r"[\[(]?(s|secs?|seconds|ms|min|h|m|mm|cm|km|meters?|metres?|ft|deg(rees)?|°|grad|rad|m/s|mps|m\*s-1|kn|kts?|knots?|km/h|kmh|"
@@ -230,7 +235,9 @@ def _with_unit(name: str, unit: str) -> str:
 def _date_and_time(row: list[str]) -> int | None:
     """Return the index of a cell that is a date before a time of day; None where there is none."""
     pairs = enumerate(itertools.pairwise(row))
-    return next((k for k, (one, other) in pairs if re.fullmatch(DATE, one) and re.fullmatch(TIME_OF_DAY, other)), None)
+    return next(
+        (k for k, (one, other) in pairs if re.fullmatch(DAY_OF, one) and re.fullmatch(TIME_OF_DAY, other)), None
+    )
 
 
 def _distinct(names: list[str]) -> list[str]:
@@ -392,7 +399,7 @@ def _dates(table: pd.DataFrame, names: list[str]) -> str | None:
     """Return the first of these columns that holds a date in every row, without a time."""
     for name in names:
         cells = _called(table, name).astype(str).str.strip()
-        if cells.str.fullmatch(DATE).all():
+        if cells.str.fullmatch(DAY_OF).all():
             return name
     return None
 
@@ -404,19 +411,22 @@ def _is_clock(name: str) -> bool:
 
 def _looks_dated(column: pd.Series[Any]) -> bool:
     texts = column.dropna().astype(str).head(20)
-    dated = texts.str.fullmatch(TIME_OF_DAY + r"|\d{4}-\d\d-\d\d[T ].*|\d\d\.\d\d\.\d{4} .*|\d{4}/\d\d/\d\d .*")
+    dated = texts.str.fullmatch(rf"{TIME_OF_DAY}|\d{{4}}-\d\d-\d\d[T ].*|(?:{DAY_OF}) .*")
     return bool(len(texts) and dated.all())
 
 
 def _unit_of_clock(name: str, values: Array) -> tuple[float, str]:
     """Return the factor to seconds and the unit of a clock: as its name says, else ms if it counts in them."""
-    inside = re.search(r"[\[(]\s*(ms|msec|s|sec|min|h)\s*[\])]", name.lower())
-    written = inside.group(1) if inside else ""
+    inside = re.search(r"[\[(]\s*(ns|us|µs|ms|msec|s|sec|min|h)\s*[\])]", name.lower())
+    written = inside.group(1).replace("µ", "u") if inside else ""
     if written in ("min", "h"):
         return {"min": 60.0, "h": 3600.0}[written], written
     steps = np.diff(values)
     counting = not written and np.median(steps) >= 20 and not np.any(values % 1)
     last = parts_of(name)[-1:] or ("",)
+    for unit, (scale, least, words) in FINE.items():
+        if written == unit or (not written and (last[0] in words or (counting and values[0] > least))):
+            return scale, unit
     if written.startswith("ms") or (not written and (last[0] in ("ms", "millis", "msec") or counting)):
         return 1e-3, "ms"
     return 1.0, "s"

@@ -6,7 +6,7 @@ import numpy as np
 
 from shipid.logs.guess.clues import State, unit_of_another
 from shipid.logs.guess.words import fits, is_order
-from shipid.logs.mapping import INPUTS
+from shipid.logs.repairs import INPUTS
 from shipid.physics.signals import SIGNALS
 
 ALIKE = (

@@ -11,6 +11,8 @@ import pandas as pd
 import pytest
 
 from shipid.logs.guess.columns import Guess, guess
+from shipid.logs.guess.draft import draft_mapping
+from shipid.logs.importing import import_log, read_mapping
 from tests.logs.simulated import as_bridge, si_log
 
 CLEAN = as_bridge(si_log()).round(4)
@@ -83,3 +85,22 @@ def test_a_repair_is_what_would_undo_the_defect(tmp_path: Path) -> None:
     assert arm.repair is not None
     assert (arm.repair["kind"], arm.repair["moves"]) == ("lever_arm", "position")
     assert (arm.repair["x"], arm.repair["y"]) == (pytest.approx(9.0, abs=0.5), pytest.approx(-3.0, abs=0.5))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_log_with_drawn_spikes_is_healed_by_its_draft(seed: int, tmp_path: Path) -> None:
+    """Imported by its draft, without an edit, it is the clean log imported by the same draft."""
+    random = np.random.default_rng(seed)
+    spoilt = CLEAN.copy()
+    for name, size in (("u", 45.0), ("r", 90.0), ("N", 900.0), ("E", -700.0)):
+        rows = random.choice(np.arange(20, len(CLEAN) - 20, 11), 4, replace=False)
+        spoilt.loc[rows, name] += size
+    (tmp_path / "spoilt").mkdir()
+    drafted = guessed(tmp_path / "spoilt", spoilt)
+    assert {"spikes", "position spikes"} <= drafted.kinds
+    mapping = tmp_path / "draft.toml"
+    mapping.write_text(draft_mapping(drafted, manoeuvres=False).replace("sha256", "# sha256"))
+    CLEAN.to_csv(tmp_path / "clean.csv", index=False)
+    healed, clean = (import_log(read_mapping(mapping), file).frame for file in (drafted.file, tmp_path / "clean.csv"))
+    for name, most in (("u", 0.5), ("v", 0.5), ("r", 0.02), ("north", 6.0), ("east", 6.0)):
+        assert (healed[name] - clean[name]).abs().max() < most, name

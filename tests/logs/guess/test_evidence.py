@@ -170,3 +170,33 @@ def test_missing_values_are_interpolated() -> None:
     columns = evidence.filled(t, [("a", np.array([0.0, np.nan, 8.0])), ("b", np.full(3, np.nan))])
     np.testing.assert_allclose(columns["a"], [0.0, 2.0, 8.0])
     assert np.isnan(columns["b"]).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_drawn_spikes_are_all_and_the_only_ones(seed: int) -> None:
+    """Of one or two rows, in a smooth track, in a noisy speed and in a yaw rate; none in what was there before."""
+    random, t = np.random.default_rng(seed), np.arange(2000.0)
+    track = np.cumsum(5 + np.cos(t / 90)) / 1e5 + 54
+    speed = 6 + np.cumsum(random.normal(0, 0.02, len(t))) + random.normal(0, 0.05, len(t))
+    rate = np.round(40 * np.sin(t / 60) + random.normal(0, 1, len(t)), 1)
+    for signal, size in ((track, 0.01), (speed, 90.0), (rate, 600.0)):
+        assert not evidence.spikes(signal).any()
+        wrong = np.zeros(len(t), dtype=bool)
+        wrong[random.choice(np.arange(5, 1990, 8), 9, replace=False)] = True
+        if seed % 2:
+            wrong |= np.roll(wrong, 1)
+        spoilt = np.where(
+            wrong, signal + size * random.choice([-1.0, 1.0], len(t)) * random.uniform(0.8, 1.2, len(t)), signal
+        )
+        np.testing.assert_array_equal(evidence.spikes(spoilt), wrong)
+
+
+def test_orders_angles_and_stays_are_no_spikes() -> None:
+    t = np.arange(2000.0)
+    helm = np.where((t % 300) < 150, 0.0, 20.0)
+    helm[777] = 0.0  # for a moment, within what is usual
+    heading = (10 * t) % 360
+    rest = np.where(t > 1990, 6.0, 0.0)
+    parts = np.repeat([0.0, 900.0, -300.0], [600, 700, 700]) + np.sin(t / 50)
+    for signal in (helm, heading, np.radians(heading), rest, parts, np.zeros(2000), t[:20]):
+        assert not evidence.spikes(signal).any()

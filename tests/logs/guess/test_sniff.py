@@ -70,6 +70,8 @@ def test_encodings(encoding: str, expected: str, tmp_path: Path) -> None:
     ("clock", "unit", "t"),
     [
         ((1000 * T).astype(int), "ms", T),
+        ((1e6 * (1.7e9 + T)).astype(np.int64), "us", 1.7e9 + T),
+        ((1e9 * (1.7e9 + T)).astype(np.int64), "ns", 1.7e9 + T),
         (1.7e9 + T, "s", 1.7e9 + T),
         (pd.to_datetime(1.7e9 + T, unit="s").strftime("%Y-%m-%dT%H:%M:%S.%f"), "date", 1.7e9 + T),
     ],
@@ -81,7 +83,7 @@ def test_the_unit_of_the_clock(clock: object, unit: str, t: np.ndarray, tmp_path
     np.testing.assert_allclose(sniffed.t, t, atol=1e-6)
 
 
-@pytest.mark.parametrize("day", ["%d.%m.%Y", "%Y-%m-%d", "%Y/%m/%d"])
+@pytest.mark.parametrize("day", ["%d.%m.%Y", "%Y-%m-%d", "%Y/%m/%d", "%m/%d/%Y", "%d.%m.%y"])
 def test_a_date_beside_times_of_day(day: str, tmp_path: Path) -> None:
     moments = pd.to_datetime(1.7e9 + T, unit="s")
     split = TABLE.assign(time=moments.strftime("%H:%M:%S.%f"))
