@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from shipid.study.run import Event
 
 
-SILENCE, LOOK = 30.0, 2.0  # s without a line before there is one; between looks at the searches on a terminal
+SILENCE, LOOK = 15.0, 2.0  # s without a line before there is one; between looks at the searches on a terminal
 HANDLER = "command line"
 """Name of the handler that writes log messages to standard error."""
 
@@ -137,7 +137,7 @@ def criterion_table(rows: Iterable[Any], first: list[str]) -> Table:
 def counted(
     blocks: Iterable[Any], total: int, what: str = "members", interrupted: str = "interrupted: nothing was written"
 ) -> Iterator[Any]:
-    """Yield the blocks of rows unchanged; on a terminal, show a bar of the rows so far out of `total`.
+    """Yield the blocks of rows unchanged; show how many of `total` rows are there, as a bar or, elsewhere, as lines.
 
     interrupted : what Ctrl-C is answered with.
     """
@@ -147,7 +147,10 @@ def counted(
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
     try:
-        with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+        if not console.is_terminal:
+            yield from _said(blocks, total, what)
+            return
+        with Progress(*columns, console=console) as progress:
             task = progress.add_task(what, total=total)
             for block in blocks:
                 progress.advance(task, len(block))
@@ -155,6 +158,21 @@ def counted(
     except KeyboardInterrupt:
         sys.stderr.write(f"{interrupted}\n")
         sys.exit(130)
+
+
+def _said(blocks: Iterable[Any], total: int, what: str) -> Iterator[Any]:
+    """Yield the blocks; say every `SILENCE` seconds on standard error how many rows there are."""
+    import time
+
+    begun, count = time.monotonic(), 0
+
+    def say() -> None:
+        sys.stderr.write(f"{count} of {total} {what} after {time.monotonic() - begun:.0f} s\n")
+
+    with looking(say, SILENCE):
+        for block in blocks:
+            count += len(block)
+            yield block
 
 
 @contextmanager

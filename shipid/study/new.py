@@ -164,6 +164,13 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     step = step_of(horizon, seen.step)
     steps = max(round(horizon / step), 2)
     usable = _usable(dataset, steps, step, data)
+    method = _method(length_of(first), step, float(seen.runs.loc[usable, "duration"].median()) - horizon)
+    past = max(method.value[0].get("memory", {}).get("turned", [0.0]))
+    held = _held(dataset, steps, step, past)
+    if len(held) > LEAST_RUNS:
+        usable = held
+    else:
+        method = _method(length_of(first), step, 0.0)
     runs = seen.runs.loc[usable]
     interval = max(step, seen.step, _round_up(float(runs["duration"].sum()) / MOST_WINDOWS))
     tests = typical_runs(runs)
@@ -184,14 +191,20 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     rest = [Choice("prediction.interval", interval, "s between instants of prediction")]
     families = _families(vessels, looks)
     some = [Choice("split.folds", 1), Choice("grid.N_D", [LEAST_RUNS]), *ahead, *rest]
-    method = _method(length_of(first), step, float(runs["duration"].median()) - horizon)
     least = _planned([*fixed, *some, method], families[:1], out, vessels)
     amounts = ladder(len(partition(least, dataset)[0].spans))
     fixed += [_folds(amounts[-1])]
     tail = [*rest, *_grid(amounts), method]
-    warnings = [*_wrong_velocities(seen), *_wrong_helm(first, dataset), *_knowing(vessels, tests)]
+    failing = [_failing(seen, data)] if seen.faults else []
+    warnings = [*failing, *_wrong_velocities(seen), *_wrong_helm(first, dataset), *_knowing(vessels, tests)]
     warnings += [look.sentence for look in looks.values() if look.wrong]
-    draft = _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
+    try:
+        draft = _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
+    except DocumentError as error:
+        if "diverges" not in error.message or not seen.faults:
+            raise
+        message = f"{error.message}; but first {_failing(seen, data)}"
+        raise DocumentError(message, file=error.file, path=error.path) from None
     return replace(draft, looks=looks)
 
 
@@ -205,6 +218,21 @@ def _knowing(vessels: Mapping[str, Vessel], tests: Sequence[str]) -> list[str]:
             words = f"{name} was identified from {', '.join(seen)}, which now test{'s' * (len(seen) == 1)} it"
             blocks.append(f"{words}: choose other test runs, or let the study identify ([family.identify])")
     return blocks
+
+
+def _failing(seen: Survey, data: Path) -> str:
+    """Where to look at the log: the first fault, and how many checks fail."""
+    count = len(seen.faults)
+    return f"look at `shipid data check {data}`, {count} failed{', such as' if count > 1 else ':'} {seen.faults[0]}"
+
+
+def _held(dataset: Dataset, steps: int, step: float, past: float) -> list[str]:
+    """Runs that hold the horizon and the past [s] before it."""
+    try:
+        names = cut_windows(dataset, horizon=steps, step=step, interval=step, past=round(past / step)).spans
+    except DataError:
+        return []
+    return [run for run in dataset.runs if run in names]
 
 
 def _usable(dataset: Dataset, steps: int, step: float, data: Path) -> list[str]:

@@ -50,7 +50,7 @@ def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
 def rotate(
     plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cpu", kept: Path | None = None
 ) -> Iterator[pd.DataFrame]:
-    """Set one run aside after the other, train on all others, and yield the cells of each turn.
+    """Set one run aside after the other, train on all others, and yield the cells of each turn, batch by batch.
 
     A row has test, foundation, family, method, N_D (runs that were left), seed, A, H, H_90 [m], coverage
     [1] and width [m] of the band, naive [m], status. No training window shares a moment with the test run.
@@ -67,9 +67,9 @@ def rotate(
             turn = plan.turn(test, len(rest.spans))
             done = {} if kept is None else {batch: _read(_file(kept, test, batch)) for batch in turn.batches}
             if any(done.get(batch) is None for batch in turn.batches):
-                yield _computed(turn, dataset, test, device, kept, claims)
+                yield from _computed(turn, dataset, test, device, kept, claims)
             else:
-                yield pd.concat([done[batch] for batch in turn.batches])
+                yield from (frame for frame in done.values() if frame is not None)
 
 
 @contextmanager
@@ -83,8 +83,8 @@ def _sharing(kept: Path) -> Iterator[Claims]:
 
 def _computed(
     turn: Plan, dataset: Dataset, test: str, device: str, kept: Path | None, claims: Claims | None
-) -> pd.DataFrame:
-    """Cells of a turn; those of its batches that nobody has computed are, and kept."""
+) -> Iterator[pd.DataFrame]:
+    """Cells of a turn, batch by batch; those of batches that nobody has computed are, and kept."""
     prepared = prepare(turn, dataset, device)
     floor = float(prepared.naive.mean())
 
@@ -93,7 +93,8 @@ def _computed(
         return pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
 
     if kept is None or claims is None:
-        return pd.concat([computed(batch) for batch in turn.batches])
+        yield from (computed(batch) for batch in turn.batches)
+        return
     trials = kept / documents.digest(test)
     make_folder(trials)
     frames: dict[Batch, pd.DataFrame | None] = {}
@@ -111,7 +112,9 @@ def _computed(
             write_table(file, frame)
 
         claims.once(file.stem, is_done, keep)
-    return pd.concat([frames[batch] for batch in turn.batches])
+        frame = frames[batch]
+        assert frame is not None
+        yield frame
 
 
 def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:

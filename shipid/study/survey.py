@@ -14,6 +14,7 @@ from shipid.logs.kinds import declared_kind
 from shipid.physics.signals import is_shaft, steers
 from shipid.study.kinds import seen_kind
 
+GRAVE = ("range",)  # checks that fail where a unit is wrong, or spikes are left
 OF_A_KIND = 3  # runs of a kind from which one may be set aside
 
 
@@ -26,11 +27,13 @@ class Survey:
         `path` apart), `straying` (fails `path`).
     step : usual time between rows [s].
     factor : positions over integrated velocities, the best complex factor; its angle is a turn.
+    faults : sentences on what no ship does, run by run.
     """
 
     runs: pd.DataFrame
     step: float
     factor: complex
+    faults: tuple[str, ...] = ()
 
     @property
     def speed(self) -> float:
@@ -65,7 +68,9 @@ def survey(dataset: Dataset) -> Survey:
         }
     steps = np.concatenate([np.diff(part["t"]) for parts in stretches.values() for part in parts])
     step = round(float(np.median(steps)), 6) if len(steps) else 1.0
-    return Survey(pd.DataFrame(list(runs.values()), index=list(runs)), step, _factor(dataset))
+    grave = failed[failed["check"].astype(str).str.startswith(GRAVE)]
+    faults = tuple(f"run {row['run']!r}: {row['sentence']}" for row in grave.to_dict("records"))
+    return Survey(pd.DataFrame(list(runs.values()), index=list(runs)), step, _factor(dataset), faults)
 
 
 def kinds_of(dataset: Dataset, runs: Container[str] | None = None) -> dict[str, str]:

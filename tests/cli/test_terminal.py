@@ -109,3 +109,23 @@ def test_counted_passes_every_block_on() -> None:
     from shipid.cli.terminal import counted
 
     assert list(counted([[1, 2], [3]], 3)) == [[1, 2], [3]]
+
+
+def test_where_there_is_no_terminal_counted_says_how_far_it_is(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A rotation of an hour whose output goes to a file is not silent, also before its first cell."""
+    from shipid.cli import terminal
+    from shipid.cli.terminal import counted
+
+    monkeypatch.setattr(terminal, "SILENCE", 0.02)
+
+    def slowly() -> Iterator[list[int]]:
+        for block in ([1, 2], [3]):
+            time.sleep(0.1)
+            yield block
+
+    assert list(counted(slowly(), 3, "cells")) == [[1, 2], [3]]
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith("0 of 3 cells after")
+    assert any(line.startswith("2 of 3 cells") for line in lines)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.data.dataset import Dataset, cumulative_integral, write_dataset
-from shipid.errors import ShipidError
+from shipid.errors import DocumentError, ShipidError
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.simulation.approach import Controls
@@ -195,6 +196,35 @@ def test_a_wrong_unit_is_reported(tmp_path: Path) -> None:
     assert document["data"]["path"] == "position"
     assert any("0.514 times" in warning for warning in draft.warnings)
     assert "# WRONG?" in draft.text
+
+
+def test_a_log_that_fails_its_checks_is_named_before_the_vessel(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A speed of 99 kn left in the log: the physics diverges there, and the log is to be mended, not the steps."""
+    dataset = trial()
+    spoilt = dataset.frame["u"].where(dataset.frame["t"] != dataset.frame["t"].iloc[40], 51.0)
+    look = r"look at `shipid data check .*u reaches 51 m/s: right unit\?"
+    with pytest.raises(DocumentError, match=f"diverges on .* but first {look}"):
+        drafted(tmp_path, Dataset(dataset.frame.assign(u=spoilt), dataset.metadata))
+    monkeypatch.setattr(
+        new, "survey", lambda log: replace(survey(log), faults=("run 'a': u reaches 51 m/s: right unit?",))
+    )
+    assert re.search(look, drafted(tmp_path, dataset)[0].warnings[0])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_test_run_holds_the_past_of_the_method(seed: int, tmp_path: Path) -> None:
+    """Of runs of drawn lengths, some hold the horizon but not the past before it: none of these is set aside."""
+    random = np.random.default_rng(seed)
+    dataset = trial(12, 150.0)
+    ends = dict(zip(dataset.runs, random.choice([30.0, 150.0], 12, p=[0.25, 0.75]), strict=True))
+    frame = dataset.frame
+    begin = frame.groupby("run")["t"].transform("min")
+    kept = frame[frame["t"] - begin <= frame["run"].map(ends)].reset_index(drop=True)
+    _, document = drafted(tmp_path, Dataset(kept, dataset.metadata))
+    assert "memory" in document["method"][0]
+    assert all(ends[name] == 150.0 for name in document["split"]["test"])
 
 
 def test_a_wrong_sign_of_the_helm_is_reported(tmp_path: Path) -> None:
