@@ -116,3 +116,46 @@ def test_a_run_contained_in_another_is_detected_on_another_clock() -> None:
     assert not row["ok"]
     assert "'a'" in row["sentence"]
     assert table[(table["check"] == "overlap") & (table["run"] == "a")].iloc[0]["ok"]
+
+
+def windy(seed: int, spoil: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]) -> pd.DataFrame:
+    """A ship that turns in a drawn steady wind with gusts of 15 %, as an anemometer with 10 % of distortion sees it.
+
+    spoil : apparent wind along and across the bow, m/s, as a complex number -> what is taken for the true wind.
+    """
+    random = np.random.default_rng(seed)
+    frame = turning(T, r=random.choice([-1, 1]) * random.uniform(0.03, 0.08))
+    psi, ship = frame["psi"].to_numpy(), (frame["u"] + 1j * frame["v"]).to_numpy()
+    steady = random.uniform(2.0, 14.0) * np.exp(1j * random.uniform(0, 2 * np.pi))
+    gusts = 0.1 * abs(steady) * (random.normal(size=len(T)) + 1j * random.normal(size=len(T)))
+    apparent = ((steady + gusts) * np.exp(-1j * psi) - ship) * (1 + random.uniform(-0.1, 0.1))
+    taken = spoil(apparent, psi, ship)
+    return frame.assign(V_w=np.abs(taken), beta_w=np.angle(taken) % (2 * np.pi))
+
+
+def true_wind(apparent: np.ndarray, psi: np.ndarray, ship: np.ndarray) -> np.ndarray:
+    return (apparent + ship) * np.exp(1j * psi)
+
+
+WRONG_WINDS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
+    "apparent as true": lambda w, _, __: w,
+    "from as towards": lambda w, psi, ship: true_wind(-w, psi, ship),
+    "knots as m/s": lambda w, psi, ship: true_wind(w / 0.5144, psi, ship),
+    "heading not added": lambda w, _, ship: w + ship,
+}
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_wind_that_is_converted_rightly_does_not_turn_with_the_ship(seed: int) -> None:
+    assert "wind" not in failed(windy(seed, true_wind))
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("wrong", WRONG_WINDS)
+def test_a_wrong_wind_turns_with_the_ship(wrong: str, seed: int) -> None:
+    assert "wind" in failed(windy(seed, WRONG_WINDS[wrong]))
+
+
+def test_a_straight_run_says_nothing_of_its_wind() -> None:
+    still = turning(T).assign(psi=1.0, r=0.0, u=5.0, v=0.0, V_w=5.0, beta_w=np.linspace(0, 6, len(T)))
+    assert "wind" not in set(check_dataset(as_dataset(still))["check"])
