@@ -23,7 +23,7 @@ from shipid.physics.inertia import mass
 from shipid.physics.signals import row_of
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import Binding, bindings, units
-from shipid.vessel.ranges import UNUSUAL, out_of_range
+from shipid.vessel.ranges import UNUSUAL, contradiction, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
@@ -132,7 +132,11 @@ def load_vessel(name: str | Path, relative_to: Path | None = None) -> Vessel:
 
     A patch has `base` (a vessel), optionally `base_digest`, and `[set]` with dotted paths; see `shipid.vessel.perturb`.
     """
-    return _load(documents.find(name, "models", relative_to), ())
+    vessel = _load(documents.find(name, "models", relative_to), ())
+    fault = contradiction(vessel.document, vessel.parameters)
+    if fault is not None:
+        raise DocumentError(fault[1], file=vessel.file, path=fault[0])
+    return vessel
 
 
 def _load(file: Path, above: tuple[Path, ...]) -> Vessel:

@@ -5,7 +5,7 @@ A vessel that is meant so names the number in `unusual`, a list of dotted paths 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -15,6 +15,10 @@ from shipid import document as documents
 UNUSUAL = "unusual"
 """Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
 WATER = 1000.0  # kg/m^3, to judge a mass by
+G = 9.81  # m/s^2
+LEAST_BLOCK = 0.05
+FASTEST, SLOWEST = 4.0, 100.0  # rad in sqrt(L / g); lag over sqrt(L / g)
+NEAR = 0.05  # ship lengths by which positions of rudder and screw may disagree: those of publications do
 TURN = 6.2832  # rad: a table of angles in degrees goes further
 
 
@@ -93,6 +97,53 @@ def out_of_range(
         if widest <= TURN and not _is_meant(path, meant):
             return path, f"angles up to {widest:.3g}: expected degrees, are these radians? {_remedy(path)}"
     return None
+
+
+def contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> tuple[str, str] | None:
+    """Dotted path of the first number that contradicts another one, and a sentence; None where none does.
+
+    A rudder that is `behind` a screw is aft of it and on its side; its force on the hull acts where the rudder is, aft
+    or forward; steering gear of this size is not so fast or slow; a block coefficient is one.
+    """
+    meant = document.get(UNUSUAL, [])
+    for path, sentence in _contradictions(document, values):
+        if not _is_meant(path, meant):
+            return path, f"{sentence}; {_remedy(path)}"
+    return None
+
+
+def _contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    block = (document.get("particulars") or {}).get("C_b")
+    if block is not None and not LEAST_BLOCK <= block <= 1:
+        yield "particulars.C_b", f"{block:g}: expected a block coefficient of {LEAST_BLOCK:g} to 1"
+    length = _size(document, values).L
+    time = (length / G) ** 0.5
+    for path, value in values.items():
+        if path.endswith((".actuator.delta.rate", ".actuator.alpha.rate")) and abs(value) > FASTEST / time:
+            most = f"at most {FASTEST / time:.3g} rad/s"
+            yield path, f"{value:g} rad/s: expected {most}, 4 rad in sqrt(L / g); is it in deg/s?"
+        if ".actuator." in path and path.endswith(".T") and value > SLOWEST * time:
+            yield path, f"{value:g} s: expected at most {SLOWEST * time:.3g} s, 100 sqrt(L / g)"
+        if path.endswith(".x_H"):
+            x = values.get(f"{path.rpartition('.')[0]}.x", 0.0)
+            if x * value < 0:
+                yield (
+                    path,
+                    f"{value:g} m, the rudder at x = {x:g} m: its force on the hull acts on the same side",
+                )
+    for name, unit in document.get("thruster", {}).items():
+        if isinstance(unit, Mapping) and isinstance(unit.get("behind"), str):
+            yield from _wrong_place(name, unit["behind"], values, NEAR * length)
+
+
+def _wrong_place(name: str, screw: str, values: Mapping[str, float], near: float) -> Iterator[tuple[str, str]]:
+    """A rudder ahead of its screw by more than `near` [m], or on the other side of the ship."""
+    (x, y), (x_of, y_of) = ([values.get(f"thruster.{one}.{axis}", 0.0) for axis in "xy"] for one in (name, screw))
+    if x and x_of and x > x_of + near:  # 0 where forces act by derivatives, not by places
+        words = f"{x:g} m is ahead of {screw!r} at {x_of:g} m, which it is behind: x counts forward from the origin"
+        yield f"thruster.{name}.x", words
+    if y * y_of < 0:
+        yield f"thruster.{name}.behind", f"{screw!r} at y = {y_of:g} m is on the other side: this is at y = {y:g} m"
 
 
 @lru_cache(maxsize=64)

@@ -12,6 +12,7 @@ import pytest
 from shipid.errors import DocumentError
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.ranges import out_of_range
+from shipid.vessel.template import Particulars, first_guess
 
 NONSENSE: dict[str, tuple[str, Any]] = {
     "inertia of nothing": ("inertia.I_z", 1e-3),
@@ -122,3 +123,41 @@ def test_a_patch_may_mean_it(tmp_path: Path) -> None:
     file = tmp_path / "far.toml"
     file.write_text('base = "gunnerus-28.9"\nunusual = ["thruster.*.x"]\n[set]\n"thruster.port.x" = 1e6\n')
     assert load_vessel(str(file)).parameters["thruster.port.x"] == 1e6
+
+
+CONTRADICTIONS: dict[str, tuple[str, float | str]] = {
+    "rudder at the bow": ("thruster.rudder.x", 3.5),
+    "force on the hull at the other end": ("thruster.rudder.x_H", 3.0),
+    "deg/s for rad/s": ("thruster.rudder.actuator.delta.rate", 15.8),
+    "per cent of a block": ("particulars.C_b", 80.0),
+}
+
+
+@pytest.mark.parametrize("name", CONTRADICTIONS)
+def test_what_contradicts_itself_is_refused_and_may_be_meant(name: str, tmp_path: Path) -> None:
+    """In a document and in a patch on one that is sound."""
+    path, value = CONTRADICTIONS[name]
+    block, _, key = path.rpartition(".")
+    change = f'extends = "kvlcc2-l7"\n[{block}]\n{key} = {value}\n'
+    (tmp_path / "ship.toml").write_text(change)
+    with pytest.raises(DocumentError) as caught:
+        load_vessel(tmp_path / "ship.toml")
+    assert caught.value.path == path or path == "thruster.rudder.x"
+    assert "unusual = [" in caught.value.message
+    (tmp_path / "ship.toml").write_text('unusual = ["particulars.*", "thruster.*"]\n' + change)
+    load_vessel(tmp_path / "ship.toml")
+    if path in load_vessel("kvlcc2-l7").parameters:
+        (tmp_path / "patch.toml").write_text(f'base = "kvlcc2-l7"\n[set]\n"{path}" = {value}\n')
+        with pytest.raises(DocumentError, match="unusual = "):
+            load_vessel(tmp_path / "patch.toml")
+
+
+def test_a_rudder_behind_the_screw_of_the_other_side_is_refused(tmp_path: Path) -> None:
+    twin = first_guess(Particulars(60.0, 12.0, 3.5, 0.6, shafts=2), "twin", "twin.toml").text
+    (tmp_path / "twin.toml").write_text(twin)
+    load_vessel(tmp_path / "twin.toml")
+    swapped = re.sub(r'behind = "(port|starboard)"', 'behind = "port"', twin)
+    assert swapped != twin
+    (tmp_path / "twin.toml").write_text(swapped)
+    with pytest.raises(DocumentError, match=r"starboard_rudder.behind: 'port' at y = .* is on the other side"):
+        load_vessel(tmp_path / "twin.toml")
