@@ -177,28 +177,29 @@ def _said(blocks: Iterable[Any], total: int, what: str) -> Iterator[Any]:
 
 @contextmanager
 def iterations() -> Iterator[Any]:
-    """Give a function that `identify` calls after each iteration, to rewrite one line; None if not on a terminal."""
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield None
-        return
-    with console.status("cutting runs") as status:
-        yield lambda count, objective: status.update(f"iteration {count}, objective {objective:.6g}")
+    """Give a function that `identify` calls after each iteration, to show how far it is."""
+    with steps("cutting runs") as show:
+        yield lambda count, objective: show(f"iteration {count}, objective {objective:.6g}")
 
 
 @contextmanager
-def steps() -> Iterator[Callable[[str], object] | None]:
-    """Give a function that shows the step of a long calculation, in one line; None if not on a terminal."""
+def steps(first: str = "") -> Iterator[Callable[[str], object]]:
+    """Give a function that takes the step of a long calculation; shown at once on a terminal, else now and then."""
     from rich.console import Console
 
     console = Console(stderr=True)
-    if not console.is_terminal:
-        yield None
+    if console.is_terminal:
+        with console.status(first) as status:
+            yield lambda step: status.update(visible(step))
         return
-    with console.status("") as status:
-        yield lambda step: status.update(visible(step))
+    last = [first]
+
+    def say() -> None:
+        if last[0]:
+            sys.stderr.write(f"{visible(last[0])}\n")
+
+    with looking(say, SILENCE):
+        yield lambda step: last.__setitem__(0, step)
 
 
 @contextmanager

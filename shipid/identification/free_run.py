@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -73,15 +74,15 @@ def free_runs(
         rows = [np.where(values != given, values, list(vessel.parameters.values())) for vessel in vessels.values()]
         states_of = _predicted(first, [problem.segments[i] for i in places], np.array(rows), settings)
         predicted |= {(model, places[piece]): states for (model, piece), states in states_of.items()}
-    frames = []
+    parts = []
     for number, run in enumerate(problem.runs):
         places = [i for i, one in enumerate(problem.segments) if one.run == number]
-        frames += [
-            _series(run, piece, problem.segments[place], name, predicted[model, place])
+        parts += [
+            (run, piece, name, problem.segments[place], predicted[model, place])
             for piece, place in enumerate(places)
             for model, name in enumerate((MEASURED, *vessels))
         ]
-    series = pd.concat(frames, ignore_index=True)
+    series = _series(parts)
     return FreeRuns(series.drop(columns="measured"), _errors(series))
 
 
@@ -131,10 +132,17 @@ def _predicted(
     return result
 
 
-def _series(run: str, piece: int, segment: ShootingSegment, model: str, states: Array) -> pd.DataFrame:
-    head = {"run": run, "piece": piece, "t": segment.t, "model": model}
-    seen = segment.measured & (np.arange(len(segment.t)) > 0)
-    return pd.DataFrame({**head, **dict(zip(CHANNELS, states.T, strict=True)), "measured": seen})
+def _series(parts: Sequence[tuple[str, int, str, ShootingSegment, Array]]) -> pd.DataFrame:
+    """Rows of run, piece, model, its instants and its states (N + 1, channels), one part after the other."""
+    runs, pieces, models, segments, states = zip(*parts, strict=True)
+    lengths = [len(segment.t) for segment in segments]
+    heads = {"run": runs, "piece": pieces, "model": models}
+    columns: dict[str, Any] = {name: np.repeat(np.array(head), lengths) for name, head in heads.items()}
+    columns |= {"t": np.concatenate([segment.t for segment in segments])}
+    columns |= dict(zip(CHANNELS, np.concatenate(states).T, strict=True))
+    seen = [segment.measured & (np.arange(len(segment.t)) > 0) for segment in segments]
+    frame = pd.DataFrame({**columns, "measured": np.concatenate(seen)})
+    return frame[["run", "piece", "t", "model", *CHANNELS, "measured"]]
 
 
 def _errors(series: pd.DataFrame) -> pd.DataFrame:

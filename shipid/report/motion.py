@@ -54,8 +54,9 @@ def _finite(bounds: list[tuple[float, float]]) -> list[tuple[float, float]]:
 def _joined(mine: pd.DataFrame) -> pd.DataFrame:
     """Join the pieces of a line, with a gap between them."""
     every = max(1, len(mine) // POINTS)
-    parts = []
-    for _, piece in mine.groupby("piece", sort=False):
-        gap = piece.iloc[-1:].assign(**dict.fromkeys(("north", "east", "u", "v", "r"), np.nan))
-        parts += [piece.iloc[::every], gap]
-    return pd.concat(parts)
+    pieces = mine.groupby("piece", sort=False)
+    kept = mine[(pieces.cumcount() % every == 0).to_numpy()]
+    gaps = pieces.tail(1).assign(**dict.fromkeys(("north", "east", "u", "v", "r"), np.nan))
+    whole = pd.concat([kept, gaps])
+    numbers = pd.Series(range(pieces.ngroups), index=pd.unique(mine["piece"]))
+    return whole.iloc[np.argsort(whole["piece"].map(numbers).to_numpy(), kind="stable")]

@@ -189,6 +189,10 @@ def compare_structures(
     fitted, tested = pick_runs(dataset, runs, held_out)
     if folds < 2:
         raise ShipidError(f"{folds}: give two folds or more", path="folds")
+    if folds > max(len(fitted), FOLDS):
+        raise ShipidError(
+            f"{folds} folds of {len(fitted)} runs: give as many as there are runs, or fewer", path="folds"
+        )
     if len(fitted) < 2:
         raise DataError(
             "only one run: give two or more, because each run is predicted by a fit to the others", path="runs"

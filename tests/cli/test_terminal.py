@@ -129,3 +129,20 @@ def test_where_there_is_no_terminal_counted_says_how_far_it_is(
     lines = capsys.readouterr().err.splitlines()
     assert lines[0].startswith("0 of 3 cells after")
     assert any(line.startswith("2 of 3 cells") for line in lines)
+
+
+def test_where_there_is_no_terminal_a_long_step_is_said(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from shipid.cli import terminal
+
+    monkeypatch.setattr(terminal, "SILENCE", 0.02)
+    with terminal.steps() as show:
+        time.sleep(0.05)
+        show("fold 1 of 3")
+        time.sleep(0.1)
+    with terminal.iterations() as show:
+        show(3, 0.25)
+        time.sleep(0.1)
+    said = capsys.readouterr().err.splitlines()
+    assert set(said) == {"fold 1 of 3", "iteration 3, objective 0.25"}

@@ -107,6 +107,8 @@ def test_what_cannot_be_compared_is_refused() -> None:
         compare_structures(SHIP, data, SETTINGS, ["mmg"], runs=["10_5_627"])
     with pytest.raises(ShipidError, match="two folds or more"):
         compare_structures(SHIP, data, SETTINGS, ["mmg"], folds=1)
+    with pytest.raises(ShipidError, match=r"1000 folds of \d+ runs: give as many"):
+        compare_structures(SHIP, data, SETTINGS, ["mmg"], folds=1000)
     with pytest.raises(DataError, match="must hold two steps"):
         compare_structures(SHIP, data, SETTINGS, ["mmg"], ahead=0.5)
     with pytest.raises(ShipidError, match="'kubic' is no structure"):
