@@ -269,6 +269,22 @@ def _widths(given: list[str]) -> list[str] | dict[str, Any]:
     return named | pairs([name for name in given if "=" in name], "--nuisance", "current=0.3")
 
 
+def _show_nuisances(outcome: Identified, answer: Answer) -> None:
+    """Print the unknowns of each run, such as a current; initial states are many: the answer for programs has them."""
+    from shipid.identification.settings import UNITS_OF_NUISANCES
+
+    of_runs = outcome.solution.nuisances
+    rows = [{"run": run, **numbers} for run, numbers in of_runs.items() if numbers]
+    scalars = dict.fromkeys(name for numbers in of_runs.values() for name in numbers if name in UNITS_OF_NUISANCES)
+    if not rows:
+        return
+    shown = [[run, *(digits(numbers[name]) for name in scalars)] for run, numbers in of_runs.items()]
+    heads = [f"{name.replace('_', ' ')} [{UNITS_OF_NUISANCES[name]}]" for name in scalars]
+    if scalars:
+        answer.say("Unknowns of each run, estimated beside the factors:")
+    answer.rows("nuisances", rows, table(["run", *heads], shown) if scalars else None)
+
+
 def _show_identified(outcome: Identified, answer: Answer) -> None:
     """Print estimates, what is not identified, free runs, manoeuvres, manoeuvres to run next, and warnings."""
     from shipid.identification.sides import HEADS, shown
@@ -300,6 +316,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
         f"Factors are relative to the base, and so are errors and intervals, by {words[outcome.statistics.chosen]}."
     )
     answer.say("\n".join(f"  {sentence}" for sentence in outcome.unseen), unseen=outcome.unseen)
+    _show_nuisances(outcome, answer)
     answer.say(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
     heads = ["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
     answer.rows("free_runs", outcome.errors, table(heads, _free_rows(outcome)))

@@ -258,7 +258,8 @@ def read_dataset(file: str | os.PathLike[str]) -> Dataset:
     try:
         table = pyarrow.parquet.read_table(file)
     except (pyarrow.ArrowException, ValueError, TypeError):
-        raise DataError("not a Parquet file: make one from a log with `shipid data import`", file=file) from None
+        hint = "make one from a log with `shipid data import`, or give the log with --mapping where there is one"
+        raise DataError(f"not a Parquet file: {hint}", file=file) from None
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror or 'no such file'})", file=file) from None
     stored = (table.schema.metadata or {}).get(_KEY)

@@ -38,6 +38,10 @@ NUISANCES: dict[str, dict[str, float]] = {
     "lever_arm": {"lever_arm": 0.0},
 }
 """Name in `nuisance` -> its scalars with their fault-free values."""
+UNITS_OF_NUISANCES = {"thrust_scale": "1", "latency": "s", "heading_bias": "rad", "lever_arm": "m"} | dict.fromkeys(
+    ("current_north", "current_east", "velocity_bias_u", "velocity_bias_v"), "m/s"
+)
+"""Scalar of a nuisance -> its unit."""
 MOVING = ("current_north", "current_east", "thrust_scale", "latency")
 """Scalars that change the motion; the others change only the measurement."""
 WIDE = {"initial_state": 1.0, "current": 0.3, "thrust_scale": 0.1, "latency": 1.0, "lever_arm": 5.0} | {

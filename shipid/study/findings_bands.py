@@ -118,7 +118,8 @@ def kept_promise(held: Array, run: NDArray[np.str_], level: float) -> Finding:
     """Verdict on B2 from held (S,), the share of models whose band holds the path of a window, and its run (S,)."""
     low, high = share_interval(held, run)
     share, count = float(held.mean()), len(np.unique(run))
-    evidence = f"bands of {level:.0%} hold {share:.0%} [{low:.0%}, {high:.0%}] of whole paths ({manoeuvres(count)})"
+    interval = "" if too_few(count) else f" [{low:.0%}, {high:.0%}]"
+    evidence = f"bands of {level:.0%} hold {share:.0%}{interval} of whole paths ({manoeuvres(count)})"
     decided = verdict(low >= level - SHORT, high < level)
     return _finding("B2", decided if not too_few(count) else "undecided", evidence, **{f"share at {level:.0%}": share})
 

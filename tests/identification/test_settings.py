@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.identification.settings import POSITIVE, WIDE, Identify, overrides, unknowns
+from shipid.identification.settings import (
+    NUISANCES,
+    POSITIVE,
+    UNITS_OF_NUISANCES,
+    WIDE,
+    Identify,
+    overrides,
+    unknowns,
+)
 from shipid.vessel.load import load_vessel
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -85,3 +93,7 @@ def test_a_pattern_selects_no_constant_and_no_dimension() -> None:
 def test_the_time_constant_of_an_actuator_is_no_draught() -> None:
     paths = unknowns(load_vessel("otter"), Identify(parameters=["thruster.*.actuator.*"])).paths
     assert {"thruster.port.actuator.n.T", "thruster.starboard.actuator.n.T"} <= set(paths)
+
+
+def test_every_scalar_of_a_nuisance_has_a_unit() -> None:
+    assert set(UNITS_OF_NUISANCES) == {name for scalars in NUISANCES.values() for name in scalars}
