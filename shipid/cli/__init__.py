@@ -46,7 +46,7 @@ def main() -> None:
         sys.stderr.write("interrupted\n")
         sys.exit(130)
     except MemoryError:
-        sys.stderr.write("error: out of memory: fewer --workers, longer intervals or fewer members take less\n")
+        sys.stderr.write("error: out of memory: longer steps, fewer runs, members or --workers take less\n")
         sys.exit(1)
     except OSError as error:  # a full disk, a folder that is a file, a place where one may not write
         sys.stderr.write(f"error: {error.filename or 'system'}: {error.strerror or error}\n")

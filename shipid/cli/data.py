@@ -154,6 +154,8 @@ def data_segment(
     from shipid.logs.mapping import read_mapping
 
     declared = read_mapping(mapping)
+    if declared.source.runs is not None or declared.parts is not None:
+        raise ShipidError("says where runs begin ([source] runs or [parts]): nothing is to be cut", file=mapping)
     unit = declared.clock.unit
     segments = segment_log(declared, log or fetch(mapping))
     file = write_new(segments_text(segments, unit), out or Path(f"{Path(mapping).stem}-segments.toml"))
@@ -255,9 +257,11 @@ def data_measures(
 ) -> None:
     """Measure the standard manoeuvres of a dataset: overshoots, advance, tactical diameter, ..."""
     from shipid.data.dataset import read_dataset
-    from shipid.files import write_table
+    from shipid.files import check_table, write_table
     from shipid.logs.measuring import measure_dataset
 
+    if csv is not None:
+        check_table(csv)
     result = measure_dataset(read_dataset(dataset), manoeuvre, length)
     measures, criteria = (frame.to_dict("records") for frame in (result.measures, result.criteria))
     left = [{"run": run, "because": why} for run, why in result.left.items()]

@@ -128,13 +128,17 @@ def manoeuvre(
 ) -> None:
     """Simulate a standard manoeuvre: measures with the IMO criteria, and a page with plots."""
     from shipid.data.dataset import Dataset, write_dataset
-    from shipid.files import write_table
+    from shipid.files import check_table, write_table
     from shipid.report.manoeuvre import write_manoeuvre
     from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
     from shipid.vessel.load import load_vessel
 
     if log is not None and log.suffix != ".parquet":
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=log)
+    if out is not None and out.suffix != ".html":
+        raise ShipidError("a page is an HTML file: let the name end in .html", file=out)
+    if csv is not None:
+        check_table(csv)
     ship = load_vessel(vessel)
     done = measure_standard(
         ship, name, angles or (), speed=speed, side=side, duration=duration, step=step, approach=approach

@@ -130,6 +130,9 @@ def import_log(
 def runs_of(source: Source, log: Path) -> dict[str, Path]:
     """Return run -> file: every file of the folder that fits `source.runs`; without that pattern, the log itself."""
     if source.runs is None:
+        if log.is_dir():
+            fault = 'cannot be read: a folder, and the mapping reads one file; for a file a run write runs = "*.csv"'
+            raise DataError(fault, file=log, path="source.runs")
         return {log.stem: log}
     if not log.is_dir():
         fault = "is a file, and the mapping takes a folder of runs" if log.is_file() else "there is no such folder"
@@ -176,7 +179,7 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
     rows = _unwrapped(rows, mapping.columns, file)
     rows, mended = apply_repairs(rows, early, off, file)
     records += mended
-    rows, origin = _projected(rows, mapping) if "latitude" in rows else (rows, None)
+    rows, origin = _projected(rows, mapping, file) if "latitude" in rows else (rows, None)
     rows, gaps = _close_gaps(rows, mapping.clock.max_gap, file)
     rows = _in_body(rows, mapping.columns)
     fixed = "speed" in mapping.columns or ("u" in mapping.columns and mapping.columns["u"].frame == "earth")
@@ -546,11 +549,17 @@ def _unwrap(values: NDArray[np.float64]) -> None:
         values += np.cumsum(corrections, out=corrections)
 
 
-def _projected(rows: pd.DataFrame, mapping: Mapping) -> tuple[pd.DataFrame, tuple[float, float]]:
+def _projected(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.DataFrame, tuple[float, float]]:
     """North and east [m] in the plane that touches the ellipsoid (WGS 84) at the origin, instead of positions on it."""
     from pymap3d import geodetic2ned
 
     latitude, longitude = np.degrees(rows["latitude"].to_numpy()), np.degrees(rows["longitude"].to_numpy())
+    for name, values, most in (("latitude", latitude, 90.0), ("longitude", longitude, 360.0)):
+        wrong = np.flatnonzero(np.abs(values) > most)
+        if len(wrong):
+            reached = f"{values[wrong[0]]:.6g} deg at {moment_of(rows['t'].iloc[wrong[0]])}, one of {len(wrong)} rows"
+            message = f"{reached}: is the unit right? List what stands for a missing value in [format] missing"
+            raise DataError(message, file=file, path=f"columns.{name}")
     known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
     if mapping.origin is not None:
         origin = mapping.origin.latitude, mapping.origin.longitude

@@ -371,3 +371,24 @@ def test_a_rounded_clock_keeps_time_where_rows_were_lost(seed: int) -> None:
     apart = np.diff(even) / step
     np.testing.assert_allclose(apart, np.round(apart), atol=1e-6)
     assert apart.min() > 0.5
+
+
+def test_a_place_beyond_the_poles_is_refused(tmp_path: Path) -> None:
+    """999 deg stands for a missing fix; north and east would be thousands of kilometres."""
+    log = pd.DataFrame({"t": T, "lat": 63.0 + 1e-5 * T, "lon": 10.0, "psi": 0.1, "u": 1.0, "v": 0.0, "r": 0.0})
+    log.loc[[5, 9], "lat"] = 999.0
+    log.to_csv(tmp_path / "log.csv", index=False)
+    units = {"latitude": ("lat", "deg"), "longitude": ("lon", "deg"), "psi": ("psi", "rad")}
+    units |= {name: (name, "rad/s" if name == "r" else "m/s") for name in ("u", "v", "r")}
+    text = 'name = "m"\n[clock]\nfrom = "t"\nunit = "s"\nmax_gap = 3\n'
+    text += "".join(f'[columns.{name}]\nfrom = "{a}"\nunit = "{unit}"\n' for name, (a, unit) in units.items())
+    (tmp_path / "m.toml").write_text(text)
+    with pytest.raises(DataError, match=r"columns.latitude: 999 deg at .* one of 2 rows: .* missing"):
+        import_log(read_mapping(tmp_path / "m.toml"), tmp_path / "log.csv")
+    (tmp_path / "m.toml").write_text(text + '[format]\nmissing = ["", "999.0"]\n')
+    assert import_log(read_mapping(tmp_path / "m.toml"), tmp_path / "log.csv").frame["north"].abs().max() < 200
+
+
+def test_a_folder_for_a_mapping_of_one_file_says_what_to_write(plain_mapping: Write, tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"a folder, and the mapping reads one file; .* runs = "):
+        import_log(read_mapping(plain_mapping()), tmp_path)

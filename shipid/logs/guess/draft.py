@@ -129,7 +129,7 @@ def _head(guess: Guess) -> Iterator[str]:
     if scattered:
         yield f"step = {usual:g}    # s: each kind of sentence has other instants; this is the step of the position"
     if scattered or guess.kinds & {"holes in time", "missing values"}:
-        yield f"max_gap = {max(3.0, 5 * usual):g}    # s: shorter gaps are interpolated, longer ones break the run"
+        yield f"max_gap = {max(3.0, 5 * usual):g}    # s: missing for less: interpolated, for more: the run breaks"
 
 
 def _origin(guess: Guess) -> Iterator[str]:

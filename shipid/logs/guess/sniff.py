@@ -47,6 +47,17 @@ CLOCK_WORDS = frozenset(
         "gmt"
     ).split()
 )
+PACKED = {
+    b"\x1f\x8b": "packed by gzip",
+    b"BZh": "packed by bzip2",
+    b"\xfd7zXZ": "packed by xz",
+    b"7z\xbc\xaf": "a 7z archive",
+    b"PK\x03\x04": "a ZIP archive, or a workbook (.xlsx, .ods)",
+    b"\xd0\xcf\x11\xe0": "an old workbook (.xls)",
+    b"SQLite format 3": "a data base of SQLite",
+    b"\x89HDF": "an HDF5 file",
+}
+"""First bytes of a file that is no log as it is -> what it is."""
 FINE = {
     "ns": (1e-9, 1e17, ("ns", "nsec", "nanos", "nanosec", "nanoseconds")),
     "us": (1e-6, 1e14, ("us", "usec", "micros", "microsec", "microseconds")),
@@ -163,6 +174,9 @@ def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
 def _encoding(head: bytes, file: Path) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
+    packed = next((name for mark, name in PACKED.items() if head.startswith(mark)), None)
+    if packed is not None:
+        raise DataError(f"{packed}: unpack it, or export the log as text or Parquet", file=file)
     if b"\0" in head:
         raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
     for encoding in ("utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8", "cp1252"):
@@ -285,6 +299,9 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
     words = []
     for index, name in enumerate(map(str, table.columns)):
         column = table.iloc[:, index]
+        if pd.api.types.is_bool_dtype(column.dtype):
+            words.append(name)
+            continue
         if not pd.api.types.is_numeric_dtype(column.dtype):
             text = column.astype(str).str.strip()
             column = pd.to_numeric(text.str.replace(",", ".") if decimal == "," else text, errors="coerce")

@@ -207,3 +207,18 @@ def test_one_name_over_a_date_and_a_time(tmp_path: Path) -> None:
     assert sniffed.clock["date"] == "date"
     np.testing.assert_allclose(np.diff(sniffed.t), 1.0)
     assert list(sniffed.columns) == ["east [m]", "north [m]"]
+
+
+@pytest.mark.parametrize("name", ["log.csv.gz", "log.csv.bz2", "log.csv.xz", "log.zip"])
+def test_a_packed_log_is_named_as_one(name: str, tmp_path: Path) -> None:
+    TABLE.to_csv(tmp_path / name, index=False)
+    with pytest.raises(DataError, match=r"packed by|a ZIP archive") as caught:
+        sniff(tmp_path / name)
+    assert "unpack it" in caught.value.message
+
+
+def test_a_column_of_yes_and_no_is_no_number(tmp_path: Path) -> None:
+    TABLE.assign(rpm=T > 3).to_parquet(tmp_path / "log.parquet")
+    sniffed = sniff(tmp_path / "log.parquet")
+    assert "rpm" not in sniffed.columns
+    assert any("'rpm' holds words" in note for note in sniffed.notes)
