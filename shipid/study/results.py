@@ -366,13 +366,16 @@ def commands_frame(results: Results) -> pd.DataFrame:
     for name in results.dataset.commands:
         alike = (other for other in shown if signal_of(other) == signal_of(name))
         twin = next((other for other in alike if np.allclose(frame[other], frame[name], atol=1e-9)), None)
+        word = SIGNALS[signal_of(name)].word
+        component = name.partition(".")[0].replace("_", " ").removesuffix(word).strip()  # port_rudder, rudder
         if twin is None:
-            shown[name] = name.partition(".")[0]
+            shown[name] = component
         else:
-            shown[twin] += f" and {name.partition('.')[0]}"
+            shown[twin] += f" and {component}"
     for name, components in shown.items():
         unit, factor = read_unit(name)
-        result[f"{components} {SIGNALS[signal_of(name)].word} [{unit}]"] = frame[name].to_numpy() * factor
+        words = f"{components} {SIGNALS[signal_of(name)].word}".strip()
+        result[f"{words} [{unit}]"] = frame[name].to_numpy() * factor
     return with_gaps(result, ["run"])
 
 

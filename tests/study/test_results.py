@@ -62,6 +62,20 @@ def test_commands_are_what_was_ordered(read: Results, tiny_run: Path) -> None:
     np.testing.assert_allclose(frame.iloc[:, 3], np.degrees(ordered["port.alpha"]))
 
 
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (("rudder.delta", "propeller.n"), ["rudder [deg]", "propeller shaft [rpm]"]),
+        (("port_rudder.delta", "starboard_rudder.delta"), ["port rudder [deg]", "starboard rudder [deg]"]),
+    ],
+)
+def test_commands_have_their_words_once(names: tuple[str, str], expected: list[str], read: Results) -> None:
+    frame = read.dataset.frame.drop(columns=read.dataset.commands)
+    orders = {name: np.arange(len(frame)) * (place + 1.0) for place, name in enumerate(names)}
+    dataset = Dataset(frame.assign(**orders), read.dataset.metadata)
+    assert list(frames.commands_frame(replace(read, dataset=dataset)).columns)[2:] == expected
+
+
 def test_envelope_in_sailors_units(read: Results) -> None:
     frame = frames.envelope_frame(read).set_index(["set", "quantity"])
     columns = read.test.columns
