@@ -65,7 +65,9 @@ def study_new(
     draft = draft_study(vessel, data, file)
     write_new(with_schema(draft.text, file, "study"), file, "study")
     with answering(as_json) as answer:
-        choices = [{"path": choice.path, "value": str(choice.value), "why": choice.why} for choice in draft.choices]
+        choices = [
+            {"path": choice.path, "value": _written(choice.value), "why": choice.why} for choice in draft.choices
+        ]
         answer.say(choices=choices)
         if not as_json:
             show_reasons(choices)
@@ -83,6 +85,20 @@ def study_new(
         sentence = f"{draft.plan.cells} cells of {len(names)} foundations ({', '.join(names)}) -> {file}"
         answer.say(sentence, file=file, cells=draft.plan.cells, foundations=names, warnings=draft.warnings)
         answer.say(f"run it with: {shlex.join(['shipid', 'study', 'run', str(file)])}")
+
+
+def _written(value: Any) -> str:
+    """A value as the study document has it; a text alone without quotes."""
+    from tomlkit import item
+
+    def inline(one: Any) -> str:
+        if isinstance(one, dict):
+            return f"{{{', '.join(f'{key} = {inline(inner)}' for key, inner in one.items())}}}"
+        if isinstance(one, list | tuple):
+            return f"[{', '.join(map(inline, one))}]"
+        return str(item(one).as_string())
+
+    return value if isinstance(value, str) else inline(value)
 
 
 @app.command("variants")
