@@ -9,6 +9,7 @@ import typer
 
 from shipid.cli.completion import cells
 from shipid.cli.options import Adaptive, Folder, Kind, check_band
+from shipid.errors import ShipidError
 
 
 def predict(
@@ -26,6 +27,8 @@ def predict(
     """Write physics and cooperative paths in north-east for every instant of a log."""
     from shipid.study.apply import predict_log
 
+    if not cell:
+        raise ShipidError("is empty: name a cell, as results.parquet does", path="--cell")
     check_band(level, kind, adaptive)
     file = out or Path(f"{cell}.parquet")
     frame, outside = predict_log(folder, cell, log, mapping, file, level=level, kind=kind, rate=adaptive)

@@ -128,7 +128,10 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
     available = len(rest.spans)
     if available < max(plan.study.grid.N_D):
         raise DocumentError(
-            f"{max(plan.study.grid.N_D)}: only {available} runs are left for training", file=plan.file, path="grid.N_D"
+            f"{max(plan.study.grid.N_D)}: only {available} runs are left for training, {len(test.spans)} test "
+            "(split.test)",
+            file=plan.file,
+            path="grid.N_D",
         )
     if min(plan.study.grid.N_D) == 1:
         _check_single_runs(plan, rest)
@@ -237,7 +240,10 @@ def _test_runs(plan: Plan, windows: Windows) -> list[str]:
     for name in wanted:
         if name not in runs:
             raise DocumentError(
-                f"{name!r} is no run with windows: {choices(name, runs)}", file=plan.file, path="split.test"
+                f"{name!r} is no run with windows{'' if '*' not in name else ' (a * is not read here)'}: "
+                f"{choices(name, runs)}",
+                file=plan.file,
+                path="split.test",
             )
     return wanted
 

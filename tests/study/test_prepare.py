@@ -316,6 +316,11 @@ def test_what_is_not_measured_is_reported(recorded: Callable[..., tuple[Plan, Da
     ("changes", "path", "message"),
     [
         ({"split": {"test": ["z"]}}, "split.test", "'z' is no run with windows: valid: a, b, c, d"),
+        (
+            {"split": {"test": ["a*"]}},
+            "split.test",
+            r"is no run with windows \(a \* is not read here\): did you mean 'a'",
+        ),
         ({"split": {"test": 4}}, "split.test", "only 4 runs"),
         ({"split": {"test": 2}, "grid": {"N_D": [3]}}, "grid.N_D", "only 2 runs are left"),
         ({"split": {"test": 1}, "prediction": {"ahead": 40.0}}, "prediction.ahead", "as long as the horizon of 40 s"),
