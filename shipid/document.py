@@ -51,8 +51,8 @@ def find(name: str | Path, kind: str, relative_to: Path | None = None) -> Path:
         for folder in filter(None, (relative_to, Path())):
             if (folder / name).is_file():
                 return folder / name
-            if (folder / name).is_dir():
-                raise DocumentError("is a folder: name a document in it", file=name)
+        if any((folder / name).is_dir() for folder in filter(None, (relative_to, Path()))):
+            raise DocumentError("is a folder: name a document in it", file=name)
         raise DocumentError("no such file", file=name)
     available = bundled(kind)
     if name not in available:

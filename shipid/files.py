@@ -38,14 +38,14 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
     temporary folder, which `sweep` removes. A link stays, and the file that it leads to is replaced. Raises OSError
     where the place cannot be written, and for a device or a pipe, which a file would replace.
     """
-    target = Path(os.path.realpath(target))
+    name, target = Path(target).name, Path(os.path.realpath(target))
     if target.is_symlink():
         raise OSError(errno.ELOOP, "a link that leads to itself", str(target))
     if target.exists() and not (target.is_file() or target.is_dir()):
         raise OSError(errno.EINVAL, "a device or a pipe: name a file to write", str(target))
     make_folder(target.parent)
     with temporary_folder(target.parent) as folder:
-        temporary = folder / target.name
+        temporary = folder / name
         yield temporary
         sync(temporary)
         os.replace(temporary, target)

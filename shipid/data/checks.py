@@ -17,7 +17,7 @@ Plane = np.ndarray[Any, np.dtype[np.complex128]]
 GAP, JITTER, FROZEN, OVERLAP = 3.0, 0.05, 0.02, 0.5
 CORRELATION, SCALE_ERROR, HEADING_ERROR, PATH_ERROR = 0.8, 0.1, 0.25, 0.05
 TURNING = np.radians(0.2)  # rms of r under which a run is too straight to compare headings
-FEW_ROWS, FAR, CALM = 30, np.radians(150.0), 1.0  # rows; turn of the ship; m/s
+FEW_ROWS, FAR, BRIEF, CALM = 30, np.radians(240.0), 600.0, 1.0  # rows; turn of the ship; s; m/s
 WITH_HER, GUSTY = 0.45, 0.55  # of her speed, of the wind speed: less is distortion of the flow, and gusts
 STEADIER, UNSTEADY = 0.5, 0.25  # where it is so much steadier if taken for an apparent wind; of the wind speed
 STRETCH, WINDOW = 30.0, 10.0  # s
@@ -75,31 +75,39 @@ def _wind(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     """Whether the true wind turns with the ship: of a steady wind W, logged as W + b e^(i psi), b is 0.
 
     An apparent wind taken for a true one changes by more than gusts do. A wrong unit, or from and towards taken for
-    each other, leave a part of the ship's speed in b. Stretches in which the ship turns far can show it; the worst one.
+    each other, leave a part of the ship's speed in b. Judged are parts of `BRIEF` in which the ship turns far, with a
+    wind that may drift; the worst one is reported.
     """
-    found = [_turning_wind(rows) for rows in stretches if "V_w" in rows and len(rows) >= FEW_ROWS]
+    found = []
+    for rows in stretches:
+        if "V_w" in rows:
+            part = ((rows["t"] - rows["t"].iloc[0]) // BRIEF).to_numpy()
+            found += [_turning_wind(rows[part == number]) for number in np.unique(part)]
     yield from sorted((row for row in found if row is not None), key=lambda row: float(row["value"]))[-1:]
 
 
 def _turning_wind(rows: pd.DataFrame) -> dict[str, Any] | None:
     psi = np.unwrap(rows["psi"].to_numpy())
-    if np.ptp(psi) < FAR:
+    if len(rows) < FEW_ROWS or np.ptp(psi) < FAR:
         return None
+    t = rows["t"].to_numpy() - rows["t"].mean()
+    still, ship = np.stack([np.ones_like(t), t], axis=1), (rows["u"] + 1j * rows["v"]).to_numpy()
     wind = rows["V_w"].to_numpy() * np.exp(1j * rows["beta_w"].to_numpy())
-    design = np.stack([np.ones_like(psi), np.exp(1j * psi)], axis=1)
-    (_, with_her), *_ = np.linalg.lstsq(design, wind, rcond=None)
-    ship = (rows["u"] + 1j * rows["v"]).to_numpy()
-    speed = float(np.abs(ship).mean())
-    apparent = min(
-        float(np.std((sign * wind + moving) * np.exp(1j * psi))) for sign in (1, -1) for moving in (ship, 0.0)
-    )
-    steadier = apparent < STEADIER * float(np.std(wind))
-    share, moved = abs(with_her) / max(speed, CALM), float(np.std(wind)) / max(float(np.abs(wind).mean()), CALM)
+
+    def left(values: Plane) -> float:
+        return float(np.std(values - still @ np.linalg.lstsq(still, values, rcond=None)[0]))
+
+    with_her = np.linalg.lstsq(np.column_stack([still, np.exp(1j * psi)]), wind, rcond=None)[0][2]
+    speed, mean = max(float(np.abs(ship).mean()), CALM), max(float(np.abs(wind).mean()), CALM)
+    apparent = min(left((sign * wind + moving) * np.exp(1j * psi)) for sign in (1, -1) for moving in (ship, 0 * ship))
+    moved = left(wind)
     sentence = (
-        f"while the ship turns by {np.degrees(np.ptp(psi)):.0f} deg, the true wind changes by {100 * moved:.0f} % "
-        f"(RMS), and {abs(with_her):.2g} m/s of it turn with her: relative, from or towards, or unit wrong?"
+        f"while the ship turns by {np.degrees(np.ptp(psi)):.0f} deg, the true wind changes by "
+        f"{100 * moved / mean:.0f} % (RMS), and {abs(with_her):.2g} m/s of it turn with her: relative, from or "
+        "towards, or unit wrong?"
     )
-    return _row("wind", max(share / WITH_HER, moved / (UNSTEADY if steadier else GUSTY)), "1", 1.0, sentence)
+    most = UNSTEADY if apparent < STEADIER * moved else GUSTY
+    return _row("wind", max(abs(with_her) / speed / WITH_HER, moved / mean / most), "1", 1.0, sentence)
 
 
 def noise_of(values: Array) -> float:

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid import document as documents
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Dataset, pieces
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError
 from shipid.identification.residuals import build
@@ -57,8 +57,8 @@ def free_runs(
     a new run. Raises DataError for a length shorter than two steps, and what `residuals.build` raises.
     """
     check_length(settings, length)
-    spans = dataset.select(runs).frame.groupby("run")["t"]
-    steps = float((spans.max() - spans.min()).sum()) / settings.step
+    spans = [float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for _, rows in pieces(dataset.select(runs))]
+    steps = sum(spans) / settings.step
     if steps > MOST_STEPS:
         raise DataError(
             f"{settings.step:g} s makes {steps:.2g} steps of these runs: at most {MOST_STEPS:.0e}", path="step"

@@ -178,7 +178,8 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
         return select(patterns, base, file, f"{BLOCK}.{key}")
 
     selected = chosen(settings.parameters, "parameters")
-    asked = _without_dimensions(selected, settings.parameters, file)
+    named = {*settings.parameters, *settings.prior, *settings.bounds, *settings.scale}
+    asked = _without_dimensions(selected, named | {path for group in settings.together for path in group}, file)
 
     def reached(pattern: str, key: str, among: Collection[str]) -> list[str]:
         paths = [path for path in chosen([pattern], key) if path in among]
@@ -231,7 +232,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     return Unknowns(tuple(groups), tuple(scales), centre, low, high, prior)
 
 
-def _without_dimensions(asked: Sequence[str], patterns: Sequence[str], file: str) -> list[str]:
+def _without_dimensions(asked: Sequence[str], patterns: Collection[str], file: str) -> list[str]:
     """The paths without dimensions and constants, which are measured or known; with those that are written in full."""
     known = {
         path

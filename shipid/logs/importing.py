@@ -43,6 +43,7 @@ from shipid.physics.signals import is_command, is_output
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 
+NEAR = 3.0  # usual steps
 JUMP = 1.75 * np.pi  # rad: of an angle from row to row, beyond which it counts from 0 again
 Records = list[dict[str, Any]]
 Begins = list[tuple[float, str]]
@@ -526,9 +527,11 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column], file: Path) -> pd
 
 
 def _check_whole(rows: pd.DataFrame, name: str, source: str, file: Path) -> None:
-    """Raise DataError where an angle jumps by nearly a whole turn from row to row: the mean of 359 and 1 deg is 0."""
+    """Raise DataError where an angle jumps by a whole turn from row to row: the mean of 359 and 1 deg is 180."""
     known = rows[["t", name]].dropna()
-    places = np.flatnonzero(np.abs(np.diff(known[name].to_numpy())) > JUMP)
+    steps, jumps = np.diff(known["t"].to_numpy()), np.abs(np.diff(known[name].to_numpy()))
+    near = steps < NEAR * np.median(steps) if len(steps) else steps > 0
+    places = np.flatnonzero(near & (np.abs(jumps - 2 * np.pi) < 2 * np.pi - JUMP))
     if len(places):
         times = "once" if len(places) == 1 else f"{len(places)} times, first"
         sentence = f"{source!r} jumps by a whole turn, {times} at t = {known['t'].iloc[places[0] + 1]:.10g} s"

@@ -13,6 +13,7 @@ import pandas as pd
 from shipid.data.dataset import DATED, Dataset, units_of
 from shipid.errors import DataError
 
+FARTHEST = 1e5  # m between origins
 PAUSE = 3600.0  # s put between recordings whose clocks overlap but count from no common moment
 
 
@@ -58,6 +59,8 @@ def _check_alike(datasets: Mapping[Path, Dataset]) -> None:
             if lacking:
                 sentence = f"no command {', '.join(lacking)}, which {first.name if place is file else file.name} has"
                 raise DataError(f"{sentence}: name the columns alike in both mappings, and import again", file=place)
+        if one.digest == wanted.digest:
+            raise DataError(f"holds the same rows as {first.name}: a copy would train on what it tests", file=file)
         vessels = {str(data.metadata["vessel"]) for data in (wanted, one) if data.metadata.get("vessel")}
         if len(vessels) > 1:
             raise DataError(f"of another vessel than {first.name}: {' and '.join(sorted(vessels))}", file=file)
@@ -98,8 +101,12 @@ def _clock(datasets: Mapping[Path, Dataset], notes: list[str]) -> tuple[str, dic
                 _check_apart(file, one)
         return "run", delays
     spans = {file: (float(one.frame["t"].min()), float(one.frame["t"].max())) for file, one in datasets.items()}
-    dated = all(begin > DATED for begin, _ in spans.values())
-    if dated or not any(a < d and c < b for (a, b), (c, d) in combinations(spans.values(), 2)):
+    with_date = {file: begin > DATED for file, (begin, _) in spans.items()}
+    dated = all(with_date.values())
+    if any(with_date.values()) and not dated:
+        file = next(file for file, here in with_date.items() if not here)
+        raise DataError("its clock has no date, that of another has: map the column of dates in both", file=file)
+    if dated or not any(a <= d and c <= b for (a, b), (c, d) in combinations(spans.values(), 2)):
         return "shared", delays
     end = -np.inf
     for file, (begin, last) in spans.items():
@@ -132,6 +139,9 @@ def _moved(datasets: Mapping[Path, Dataset], file: Path) -> tuple[float, float]:
     from pymap3d import geodetic2ned
 
     north, east, _ = geodetic2ned(here["latitude"], here["longitude"], 0.0, there["latitude"], there["longitude"], 0.0)
+    if np.hypot(north, east) > FARTHEST:
+        away = f"{np.hypot(north, east) / 1e3:.0f} km from that of {first.name}"
+        raise DataError(f"its origin is {away}: a plane holds {FARTHEST / 1e3:.0f} km", file=file, path="origin")
     return float(north), float(east)
 
 

@@ -16,7 +16,7 @@ from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.physics.signals import is_command, steers
 
-NO_HELM = "no angle steers: zigzags and turning circles are measured by the helm, and the shafts are not reversed"
+NO_HELM = "the log has no angle that steers, by which zigzags and turning circles are measured"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,8 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
         record = record_of(columns)
         kinds, why = kinds_of(record) if kind is None else ((kind,), "")
         if not kinds:
-            left[name] = why if any(is_command(column) and steers(column) for column in columns) else NO_HELM
+            helm = any(is_command(column) and steers(column) for column in columns)
+            left[name] = why if helm else f"{NO_HELM}; {why}"
         for seen in kinds:
             result = MEASURES[seen](record)
             measures += [{"run": name, "kind": seen, **row} for row in measure_rows(result, length)]

@@ -36,7 +36,7 @@ TIME_OF_DAY = r"\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?(\s*[AaPp][Mm])?\s*"
 DAY_OF = r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)"
 """A date without a time."""
 DAYS = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y", "%d-%m-%Y", "%m-%d-%Y")
-HOURS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S.%f %p", "%I:%M:%S %p", "%I:%M %p")
+HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 SAMPLES = 60  # texts by which the way of writing is looked for
 _SENTENCE = re.compile(r"\$[A-Z]{2}[A-Z]{3},")
 Progress = Callable[[float], None]
@@ -144,32 +144,40 @@ def seconds(dates: pd.Series[Any]) -> Array:
     every row can be, else that with which the log is shorter, else day/month. A time of day goes on after midnight. NaN
     where there is none.
     """
+    if isinstance(dates.dtype, pd.CategoricalDtype):
+        dates = dates.astype(object)
     if pd.api.types.is_timedelta64_dtype(dates.dtype):
         return np.array(dates.dt.total_seconds(), dtype=np.float64)
     if pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object:
-        texts = dates.dropna().astype(str)
+        texts = dates.dropna().astype(str).str.strip().str.replace(",", ".")
         if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
             return _since_midnight(dates)
-        texts = texts.str.strip().str.replace(",", ".")
-        written = _written(texts)
+        written = ways_of(texts)
         if written:
             moments = min((_moments(texts, one) for one in written), key=_unlikely)
             return _since_1970(moments.reindex(dates.index))
+        dates = texts.reindex(dates.index)
     return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))
 
 
-def _written(texts: pd.Series[Any]) -> list[str]:
-    """Ways in which dates (N,) of text may be written: most of a sample can be read so."""
-    some = texts.iloc[:: max(1, len(texts) // SAMPLES)]
+def ways_of(texts: pd.Series[Any]) -> list[str]:
+    """Ways in which dates (N,) of text may be written, none for ISO 8601: most of a sample can be read so."""
+    places = np.random.default_rng(0).integers(
+        0, max(1, len(texts)), SAMPLES
+    )  # no stride: rows of one kind may have one
+    some = texts.iloc[np.unique(places)] if len(texts) else texts
     some = some[some.str.fullmatch(rf"(?:{DAY_OF})\s+{TIME_OF_DAY}")]
-    ways = [f"{day} {hour}" for day in DAYS for hour in HOURS] if len(some) else []
-    return [one for one in ways if pd.to_datetime(some, format=one, utc=True, errors="coerce").notna().mean() > 0.5]
+    ways = [f"{day} {hour}" for day in DAYS for hour in HOURS] + [f"%Y-%m-%d {hour}" for hour in HOURS if "%p" in hour]
+    return [one for one in ways if _moments(some, one).notna().mean() > 0.5] if len(some) else []
 
 
 def _moments(texts: pd.Series[Any], way: str) -> pd.Series[Any]:
-    moments = pd.to_datetime(texts, format=way, utc=True, errors="coerce")
-    if ".%f" in way:  # a whole second may be written without a fraction
-        moments = moments.fillna(pd.to_datetime(texts, format=way.replace(".%f", ""), utc=True, errors="coerce"))
+    """Dates of one way of writing, NaT for others; a second may have a fraction, or none."""
+    moments = pd.to_datetime(texts, format=way, utc=True, errors="coerce").dt.as_unit("us")
+    missing = moments.isna()
+    if "%S" in way and missing.any():
+        again = pd.to_datetime(texts[missing], format=way.replace("%S", "%S.%f"), utc=True, errors="coerce")
+        moments = moments.fillna(again.dt.as_unit("us"))
     return moments
 
 
@@ -438,8 +446,8 @@ def _decimal(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
 def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:
     try:
         stored = pyarrow.parquet.read_table(file)
-        nested = [field.name for field in stored.schema if pyarrow.types.is_nested(field.type)]
-        table: pd.DataFrame = stored.drop_columns(nested).to_pandas(ignore_metadata=True)  # an index is a column
+        plain = [place for place, field in enumerate(stored.schema) if not pyarrow.types.is_nested(field.type)]
+        table: pd.DataFrame = stored.select(plain).to_pandas(ignore_metadata=True)  # an index is a column
         return table
     except (pyarrow.ArrowException, ValueError):
         raise DataError("not a Parquet file, or damaged: set [format] kind", file=file, path="format.kind") from None

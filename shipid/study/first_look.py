@@ -348,7 +348,7 @@ def _facts(vessel: Vessel, windows: Windows, share: float | None) -> Iterable[st
         seen, orders = steady
         held = steady_speed(vessel, orders)
         if held > OFF * seen or seen > OFF * held:
-            rpm = max(value for name, value in orders.items() if is_shaft(name)) / RPM
+            rpm = max((value for name, value in orders.items() if is_shaft(name)), key=abs) / RPM
             unit = _unit(vessel, seen, orders)
             yield f"at {rpm:.4g} rpm the log runs {seen:.3g} m/s and the vessel {held:.3g} m/s{unit}"
     backwards = _backwards(windows)

@@ -142,7 +142,7 @@ def _wrong_place(name: str, screw: str, values: Mapping[str, float], near: float
     if x and x_of and x > x_of + near:  # 0 where forces act by derivatives, not by places
         words = f"{x:g} m is ahead of {screw!r} at {x_of:g} m, which it is behind: x counts forward from the origin"
         yield f"thruster.{name}.x", words
-    if y * y_of < 0:
+    if y * y_of < 0 and min(abs(y), abs(y_of)) > near / 5:
         yield f"thruster.{name}.behind", f"{screw!r} at y = {y_of:g} m is on the other side: this is at y = {y:g} m"
 
 

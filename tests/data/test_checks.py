@@ -124,7 +124,7 @@ def windy(seed: int, spoil: Callable[[np.ndarray, np.ndarray, np.ndarray], np.nd
     spoil : apparent wind along and across the bow, m/s, as a complex number -> what is taken for the true wind.
     """
     random = np.random.default_rng(seed)
-    frame = turning(T, r=random.choice([-1, 1]) * random.uniform(0.03, 0.08))
+    frame = turning(T, r=random.choice([-1, 1]) * random.uniform(0.04, 0.08))
     psi, ship = frame["psi"].to_numpy(), (frame["u"] + 1j * frame["v"]).to_numpy()
     steady = random.uniform(2.0, 14.0) * np.exp(1j * random.uniform(0, 2 * np.pi))
     gusts = 0.1 * abs(steady) * (random.normal(size=len(T)) + 1j * random.normal(size=len(T)))

@@ -392,3 +392,19 @@ def test_a_place_beyond_the_poles_is_refused(tmp_path: Path) -> None:
 def test_a_folder_for_a_mapping_of_one_file_says_what_to_write(plain_mapping: Write, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"a folder, and the mapping reads one file; .* runs = "):
         import_log(read_mapping(plain_mapping()), tmp_path)
+
+
+def test_a_heading_that_counts_on_or_begins_anew_needs_no_wrap(tmp_path: Path) -> None:
+    """Two turns in one run, then from 0 in the next: no jump of one turn within a run."""
+    one = turning(T, r=0.11)
+    motion = pd.concat([one, one.assign(t=one["t"] + 500.0)], ignore_index=True)
+    log = pd.DataFrame({"t": motion["t"], "x": motion["north"], "y": motion["east"], "psi": motion["psi"]})
+    log = log.assign(**{name: motion[name] for name in ("u", "v", "r")})
+    log.to_csv(tmp_path / "log.csv", index=False)
+    units = {"north": ("x", "m"), "east": ("y", "m"), "psi": ("psi", "rad"), "r": ("r", "rad/s")}
+    units |= {name: (name, "m/s") for name in ("u", "v")}
+    text = 'name = "m"\n[clock]\nfrom = "t"\nunit = "s"\n'
+    text += "".join(f'[columns.{name}]\nfrom = "{a}"\nunit = "{unit}"\n' for name, (a, unit) in units.items())
+    (tmp_path / "m.toml").write_text(text)
+    frame = import_log(read_mapping(tmp_path / "m.toml"), tmp_path / "log.csv").frame
+    assert frame["psi"].max() > 4 * np.pi

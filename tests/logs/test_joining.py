@@ -135,3 +135,13 @@ def test_the_command_writes_one_dataset_and_none_over_another(tmp_path: Path) ->
         assert "is named twice" in error
     assert files[0].read_bytes() == before
     assert "needs two or more" in ended("data", "join", files[0], "--out", tmp_path / "x.parquet")[2]
+
+
+def test_a_copy_mixed_clocks_and_another_sea_are_refused() -> None:
+    with pytest.raises(DataError, match=r"day 1\.parquet: holds the same rows as day 0\.parquet"):
+        joined(recording(1), recording(1))
+    with pytest.raises(DataError, match=r"day 1\.parquet: its clock has no date, that of another has"):
+        joined(recording(1, begin=1.7e9), recording(2, ("c",)))
+    far = recording(2, ("c",), begin=900.0, origin={"latitude": 60.0, "longitude": 20.0})
+    with pytest.raises(DataError, match=r"its origin is \d+ km from that of day 0\.parquet"):
+        joined(recording(1, origin=ORIGIN), far)

@@ -386,3 +386,13 @@ def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: 
     table = read_table(tmp_path / "log.parquet", ParquetFormat(kind="parquet"), "t")
     assert list(table.columns) == ["t", "u"]
     np.testing.assert_allclose(seconds(table["t"]), steps)
+
+
+@pytest.mark.parametrize("rate", [1, 2, 5, 10, 20])
+@pytest.mark.parametrize("style", ["%d.%m.%Y %H:%M:%S.%f", "%m/%d/%Y %I:%M:%S.%f %p", "%Y-%m-%d %I:%M:%S.%f %p"])
+def test_whole_seconds_may_be_written_without_a_fraction(style: str, rate: int) -> None:
+    moments = pd.Timestamp("2024-02-01T10:00:00") + pd.to_timedelta(np.arange(1200) / rate, "s")
+    texts = pd.Series(moments.strftime(style)).str.replace(".000000", "", regex=False)
+    times = seconds(texts)
+    np.testing.assert_allclose(np.diff(times), 1 / rate, atol=1e-5)
+    np.testing.assert_array_equal(seconds(texts.astype("category")), times)

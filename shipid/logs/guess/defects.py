@@ -148,7 +148,7 @@ def _jumps(state: State, path: Complex) -> None:
         words = ", ".join(f"{_when(state, start)} to {_when(state, end)} ({far:.0f} m)" for start, end, far in stay[:6])
         repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
         state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
-    if spikes:
+    if spikes and not any(one.kind == "position spikes" for one in state.findings):  # one repair mends them all
         words = ", ".join(_when(state, (start + end) / 2) for start, end, _ in spikes[:6])
         words = f"at {len(spikes)} place{'s' * (len(spikes) > 1)} of the files" if state.joined else f"near {words}"
         repair = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}

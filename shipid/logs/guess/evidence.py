@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Array, cumulative_integral
 
 Complex = NDArray[np.complex128]
+TURNS = (360.0, 2 * np.pi, 400.0, 3600.0, 36000.0, 6400.0)  # a whole turn in deg, rad, gon, 0.1 and 0.01 deg, mils
 GAP = 3.0  # usual steps: a longer one is a hole, and no window reaches over it
 WINDOW, STEPS, MOST = 10.0, 4, 1500  # s; steps and windows
 FALSE_STEP = np.radians(20.0)  # of a heading between two rows
@@ -307,23 +308,35 @@ def _roundness(values: Array, multipliers: Array, quantum: float) -> Array:
 def spikes(values: Array) -> NDArray[np.bool_]:
     """Return the rows (N,) of a signal that leave it and come back within two rows, as no ship and no order does.
 
-    They leave the median of five rows by more than all else the signal ever does, or, of a signal that moves in
-    most rows, by twenty times what 99 of 100 rows do. Angles that count from 0 again, and signals of which more than
-    one row in fifty does so, have none.
+    They leave the median of five rows by more than all else the signal ever does, or, of a signal that moves in most
+    rows, by more than 0.02 of its range. In both cases that is far more than nine in ten of the rows around do, and
+    than the signal steps there from row to row; the rows before and after agree. An angle that counts from 0 again, and
+    a signal with more than one such row in fifty, has none.
     """
     none = np.zeros(len(values), dtype=bool)
     low, high = np.percentile(values, [0.5, 99.5])
-    if (
-        len(values) < 50
-        or not high > low
-        or any(0.94 < float(np.ptp(values)) / turn < 1.01 for turn in (360, 2 * np.pi))
-    ):
+    if len(values) < 50 or not high > low:
         return none
+
+    def around(of: Array, share: float) -> Array:
+        rolled = pd.Series(of).rolling(41, center=True, min_periods=1)
+        return np.asarray(rolled.max() if share == 1.0 else rolled.quantile(share))
+
     off = np.abs(values - pd.Series(values).rolling(5, center=True, min_periods=1).median().to_numpy())
-    moves = float(np.mean(np.diff(values) != 0)) > 0.5  # an order is held, and may be given for a moment
-    noisy = off > max(20 * float(np.percentile(off, 99)), 0.02 * (high - low)) if moves else none
-    wild = np.asarray(noisy | (off > 1.0 * (high - low)))
-    return wild if 0 < wild.mean() <= 0.02 else none
+    steps = np.abs(np.diff(values, prepend=values[0]))
+    moves = float(np.mean(steps > 0)) > 0.5  # an order is held, and may be given for a moment
+    wild = off > np.maximum((0.02 if moves else 1.0) * (high - low), 8 * around(off, 0.9))
+    wild &= ~np.any([np.abs(off / turn - 1) < 0.05 for turn in TURNS], axis=0)
+    touching = wild | np.append(False, wild[:-1])
+    usual = around(np.where(touching, 0.0, steps), 1.0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], wild.astype(int), [0]])))
+    result = none.copy()
+    for first, end in edges.reshape(-1, 2):
+        before, after = max(first - 1, 0), min(end, len(values) - 1)
+        size = float(off[first:end].min())
+        agrees = abs(values[after] - values[before]) < 0.25 * size
+        result[first:end] = end - first <= 2 and agrees and size > 4 * usual[first:end].max()
+    return result if result.mean() <= 0.02 else none
 
 
 def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:

@@ -434,8 +434,8 @@ def _looks_dated(column: pd.Series[Any]) -> bool:
 
 def _unit_of_clock(name: str, values: Array) -> tuple[float, str]:
     """Return the factor to seconds and the unit of a clock: as its name says, else ms if it counts in them."""
-    inside = re.search(r"[\[(]\s*(ns|us|µs|ms|msec|s|sec|min|h)\s*[\])]", name.lower())
-    written = inside.group(1).replace("µ", "u") if inside else ""
+    inside = re.search(r"[\[(]\s*(ns|us|[µμ]s|ms|msec|s|sec|min|h)\s*[\])]", name.lower())
+    written = inside.group(1).replace("µ", "u").replace("μ", "u") if inside else ""
     if written in ("min", "h"):
         return {"min": 60.0, "h": 3600.0}[written], written
     steps = np.diff(values)

@@ -200,3 +200,19 @@ def test_orders_angles_and_stays_are_no_spikes() -> None:
     parts = np.repeat([0.0, 900.0, -300.0], [600, 700, 700]) + np.sin(t / 50)
     for signal in (helm, heading, np.radians(heading), rest, parts, np.zeros(2000), t[:20]):
         assert not evidence.spikes(signal).any()
+
+
+def test_what_a_ship_does_after_a_long_stay_is_no_spike() -> None:
+    """Of a day in port, an hour of zigzags: what is rare is not wrong; and a short crossing turns round once."""
+    t = np.arange(20_000.0)
+    under_way = (t > 12_000) & (t < 12_180)
+    random = np.random.default_rng(1)
+    noise = random.normal(0, 0.01, len(t))
+    roll = np.where(under_way, 8 * np.sin(2 * np.pi * t / 5), 0.0) + noise
+    rate = np.where(under_way, 3 * np.sin(2 * np.pi * t / 8), 0.0) + noise
+    out = np.clip(10 - np.abs(t - 12_000), 0, None) * 1e-4 + 54
+    north = (noise * 10 + np.where(t < 9000, 0.5, 359.5)) % 360
+    for signal in (roll, rate, out, north, north * 10, np.radians(north), north / 360 * 400):
+        assert not evidence.spikes(signal).any()
+    absent = np.where(np.isin(t, [500.0, 15_000.0]), 511.0, north)
+    np.testing.assert_array_equal(np.flatnonzero(evidence.spikes(absent)), [500, 15_000])
