@@ -28,7 +28,17 @@ from shipid.data.dataset import (
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
 from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Parts, Segment, Source, read_mapping, to_si
-from shipid.logs.readers import Format, Progress, TextFormat, dated, moment_of, read_table, require_file, seconds
+from shipid.logs.readers import (
+    Format,
+    Progress,
+    TextFormat,
+    dated,
+    moment_of,
+    read_table,
+    require_file,
+    seconds,
+    span_of,
+)
 from shipid.logs.repairs import (
     FLAGS,
     REPAIRS,
@@ -43,8 +53,8 @@ from shipid.physics.signals import is_command, is_output
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 
-NEAR = 3.0  # usual steps
-JUMP = 1.75 * np.pi  # rad: of an angle from row to row, beyond which it counts from 0 again
+NEAR = 3.0  # usual steps: rows further apart are no neighbours
+TURN, ABOUT = 2 * np.pi, np.pi / 4  # rad: a jump of an angle that counts from 0 again, and how far from it one may be
 Records = list[dict[str, Any]]
 Begins = list[tuple[float, str]]
 Channel = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -72,8 +82,7 @@ def import_log(
     Order: units, resampling of channels, repair of wrapping channels, unwrapping, `despike` and `scale` of speed,
     course, latitude or longitude, position on the Earth to north and east, gaps, speed and course or earth-fixed to
     body velocities, the other repairs in the order of the mapping, estimation of u, v, r, apparent to true wind, runs,
-    resampling. `metadata["repairs"]` counts every repair, `flags`
-    marks its rows.
+    resampling. `metadata["repairs"]` counts every repair, `flags` marks its rows.
 
     Parameters
     ----------
@@ -508,7 +517,7 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column], file: Path) -> pd
     turned: dict[str, NDArray[np.float64]] = {}
     for name, column in columns.items():
         if (wraps(name) or name == "course") and not column.wrap:
-            _check_whole(rows, name, column.source, file)
+            _check_wraps(rows, name, column.source, file)
         if column.direction != "from" and not column.wrap:
             continue
         values = rows[name].to_numpy().copy()
@@ -526,15 +535,15 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column], file: Path) -> pd
     return rows.assign(**turned)
 
 
-def _check_whole(rows: pd.DataFrame, name: str, source: str, file: Path) -> None:
+def _check_wraps(rows: pd.DataFrame, name: str, source: str, file: Path) -> None:
     """Raise DataError where an angle jumps by a whole turn from row to row: the mean of 359 and 1 deg is 180."""
     known = rows[["t", name]].dropna()
     steps, jumps = np.diff(known["t"].to_numpy()), np.abs(np.diff(known[name].to_numpy()))
     near = steps < NEAR * np.median(steps) if len(steps) else steps > 0
-    places = np.flatnonzero(near & (np.abs(jumps - 2 * np.pi) < 2 * np.pi - JUMP))
+    places = np.flatnonzero(near & (np.abs(jumps - TURN) < ABOUT))
     if len(places):
         times = "once" if len(places) == 1 else f"{len(places)} times, first"
-        sentence = f"{source!r} jumps by a whole turn, {times} at t = {known['t'].iloc[places[0] + 1]:.10g} s"
+        sentence = f"{source!r} jumps by a whole turn, {times} at {moment_of(known['t'].iloc[places[0] + 1])}"
         raise DataError(f"{sentence}: write wrap = true", file=file, path=f"columns.{name}")
 
 
@@ -676,8 +685,7 @@ def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Pat
         start, end = segment.start * unit, segment.end * unit
         inside = (t >= start - slack) & (t <= end + slack)
         if start < t[0] - step - slack or end > t[-1] + step + slack or inside.sum() < 2:
-            asked, there = (f"{moment_of(a)} to {moment_of(b)}" for a, b in ((start, end), (t[0], t[-1])))
-            message = f"run {segment.run!r}, {asked}, is not in the log, which has {there}"
+            message = f"run {segment.run!r}, {span_of(start, end)}, is not in the log, {span_of(t[0], t[-1])}"
             raise DataError(message, file=file, path=f"segment.{index}")
         part = rows if inside.all() else rows.loc[inside].reset_index(drop=True)
         runs.append(_named(part, segment.run))

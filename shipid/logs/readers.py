@@ -196,6 +196,11 @@ def moment_of(t: float) -> str:
     return f"{date_of(t)} UTC" if t > DATED else f"{t:.10g} s"
 
 
+def span_of(first: float, last: float) -> str:
+    """Two times [s] of a log in words: dates where they count from 1970, else seconds."""
+    return f"{date_of(first)} to {date_of(last)} UTC" if first > DATED else f"{first:.10g} to {last:.10g} s"
+
+
 def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
     """Return dates and times of day, of two columns (N,) of text, as one column of text for `seconds`."""
     text = dates.astype("string").str.strip() + " " + times.astype("string").str.strip().str.replace(",", ".")

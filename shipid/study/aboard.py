@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.causal import causal_columns
-from shipid.data.dataset import DATED, Dataset, clock_slack, pieces, read_dataset, sample
+from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
 from shipid.data.windows import Instants, from_frame, past_of, to_frame, travelled
 from shipid.errors import DataError
 from shipid.files import check_table, write_table
@@ -19,7 +19,7 @@ from shipid.hybrid.bands import Bands, Region, at_level
 from shipid.hybrid.physics import assumed, check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
-from shipid.logs.readers import date_of
+from shipid.logs.readers import span_of
 from shipid.observer import observe
 from shipid.predictor import Predictor
 from shipid.study.apply import Band, along_run
@@ -314,12 +314,5 @@ def _spans(instants: pd.DataFrame, most: int = 5) -> list[str]:
         edges = np.flatnonzero(np.diff(np.r_[False, outside, False].astype(int)))
         spans += [(t[b - 1] - t[a], str(run), t[a], t[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     spans.sort(key=lambda span: -span[0])
-    lines = [f"  {run}: {_between(first, last)}" for _, run, first, last in spans[:most]]
+    lines = [f"  {run}: from {span_of(first, last)}" for _, run, first, last in spans[:most]]
     return [*lines, f"  and {len(spans) - most} shorter ones"] if len(spans) > most else lines
-
-
-def _between(first: float, last: float) -> str:
-    """Two moments as the log has them: dates in UTC, or seconds on its clock."""
-    if first < DATED:
-        return f"from {first:.1f} to {last:.1f} s"
-    return f"from {date_of(first)} to {date_of(last)} UTC"

@@ -133,7 +133,7 @@ def test_a_heading_that_counts_from_0_again_is_refused_without_wrap(plain_mappin
     """The mean of 359 and 1 deg would be 180: the ship would look back between two rows."""
     motion = turning(T)
     plain = plain_mapping("", ("wrap = true", "wrap = false"))
-    with pytest.raises(DataError, match=r"columns.psi: .* jumps by a whole turn, once at t = .* write wrap = true"):
+    with pytest.raises(DataError, match=r"columns.psi: .* jumps by a whole turn, once at .* s: write wrap = true"):
         imported(motion, plain, tmp_path)
     straight = motion.assign(psi=1.0 + 0.1 * np.sin(motion["t"]))
     np.testing.assert_allclose(imported(straight, plain, tmp_path).frame["psi"], straight["psi"], atol=1e-9)

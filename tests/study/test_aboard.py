@@ -167,4 +167,4 @@ def test_alarms_are_at_the_times_that_the_log_has():
     rows = pd.DataFrame({"run": "a", "t": [1652954400.0, 1652954405.0, 1652954410.0], "outside": [True, True, False]})
     assert aboard._spans(rows) == ["  a: from 2022-05-19 10:00:00 to 2022-05-19 10:00:05 UTC"]
     early = rows.assign(t=[36000.0, 36005.5, 36010.0])
-    assert aboard._spans(early) == ["  a: from 36000.0 to 36005.5 s"]
+    assert aboard._spans(early) == ["  a: from 36000 to 36005.5 s"]
