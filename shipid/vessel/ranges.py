@@ -11,12 +11,13 @@ from functools import lru_cache
 from typing import Any
 
 from shipid import document as documents
+from shipid.vessel.regressions import GRAVITY
 
 UNUSUAL = "unusual"
 """Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
 WATER = 1000.0  # kg/m^3, to judge a mass by
-G = 9.81  # m/s^2
 LEAST_BLOCK = 0.05
+# Judgement, far from ships: SOLAS asks 65 deg of helm in 28 s, which is 0.18 rad in sqrt(L / g) of a ship of 200 m.
 FASTEST, SLOWEST = 4.0, 100.0  # rad in sqrt(L / g); lag over sqrt(L / g)
 NEAR = 0.05  # ship lengths by which positions of rudder and screw may disagree: those of publications do
 TURN = 6.2832  # rad: a table of angles in degrees goes further
@@ -117,7 +118,7 @@ def _contradictions(document: Mapping[str, Any], values: Mapping[str, float]) ->
     if block is not None and not LEAST_BLOCK <= block <= 1:
         yield "particulars.C_b", f"{block:g}: expected a block coefficient of {LEAST_BLOCK:g} to 1"
     length = _size(document, values).L
-    time = (length / G) ** 0.5
+    time = (length / GRAVITY) ** 0.5
     for path, value in values.items():
         if path.endswith((".actuator.delta.rate", ".actuator.alpha.rate")) and abs(value) > FASTEST / time:
             most = f"at most {FASTEST / time:.3g} rad/s"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
-from shipid.logs.guess.evidence import Complex, Windows
+from shipid.logs.guess.evidence import Complex, Windows, effect
 from shipid.logs.guess.words import fits, is_order, parts_of, units_in
 from shipid.logs.mapping import UNITS
 from shipid.logs.repairs import INPUTS
@@ -40,6 +40,8 @@ FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db
 """Units of quantities that no column of a dataset has, in lower case."""
 
 
+PART = 0.4  # of the windows of the guess: about a quarter of a usual turn
+SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which it is taken to turn the ship
 LIKELY = 0.6  # confidence from which a suggestion is not marked as unsure
 NEARLY, STRONG = 0.1, 0.65  # how much worse than its best meaning a name may fit another; a name that says something
 
@@ -174,6 +176,11 @@ class State:
     r: Array | None = None
     velocity: Complex | None = None
     body: Complex | None = None
+
+    def effect(self, r: Array, order: Array) -> float:
+        """Return the t value of the effect of an order (N,) on the yaw rate r (N,) [rad/s], in parts of usual turns."""
+        span = float(np.median(self.t[self.chosen.last] - self.t[self.chosen.first]))
+        return effect(self.t, r, order, PART * span)
 
     def free(self) -> list[str]:
         """Return the columns that have no meaning yet."""

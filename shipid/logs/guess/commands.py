@@ -9,7 +9,7 @@ import numpy as np
 
 from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.clues import SEEN, State, unit_in_name
 from shipid.logs.guess.twins import choose_twins, twins
 from shipid.logs.guess.words import fits, is_order, parts_of, side_of
 from shipid.logs.mapping import to_si
@@ -17,7 +17,6 @@ from shipid.physics.signals import SIGNALS, is_command, is_shaft, named, steers
 
 AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name has no side
 SCREW = SIGNALS["n"].component  # of a shaft speed or pitch without a side: that of the azimuth unit where there is one
-SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which its sign is taken
 FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
 ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
 TOGETHER = 0.2  # of the range of a column: how far twin rudders are apart
@@ -40,7 +39,7 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
     """Choose the columns that steer, with their sign; return whether one is of an azimuth unit."""
     angles = _named(state, [signal for signal in named("command") if steers(signal)])
     turned = {name for name, signal in angles if _centred(state, name, signal)}
-    power = {name: 0.0 if r is None else _power(state, r, name) for name in state.eligible()}
+    power = {name: 0.0 if r is None else state.effect(r, state.columns[name]) for name in state.eligible()}
     by_name = bool(angles)
     if not angles and r is not None:
         # an order is held at its largest value; a response such as roll is not
@@ -134,12 +133,6 @@ def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
         chosen += [(name, signal) for name in kept]
     order = list(state.columns)
     return sorted(chosen, key=lambda entry: order.index(entry[0]))
-
-
-def _power(state: State, r: Array, name: str) -> float:
-    """Return the t value of the effect of a column on the yaw rate; over windows of a quarter of a usual turn."""
-    span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
-    return evidence.effect(state.t, r, state.columns[name], 0.4 * span)
 
 
 def _small(values: Array) -> bool:

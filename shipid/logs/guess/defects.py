@@ -18,6 +18,7 @@ from shipid.physics.signals import is_shaft
 
 POSITIONS = ("latitude", "longitude", "north", "east")
 SPIKY = ("speed", "u", "v", "r", "psi", "phi", "V_w")
+OF_POSITIONS = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
 FEW = 4  # times that a sentence names
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
@@ -151,8 +152,7 @@ def _jumps(state: State, path: Complex) -> None:
     if spikes and not any(one.kind == "position spikes" for one in state.findings):  # one repair mends them all
         words = ", ".join(_when(state, (start + end) / 2) for start, end, _ in spikes[:6])
         words = f"at {len(spikes)} place{'s' * (len(spikes) > 1)} of the files" if state.joined else f"near {words}"
-        repair = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
-        state.find("position spikes", (), 0.8, f"the position leaves and comes back {words}", repair)
+        state.find("position spikes", (), 0.8, f"the position leaves and comes back {words}", OF_POSITIONS)
 
 
 def _when(state: State, t: float) -> str:
@@ -205,10 +205,8 @@ def defects_of_spikes(state: State) -> None:
     places = [one for one in state.suggestions if one.name in POSITIONS and one.source in state.spikes]
     if places:
         rows = np.unique(np.concatenate([state.spikes[one.source][0] for one in places]))
-        repair: dict[str, Any] = {"kind": "despike", "columns": ["north", "east"]}
-        repair |= {"window": 10.0, "threshold": 10.0, "unit": "m"}
         words = f"the position leaves and comes back {_times(state, rows)}"
-        state.find("position spikes", (), 0.9, words, repair)
+        state.find("position spikes", (), 0.9, words, OF_POSITIONS)
     for one in state.suggestions:
         if one.name in SPIKY and one.source in state.spikes:
             rows, size = state.spikes[one.source]

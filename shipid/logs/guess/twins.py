@@ -10,12 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import STRONG, State, unit_in_name, unit_of_another
+from shipid.logs.guess.clues import SEEN, STRONG, State, unit_in_name, unit_of_another
 from shipid.logs.guess.words import fits, is_order, parts_of, side_of, words_of_side
 
 OF_THROTTLES = frozenset("throttle throttles thrust thruster motor motors engine esc pwm power gas".split())
-SEEN = 4.0  # t value of the effect of the difference on the yaw rate
 REST, STILL, ALIKE = 0.05, 5, 0.02  # of the usual speed; windows at rest; of the range: how much alike values there are
 CONFIDENCE = 0.5
 
@@ -24,9 +22,8 @@ def choose_twins(state: State, r: np.ndarray | None) -> None:
     """Suggest shaft speeds from one pair of free columns, port and starboard, whose difference turns the ship."""
     if r is None:
         return
-    span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
     found = {
-        pair: evidence.effect(state.t, r, state.columns[pair[0]] - state.columns[pair[1]], 0.4 * span)
+        pair: state.effect(r, state.columns[pair[0]] - state.columns[pair[1]])
         for pair in twins(state)
         if all(_may_be_a_throttle(name) for name in pair)
     }
