@@ -9,6 +9,7 @@ import typer
 
 from shipid.cli.completion import cells
 from shipid.cli.options import Adaptive, Folder, Kind, check_band
+from shipid.cli.outputs import check_output
 from shipid.errors import ShipidError
 
 
@@ -31,6 +32,7 @@ def predict(
         raise ShipidError("is empty: name a cell, as results.parquet does", path="--cell")
     check_band(level, kind, adaptive)
     file = out or Path(f"{cell}.parquet")
+    check_output(file, [log], "--out")
     frame, outside = predict_log(folder, cell, log, mapping, file, level=level, kind=kind, rate=adaptive)
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
     if outside:

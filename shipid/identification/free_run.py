@@ -60,9 +60,8 @@ def free_runs(
     spans = [float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for _, rows in pieces(dataset.select(runs))]
     steps = sum(spans) / settings.step
     if steps > MOST_STEPS:
-        raise DataError(
-            f"{settings.step:g} s makes {steps:.2g} steps of these runs: at most {MOST_STEPS:.0e}", path="step"
-        )
+        many = f"{settings.step:g} s makes {steps:.2g} steps of these runs, at most {MOST_STEPS:.0e}"
+        raise DataError(f"{many}: give a longer step, or fewer runs", path="step")
     overrides = {key: value for key, value in documents.leaves(settings.runs) if _belongs(key, runs)}
     first = next(iter(vessels.values()))
     asked = {"horizon": length, "nuisance": [], "runs": overrides}

@@ -94,7 +94,7 @@ def standard(
     for place, angle in enumerate(angles):
         greatest = MOST_HEADING if place else MOST_HELM
         if not angle <= greatest:
-            raise ShipidError(f"{angle:g}: give up to {greatest:g}", path="ANGLES")
+            raise ShipidError(f"{angle:g} deg: give at most {greatest:g} deg", path="ANGLES")
     if approach not in APPROACHES:
         raise ShipidError(f"{approach!r} is no approach: {choices(approach, APPROACHES)}", path="--approach")
     for option, value in (("--duration", duration), ("--step", step)):
@@ -117,7 +117,8 @@ def standard(
     steps = manoeuvre.length / interval * STEPS
     if steps > MOST_STEPS:
         option = "--duration" if step is None else "--step"
-        raise ShipidError(f"{steps:.2g} steps of {interval / STEPS:g} s: at most {MOST_STEPS:.0e}", path=option)
+        remedy = f"at most {MOST_STEPS:.0e}: give a {'shorter duration' if step is None else 'longer step'}"
+        raise ShipidError(f"{steps:.2g} steps of {interval / STEPS:g} s, {remedy}", path=option)
     return Standard(name, _title(name, manoeuvre), manoeuvre, float(asked), interval / STEPS, interval)
 
 

@@ -165,7 +165,7 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     steps = max(round(horizon / step), 2)
     usable = _usable(dataset, steps, step, data)
     method = _method(length_of(first), step, float(seen.runs.loc[usable, "duration"].median()) - horizon)
-    past = max(method.value[0].get("memory", {}).get("turned", [0.0]))
+    past = _past(method)
     held = _held(dataset, steps, step, past)
     if len(held) > LEAST_RUNS:
         usable = held
@@ -470,7 +470,7 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     amounts = ladder(MANOEUVRES - TESTS)
     families = _degraded(named, vessel)
     method = _method(length, step, np.inf)
-    past = max(method.value[0].get("memory", {}).get("turned", [0.0]))
+    past = _past(method)
     fixed = [
         Choice(
             "question",
@@ -518,6 +518,11 @@ def _method(length: float | None, step: float, spare: float) -> Choice:
         "got wrong; validation chooses how much of it is taken. The first instants of a run have no past: left out"
     )
     return Choice("method", [{"name": "memory", "kind": "path-drawn", "choose": True, "memory": memory}], why)
+
+
+def _past(method: Choice) -> float:
+    """Longest past [s] that a method of `_method` reads; 0 without a memory."""
+    return float(max(method.value[0].get("memory", {}).get("turned", [0.0])))
 
 
 def _truth(

@@ -89,9 +89,9 @@ def test_spirals_go_to_the_side_and_the_angle_asked_for() -> None:
         ("turning", (), {"step": 1e-9}, "--step: "),
         ("turning", (), {"step": 50.0}, "--step: 50 s is too long for this ship"),
         ("turning", (), {"speed": float("nan")}, "--speed: nan m/s"),
-        ("turning", (float("inf"),), {}, "ANGLES: inf: give up to 90"),
-        ("spiral", (float("nan"),), {}, "ANGLES: nan: give up to 90"),
-        ("zigzag", (20, 400), {}, "ANGLES: 400: give up to 180"),
+        ("turning", (float("inf"),), {}, "ANGLES: inf deg: give at most 90 deg"),
+        ("spiral", (float("nan"),), {}, "ANGLES: nan deg: give at most 90 deg"),
+        ("zigzag", (20, 400), {}, "ANGLES: 400 deg: give at most 180 deg"),
         ("turning", (), {"step": -1.0}, "--step: -1 s must be positive"),
     ],
 )
