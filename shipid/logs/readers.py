@@ -37,6 +37,7 @@ DAY_OF = r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d
 """A date without a time."""
 DAYS = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y", "%d-%m-%Y", "%m-%d-%Y")
 HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
+LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
 SAMPLES = 60  # texts by which the way of writing is looked for
 _SENTENCE = re.compile(r"\$[A-Z]{2}[A-Z]{3},")
 Progress = Callable[[float], None]
@@ -162,9 +163,7 @@ def seconds(dates: pd.Series[Any]) -> Array:
 
 def ways_of(texts: pd.Series[Any]) -> list[str]:
     """Ways in which dates (N,) of text may be written, none for ISO 8601: most of a sample can be read so."""
-    places = np.random.default_rng(0).integers(
-        0, max(1, len(texts)), SAMPLES
-    )  # no stride: rows of one kind may have one
+    places = np.random.default_rng(0).integers(0, max(1, len(texts)), SAMPLES)  # a stride may meet one kind
     some = texts.iloc[np.unique(places)] if len(texts) else texts
     some = some[some.str.fullmatch(rf"(?:{DAY_OF})\s+{TIME_OF_DAY}")]
     ways = [f"{day} {hour}" for day in DAYS for hour in HOURS] + [f"%Y-%m-%d {hour}" for hour in HOURS if "%p" in hour]
@@ -193,12 +192,13 @@ def date_of(moment: float) -> str:
 
 def moment_of(t: float) -> str:
     """A time [s] of a log in words: a date where it counts from 1970, else seconds."""
-    return f"{date_of(t)} UTC" if t > DATED else f"{t:.10g} s"
+    return f"{date_of(t)} UTC" if DATED < t < LAST_DATE else f"{t:.10g} s"
 
 
 def span_of(first: float, last: float) -> str:
     """Two times [s] of a log in words: dates where they count from 1970, else seconds."""
-    return f"{date_of(first)} to {date_of(last)} UTC" if first > DATED else f"{first:.10g} to {last:.10g} s"
+    dates = min(first, last) > DATED and max(first, last) < LAST_DATE
+    return f"{date_of(first)} to {date_of(last)} UTC" if dates else f"{first:.10g} to {last:.10g} s"
 
 
 def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:

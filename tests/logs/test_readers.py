@@ -12,7 +12,18 @@ from scipy.io import savemat
 from shipid.errors import DataError, DocumentError
 from shipid.logs import readers
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.readers import WIDEST, ParquetFormat, TextFormat, date_of, read_table, require_file, seconds, widest
+from shipid.logs.readers import (
+    WIDEST,
+    ParquetFormat,
+    TextFormat,
+    date_of,
+    moment_of,
+    read_table,
+    require_file,
+    seconds,
+    span_of,
+    widest,
+)
 from tests.logs.conftest import PLAIN, as_log, turning
 
 Write = Callable[..., Path]
@@ -373,7 +384,18 @@ def test_a_line_of_very_many_cells_is_refused(separator: str, cells: int, refuse
 
 def test_a_moment_and_its_date() -> None:
     text = "2022-11-30 09:15:02"
-    assert date_of(float(seconds(pd.Series([text]))[0])) == text
+    t = float(seconds(pd.Series([text]))[0])
+    assert date_of(t) == text
+    assert moment_of(t) == f"{text} UTC"
+    assert span_of(t, t + 60.0) == f"{text} to 2022-11-30 09:16:02 UTC"
+
+
+@pytest.mark.parametrize("t", [-1e308, -5.0, 0.0, 12.5, 9.99e7, 1e13, 1e308, float("inf"), float("nan")])
+def test_a_moment_without_a_date_is_seconds(t: float) -> None:
+    """A damaged clock too: no date is beyond the year 9999."""
+    assert moment_of(t) == f"{t:.10g} s"
+    assert span_of(0.0, t) == f"0 to {t:.10g} s"
+    assert span_of(t, 1.7e9).endswith(" s")
 
 
 def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: Path) -> None:
