@@ -21,6 +21,32 @@ Document = dict[str, Any]
 LARGEST = 20_000_000  # bytes of a document
 DEEPEST = 40  # tables and lists inside one another
 MOST_NUMBER, MOST_INTEGER = 1e24, 10**15
+MUST, BE = "must ", "be "
+REQUIRED = {
+    "string_type": "must be text",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "int_type": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "finite_number": "must be a finite number",
+    "greater_than": "must be above {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be below {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "literal_error": "must be {expected}",
+    "list_type": "must be a list",
+    "tuple_type": "must be a list",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "too_short": "must have {min_length} or more entries, not {actual_length}",
+    "too_long": "must have {max_length} or fewer entries, not {actual_length}",
+    "string_too_short": "must have {min_length} or more characters",
+    "string_too_long": "must have {max_length} or fewer characters",
+}
+"""Type of a problem that pydantic reports -> what the value must be."""
 LEAST_NUMBER = 1e-100  # but for 0: a quotient of two numbers of a document stays finite
 
 
@@ -285,7 +311,8 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
     except ValidationError as error:
         problems = error.errors(include_url=False)
         first = next((entry for entry in problems if entry["type"] == "extra_forbidden"), problems[0])
-        path = ".".join(filter(None, (prefix, *_place(data, first["loc"]))))
+        places = [".".join(filter(None, (prefix, *_place(data, entry)))) for entry in problems]
+        path = places[problems.index(first)]
         if first["type"] == "extra_forbidden":
             message = f"unknown key: {choices(str(first['loc'][-1]), _fields(model, first['loc'][:-1]))}"
         elif first["type"] == "missing":
@@ -294,7 +321,7 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
             path, message = _of_no_kind(path, first)
         else:
             shown = "" if isinstance(first["input"], dict | list) else f"{first['input']!r}: "
-            message = shown + first["msg"].removeprefix("Value error, ")
+            message = shown + required(*(entry for entry, place in zip(problems, places, strict=True) if place == path))
         raise DocumentError(message, file=file, path=path) from None
 
 
@@ -308,11 +335,28 @@ def _of_no_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:
     return f"{path}.{key}", f"{tag!r} is no {key}: {choices(str(tag), valid)}"
 
 
-def _place(data: Any, location: tuple[int | str, ...]) -> Iterator[str]:
+def required(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
+    """What pydantic's problem with a value says would be right; more problems are of other members of a union."""
+    sentences = [
+        REQUIRED[one["type"]].format(**one.get("ctx", {}))
+        if one["type"] in REQUIRED
+        else one["msg"].removeprefix("Value error, ")
+        for one in (first, *others)
+    ]
+    if not all(one.startswith(MUST) for one in sentences):
+        return sentences[0]
+    parts = list(dict.fromkeys(one.removeprefix(MUST) for one in sentences))
+    if all(one.startswith(BE) for one in parts):
+        return MUST + BE + " or ".join(one.removeprefix(BE) for one in parts)
+    return MUST + " or ".join(parts)
+
+
+def _place(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
     """The parts of a pydantic location that are keys or indices of the data, without the names of union members."""
+    location = problem["loc"]
     for position, part in enumerate(location):
         if isinstance(data, Mapping):
-            if part not in data and position < len(location) - 1:
+            if part not in data and not (problem["type"] == "missing" and position == len(location) - 1):
                 continue
             data = data.get(part)
         elif isinstance(data, list) and isinstance(part, int) and part < len(data):

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
+from shipid.document import required
 from shipid.errors import choices
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre
 
@@ -77,8 +78,8 @@ class Draw(BaseModel):
             return kind.model_validate(given)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
-            message = first["msg"].removeprefix("Value error, ")
-            raise ValueError(f"{'.'.join(map(str, first['loc'])) or self.kind}: {message}") from None
+            key = ".".join(str(part) for part in first["loc"] if part != "orders")
+            raise ValueError(f"{key or self.kind}: {required(first)}") from None
 
 
 def _flat(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
