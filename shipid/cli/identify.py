@@ -222,6 +222,8 @@ def _show_structures(compared: Compared, answer: Answer) -> None:
         answer.say(f"Errors of {compared.chosen} by side, helm and speed, on runs that the fit has not seen:")
         answer.rows("groups", compared.groups, table(list(HEADS), shown(compared.groups)))
     answer.say("\n".join(compared.sentences), sentences=list(compared.sentences))
+    for warning in compared.shared:
+        typer.echo(f"warning: {warning}", err=True)
     for name, fit in compared.fits.items():
         if fit.caution:
             typer.echo(f"warning: intervals of {name}: {fit.caution}", err=True)
@@ -238,11 +240,11 @@ def _with_interval(row: Any) -> str:
 def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
     """Say what is off between vessel and log before anything is fitted, and draft the correction."""
     from shipid.errors import DataError
-    from shipid.identification.outcome import pick_runs
+    from shipid.identification.outcome import pick_runs, without_shared
     from shipid.study.first_look import first_look
     from shipid.study.new import proposed_horizon
 
-    fitted, _ = pick_runs(log, runs, test)
+    log, fitted, _ = without_shared(log, *pick_runs(log, runs, test))
     try:
         ahead, step = proposed_horizon(ship, log)
         look = first_look(ship, log, fitted, ahead=ahead, step=step)

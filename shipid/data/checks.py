@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.data.dataset import Array, Dataset, cumulative_integral, pieces, unit_of
+from shipid.data.dataset import Array, Dataset, cumulative_integral, pieces, shares_clock, unit_of
 from shipid.physics.signals import row_of
 
 Plane = np.ndarray[Any, np.dtype[np.complex128]]
@@ -35,7 +35,7 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     by_run: dict[str, list[pd.DataFrame]] = {}
     for run, rows in pieces(dataset):
         by_run.setdefault(run, []).append(rows)
-    shared = dataset.metadata.get("clock", "shared") != "run"
+    shared = shares_clock(dataset)
     whole = {run: _motion(pd.concat(stretches)) for run, stretches in by_run.items()}
     table = []
     for run, stretches in by_run.items():

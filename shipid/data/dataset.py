@@ -126,6 +126,44 @@ def stretches(dataset: Dataset) -> Iterator[tuple[str, NDArray[np.intp]]]:
             yield str(name), rows[first:last]
 
 
+def shares_clock(dataset: Dataset) -> bool:
+    """Whether all runs lie on one clock; if not, equal times of two runs are different moments."""
+    return bool(dataset.metadata.get("clock", "shared") != "run")
+
+
+def outside_spans(dataset: Dataset, spans: Iterable[tuple[float, float]]) -> NDArray[np.bool_]:
+    """Rows (N,) at no moment of the spans (start, end) [s]."""
+    t = dataset.frame["t"].to_numpy()
+    seen = np.zeros(len(t), dtype=bool)
+    for start, end in spans:
+        seen |= (t >= start) & (t <= end)
+    return ~seen
+
+
+def kept_rows(dataset: Dataset, kept: NDArray[np.bool_]) -> Dataset:
+    """The dataset with the rows `kept` (N,) alone, broken where rows are missing."""
+    if kept.all():
+        return dataset
+    names = list(dict.fromkeys([*dataset.metadata.get("flags", []), BREAK]))
+    after = np.concatenate([[False], ~kept[:-1]])
+    flags = dataset.frame["flags"] | np.where(after, 1 << names.index(BREAK), 0)
+    frame = dataset.frame.assign(flags=flags)[kept].reset_index(drop=True)
+    return replace(dataset, frame=frame, metadata={**dataset.metadata, "flags": names})
+
+
+def apart_from(dataset: Dataset, runs: Iterable[str]) -> Dataset:
+    """The dataset in which no other run sees a moment of these runs, which stay whole; broken where rows are missing.
+
+    On a shared clock runs may overlap: the same rows of a log, cut twice.
+    """
+    if not shares_clock(dataset):
+        return dataset
+    mine = dataset.frame["run"].isin(list(runs)).to_numpy()
+    t = dataset.frame["t"].to_numpy()
+    spans = [(t[places[0]], t[places[-1]]) for _, places in stretches(dataset) if mine[places[0]]]
+    return kept_rows(dataset, mine | outside_spans(dataset, spans))
+
+
 def clock_slack(t: Array) -> float:
     """Difference [s] under which two instants on a clock t (N,) [s] are the same: a thousandth of its least step.
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Array, Dataset, clock_slack, cumulative_integral, pieces, sample
+from shipid.data.dataset import Array, Dataset, clock_slack, cumulative_integral, pieces, sample, shares_clock
 from shipid.errors import DataError
 
 Mask = NDArray[np.bool_]
@@ -194,7 +194,7 @@ def cut_windows(
     """
     if horizon < 1 or step <= 0 or interval <= 0:
         raise DataError(f"horizon {horizon}, step {step:g} s and interval {interval:g} s must all be positive")
-    shared = dataset.metadata.get("clock", "shared") != "run"
+    shared = shares_clock(dataset)
     parts = []
     for run, rows in pieces(dataset):
         t = rows["t"].to_numpy()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from shipid import document as documents
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Dataset, apart_from
 from shipid.data.outputs import common_outputs, compare_outputs
 from shipid.document import short_names
 from shipid.errors import DataError, DocumentError, ShipidError, choices
@@ -190,6 +190,29 @@ def pick_runs(
     return tuple(fitted), tuple(tested)
 
 
+def without_shared(
+    dataset: Dataset, runs: Sequence[str], held_out: Sequence[str]
+) -> tuple[Dataset, tuple[str, ...], tuple[str, ...]]:
+    """The dataset whose runs to fit see no moment of the runs held out, the runs that are left, and warnings.
+
+    On a shared clock runs may overlap. Raises DataError where no run is left.
+    """
+    apart = apart_from(dataset, held_out)
+    before, after = (one.frame["run"].value_counts() for one in (dataset, apart))
+    lost = {run: 1.0 - int(after.get(run, 0)) / int(before[run]) for run in runs}
+    left = tuple(run for run in runs if after.get(run, 0) > 1)
+    if not left:
+        clocks = "where every run has its clock, metadata['clock'] must be 'run'"
+        raise DataError(f"every run shares its moments with the runs held out: hold out others ({clocks})", path="runs")
+    warnings = tuple(
+        f"run {run} shares {share:.0%} of its rows in time with the runs held out: "
+        + ("they take no part in the fit" if run in left else "it takes no part in the fit")
+        for run, share in lost.items()
+        if share > 0
+    )
+    return apart, left, warnings
+
+
 def run_identification(
     vessel: Vessel,
     dataset: Dataset,
@@ -220,6 +243,8 @@ def run_identification(
     """
     check_level(band)
     fitted, tested = check(vessel, dataset, settings, runs, held_out, ahead=ahead, profiles=profiles)
+    digest = dataset.digest
+    dataset, fitted, shared = without_shared(dataset, fitted, tested)
     sets = {"fit": fitted, "test": tested} if tested else {"fit": fitted}
     with uninterrupted() as held:  # an interrupted library call raises an unrelated error
 
@@ -245,7 +270,12 @@ def run_identification(
         if band is not None:
             manoeuvres, refused = _banded(manoeuvres, vessel, solution, judged, band)
         _go_on(held)
-        warnings = (*_blurred(dataset, fitted, settings), *_warnings(solution, judged, pairs), *_left(solution, curves))
+        warnings = (
+            *shared,
+            *_blurred(dataset, fitted, settings),
+            *_warnings(solution, judged, pairs),
+            *_left(solution, curves),
+        )
         warnings += tuple(filter(None, (verdict(vessel, path, solution.values) for path in solution.values)))
         outputs = _outputs(pair, dataset, fitted)
         warnings += tuple(_unused(outputs, settings))
@@ -259,7 +289,7 @@ def run_identification(
             statistics=judged,
             runs=fitted,
             held_out=tested,
-            digest=dataset.digest,
+            digest=digest,
             estimates=_estimates(vessel, solution, judged),
             ahead=ahead,
             free=pairs,

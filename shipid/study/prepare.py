@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.causal import causal_columns
-from shipid.data.dataset import BREAK, Dataset, pieces, read_dataset
+from shipid.data.dataset import Dataset, kept_rows, outside_spans, pieces, read_dataset
 from shipid.data.windows import (
     Instants,
     Windows,
@@ -336,7 +336,7 @@ def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset, test: Win
     known = known_by_then(plan, dataset)
     calls = sum(one.observer is not None for one in plan.foundations)
     whole = observe(foundation.vessel, known, foundation.observer, calls=calls)
-    kept = outside(dataset, test)
+    kept = outside_of(dataset, test)
     rest = np.flatnonzero(kept & ~dataset.frame["run"].isin(list(test.spans)).to_numpy())
     if kept.all() or not len(rest):
         return whole
@@ -350,25 +350,14 @@ def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset, test: Win
     return whole
 
 
-def outside(dataset: Dataset, test: Windows) -> NDArray[np.bool_]:
+def outside_of(dataset: Dataset, test: Windows) -> NDArray[np.bool_]:
     """Rows (N,) that share no moment with the test windows; all, where every run has its clock."""
-    t = dataset.frame["t"].to_numpy()
-    seen = np.zeros(len(t), dtype=bool)
-    for start, end in test.spans.values() if test.shared_clock else ():
-        seen |= (t >= start) & (t <= end)
-    return ~seen
+    return outside_spans(dataset, test.spans.values() if test.shared_clock else ())
 
 
 def apart(dataset: Dataset, test: Windows) -> Dataset:
     """The dataset without the moments that the test windows see, broken there: on a shared clock runs may overlap."""
-    kept = outside(dataset, test)
-    if kept.all():
-        return dataset
-    names = list(dict.fromkeys([*dataset.metadata.get("flags", []), BREAK]))
-    after = np.concatenate([[False], ~kept[:-1]])
-    flags = dataset.frame["flags"] | np.where(after, 1 << names.index(BREAK), 0)
-    frame = dataset.frame.assign(flags=flags)[kept].reset_index(drop=True)
-    return replace(dataset, frame=frame, metadata={**dataset.metadata, "flags": names})
+    return kept_rows(dataset, outside_of(dataset, test))
 
 
 def chosen_observer(plan: Plan, foundation: Foundation, dataset: Dataset, windows: Windows) -> Observer:

@@ -39,7 +39,7 @@ from shipid.study.prepare import (
     describe,
     instants_of,
     obtain,
-    outside,
+    outside_of,
     physics_of,
     prepare,
     runs_by_amount,
@@ -346,7 +346,7 @@ def refitted(
         return {}
     left_out = {(name, way.name): (np.full_like(windows.future, np.nan), 0.0) for name, way in pairs}
     names = {name for name, _ in pairs}
-    data, kept = apart(prepared.data, prepared.test), outside(prepared.data, prepared.test)
+    data, kept = apart(prepared.data, prepared.test), outside_of(prepared.data, prepared.test)
     estimates = {name: known.select(kept) for name, known in prepared.estimates.items()}
     place = np.flatnonzero(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
     for training, judged in refit_folds(windows, refits, batch.seed):

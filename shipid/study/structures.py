@@ -26,7 +26,7 @@ from shipid.files import write_new
 from shipid.identification.bands import Measure, bands, check_level, refusal
 from shipid.identification.design import Candidate, Limits, candidates, performed, steps_between
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
-from shipid.identification.outcome import SIGNALS, TRIED, pick_runs, residual_level, residual_spacing
+from shipid.identification.outcome import SIGNALS, TRIED, pick_runs, residual_level, residual_spacing, without_shared
 from shipid.identification.reach import Reach, beyond, of_log, reach_of
 from shipid.identification.settings import Identify
 from shipid.identification.sides import by_group, uneven
@@ -65,7 +65,8 @@ class Fitted:
 class Compared:
     """Result of a comparison of structures.
 
-    vessel : the base. runs, test : of the folds, and held out of all. ahead : length of a free run [s], 0: whole runs.
+    vessel : the base. runs, test : of the folds, and held out of all. shared : warnings of runs that share moments with
+        those held out. ahead : length of a free run [s], 0: whole runs.
     errors : `structure`, `set` (`folds`, `test`), `run` (`all` at first), RMS `u`, `v` [m/s], `r` [rad/s], `position`
         [m] of runs that the fit has not seen.
     table : `structure`, `numbers`, means over runs `u`, `v`, `r`, `position`; `test`, that of the position on the test
@@ -86,6 +87,7 @@ class Compared:
     runs: tuple[str, ...]
     test: tuple[str, ...]
     digest: str
+    shared: tuple[str, ...]
     ahead: float
     level: float | None
     errors: pd.DataFrame
@@ -186,7 +188,9 @@ def compare_structures(
     check_level(level)
     if not names:
         raise ShipidError(f"name structures to compare: {', '.join((PRESENT, *STRUCTURES))}", path="structures")
+    digest = dataset.digest
     fitted, tested = pick_runs(dataset, runs, held_out)
+    dataset, fitted, shared = without_shared(dataset, fitted, tested)
     if folds < 2:
         raise ShipidError(f"{folds}: give two folds or more", path="folds")
     if folds > max(len(fitted), FOLDS):
@@ -232,7 +236,8 @@ def compare_structures(
         vessel=vessel,
         runs=fitted,
         test=tested,
-        digest=dataset.digest,
+        digest=digest,
+        shared=shared,
         ahead=length,
         level=level,
         errors=every,
@@ -261,20 +266,21 @@ def _judged(
 ) -> tuple[list[pd.DataFrame], Fitted, pd.DataFrame]:
     """Errors of runs by fits that have not seen them, the fit to all runs, and the free runs of the folds."""
 
-    def fit(runs: Sequence[str]) -> tuple[Vessel, Solution]:
+    def fit(runs: Sequence[str], others: Sequence[str]) -> tuple[Vessel, Solution]:
         """A fit to some runs; the others decide nothing in it, neither its start nor its priors."""
         report(f"{name}: {len(runs)} of {len(fitted)} runs")
-        other = exchange(vessel, name, dataset, runs, settings)
-        solution = identify(other.vessel, dataset, runs, other.settings)
+        seen, runs, _ = without_shared(dataset, runs, others)
+        other = exchange(vessel, name, seen, runs, settings)
+        solution = identify(other.vessel, seen, runs, other.settings)
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
         return other.vessel.with_values(solution.values), solution
 
-    whole, solution = fit(fitted)
+    whole, solution = fit(fitted, ())
     frames, series = [], []
     for part in parts:
         rest = [run for run in fitted if run not in part]
-        replayed = free_runs({name: fit(rest)[0]}, dataset, part, settings, ahead)
+        replayed = free_runs({name: fit(rest, part)[0]}, dataset, part, settings, ahead)
         frames.append(replayed.errors[replayed.errors["run"] != ALL])
         series.append(replayed.series)
     errors = [_with_mean(pd.concat(frames, ignore_index=True)).assign(set="folds")]

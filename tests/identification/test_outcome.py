@@ -67,6 +67,31 @@ def identified(log: Dataset) -> Identified:
     return run_identification(off(), log, settings(), held_out=["M05"], profiles=FEW[:1], programme=True)
 
 
+def test_a_fit_sees_no_moment_of_a_run_held_out(log: Dataset) -> None:
+    """On one clock a run may overlap another one; what it holds there does not matter, and it is said."""
+    t = log.frame["t"].where(log.frame["run"] != "M05", log.frame["t"] + 50.0)
+    t = t + 1000.0 * log.frame["run"].map({"M01": 0, "M02": 1, "M03": 2, "M04": 3, "M05": 3})
+    overlap = log.frame["run"].eq("M04") & (t >= t[log.frame["run"] == "M05"].min())
+    metadata = {**log.metadata, "clock": "shared"}
+    fits = []
+    for factor in (1.0, 1.5):
+        frame = log.frame.assign(t=t, r=log.frame["r"].where(~overlap, factor * log.frame["r"]))
+        shared = Dataset(frame, metadata)
+        apart, runs, warnings = outcome.without_shared(shared, ["M01", "M02", "M03", "M04"], ["M05"])
+        fits.append(identify(off(), apart, runs, settings()).factors)
+        assert runs == ("M01", "M02", "M03", "M04")
+        assert warnings == (
+            "run M04 shares 18% of its rows in time with the runs held out: they take no part in the fit",
+        )
+    np.testing.assert_array_equal(*fits)
+    done = run_identification(off(), shared, settings(), held_out=["M05"])
+    np.testing.assert_allclose(done.solution.factors, fits[0])
+    assert warnings[0] in done.warnings
+    everything = Dataset(log.frame, metadata)  # each run from 0 s on the same clock
+    with pytest.raises(DataError, match="every run shares its moments"):
+        run_identification(off(), everything, settings(), held_out=["M05"])
+
+
 def test_it_tells_what_the_parts_tell(identified: Identified, log: Dataset) -> None:
     alone = identify(off(), log, ["M01", "M02", "M03", "M04"], settings())
     assert identified.runs == alone.runs
