@@ -11,7 +11,7 @@ import tempfile
 import time
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -130,6 +130,36 @@ def write_new(text: str, file: Path, kind: str = "mapping") -> Path:
     except OSError as error:
         raise DataError(f"cannot be written ({error.strerror or error})", file=file) from None
     return file
+
+
+def write_together(texts: Mapping[Path, str], gone: Iterable[Path] = ()) -> list[Path]:
+    """Write text files of one folder that belong together; `gone` are files of an earlier set that are removed.
+
+    A process that is killed leaves the old set, the new one or a set with files missing, never files of both.
+    """
+    folder = next(iter(texts)).parent
+    make_folder(folder)
+    with temporary_folder(folder) as above:
+        for file, text in texts.items():
+            (above / file.name).write_text(text, encoding="utf-8", newline="\n")
+            sync(above / file.name)
+        for file in (*gone, *texts):
+            file.unlink(missing_ok=True)
+        sync(folder)
+        for file in texts:
+            os.replace(above / file.name, file)
+    sync(folder)
+    return list(texts)
+
+
+def check_empty(folder: Path) -> None:
+    """Raise DataError where a folder for new files has files already, or is none."""
+    try:
+        used = folder.exists() and (not folder.is_dir() or next(folder.iterdir(), None) is not None)
+    except OSError as error:
+        raise DataError(f"cannot be read ({error.strerror})", file=folder) from None
+    if used:
+        raise DataError("is there already and not an empty folder: name a new one", file=folder)
 
 
 def write_json(file: Path, content: Any) -> None:

@@ -80,6 +80,45 @@ def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path: Path) -> Non
     assert file.read_text() == "new"
 
 
+@pytest.mark.parametrize("moment", range(12))
+def test_of_files_that_belong_together_none_is_old_beside_a_new_one(
+    moment: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed at any call that changes the folder."""
+    old, new = ({tmp_path / name: f"{age} {name}" for name in ("a.c", "a.h")} for age in ("old", "new"))
+    files.write_together(old | {tmp_path / "gone.h": "old"})
+    calls = iter(range(100))
+
+    def killed(call: Callable[..., Any]) -> Callable[..., Any]:
+        def maybe(*arguments: Any, **more: Any) -> Any:
+            if next(calls) == moment:
+                raise KeyboardInterrupt
+            return call(*arguments, **more)
+
+        return maybe
+
+    for place, name in ((Path, "write_text"), (Path, "unlink"), (os, "replace"), (files, "sync")):
+        monkeypatch.setattr(place, name, killed(getattr(place, name)))
+    try:
+        files.write_together(new, [tmp_path / "gone.h"])
+        done = True
+    except KeyboardInterrupt:
+        done = False
+    left = {file.name: file.read_text() for file in tmp_path.iterdir() if file.is_file()}
+    assert len({text.split()[0] for text in left.values()}) <= 1
+    assert not done or left == {file.name: text for file, text in new.items()}
+    assert done == (next(calls) <= moment)
+
+
+def test_only_an_empty_folder_is_new(tmp_path: Path) -> None:
+    files.check_empty(tmp_path)
+    files.check_empty(tmp_path / "new")
+    (tmp_path / "a").touch()
+    for place in (tmp_path, tmp_path / "a"):
+        with pytest.raises(DataError, match="name a new one"):
+            files.check_empty(place)
+
+
 def test_what_is_not_finite_is_null_in_json(tmp_path: Path) -> None:
     files.write_json(tmp_path / "a.json", {"x": np.float64(2.5), 3: [np.nan, (np.inf, np.int64(7))], "s": "ä"})
     assert json.loads((tmp_path / "a.json").read_text()) == {"x": 2.5, "3": [None, [None, 7]], "s": "ä"}

@@ -23,7 +23,7 @@ def export(
 ) -> None:
     """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""
     from shipid.errors import DocumentError, choices
-    from shipid.export.write import export_predictor, export_vessel
+    from shipid.export.write import EXAMPLE, export_predictor, export_vessel
     from shipid.predictor import Predictor
     from shipid.vessel.load import load_vessel
 
@@ -39,6 +39,8 @@ def export(
         written = export_vessel(vessel, to, out, integrator=integrator, single=single, name=name)  # type: ignore[arg-type]
     for file in written:
         typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
+    if to == "c" and out / EXAMPLE not in written:
+        typer.echo(f"{out / EXAMPLE} is there already and is kept; without it, an example is written")
 
 
 def aboard(

@@ -10,8 +10,10 @@ import typer.core
 
 from shipid.errors import ShipidError
 
-OUTPUTS = ("out", "csv", "html", "log")
+OUTPUTS = ("out", "csv", "html", "log", "save")
 """Names of options that say what to write."""
+RESULTS = ("study.toml", "provenance.json")
+"""Files that a folder of results has."""
 
 
 class Guarded(typer.core.TyperCommand):
@@ -35,6 +37,14 @@ def check_output(file: Path, read: Iterable[Path], option: str) -> None:
         raise ShipidError(message, file=file, path=option)
     if file.exists() and not (file.is_file() or file.is_dir()):
         raise ShipidError("is a device or a pipe: name a file to write", file=file, path=option)
+    if file.is_file() and (results := results_of(file)) is not None:
+        message = f"belongs to the results in {results}, and would be written over: name another file to write"
+        raise ShipidError(message, file=file, path=option)
+
+
+def results_of(file: Path) -> Path | None:
+    """The folder of results that a file belongs to, if it does."""
+    return next((one for one in file.absolute().parents if all((one / name).is_file() for name in RESULTS)), None)
 
 
 def _files(value: Any) -> Iterator[Path]:

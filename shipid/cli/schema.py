@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from shipid.errors import ShipidError
+
 
 def schema(
     name: Annotated[Literal["vessel", "study", "mapping", "settings"], typer.Argument(help="kind of document")],
@@ -18,6 +20,8 @@ def schema(
 
     if out is None:
         typer.echo(json_text(schemas.schema(name)))
+    elif out.suffix != ".json":
+        raise ShipidError("a schema is a JSON file: let the name end in .json", file=out)
     else:
         write_json(out, schemas.schema(name))
         typer.echo(f"schema -> {out}")

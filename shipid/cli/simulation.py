@@ -25,7 +25,7 @@ def simulate(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(help="Parquet file to write, of a vessel also CSV; default: <study>.parquet, <vessel>.csv"),
+        typer.Option(help="Parquet file, of a vessel also CSV; default: <study>.parquet, <vessel>-simulated.csv"),
     ] = None,
     manoeuvres: Annotated[
         str | None,
@@ -40,7 +40,7 @@ def simulate(
     elif changes:
         raise ShipidError("changes a study: write the document of manoeuvres as it is meant", path="--set")
     else:
-        _simulate_vessel(name, manoeuvres, out or Path(f"{stem(name)}.csv"), as_json)
+        _simulate_vessel(name, manoeuvres, out or Path(f"{stem(name)}-simulated.csv"), as_json)
 
 
 def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> None:

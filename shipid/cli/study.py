@@ -12,6 +12,7 @@ import typer
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import bundled_or_file, files
 from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyName, Workers, parsed, stem
+from shipid.cli.outputs import check_output
 from shipid.cli.terminal import counted, digits, draw, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
 
@@ -110,9 +111,12 @@ def study_variants(
     as_json: Json = False,
 ) -> None:
     """Show the foundations of a study with their factors and accuracy A; save patches that rebuild them exactly."""
+    from shipid.files import check_empty
     from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain, prepare
 
+    if save is not None:
+        check_empty(save)
     plan = read_plan(study, parsed(changes))
     models, scores = plan.foundations, {}
     if accuracy or save is not None:  # what diverges on training windows is redrawn, so a patch needs the data
@@ -453,6 +457,7 @@ def _before_work(
     plan = read_plan(study, parsed(changes))
     file = out or Path(f"{plan.name}-{command}.csv")
     check_table(file)
+    check_output(file, plan.inputs, "--out")
     return plan, file
 
 

@@ -293,6 +293,8 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
 
 def read_dataset(file: str | os.PathLike[str]) -> Dataset:
     """Read a dataset that `write_dataset` wrote; raises DataError for anything else, naming file and column."""
+    if os.path.isdir(file):
+        raise DataError("is a folder: name one dataset; `shipid data join` makes one of several", file=file)
     try:
         table = pyarrow.parquet.read_table(file)
     except (pyarrow.ArrowException, ValueError, TypeError):

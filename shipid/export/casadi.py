@@ -96,11 +96,17 @@ def band_function(model: Model, name: str) -> tuple[ca.Function, dict[str, Any]]
     }
 
 
+def listing_of(file: Path) -> Path:
+    """Where the names of the inputs and outputs of a written function are."""
+    return file.with_name(file.name + ".json")
+
+
 def write_function(function: ca.Function, names: Mapping[str, Any], file: Path) -> list[Path]:
     """Write `file` (for `casadi.Function.load`) and `file.json` with the names of inputs and outputs."""
+    listing = listing_of(file)
+    listing.unlink(missing_ok=True)  # never the names of another function
     with whole(file) as temporary:
         function.save(str(temporary))
-    listing = file.with_name(file.name + ".json")
     write_json(
         listing,
         {"shipid": __version__, "casadi": str(ca.CasadiMeta.version()), **json.loads(json.dumps(names, default=str))},

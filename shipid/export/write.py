@@ -10,15 +10,17 @@ from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.export.blocks import Precision
 from shipid.export.c import Files, c_name, predictor_files, vessel_files
-from shipid.export.casadi import band_function, predictor_function, vessel_function, write_function
+from shipid.export.casadi import band_function, listing_of, predictor_function, vessel_function, write_function
 from shipid.export.fmu import Packed, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import Exportable, model
 from shipid.export.onnx import write_onnx
-from shipid.files import write_text
+from shipid.files import write_together
 from shipid.vessel.load import Vessel
 
 Target = Literal["c", "fmu", "casadi", "onnx"]
 TARGETS: tuple[str, ...] = get_args(Target)
+EXAMPLE = "main.c"
+ENDINGS = {"fmu": ".fmu", "casadi": ".casadi", "onnx": ".onnx"}
 
 
 def export_predictor(
@@ -48,6 +50,8 @@ def export_predictor(
     if target == "casadi":
         band = band_function(kept, f"{title}_band")
         band_file = file.with_name(f"{file.stem}-band{file.suffix}")
+        for old in (band_file, listing_of(band_file)):
+            old.unlink(missing_ok=True)
         written = write_function(*predictor_function(kept, title), file)
         return written if band is None else [*written, *write_function(*band, band_file)]
     return [write_onnx(kept, title, file, single=single)]
@@ -82,19 +86,17 @@ def _checked(to: str, out: str | os.PathLike[str], single: bool) -> tuple[str, P
     file = Path(out)
     if to == "c" and file.exists() and not file.is_dir():
         raise DocumentError("is a file: the target c takes a folder", file=file, path="--out")
-    if to == "fmu" and file.suffix != ".fmu":
-        raise DocumentError("an FMU is a file that ends in .fmu", file=file, path="--out")
     if to != "c" and file.is_dir():
         raise DocumentError(f"is a folder: the target {to} takes a file", file=file, path="--out")
+    if to in ENDINGS and file.suffix != ENDINGS[to]:
+        raise DocumentError(f"the target {to} is a file that ends in {ENDINGS[to]}", file=file, path="--out")
     return to, file
 
 
 def _folder(files: Files, folder: Path) -> list[Path]:
-    written = []
-    for name, text in files.texts.items():
-        write_text(folder / name, text)
-        written.append(folder / name)
-    return written
+    """Write the files; an example that is there is kept, because it may have become the user's program."""
+    texts = {folder / name: text for name, text in files.texts.items()}
+    return write_together({file: text for file, text in texts.items() if file.name != EXAMPLE or not file.exists()})
 
 
 def _fmu(unit: Packed, file: Path) -> list[Path]:

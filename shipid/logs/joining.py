@@ -14,6 +14,7 @@ from shipid.data.dataset import DATED, Dataset, units_of
 from shipid.errors import DataError
 
 FARTHEST = 1e5  # m between origins
+COPIED = 0.3  # share of the rows of a run from which on it is a copy: manoeuvres of a simulator may begin alike
 PAUSE = 3600.0  # s put between recordings whose clocks overlap but count from no common moment
 
 
@@ -34,6 +35,7 @@ def join(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
     if len(datasets) < 2:
         raise DataError(f"{len(datasets)} dataset: joining needs two or more")
     _check_alike(datasets)
+    _check_copies(datasets)
     notes: list[str] = []
     columns = _columns(datasets, notes)
     names = _names(datasets, notes)
@@ -59,11 +61,28 @@ def _check_alike(datasets: Mapping[Path, Dataset]) -> None:
             if lacking:
                 sentence = f"no command {', '.join(lacking)}, which {first.name if place is file else file.name} has"
                 raise DataError(f"{sentence}: name the columns alike in both mappings, and import again", file=place)
-        if one.digest == wanted.digest:
-            raise DataError(f"holds the same rows as {first.name}: a copy would train on what it tests", file=file)
         vessels = {str(data.metadata["vessel"]) for data in (wanted, one) if data.metadata.get("vessel")}
         if len(vessels) > 1:
             raise DataError(f"of another vessel than {first.name}: {' and '.join(sorted(vessels))}", file=file)
+
+
+def _check_copies(datasets: Mapping[Path, Dataset]) -> None:
+    """Raise DataError for a run whose motion is, row by row, that of a run in another dataset, whatever its name."""
+    known: dict[Path, np.ndarray] = {}
+    for file, one in datasets.items():
+        rows = pd.util.hash_pandas_object(one.frame[["u", "v", "r"]], index=False)
+        distinct = ~rows.duplicated(keep=False)  # a ship at rest is no copy of another one at rest
+        for other, seen in known.items():
+            copied = rows.isin(seen) & distinct
+            of_runs = copied.groupby(one.frame["run"], sort=False).sum() / one.frame.groupby("run", sort=False).size()
+            if of_runs.max() > COPIED:
+                run = of_runs.idxmax()
+                raise DataError(
+                    f"run {run!r} has {of_runs.max():.0%} of its rows from {other.name}: a copy would train on what it "
+                    "tests; leave one of them out",
+                    file=file,
+                )
+        known[file] = rows[distinct].to_numpy()
 
 
 def _columns(datasets: Mapping[Path, Dataset], notes: list[str]) -> list[str]:

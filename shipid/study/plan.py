@@ -375,6 +375,14 @@ class Plan:
         return [*(vessel for vessel in every if vessel is not None), *of_parts]
 
     @property
+    def inputs(self) -> list[Path]:
+        """Files that the study is read from: the document, the vessels, the mapping, the log and the dataset."""
+        data, here = self.study.data, Path(self.file)
+        named = [] if data is None else [mapping_of(data, here), data.log, data.dataset]
+        vessels = [Path(vessel.file) for vessel in self.vessels.values()]
+        return [here, *vessels, *(beside(here.parent, name) for name in named if name is not None)]
+
+    @property
     def digest(self) -> str:
         """Digest of the document, every vessel, the data's sources and the methods in full: what results depend on."""
         return self._digest(self.document)

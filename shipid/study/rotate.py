@@ -15,7 +15,8 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
-from shipid.files import make_folder, sweep, write_table
+from shipid.files import make_folder, sweep, write_table, write_text
+from shipid.logs.importing import sha256_of
 from shipid.study.claims import Claims
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings import Rivals, judged
@@ -110,6 +111,7 @@ def _computed(
             frames[batch] = frame = computed(batch, trials, check)
             check()
             write_table(file, frame)
+            write_text(_seal(file), sha256_of(file))
 
         claims.once(file.stem, is_done, keep)
         frame = frames[batch]
@@ -137,9 +139,16 @@ def _file(kept: Path, test: str, batch: Batch) -> Path:
     return kept / f"{documents.digest(test)}-{batch.key}.parquet"
 
 
+def _seal(file: Path) -> Path:
+    """Where the digest of the rows of a batch is, which is written last."""
+    return file.with_suffix(".sha256")
+
+
 def _read(file: Path) -> pd.DataFrame | None:
-    """Rows of a batch of a turn; None where it is not finished, or the file is damaged."""
+    """Rows of a batch of a turn; None where it is not finished, or the file is not as it was written."""
     try:
+        if _seal(file).read_text(encoding="utf-8") != sha256_of(file):
+            return None
         return pd.read_parquet(file)
     except (OSError, ValueError):
         return None

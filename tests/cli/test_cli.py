@@ -107,7 +107,7 @@ def test_mistakes_with_folders(tiny_run: Path) -> None:
     """No traceback, no warning, exit 1: another study's folder, a file where a folder should be."""
     for arguments, remedy in (
         (["study", "run", TINY, "--out", tiny_run, "--set", "truth.seed=8"], "another study"),
-        (["study", "variants", TINY, "--no-accuracy", "--save", TINY], "plain.toml: File exists"),
+        (["study", "variants", TINY, "--no-accuracy", "--save", TINY], "plain.toml: --save: is named twice"),
     ):
         status, _, err = ended(*arguments)
         assert status == 1

@@ -87,6 +87,18 @@ unit = "s"
     assert "-> set.parquet" in output_of("data", "import", "log.toml", "log.parquet", "--out", "set.parquet")
 
 
+def test_no_file_of_results_is_written_over(there: Path) -> None:
+    """A folder of results, whatever file it is: the seal would say that it was edited."""
+    results = there / "results" / "quick"
+    for name in ("study.toml", "provenance.json", "cells/a.parquet"):
+        (results / name).parent.mkdir(parents=True, exist_ok=True)
+        (results / name).write_text("sealed")
+    status, _, error = ended("data", "measures", "log.parquet", "--csv", "results/quick/cells/a.parquet")
+    assert status == 1
+    assert "--csv: belongs to the results in" in error
+    assert (results / "cells/a.parquet").read_text() == "sealed"
+
+
 def test_a_pipe_is_no_page(there: Path) -> None:
     os.mkfifo(there / "pipe.html")
     status, _, error = ended("manoeuvre", "./ship.toml", "zigzag", "10", "10", "--out", "pipe.html")

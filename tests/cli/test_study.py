@@ -16,7 +16,7 @@ from shipid.engine import engines
 from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
-from tests.cli.running import output_of
+from tests.cli.running import ended, output_of
 from tests.study.tiny import without_figures, without_workers
 
 
@@ -37,6 +37,30 @@ def test_studies_and_variants(study: Path) -> None:
     ]
     text = output_of("study", "variants", study, "--no-accuracy", "--set", 'unusual=["*"]', *moved)
     assert re.search(r"^ *right +- +3 +inertia.m x0.90, A_FW x0.009, x_G 2.5 in place of 0", text, re.MULTILINE), text
+
+
+def test_patches_replace_no_vessel(study: Path) -> None:
+    """Foundations and vessels may have one name; patches of an earlier family with more members would stay, too."""
+    Path("wrong-1.toml").write_text("mine")
+    for folder in (".", "wrong-1.toml"):
+        status, _, error = ended("study", "variants", study, "--save", folder)
+        assert status == 1
+        assert "name a new one" in error
+    assert Path("wrong-1.toml").read_text() == "mine"
+
+
+@pytest.mark.parametrize("command", ["screen", "rotate"])
+def test_a_table_replaces_nothing_that_the_study_reads(study: Path, command: str) -> None:
+    output_of("simulate", study, "--out", "data.parquet")
+    text = study.read_text()
+    head, rest = text[: text.index("[truth]")], text[text.index("[split]") :]
+    study.write_text(f'{head}[data]\ndataset = "data.parquet"\n{rest}')
+    before = Path("data.parquet").read_bytes()
+    words = ["--tests", "*"] if command == "rotate" else []
+    status, _, error = ended("study", command, study, *words, "--out", "data.parquet")
+    assert status == 1
+    assert "data.parquet: --out: is named twice" in error
+    assert Path("data.parquet").read_bytes() == before
 
 
 def test_variants_of_a_chosen_observer_have_no_accuracy_yet(study: Path) -> None:

@@ -51,6 +51,14 @@ def test_the_digest_changes_with_everything_in_the_table_and_nothing_else(tmp_pa
     assert read_dataset(write_dataset(dataset, tmp_path / "trial.parquet")).digest == dataset.digest
 
 
+def test_a_folder_is_no_dataset(tmp_path: Path) -> None:
+    """Arrow reads all tables of a folder as one, in which runs would lie among one another."""
+    for name in ("a", "b"):
+        write_dataset(as_dataset(turning(T)), tmp_path / "days" / f"{name}.parquet")
+    with pytest.raises(DataError, match=r"is a folder: name one dataset; `shipid data join`"):
+        read_dataset(tmp_path / "days")
+
+
 def test_file_is_compressed_parquet_with_json_metadata(tmp_path: Path) -> None:
     file = write_dataset(as_dataset(turning(T), vessel="x"), tmp_path / "trial.parquet")
     stored = pyarrow.parquet.ParquetFile(file)

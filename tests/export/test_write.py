@@ -30,11 +30,28 @@ def test_the_folder_of_c_holds_three_files(simple, tmp_path):
     assert "typedef float my_ship_real;" in again[0].read_text()
 
 
+def test_an_example_that_the_user_has_made_hers_is_kept(simple, tmp_path):
+    first = simple.export("c", tmp_path / "ship")
+    (tmp_path / "ship" / "main.c").write_text("mine")
+    again = simple.export("c", tmp_path / "ship")
+    assert {file.name for file in first} - {file.name for file in again} == {"main.c"}
+    assert (tmp_path / "ship" / "main.c").read_text() == "mine"
+
+
+def test_the_band_of_an_earlier_predictor_does_not_stay(simple, tmp_path):
+    for name in ("ship-band.casadi", "ship-band.casadi.json"):
+        (tmp_path / name).write_text("of another predictor")
+    written = simple.export("casadi", tmp_path / "ship.casadi")
+    assert set(tmp_path.iterdir()) == set(written)
+
+
 @pytest.mark.parametrize(
     ("to", "out", "options", "message"),
     [
         ("matlab", "a", {}, "--to: no such target: valid: c, casadi, fmu, onnx"),
         ("fmu", "a.zip", {}, "ends in .fmu"),
+        ("casadi", "log.csv", {}, "ends in .casadi"),
+        ("onnx", "ship.toml", {}, "ends in .onnx"),
         ("fmu", "a.fmu", {"single": True}, "always in double precision"),
         ("casadi", ".", {}, "is a folder"),
     ],

@@ -52,6 +52,24 @@ def test_every_run_keeps_its_rows_its_breaks_and_its_windows(seed: int) -> None:
         np.testing.assert_array_equal(cut[0].future, cut[1].future)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_run_that_is_in_two_datasets_is_refused_whatever_it_is_called(seed: int) -> None:
+    """Renamed, at another place, on another clock, cut short: it would train on what it tests."""
+    random = np.random.default_rng(seed)
+    first, other = recording(seed), recording(seed + 50, ("c", "d"), begin=5000.0)
+    run = str(random.choice(["a", "b"]))
+    rows = first.frame[first.frame["run"] == run]
+    rows = rows.iloc[int(random.integers(0, 8)) : len(rows) - int(random.integers(0, 8))]
+    rows = rows.assign(run="e", north=rows["north"] + 100.0, t=rows["t"] + random.uniform(6000, 9000))
+    both = pd.concat([other.frame, rows], ignore_index=True).astype({"run": "str"})
+    copy = Dataset(both, other.metadata)
+    parts = [first, other.select(["c"]), copy] if seed % 2 else [copy, first]
+    with pytest.raises(DataError, match=r"of its rows from day \d\.parquet: a copy would train on what it tests"):
+        joined(*parts)
+    still = dict.fromkeys(("u", "v", "r"), 0.0)  # at rest in both: no copy
+    joined(*(Dataset(one.frame.assign(**still), one.metadata) for one in (first, other)))
+
+
 def test_joining_is_associative() -> None:
     a, b, c = recording(1), recording(2, ("c",), begin=500.0), recording(3, ("d", "e"), begin=900.0)
     left, right = joined(joined(a, b)[0], c)[0], joined(a, joined(b, c)[0])[0]
@@ -138,7 +156,7 @@ def test_the_command_writes_one_dataset_and_none_over_another(tmp_path: Path) ->
 
 
 def test_a_copy_mixed_clocks_and_another_sea_are_refused() -> None:
-    with pytest.raises(DataError, match=r"day 1\.parquet: holds the same rows as day 0\.parquet"):
+    with pytest.raises(DataError, match=r"day 1\.parquet: run 'a' has 100% of its rows from day 0\.parquet"):
         joined(recording(1), recording(1))
     with pytest.raises(DataError, match=r"day 1\.parquet: its clock has no date, that of another has"):
         joined(recording(1, begin=1.7e9), recording(2, ("c",)))

@@ -121,7 +121,7 @@ def test_two_rotations_to_one_file_share_the_work(
 
 
 def test_what_is_kept_belongs_to_one_question(recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path) -> None:
-    """Another setting, other data or another device has another folder; a damaged file is computed again."""
+    """Another setting, other data or another device has another folder; a damaged or edited file is computed again."""
     plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
     file = tmp_path / "rows.csv"
     other, _ = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 6.0}, grid={"N_D": [5]})
@@ -133,6 +133,10 @@ def test_what_is_kept_belongs_to_one_question(recorded: Callable[..., tuple[Plan
     assert len(set(folders)) == 4
     first = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
     next(folders[0].glob("*.parquet")).write_bytes(b"PAR1 no more")
+    again = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
+    pd.testing.assert_frame_equal(again, first, check_exact=True)
+    edited = next(folders[0].glob("*.parquet"))
+    pd.read_parquet(edited).assign(H=0.0).to_parquet(edited)
     again = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
     pd.testing.assert_frame_equal(again, first, check_exact=True)
 
