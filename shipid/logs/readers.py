@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import io
+import math
 import re
 import stat
 from collections.abc import Callable, Iterable
@@ -39,6 +40,9 @@ DAYS = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", 
 HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
 SAMPLES = 60  # texts by which the way of writing is looked for
+_DOTTED = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})")
+_DATED = re.compile(r"\d{4}-?\d\d-?\d\d")
+_TAG_TIME = re.compile(r"[\\,]c:(\d+)")
 _SENTENCE = re.compile(r"\$[A-Z]{2}[A-Z]{3},")
 Progress = Callable[[float], None]
 
@@ -510,7 +514,11 @@ def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
             unreadable += 1
             continue
         if form.time == "line":
-            rows.append({"time": _stamp(stamp, file, number), **values})
+            try:
+                rows.append({"time": _stamp(stamp), **values})
+            except ValueError as error:
+                message = f"{error}: set [format] time = 'fix'"
+                raise DataError(message, file=file, path=f"row {number}") from None
             continue
         clock.read(getattr(sentence, "timestamp", None))
         if clock.now is not None:  # before the first fix the time is unknown
@@ -521,6 +529,10 @@ def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
     table = pd.DataFrame(rows).reindex(columns=["time", *NMEA_COLUMNS])
     again = table["time"].ne(table["time"].shift()).cumsum()  # sentences of one instant are one row
     table = table.groupby(again).first().reset_index(drop=True)
+    if table[["rpm", "rpm_2"]].isna().all(axis=None):  # no sentence of a shaft: the engines' are all that there is
+        engines = {"rpm": "engine_rpm", "rpm_2": "engine_rpm_2"}
+        table = table.assign(**{name: table[one] for name, one in engines.items()})
+        table[list(engines.values())] = np.nan
     table.attrs["unreadable"] = unreadable
     return table
 
@@ -544,19 +556,38 @@ class _Clock:
         self.now = midnight + seconds
 
 
-def _stamp(text: str, file: Path, row: int) -> float:
-    """Time before a sentence: a number, or a date in ISO 8601 as seconds since 1970."""
+def _stamp(text: str) -> float:
+    """Time before a sentence: a number, a date as seconds since 1970, or the time of an NMEA 4.10 TAG block.
+
+    Dates are year-month-day, or day.month.year with dots. ValueError where it is none, or a date that may be two days.
+    """
     words = text.strip().rstrip(",;")
+    if words.startswith("\\"):
+        tag = _TAG_TIME.search(words)
+        if tag is None:
+            raise ValueError("no time in the TAG block before the sentence")
+        return float(tag[1]) / (1000.0 if len(tag[1]) > 11 else 1.0)  # some write milliseconds
     try:
         return float(words)
     except ValueError:
-        try:
-            moment = pd.Timestamp(words)
-            moment = moment if moment.tzinfo else moment.tz_localize("UTC")
-            return moment.timestamp()
-        except (ValueError, AttributeError):
-            message = f"no number and no date before the sentence ({words[:30]!r}): set [format] time = 'fix'"
-            raise DataError(message, file=file, path=f"row {row}") from None
+        pass
+    shown = repr(words[:30])
+    if _DOTTED.match(words):
+        words = _DOTTED.sub(r"\3-\2-\1", words)
+    elif not _DATED.match(words):
+        raise ValueError(f"no number and no date year-month-day before the sentence ({shown})")
+    try:
+        moment = pd.Timestamp(words)
+        return (moment if moment.tzinfo else moment.tz_localize("UTC")).timestamp()
+    except (ValueError, AttributeError):
+        raise ValueError(f"no number and no date before the sentence ({shown})") from None
+
+
+def _is_stamp(text: str) -> bool:
+    try:
+        return math.isfinite(_stamp(text))
+    except ValueError:
+        return False
 
 
 def _values_of(sentence: Any) -> dict[str, float]:
@@ -577,8 +608,13 @@ def _apparent(name: str) -> Callable[[Any], Any]:
     return lambda sentence: getattr(sentence, name) if sentence.reference == "R" else None
 
 
-def _engine(*numbers: str) -> Callable[[Any], Any]:
-    return lambda sentence: sentence.speed if sentence.engine_no in numbers else None
+def _turns(sentence: Any, source: str) -> str | None:
+    """Number of the shaft (source S) or engine (E) whose speed a sentence has; None where it is of the other kind."""
+    return str(sentence.engine_no) if sentence.source == source else None
+
+
+def _revolutions(source: str, *numbers: str) -> Callable[[Any], Any]:
+    return lambda sentence: sentence.speed if _turns(sentence, source) in numbers else None
 
 
 def _speed(sentence: Any) -> Any:
@@ -602,7 +638,12 @@ SENTENCES: dict[str, dict[str, Callable[[Any], Any]]] = {
     "HDT": {"heading": lambda s: s.heading},
     "ROT": {"rot": lambda s: s.rate_of_turn},
     "RSA": {"rudder": lambda s: s.rsa_starboard, "rudder_port": lambda s: s.rsa_port},
-    "RPM": {"rpm": _engine("0", "1"), "rpm_2": _engine("2")},
+    "RPM": {
+        "rpm": _revolutions("S", "0", "1"),
+        "rpm_2": _revolutions("S", "2"),
+        "engine_rpm": _revolutions("E", "0", "1"),
+        "engine_rpm_2": _revolutions("E", "2"),
+    },
     "MWV": {"apparent_angle": _apparent("wind_angle"), "apparent_speed": _speed},
     "MWD": {"wind_from": lambda s: s.direction_true, "wind_speed": lambda s: s.wind_speed_meters},
 }
@@ -642,7 +683,7 @@ def _is_nmea(_: Path, head: bytes) -> dict[str, Any] | None:
     sentences = [line for line in lines if _SENTENCE.search(line)]
     if len(sentences) <= len(lines) / 2:
         return None
-    stamped = sum(not line.lstrip().startswith("$") for line in sentences)
+    stamped = sum(_is_stamp(line.partition("$")[0]) for line in sentences)
     return {"kind": "nmea", "time": "line" if stamped > len(sentences) / 2 else "fix"}
 
 

@@ -2,7 +2,9 @@
 
 import os
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +15,9 @@ from shipid.errors import DataError, DocumentError
 from shipid.logs import readers
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.readers import (
+    READERS,
     WIDEST,
+    NmeaFormat,
     ParquetFormat,
     TextFormat,
     date_of,
@@ -368,6 +372,50 @@ def test_nmea(time: str, midnight: float, tmp_path: Path) -> None:
     counted = [record["count"] for record in dataset.metadata["repairs"] if record["kind"] == "unreadable"]
     assert counted == ([2] if time == "fix" else [])
     assert dataset.metadata["origin"] == {"latitude": 63.45, "longitude": 10.4}
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        lambda moment: f"{moment.timestamp():.3f} ",
+        lambda moment: f"{moment:%d.%m.%Y};{moment:%H:%M:%S.%f};",
+        lambda moment: f"{moment:%d.%m.%Y %H:%M:%S.%f},",
+        lambda moment: f"{moment:%Y-%m-%dT%H:%M:%S.%f}Z ",
+        lambda moment: f"{moment:%Y%m%dT%H%M%S.%f} ",
+        lambda moment: f"\\g:1-1-1234,s:r3669961,c:{round(1000 * moment.timestamp())}*5F\\",
+    ],
+)
+@pytest.mark.parametrize("source", ["S", "E", "both"])
+def test_stamps_before_sentences_and_speeds_of_shafts(written: Any, source: str, tmp_path: Path) -> None:
+    """6 May, not 5 June; shafts by their number, and engines where no shaft is logged."""
+    begin = datetime(2025, 5, 6, 7, 8, 9, 500000, tzinfo=UTC)
+    lines = []
+    for second in range(20):
+        bodies = [f"{kind},{number},{100.0 * factor + 10 * number + second},,A" for kind, factor in (("E", 5), ("S", 1))
+                  for number in (1, 2) if source in (kind, "both")]  # fmt: skip
+        stamp = written(begin + timedelta(seconds=second))
+        lines += [stamp + sentence(f"IIRPM,{body}") for body in bodies] + [stamp + sentence("HEHDT,10.0,T")]
+    file = tmp_path / "bridge.nmea"
+    file.write_text("\n".join(lines))
+    assert READERS["nmea"].detect is not None
+    assert READERS["nmea"].detect(file, file.read_bytes()) == {"kind": "nmea", "time": "line"}
+    table = READERS["nmea"].read(file, NmeaFormat(kind="nmea", time="line"), "time")
+    np.testing.assert_allclose(table["time"], begin.timestamp() + np.arange(20.0), atol=1e-3)
+    base = 500.0 if source == "E" else 100.0
+    np.testing.assert_allclose(table["rpm"], base + 10 + np.arange(20))
+    np.testing.assert_allclose(table["rpm_2"], base + 20 + np.arange(20))
+    assert table["engine_rpm"].notna().all() == (source == "both")
+
+
+@pytest.mark.parametrize("stamp", ["06/05/2025 12:00:00,", "12:00:01 ", "\\s:GPS*1C\\", "bridge "])
+def test_a_stamp_that_is_no_moment_is_refused(stamp: str, tmp_path: Path) -> None:
+    """A time without a date, or a date that may be two days; a guess takes the time of the fix."""
+    file = tmp_path / "bridge.nmea"
+    file.write_text(stamp + sentence("HEHDT,10.0,T") + "\n")
+    assert READERS["nmea"].detect is not None
+    assert READERS["nmea"].detect(file, file.read_bytes()) == {"kind": "nmea", "time": "fix"}
+    with pytest.raises(DataError, match=r"row 1: no .*: set \[format\] time = 'fix'"):
+        READERS["nmea"].read(file, NmeaFormat(kind="nmea", time="line"), "time")
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", "whitespace"])
