@@ -217,7 +217,8 @@ def _late(
     misfit, noise, size, count = np.zeros(len(delays)), 0.0, 0.0, 0
     for rows in stretches:
         t = rows["t"].to_numpy()
-        width = WINDOW if t[-1] - t[0] > 4 * WINDOW else (t[-1] - t[0]) / 6
+        span = t[-1] - t[0]
+        width = max(WINDOW, span / len(t)) if span > 4 * WINDOW else span / 6  # no more windows than rows
         first = np.arange(t[0] + longest, t[-1] - longest - width, width)
         if len(first) < 2 or len(t) < 8:
             continue

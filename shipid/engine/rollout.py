@@ -19,6 +19,7 @@ from shipid.physics.helm import Helmsman
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
+MOST_STEPS = 10**12
 SPEED_LIMIT = 100.0  # m/s: beyond any ship; a faster sample has diverged
 PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time where an engine cannot measure on its way
 
@@ -84,6 +85,7 @@ def rollout(
     asked = named(engine, device)
     if num_steps < 1 or every < 1 or num_steps % every:
         raise ShipidError(f"num_steps must be a multiple of every, both 1 or more, not {num_steps} and {every}")
+    check_steps(num_steps)
     given = start, commands, environment or {}, components or {}
     model, batch = prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
     names = channels(model)
@@ -94,6 +96,12 @@ def rollout(
             asked, lambda: chosen(batch, job, engine == REPEATED), lambda way: way.run(model, batch, job)
         )
     return Trajectories(records, kept, ~(worst <= SPEED_LIMIT) | ~finite(batch), step * every)
+
+
+def check_steps(num_steps: int) -> None:
+    """Raise ShipidError for more steps than any computer does."""
+    if num_steps > MOST_STEPS:
+        raise ShipidError(f"{num_steps:.2g} steps, at most {MOST_STEPS:.0e}: give a longer step, or a shorter time")
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ WORDS = frozenset(
     isfinite signbit abort abs atexit atof atoi atol atoll bsearch calloc div exit free getenv labs ldiv llabs lldiv
     malloc qsort rand realloc srand strtod strtof strtol system memchr memcmp memcpy memmove memset strcat strchr strcmp
     strcpy strlen strncmp strncpy strstr printf fprintf sprintf snprintf scanf puts putchar getchar perror remove rename
-    rewind signal raise time clock gamma j0 j1 jn y0 y1 yn index bool true false complex imaginary
+    rewind signal raise time clock gamma j0 j1 jn y0 y1 yn index bool true false complex imaginary linux unix
     """.split()
 )
 """Keywords of C99 and names of its library: a file of such a name would not compile."""
@@ -55,7 +55,7 @@ class Files:
 def c_name(text: str) -> str:
     """A name for C from any text: letters, digits and _, with a letter first."""
     name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower() or "model"
-    return f"m_{name}" if name[0].isdigit() or name in WORDS else name
+    return f"m_{name}" if name[0].isdigit() or name in WORDS or name.endswith("_t") else name  # _t: types of POSIX
 
 
 def strings(values: Sequence[str]) -> str:

@@ -299,20 +299,20 @@ typedef struct {{
     int status;
 }} Model;
 {_fmi(name, variables)}
-static void model_init(Model *self)
+static void Model_init(Model *self)
 {{
     memset(self, 0, sizeof *self);
     memcpy(self->values, start_values, sizeof start_values);
 }}
 
-static const char *model_begin(Model *self, double t)
+static const char *Model_begin(Model *self, double t)
 {{
     (void)t;
 {begin or "    (void)self;"}
     return 0;
 }}
 
-static const char *model_step(Model *self, double t, double h)
+static const char *Model_step(Model *self, double t, double h)
 {{
     const double largest = self->values[{total - 1}];
     const double count = ceil(h / largest - 1e-9);
@@ -334,7 +334,7 @@ static const char *model_step(Model *self, double t, double h)
     return 0;
 }}
 
-static int model_boolean(const Model *self, unsigned reference)
+static int Model_boolean(const Model *self, unsigned reference)
 {{
     (void)self;
     (void)reference;
@@ -392,7 +392,7 @@ typedef struct {{
     {name} kept;
 }} Model;
 {_fmi(name, variables)}
-static void model_init(Model *self)
+static void Model_init(Model *self)
 {{
     memset(self, 0, sizeof *self);
     memcpy(self->values, start_values, sizeof start_values);
@@ -418,19 +418,19 @@ static const char *predict_from(Model *self, {name} *kept, double t)
 }}
 
 /* The path at the start: from a copy, since the first step keeps this row. */
-static const char *model_begin(Model *self, double t)
+static const char *Model_begin(Model *self, double t)
 {{
     {name} kept = self->kept;
     return predict_from(self, &kept, t);
 }}
 
-static const char *model_step(Model *self, double t, double h)
+static const char *Model_step(Model *self, double t, double h)
 {{
     (void)h;
     return predict_from(self, &self->kept, t);
 }}
 
-static int model_boolean(const Model *self, unsigned reference)
+static int Model_boolean(const Model *self, unsigned reference)
 {{
     (void)reference;
     return (self->status & {name}_OUTSIDE) != 0;
@@ -582,7 +582,7 @@ FMI2_EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, 
         return 0;
     }
     strcpy(self->name, name);
-    model_init(&self->model);
+    Model_init(&self->model);
     return self;
 }
 
@@ -628,7 +628,7 @@ FMI2_STATUS FMI2(fmi2ExitInitializationMode)(fmi2Component c)
     const char *message;
     if (self->phase != INITIALIZING) return refuse(self, fmi2Error, "there is no initialisation to end");
     self->phase = STEPPING;
-    message = model_begin(&self->model, self->time);
+    message = Model_begin(&self->model, self->time);
     return message ? refuse(self, fmi2Error, "%s", message) : fmi2OK;
 }
 
@@ -643,7 +643,7 @@ FMI2_STATUS FMI2(fmi2Reset)(fmi2Component c);
 FMI2_STATUS FMI2(fmi2Reset)(fmi2Component c)
 {
     Instance *self = (Instance *)c;
-    model_init(&self->model);
+    Model_init(&self->model);
     self->phase = INSTANTIATED;
     self->time = 0;
     return fmi2OK;
@@ -695,7 +695,7 @@ FMI2_STATUS FMI2(fmi2GetBoolean)(fmi2Component c, const fmi2ValueReference vr[],
     size_t i;
     for (i = 0; i < n; ++i) {
         if (vr[i] + 1 > NUM_BOOLEANS) return refuse(self, fmi2Error, "there is no boolean variable %u", vr[i]);
-        value[i] = model_boolean(&self->model, vr[i]);
+        value[i] = Model_boolean(&self->model, vr[i]);
     }
     return fmi2OK;
 }
@@ -849,7 +849,7 @@ FMI2_STATUS FMI2(fmi2DoStep)(fmi2Component c, fmi2Real time, fmi2Real step, fmi2
     if (!isfinite(time) || !isfinite(step) || step < 0)
         return refuse(self, fmi2Discard, "time %g and step %g must be finite, the step not below 0", time, step);
     if (step == 0) return fmi2OK;
-    message = model_step(&self->model, time, step);
+    message = Model_step(&self->model, time, step);
     if (message) return refuse(self, fmi2Discard, "at %g s: %s", time, message);
     self->time = time + step;
     return fmi2OK;

@@ -15,8 +15,8 @@ def check_device(device: str) -> None:
     import torch
 
     try:
-        torch.zeros(1, device=device)
-    except (RuntimeError, AssertionError, NotImplementedError):
+        float(torch.zeros(1, device=device))  # one that keeps no numbers, such as meta, cannot give it back
+    except (RuntimeError, AssertionError, NotImplementedError, ImportError, AttributeError):
         raise ShipidError("PyTorch has no such device here: use cpu", path=f"--device {device}") from None
 
 

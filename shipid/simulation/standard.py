@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import ShipidError, choices
 from shipid.simulation.approach import Controls, acceleration
 from shipid.simulation.manoeuvre import (
@@ -144,8 +145,9 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     ------
     ShipidError : the speed is not positive, or no shaft speed up to 6000 rpm gives it.
     """
-    if not 0 < speed < np.inf:
-        raise ShipidError(f"{speed:g} m/s: the speed of the approach must be positive", path="--speed")
+    if not 0 < speed <= SPEED_LIMIT:
+        words = f"the speed of the approach must be above 0 and at most {SPEED_LIMIT:g} m/s"
+        raise ShipidError(f"{speed:g} m/s: {words}", path="--speed")
 
     def surplus(n: float) -> float:
         return float(acceleration(controls.vessel, speed, controls.ahead(n))[0])

@@ -15,6 +15,7 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
+from shipid.export.c import c_name
 from shipid.export.fmu import predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
@@ -73,6 +74,14 @@ def test_the_sources_compile_without_a_warning(aboard, tmp_path):
         command = [compiler(), *FLAGS, *more, "-c", "path.c", "-o", "path.o"]
         result = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True)
         assert result.returncode == 0, result.stderr[:1000]
+
+
+@pytest.mark.parametrize("name", ["model", "size_t", "kept", "instance", "predict", "linux", "x"])
+def test_no_name_collides_with_those_of_the_source(predictor, name, tmp_path):
+    compiler()
+    title = c_name(name)
+    for unit in (predictor_unit(model(predictor), title), vessel_unit(variety()["actuators"], title, "rk4")):
+        assert write_fmu(unit, tmp_path / "a.fmu")  # compiled
 
 
 @pytest.mark.slow

@@ -34,7 +34,7 @@ def test_threads_are_those_of_every_library(count: int) -> None:
     assert threads() == {count}
 
 
-@pytest.mark.parametrize("device", ["cuda:99", "abacus"])
+@pytest.mark.parametrize("device", ["cuda:99", "abacus", "meta", "hpu", "mtia", "vulkan", "privateuseone"])
 def test_a_device_that_is_not_there_is_refused(device: str) -> None:
     check_device("cpu")
     with pytest.raises(ShipidError, match=f"--device {device}: PyTorch has no such device here: use cpu"):

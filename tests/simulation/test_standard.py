@@ -39,6 +39,11 @@ def test_shaft_speed_gives_the_speed(speed: float) -> None:
     assert path["u"].iloc[0] == pytest.approx(speed, abs=0.02)  # an approach ends where it changes by 1 mm/s in 30 s
 
 
+def test_a_speed_that_no_shaft_speed_gives_is_refused() -> None:
+    with pytest.raises(ShipidError, match="--speed: no shaft speed drives .* at 100 m/s: give a lower speed"):
+        standard(load_vessel("mariner"), "turning", speed=100.0)
+
+
 def test_speed_is_that_of_froude_unless_asked() -> None:
     assert standard(SHIP, "turning").speed == pytest.approx(0.2 * np.sqrt(9.81 * 28.9))
     assert standard(SHIP, "turning", speed=2.0).speed == 2.0
@@ -82,7 +87,7 @@ def test_spirals_go_to_the_side_and_the_angle_asked_for() -> None:
         ("turning", (-35,), {}, "ANGLES: angles are positive"),
         ("turning", (), {"side": "left"}, "--side: 'left' is no side"),
         ("turning", (), {"speed": 0.0}, "--speed: 0 m/s"),
-        ("turning", (), {"speed": 900.0}, "--speed: no shaft speed drives"),
+        ("turning", (), {"speed": 1e160}, "--speed: 1e+160 m/s: the speed of the approach must be above 0"),
         ("turning", (), {"duration": 0.0}, "--duration: 0 s must be positive"),
         ("turning", (), {"duration": 1e12}, "--duration: "),
         ("turning", (), {"step": float("nan")}, "--step: nan s must be positive"),

@@ -118,11 +118,11 @@ def test_results_of_several_parts_are_read_one_by_one(four: tuple[Plan, Path], t
 BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "two of a name": ({"condition": [{"name": "a"}, {"name": "a"}]}, "condition.1.name", "two conditions"),
     "a name that is no file": ({"condition": [{"name": "a/b"}]}, "condition.a/b.name", "pattern"),
-    "no value": ({"repeat": {"seed": []}}, "repeat.seed", "at least 1"),
+    "no value": ({"repeat": {"seed": []}}, "repeat.seed", "must have 1 or more entries"),
     "an unknown block": ({"repeat": {"sead": [1]}}, "repeat.sead", "did you mean 'seed'"),
     "a part of parts": ({"repeat": {"repeat.seed": [1]}}, "repeat.repeat.seed", "no such block"),
     "a path into a number": ({"repeat": {"truth.seed.x": [1]}}, "repeat.truth.seed.x", "is no key of this study"),
-    "a wrong value": ({"repeat": {"prediction.step": [-1.0]}}, "prediction.step", "greater than 0"),
+    "a wrong value": ({"repeat": {"prediction.step": [-1.0]}}, "prediction.step", "must be above 0"),
 }
 
 
