@@ -100,6 +100,7 @@ def over_time(content: ReportContent) -> Figure | None:
         takeaway=_takeaway_time(worst, last),
         how="At each instant t of a test run: mean position error of the prediction made there, over its horizon. "
         "The commands that were given are below."
+        + (f" Of {seeds} seeds the first is drawn." if (seeds := content.cells["seed"].nunique()) > 1 else "")
         + _drawn(content)
         + (f" {counted(left, 'test run')} more are not drawn." if left else ""),
         alternative="Lines of the position error over the time of one test run, above lines of its commands.",

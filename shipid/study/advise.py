@@ -407,20 +407,26 @@ def _floor(case: Case) -> str:
     sides = case.sides(models, contrasts(still - errors, table.counts, training))
     if len(sides.better) == len(models):
         return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} every model beats it."
-    others = [*sides.worse, *sides.open]
-    verb = "does" if len(others) == 1 else "do"
-    begins = f"Keeping u, v and r constant gives {metres(floor)}"
-    return f"{begins}: at {runs(case.largest)} {named(others)} {verb} not beat it."
+    parts = []
+    if sides.worse:
+        parts.append(f"{named(sides.worse)} {'is' if len(sides.worse) == 1 else 'are'} worse")
+    if sides.open:
+        parts.append(f"{named(sides.open)} {'is' if len(sides.open) == 1 else 'are'} not shown to beat it")
+    return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} {', and '.join(parts)}."
 
 
 def _nominal(nominal: pd.DataFrame, largest: int, plan: Plan) -> list[str]:
     """The error that exact coefficients leave, alone and compensated with the largest amount of data."""
-    causes = ["waves"]
+    truth = plan.study.truth
+    causes = ["waves"] if truth is None or truth.waves is not None else []
+    causes += ["gusts"] if truth is not None and truth.gusts is not None else []
+    causes += ["noise of the sensors"] if truth is not None and truth.sensors else []
     causes += ["Euler steps"] if plan.euler else []
     causes += [] if plan.known else ["held commands"]
+    such = f", such as {listed(causes)}," if causes else ","
     return [
-        f"Exact coefficients ({row['model']}) leave {metres(row['A'])} alone, the floor set by what is no "
-        f"coefficient, such as {listed(causes)}, and {metres(row['H'])} compensated with {runs(largest)}."
+        f"Exact coefficients ({row['model']}) leave {metres(row['A'])} alone, the floor set by what is no coefficient"
+        f"{such} and {metres(row['H'])} compensated with {runs(largest)}."
         for _, row in nominal[nominal["N_D"] == largest].iterrows()
     ]
 

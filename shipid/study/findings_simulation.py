@@ -190,8 +190,9 @@ def _S2(grid: Grid) -> Finding:
     falls = grid.table.compare([[(float(weights[k]), model, k) for k in places] for model in models])
     fallen = shown(falls.above)
     left = float(np.median([grid.table.mean(model, places[-1]) / grid.table.mean(model, 0) for model in models]))
+    shown_for = f"{fallen.sum()} of {len(models)}" if fallen.any() else f"none of {len(models)}"
     evidence = (
-        f"H of {fallen.sum()} of {len(models)} models falls, by {_range(falls)} for twice the runs; "
+        f"H is shown to fall for {shown_for} models; twice the runs lower it by {_range(falls)}; "
         f"N_D = {grid.amounts[-1]} leaves {left:.0%} of the error at {grid.amounts[0]} in the median"
     )
     if not fallen.all():

@@ -104,9 +104,9 @@ def test_data_that_did_not_help_is_reported(made: Any) -> None:
 
 def test_constant_motion_that_is_not_beaten(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.5))
-    assert "gives 2.50 m: at 30 runs pure data-driven does not beat it." in advice
-    advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.0))
-    assert "bad, pure data-driven do not beat it." in advice
+    assert "gives 2.50 m: at 30 runs pure data-driven is worse." in advice
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=1.9))
+    assert "bad, pure data-driven are worse." in advice
 
 
 def test_test_manoeuvres_become_an_interval_and_seeds_do_not(made: Any) -> None:
@@ -247,10 +247,13 @@ def test_the_nominal_model_is_a_floor_and_no_degraded_model(made: Any) -> None:
     assert "(over 2 models)" in advice
     assert advice.count("exact") == 1
     assert "Exact coefficients (exact) leave 0.75 m alone, the floor" in advice
-    assert "such as waves, Euler steps and held commands, and 0.25 m compensated with 30 runs." in advice
+    assert "such as Euler steps and held commands, and 0.25 m compensated with 30 runs." in advice
     ahead = results.plan.study.prediction.model_copy(update={"integrator": "rk4", "commands": "known"})
     other = replace(results.plan, study=results.plan.study.model_copy(update={"prediction": ahead}))
-    assert "such as waves, and 0.25 m" in text(replace(results, plan=other))
+    assert "by what is no coefficient, and 0.25 m" in text(replace(results, plan=other))
+    truth = results.plan.study.truth.model_copy(update={"waves": object(), "sensors": {"u": object()}})
+    at_sea = replace(results.plan, study=other.study.model_copy(update={"truth": truth}))
+    assert "such as waves and noise of the sensors, and 0.25 m" in text(replace(results, plan=at_sea))
 
 
 def test_a_long_list_of_names_is_cut(made: Any) -> None:

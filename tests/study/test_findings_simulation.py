@@ -105,7 +105,7 @@ def test_S1_a_lead_that_another_training_could_turn_round(judged: Any) -> None:
 def test_S2_names_what_does_not_fall(judged: Any) -> None:
     finding = judged({**H, "high-2": (8.5, 9.5, 11.0)})["S2"]
     assert finding["verdict"] == "refuted"
-    assert "H of 5 of 6 models falls" in finding["evidence"]
+    assert "H is shown to fall for 5 of 6 models" in finding["evidence"]
     assert "not shown for: high-2" in finding["evidence"]
     bump = judged({**H, "high-2": (8.5, 8.6, 5.0)})["S2"]
     assert bump["verdict"] == "confirmed", "a small rise on the way down is no refutation"
