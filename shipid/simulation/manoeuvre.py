@@ -503,6 +503,11 @@ KINDS: dict[str, type[Manoeuvre]] = {
 """Name -> class of every kind. To add one, write the class and name it here."""
 
 
+def name_of(manoeuvre: Manoeuvre) -> str:
+    """Name of the kind of a manoeuvre in `KINDS`; of a class that is not there, its own."""
+    return next((name for name, kind in KINDS.items() if type(manoeuvre) is kind), type(manoeuvre).__name__)
+
+
 def order_unit(command: str) -> float:
     """SI units in one unit of the key that orders a command."""
     return SIGNALS[signal_of(command)].factor

@@ -417,10 +417,7 @@ def _floor(case: Case) -> str:
 
 def _nominal(nominal: pd.DataFrame, largest: int, plan: Plan) -> list[str]:
     """The error that exact coefficients leave, alone and compensated with the largest amount of data."""
-    truth = plan.study.truth
-    causes = ["waves"] if truth is None or truth.waves is not None else []
-    causes += ["gusts"] if truth is not None and truth.gusts is not None else []
-    causes += ["noise of the sensors"] if truth is not None and truth.sensors else []
+    causes = [*plan.disturbances]
     causes += ["Euler steps"] if plan.euler else []
     causes += [] if plan.known else ["held commands"]
     such = f", such as {listed(causes)}," if causes else ","

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
+from shipid.data.dataset import Dataset, pieces
+from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM, declared_kind
 from shipid.logs.segments import kind_of
 from shipid.physics.signals import is_shaft, steers
 
@@ -19,6 +21,32 @@ SLOW = 0.3  # of the usual speed of the runs
 LEVELS, APART = 4, np.radians(3.0)  # levels of helm, and how far apart, from which orders count as random
 ALIKE = 0.25  # spread of the helm over its size in a zigzag
 LEAST_HELD, SHORTEST = 0.03, 3  # of the time of the run, and rows: a level
+
+
+def kinds_of(dataset: Dataset, runs: Container[str] | None = None) -> dict[str, str]:
+    """Run -> kind of manoeuvre: as the mapping says, else as the words in its name say, else by orders and motion.
+
+    runs : those wanted; all by default. The usual speeds come from all runs.
+    """
+    stretches: dict[str, list[pd.DataFrame]] = {}
+    for run, rows in pieces(dataset):
+        stretches.setdefault(run, []).append(rows)
+    declared = dataset.metadata.get("manoeuvres", {})
+    frame = dataset.frame
+    shafts = [name for name in dataset.commands if is_shaft(name)]
+    speeds = pd.Series(np.hypot(frame["u"].to_numpy(), frame["v"].to_numpy()))
+    speed = float(speeds.groupby(frame["run"].to_numpy()).mean().median())
+    shaft = float(frame[shafts].abs().max(axis=1).median()) if shafts else 0.0
+    return {
+        run: declared.get(run) or declared_kind(run) or seen_kind(longest(parts), speed, shaft)
+        for run, parts in stretches.items()
+        if runs is None or run in runs
+    }
+
+
+def longest(parts: list[pd.DataFrame]) -> pd.DataFrame:
+    """The longest of the unbroken pieces of a run."""
+    return max(parts, key=lambda part: float(part["t"].iloc[-1] - part["t"].iloc[0]))
 
 
 def seen_kind(rows: pd.DataFrame, speed: float, shaft: float) -> str:

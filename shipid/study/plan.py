@@ -375,6 +375,15 @@ class Plan:
         return [*(vessel for vessel in every if vessel is not None), *of_parts]
 
     @property
+    def disturbances(self) -> tuple[str, ...]:
+        """What moves the ship or its log and is no coefficient of the vessel, in words; recorded runs have waves."""
+        truth = self.study.truth
+        if truth is None:
+            return ("waves",)
+        known = {"waves": truth.waves, "gusts": truth.gusts, "noise of the sensors": truth.sensors}
+        return tuple(words for words, there in known.items() if there)
+
+    @property
     def inputs(self) -> list[Path]:
         """Files that the study is read from: the document, the vessels, the mapping, the log and the dataset."""
         data, here = self.study.data, Path(self.file)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -27,11 +27,13 @@ from shipid.errors import DataError, DocumentError, choices
 from shipid.hybrid.physics import Physics, assumed, check_columns
 from shipid.logs.catalogue import fetch
 from shipid.logs.importing import import_log
+from shipid.logs.kinds import declared_kind
 from shipid.logs.mapping import read_mapping
-from shipid.logs.segments import kind_of
 from shipid.metrics import Summary, position_error, summary
 from shipid.observer import Estimates, Observer, at_windows, observe, tune_observer
-from shipid.simulation.truth import simulate
+from shipid.simulation.manoeuvre import name_of
+from shipid.simulation.truth import draw_manoeuvres, simulate
+from shipid.study.kinds import kinds_of
 from shipid.study.plan import Batch, Foundation, Plan, beside, mapping_of
 from shipid.study.ranges import check_memory
 from shipid.vessel.load import Vessel
@@ -100,7 +102,18 @@ def obtain(plan: Plan) -> Dataset:
             frame = simulate(study.truth, plan.truth)
         except DocumentError as error:
             raise DocumentError(error.message, file=plan.file, path=error.path) from None
-        return Dataset(frame, {"vessel": study.truth.vessel, "source": "simulated", "clock": "run", "flags": []})
+        runs = map(str, frame["run"].unique())
+        kinds = {run: declared_kind(name_of(one)) for run, one in zip(runs, draw_manoeuvres(study.truth), strict=True)}
+        return Dataset(
+            frame,
+            {
+                "vessel": study.truth.vessel,
+                "source": "simulated",
+                "clock": "run",
+                "flags": [],
+                "manoeuvres": {run: kind for run, kind in kinds.items() if kind is not None},
+            },
+        )
     assert study.data is not None
     if study.data.dataset is not None:
         return read_dataset(beside(folder, study.data.dataset))
@@ -207,7 +220,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         test_paths={name: pair[1] for name, pair in paths.items()},
         notes=tuple(dict.fromkeys(notes)),
         estimates=estimates,
-        kinds=kinds_of_runs(dataset),
+        kinds=kinds_of(dataset),
     )
 
 
@@ -288,22 +301,6 @@ def _roll_out(
         finished.setdefault(foundation.name, (foundation, zeros))
     foundations = tuple(finished[foundation.name][0] for foundation in plan.foundations)
     return foundations, {one.name: finished[one.name][1] for one in foundations}
-
-
-def kinds_of_runs(dataset: Dataset, runs: Container[str] | None = None) -> dict[str, str]:
-    """Kind of manoeuvre of every run: as its mapping declares it, else as its longest unbroken piece looks.
-
-    runs : those wanted; all by default.
-    """
-    longest: dict[str, pd.DataFrame] = {}
-    for run, rows in pieces(dataset):
-        if runs is not None and run not in runs:
-            continue
-        if run not in longest or np.ptp(rows["t"]) > np.ptp(longest[run]["t"]):
-            longest[run] = rows
-    declared: Mapping[str, str] = dataset.metadata.get("manoeuvres", {})
-    kinds = ((run, declared.get(run) or kind_of(rows)) for run, rows in longest.items())
-    return {run: kind for run, kind in kinds if kind}
 
 
 def physics_of(plan: Plan, vessel: Vessel | None, observer: Observer | None = None) -> Physics:

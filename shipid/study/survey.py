@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +9,8 @@ import pandas as pd
 
 from shipid.data.checks import check_dataset
 from shipid.data.dataset import Dataset, cumulative_integral, pieces
-from shipid.logs.kinds import declared_kind
-from shipid.physics.signals import is_shaft, steers
-from shipid.study.kinds import seen_kind
+from shipid.physics.signals import steers
+from shipid.study.kinds import kinds_of, longest
 
 GRAVE = ("range",)  # checks that fail where a unit is wrong, or spikes are left
 OF_A_KIND = 3  # runs of a kind from which one may be set aside
@@ -53,14 +51,14 @@ def survey(dataset: Dataset) -> Survey:
     unsound = set(failed.loc[failed["check"] != "path", "run"])
     runs = {}
     for run, parts in stretches.items():
-        longest = _longest(parts)
-        t = longest["t"].to_numpy()
-        angles = longest[[name for name in dataset.commands if steers(name)]]
+        whole = longest(parts)
+        t = whole["t"].to_numpy()
+        angles = whole[[name for name in dataset.commands if steers(name)]]
         runs[run] = {
             "duration": float(t[-1] - t[0]),
             "kind": kinds[run],
-            "speed": float(np.hypot(longest["u"], longest["v"]).mean()),
-            "rate": float(np.sqrt((longest["r"] ** 2).mean())),
+            "speed": float(np.hypot(whole["u"], whole["v"]).mean()),
+            "rate": float(np.sqrt((whole["r"] ** 2).mean())),
             "helm": float(angles.std(ddof=0).mean()) if angles.shape[1] else 0.0,
             "whole": len(parts) == 1,
             "sound": run not in unsound,
@@ -71,31 +69,6 @@ def survey(dataset: Dataset) -> Survey:
     grave = failed[failed["check"].astype(str).str.startswith(GRAVE)]
     faults = tuple(f"run {row['run']!r}: {row['sentence']}" for row in grave.to_dict("records"))
     return Survey(pd.DataFrame(list(runs.values()), index=list(runs)), step, _factor(dataset), faults)
-
-
-def kinds_of(dataset: Dataset, runs: Container[str] | None = None) -> dict[str, str]:
-    """Run -> kind of manoeuvre: as the mapping says, else as the words in its name say, else by orders and motion.
-
-    runs : those wanted; all by default. The usual speeds come from all runs.
-    """
-    stretches: dict[str, list[pd.DataFrame]] = {}
-    for run, rows in pieces(dataset):
-        stretches.setdefault(run, []).append(rows)
-    declared = dataset.metadata.get("manoeuvres", {})
-    frame = dataset.frame
-    shafts = [name for name in dataset.commands if is_shaft(name)]
-    speeds = pd.Series(np.hypot(frame["u"].to_numpy(), frame["v"].to_numpy()))
-    speed = float(speeds.groupby(frame["run"].to_numpy()).mean().median())
-    shaft = float(frame[shafts].abs().max(axis=1).median()) if shafts else 0.0
-    return {
-        run: declared.get(run) or declared_kind(run) or seen_kind(_longest(parts), speed, shaft)
-        for run, parts in stretches.items()
-        if runs is None or run in runs
-    }
-
-
-def _longest(parts: list[pd.DataFrame]) -> pd.DataFrame:
-    return max(parts, key=lambda part: float(part["t"].iloc[-1] - part["t"].iloc[0]))
 
 
 def _factor(dataset: Dataset) -> complex:

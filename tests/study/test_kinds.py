@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 
 from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
-from shipid.study.kinds import seen_kind
-from shipid.study.survey import kinds_of, typical_runs
-from tests.study.tiny import logged
+from shipid.study.kinds import kinds_of, seen_kind
+from shipid.study.prepare import obtain
+from shipid.study.survey import typical_runs
+from tests.study.tiny import logged, tiny_plan
 
 T = np.arange(0.0, 200.0)
 
@@ -41,6 +44,19 @@ def test_the_mapping_wins_over_the_name_and_the_name_over_the_motion() -> None:
     runs = {"ZZ 1": columns, "berthing 1": columns, "run 3": columns}
     log = logged(runs, T, manoeuvres={"ZZ 1": "turning"})
     assert kinds_of(log) == {"ZZ 1": "turning", "berthing 1": LOW_SPEED, "run 3": "zigzag"}
+
+
+def test_a_simulated_run_is_of_the_kind_that_was_drawn(tmp_path: Path) -> None:
+    """What its motion looks like is another question: turns of random length look like anything."""
+    blocks = [
+        {"kind": "zigzag", "n_rpm": 150.0},
+        {"kind": "turning", "n_rpm": [100.0, 200.0], "alpha_deg": [-30.0, 30.0]},
+        {"kind": "turning_circle", "n_rpm": 150.0},
+        {"kind": "excitation", "n_rpm": [100.0, 200.0], "angle_deg": 20.0},
+    ]
+    for block, kind in zip(blocks, ["zigzag", "turning", "turning", RANDOM], strict=True):
+        plan = tiny_plan(tmp_path, {"truth.manoeuvre": [block], "truth.manoeuvres": 10})
+        assert set(kinds_of(obtain(plan)).values()) == {kind}
 
 
 def test_every_kind_reaches_the_test() -> None:
