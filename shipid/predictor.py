@@ -55,6 +55,8 @@ class Predictor:
         in force in each step, `Instants.planned`, name -> (T, S).
     causal : columns of a log that were interpolated between fixes: inputs hold the last fix, see `shipid.data.causal`.
     bands : what says how far off a prediction may be; None where no runs could calibrate it.
+    run_up : time [s] from the begin of an unbroken stretch of rows to the earliest instant in training. An observer
+        that has run for less time has not settled as it had there, so such an instant is outside.
     """
 
     physics: Physics
@@ -65,6 +67,7 @@ class Predictor:
     commands: Commands = "held"
     causal: tuple[str, ...] = ()
     bands: Bands | None = None
+    run_up: float = 0.0
 
     @property
     def vessel(self) -> Vessel | None:
@@ -158,13 +161,18 @@ class Predictor:
             raise DataError("this predictor was made for known commands: it needs those planned over the horizon")
         return instants
 
-    def outside(self, columns: Mapping[str, Array]) -> Array:
-        """Whether each instant (S,) lies outside what training has seen, in any column; all do without any limits."""
+    def outside(self, columns: Mapping[str, Array], since: Array | None = None) -> Array:
+        """Whether each instant (S,) lies outside what training has seen, in any column; all do without any limits.
+
+        since : (S,) time [s] since the begin of the unbroken stretch of rows, which `run_up` is compared with.
+        """
         outside = np.full(len(columns["u"]), not self.limits)
         for name, (low, high) in self.limits.items():
             if name in columns:
                 slack = 1e-9 * max(1.0, abs(low), abs(high))
                 outside |= ~((columns[name] >= low - slack) & (columns[name] <= high + slack))
+        if since is not None:
+            outside |= since < self.run_up - 1e-3 * self.physics.step
         return outside
 
     def save(self, file: str | os.PathLike[str]) -> Path:
@@ -180,6 +188,7 @@ class Predictor:
             "path": self.physics.path,
             "observer": None if self.physics.observer is None else self.physics.observer.model_dump(mode="json"),
             "limits": {name: list(pair) for name, pair in self.limits.items()},
+            "run_up": self.run_up,
             "provenance": dict(self.provenance),
             "method": self.method,
             "corrector": self.corrector.header(),
@@ -240,6 +249,7 @@ class Predictor:
                 commands=known.commands,
                 causal=tuple(known.causal),
                 bands=None if bands is None else Bands.from_arrays(bands, band),
+                run_up=known.run_up,
             )
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None
@@ -258,6 +268,7 @@ class _Header(BaseModel):
     path: Literal["position", "velocity"]
     limits: dict[str, tuple[float, float]]
     provenance: dict[str, Any]
+    run_up: Annotated[float, Field(ge=0, le=1e9)] = 0.0
 
 
 def _check_arrays(arrays: Mapping[str, Array], file: str | os.PathLike[str]) -> None:

@@ -443,6 +443,11 @@ class PredictorParts:
                     "SI units, radians, revolutions per second; directions of wind and current are towards. Path: x ahead and y to",
                     "starboard [m] in body axes frozen at the instant of prediction. What is not measured is 0.",
                     *self._promise(),
+                    *(
+                        [f"Alarm for the first {predictor.run_up:g} s: the observer settles."]
+                        if predictor.run_up
+                        else []
+                    ),
                     "Limits of the alarm: " + ("; ".join(limits) or "none: every instant counts as outside") + ".",
                     "",
                     "Not in this file: a screening of inputs, a fusion of sensors, a repair of logs. Fixes that were interpolated",
@@ -484,7 +489,7 @@ enum {{
 /* What is kept of the past. Make one, call {name}_init, and change `parameters` where the ship differs. */
 typedef struct {{
     {name}_real parameters[{max(1, len(names.parameters))}];
-    double t[{self.capacity}];
+    double t[{self.capacity}], begun; /* s; of the first row after a gap */
     {name}_real rows[{self.capacity}][{len(self.row) + 4}];
     int first, count;
     {name}_real reached[{max(1, len(names.reached))}];
@@ -755,6 +760,7 @@ double {name}_factor(double miss, double level, int kind)
             --self->count; /* the newest row came so soon that this one replaces it */
     }} else {{
         self->first = 0;
+        self->begun = t;
         kept[{n}] = kept[{n + 1}] = 0;
         kept[{n + 2}] = kept[{u}] * M(cos)(kept[{psi}]) - kept[{v}] * M(sin)(kept[{psi}]);
         kept[{n + 3}] = kept[{u}] * M(sin)(kept[{psi}]) + kept[{v}] * M(cos)(kept[{psi}]);
@@ -773,6 +779,12 @@ double {name}_factor(double miss, double level, int kind)
         sizes_ = names.sizes
         past_lines = self._past(orders, north, east, velocity) if names.num_past else ""
         taken = [row.index(key) for key in names.now]
+        settled = model.predictor.run_up - 1e-3 * step
+        young = (
+            f"    if (self->t[newest] - self->begun < {settled!r}) i |= {name}_OUTSIDE; /* no run-up of the observer */\n"
+            if settled > 0
+            else ""
+        )
         lines.append(f"""int {name}_predict(const {name} *self, const {real} *planned, {real} *path)
 {{
     const int newest = (self->first + self->count - 1) % {cap};
@@ -783,7 +795,8 @@ double {name}_factor(double miss, double level, int kind)
     if (!self->count) return {name}_NO_PAST;
     for (i = 0; i < {len(taken)}; ++i) now[i] = self->rows[newest][taken[i]];
 {past_lines or "    past[0] = 0;"}
-    return {name}_path(now, self->reached, past, planned, self->estimates, self->parameters, path);
+    i = {name}_path(now, self->reached, past, planned, self->estimates, self->parameters, path);
+{young}    return i;
 }}
 """)
         return "\n".join(lines)

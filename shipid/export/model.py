@@ -51,6 +51,8 @@ class Exportable(Protocol):
     def bands(self) -> Bands | None: ...  # noqa: D102
     @property
     def no_band(self) -> str: ...  # noqa: D102
+    @property
+    def run_up(self) -> float: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)

@@ -492,6 +492,7 @@ def _predictor(
         limits=limits_of(windows, prepared.commands),
         commands=plan.commands,
         causal=plan.causal,
+        run_up=windows.num_past * windows.step if foundation.observer is not None else 0.0,
         provenance={
             "study": plan.name,
             "digest": plan.digest,

@@ -203,7 +203,7 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
     table = inputs.table(physics, instants)
     names = [name for name in table if "." not in name or rng.random() < 0.6]
     network = network_of(rng, names, table, physics.horizon, 3, False)
-    predictor = Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}), {"u": (0.0, 9.0)})
+    predictor = Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}), {"u": (0.0, 9.0)}, run_up=9.0)
     exported = model(predictor)
     files = predictor_files(exported, "odd", Precision())
     size = _size_of_struct(files, tmp_path)
@@ -224,7 +224,8 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
         bad[3] = np.nan
         assert loaded.odd_record(pointer(kept), t[i] + 0.1, pointer(bad)) == INVALID
         result = loaded.odd_predict(pointer(kept), None, pointer(path))
-        assert result == (NO_PAST if t[i] < t[0] + 4.0 - 1e-9 else 0)
+        settled = t[i] >= t[0] + 9.0 - 1e-9
+        assert result == (NO_PAST if t[i] < t[0] + 4.0 - 1e-9 else 0 if settled else OUTSIDE)
         if t[i] > t[0] + 4.0:
             predicted.append(path.copy())
     expected = predictor.predict(instants)

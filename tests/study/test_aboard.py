@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.dataset import Dataset, write_dataset
+from shipid.data.dataset import Dataset, pieces, read_dataset, write_dataset
 from shipid.errors import DataError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
-from shipid.study import aboard
+from shipid.study import aboard, apply
 from shipid.study.aboard import play, summary, write
 from shipid.vessel.load import load_vessel
 from tests.export.strange import bands_of, drawn
@@ -71,6 +71,25 @@ def test_later_rows_change_nothing_that_was_seen(predictor, tmp_path):
     columns = ["t", "ahead", "north", "east"]
     pd.testing.assert_frame_equal(first.loc[early, columns], second.loc[early, columns])
     assert not first.loc[~early, "north"].equals(second.loc[~early, "north"])
+
+
+@pytest.mark.parametrize("run_up", [0.0, 5.0, 40.0])
+def test_the_alarm_stands_until_the_observer_has_run_as_long_as_in_training(predictor, run_up, tmp_path):
+    """Each unbroken stretch begins anew, aboard and in a table of predictions alike; it is in the file of the cell."""
+    frame = log()
+    frame.loc[30:, "t"] += 100.0  # a hole
+    names = ["break"]
+    frame["flags"] = (np.arange(len(frame)) == 30).astype(np.int64)
+    dataset = write_dataset(Dataset(frame, {"clock": "run", "flags": names}), tmp_path / "log.parquet")
+    whole = replace(Predictor.load(predictor), limits={"u": (0.0, 9.0)}, run_up=run_up)
+    cell = whole.save(tmp_path / "cell.npz")
+    since = 5.0 * (np.arange(len(frame)) % 30)
+    played = play(cell, dataset, every=5.0)
+    np.testing.assert_array_equal(played.instants["outside"], since[: len(played.instants)] < run_up)
+    known = read_dataset(dataset)
+    tables = [apply._along(Predictor.load(cell), known, run, rows, None) for run, rows in pieces(known)]
+    table = pd.concat(tables).groupby("t")["outside"].first()
+    np.testing.assert_array_equal(table, pd.Series(since < run_up, index=frame["t"].to_numpy())[table.index])
 
 
 def test_an_officer_sees_path_alarm_and_latency(predictor, tmp_path):
