@@ -155,6 +155,13 @@ class Predictor:
 
     def _known(self, instants: Instants) -> Instants:
         """The instants with planned commands where the predictor takes them, and without them where it does not."""
+        missing = next((name for name in ("u", "v", "r") if name not in instants.columns), None)
+        if missing is not None:
+            raise DataError("the instants lack this column", path=missing)
+        step = self.physics.step
+        if instants.step is not None and abs(instants.step - step) > 1e-9 * step:
+            message = f"instants of windows with steps of {instants.step:g} s, the predictor has {step:g} s"
+            raise DataError(f"{message}: cut windows with its step")
         if self.commands == "held":
             return replace(instants, planned=None)
         if instants.planned is None:
@@ -164,9 +171,10 @@ class Predictor:
     def outside(self, columns: Mapping[str, Array], since: Array | None = None) -> Array:
         """Whether each instant (S,) lies outside what training has seen, in any column; all do without any limits.
 
+        columns : name -> (S,); columns without limits, and limits without a column, are passed over.
         since : (S,) time [s] since the begin of the unbroken stretch of rows, which `run_up` is compared with.
         """
-        outside = np.full(len(columns["u"]), not self.limits)
+        outside = np.full(len(next(iter(columns.values()), ())), not self.limits)
         for name, (low, high) in self.limits.items():
             if name in columns:
                 slack = 1e-9 * max(1.0, abs(low), abs(high))
@@ -195,6 +203,8 @@ class Predictor:
             "bands": None if self.bands is None else self.bands.header(),
         }
         target = Path(file)
+        if target.is_dir():
+            raise ResultError("is a folder: name a file to write", file=target)
         arrays = {"header": np.array(json.dumps(header)), **self.corrector.arrays()}
         if self.bands is not None:
             arrays |= {BANDS + name: values for name, values in self.bands.arrays().items()}

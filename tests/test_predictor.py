@@ -50,7 +50,7 @@ def test_every_field_survives_a_file(tmp_path: Path) -> None:
     """Each field has a value that is not its default, so that none can be left out of the file."""
     physics = Physics(load_vessel("gunnerus-28.9"), 7, 0.5, "rk4", Observer(current=0.0), "velocity")
     bands = made(0)[1]
-    first = Predictor(physics, "alone", Unchanged({}), {"u": (1.0, 2.0)}, {"seed": 3}, "known", ("u", "v"), bands)
+    first = Predictor(physics, "alone", Unchanged({}), {"u": (1.0, 2.0)}, {"seed": 3}, "known", ("u", "v"), bands, 7.0)
     for one in (first, physics):
         for place in fields(one):
             value = getattr(one, place.name)
@@ -80,6 +80,15 @@ def test_a_level_gives_a_band_or_one_sentence(tiny_run: Path) -> None:
         predictor.predict(instants, level=0.9)
     with pytest.raises(DataError, match="this predictor has no band: it was made without"):
         replace(predictor, bands=None).predict(instants, level=0.7)
+
+
+def test_windows_of_another_step_are_refused(tiny_run: Path, predictor: Predictor) -> None:
+    """Past and planned commands would be taken for those of other moments."""
+    test = read_test(tiny_run)[0]
+    with pytest.raises(DataError, match=r"instants of windows with steps of 0\.5 s, the predictor has 1 s"):
+        predictor.predict(replace(test, step=0.5).instants())
+    with pytest.raises(DataError, match="instants of windows with steps"):
+        predictor.alone(replace(test, step=2.0).instants())
 
 
 def test_the_perturbed_numbers_are_aboard(predictor: Predictor) -> None:

@@ -1,8 +1,9 @@
-"""What a command writes must not be what it reads: checked for every command, before it begins."""
+"""What every command refuses before it begins: numbers that are not finite, and to write over what it reads."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,15 @@ RESULTS = ("study.toml", "provenance.json")
 
 
 class Guarded(typer.core.TyperCommand):
-    """A command that is refused where one file is named to be read and to be written, or to be written twice."""
+    """A command that refuses numbers that are not finite, and a file named to be read and written, or written twice."""
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; ShipidError for a file named twice, or for a device or pipe as an output."""
+        for one in self.params:
+            values = ctx.params.get(one.name)
+            for value in values if isinstance(values, list | tuple) else [values]:
+                if isinstance(value, float) and not isfinite(value):
+                    raise ShipidError(f"{value:g}: must be a finite number", path=one.opts[0])
         options = {one.name for one in self.params if one.param_type_name == "option"}
         written = {name: value for name, value in ctx.params.items() if name in OUTPUTS and name in options and value}
         read = [one for name, value in ctx.params.items() if name not in written for one in _files(value)]

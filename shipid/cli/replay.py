@@ -27,7 +27,7 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Replay recorded runs on a vessel: from the measured state, with the recorded orders; errors, and a page."""
-    from math import degrees, inf
+    from math import degrees
 
     from shipid.data.dataset import read_dataset
     from shipid.files import check_table, write_table
@@ -41,8 +41,8 @@ def replay(
     file = out or Path(f"{stem(vessel)}-replay.html")
     if file.suffix != ".html":
         raise ShipidError("a page is an HTML file: let the name end in .html", file=file)
-    if not 0 < step < inf:
-        raise ShipidError(f"{step:g} s must be positive and finite", path="--step")
+    if not step > 0:
+        raise ShipidError(f"{step:g} s must be positive", path="--step")
     if csv is not None:
         check_table(csv)
     ship, log = load_vessel(vessel), read_dataset(dataset)

@@ -209,6 +209,9 @@ def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
     check_metadata(metadata)
     if len(frame) == 0:
         raise DataError("the dataset has no rows: it needs at least one run")
+    other = next((name for name in frame.columns if not isinstance(name, str)), None)
+    if other is not None:
+        raise DataError(f"the column {other!r} has no name: names of columns are text")
     names = [str(name) for name in frame.columns]
     for name in ("run", "flags", *required()):
         if name not in names:
@@ -278,8 +281,13 @@ def _check_column(name: str, column: pd.Series[Any]) -> None:
 
 
 def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
-    """Write a dataset as Parquet (zstd), metadata as JSON in its schema; the file appears whole or not at all."""
+    """Write a dataset as Parquet (zstd), metadata as JSON in its schema; the file appears whole or not at all.
+
+    Raises DataError for a name that does not end in .parquet, or where the file cannot be written.
+    """
     target = Path(file)
+    if target.suffix != ".parquet":
+        raise DataError("a dataset is a Parquet file: let the name end in .parquet", file=target)
     metadata = {"units": units_of(map(str, dataset.frame.columns)), **dataset.metadata}
     table = pyarrow.Table.from_pandas(dataset.frame, preserve_index=False)
     table = table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: json.dumps(metadata).encode()})

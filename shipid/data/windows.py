@@ -18,6 +18,7 @@ Commands = Literal["held", "known"]
 NESTED, HELD_OUT, FOLDS = 1, 2, 3
 """Purposes of a draw of runs: one seed gives each a separate order."""
 VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
+MANY = 100  # instants asked for each row, from which on every row is one
 STATES = ("u", "v", "r", "psi")
 """True states that a window holds over its horizon, beside the path."""
 
@@ -35,6 +36,7 @@ class Instants:
         at their value at the instant.
     hidden : states of actuators at the instant, name -> (S,); None takes each actuator as having reached its order.
     estimates : what an observer knows at the instant, `observer.u`, ... -> (S,); empty without an observer.
+    step : time [s] between the entries of past and planned; None: that of the predictor.
     """
 
     columns: Mapping[str, NDArray[Any]]
@@ -42,6 +44,7 @@ class Instants:
     planned: Mapping[str, Array] | None = None
     hidden: Mapping[str, Array] | None = None
     estimates: Mapping[str, Array] = field(default_factory=dict)
+    step: float | None = None
 
     def __len__(self) -> int:
         return len(self.columns["u"])
@@ -58,6 +61,7 @@ class Instants:
             last(self.planned),
             last(self.hidden),
             last(self.estimates) or {},
+            self.step,
         )
 
 
@@ -115,7 +119,7 @@ class Windows:
         estimates: Mapping[str, Array] | None = None,
     ) -> Instants:
         """Input of a predictor: no future, except for the commands where they are `known` over the horizon."""
-        return Instants(self.columns, self.past, self.planned if known else None, hidden, estimates or {})
+        return Instants(self.columns, self.past, self.planned if known else None, hidden, estimates or {}, self.step)
 
     @property
     def spans(self) -> dict[str, tuple[float, float]]:
@@ -190,10 +194,10 @@ def cut_windows(
 
     Raises
     ------
-    DataError : if no run is as long as past and horizon together.
+    DataError : a number that is not positive and finite, or no run is as long as past and horizon together.
     """
-    if horizon < 1 or step <= 0 or interval <= 0:
-        raise DataError(f"horizon {horizon}, step {step:g} s and interval {interval:g} s must all be positive")
+    if not (horizon >= 1 and 0 < step < np.inf and 0 < interval < np.inf):
+        raise DataError(f"horizon {horizon}, step {step:g} s and interval {interval:g} s must be positive and finite")
     shared = shares_clock(dataset)
     parts = []
     for run, rows in pieces(dataset):
@@ -228,6 +232,9 @@ def _instants(t: Array, past: float, ahead: float, interval: float) -> Array:
     """Times of the rows t (N,) at which windows are cut, (S,): a past and a future [s] of each lie within t."""
     slack, first = clock_slack(t), t[0] + past
     last = np.floor((t[-1] - first - ahead + slack) / interval)
+    if last > MANY * len(t):  # so close that no row is left out
+        rows = np.flatnonzero((t >= first - slack) & (t <= t[-1] - ahead + slack))
+        return np.asarray(t[rows])
     wanted = first + interval * np.arange(int(last) + 1)
     rows = np.unique(np.searchsorted(t, wanted + slack, side="right") - 1)
     return np.asarray(t[rows[t[rows] >= first - slack]])

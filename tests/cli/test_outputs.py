@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -105,6 +106,20 @@ def test_a_pipe_is_no_page(there: Path) -> None:
     assert status == 1
     assert "a device or a pipe" in error
     assert not (there / "pipe.html").is_file()
+
+
+@pytest.mark.parametrize("value", ["inf", "-inf", "nan"])
+@pytest.mark.parametrize(
+    "words",
+    ["data measures log.parquet --length", "replay ./ship.toml log.parquet --step",
+     "manoeuvre ./ship.toml stop --speed",
+     "aboard log.parquet --predictor cell.npz --every"],
+)  # fmt: skip
+@pytest.mark.usefixtures("there")
+def test_numbers_are_finite(words: str, value: str) -> None:
+    status, _, error = ended(*f"{words}={value}".split())
+    assert status == 1
+    assert re.fullmatch(rf"error: --\w+: {value}: must be a finite number\n", error)
 
 
 def test_every_command_is_guarded() -> None:

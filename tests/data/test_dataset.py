@@ -51,6 +51,15 @@ def test_the_digest_changes_with_everything_in_the_table_and_nothing_else(tmp_pa
     assert read_dataset(write_dataset(dataset, tmp_path / "trial.parquet")).digest == dataset.digest
 
 
+def test_columns_have_names_and_files_their_ending(tmp_path: Path) -> None:
+    dataset = as_dataset(turning(T))
+    with pytest.raises(DataError, match="the column 5 has no name"):
+        Dataset(dataset.frame.assign(**{"V": 1.0}).rename(columns={"V": 5}), dataset.metadata)
+    with pytest.raises(DataError, match=r"let the name end in \.parquet"):
+        write_dataset(dataset, tmp_path / "log.csv")
+    assert not (tmp_path / "log.csv").exists()
+
+
 def test_a_folder_is_no_dataset(tmp_path: Path) -> None:
     """Arrow reads all tables of a folder as one, in which runs would lie among one another."""
     for name in ("a", "b"):

@@ -440,3 +440,18 @@ def test_folds_of_windows_with_a_past_share_no_moment() -> None:
     one, other = windows.select(training), windows.select(validation)
     assert ((one.end[:, None] < other.begin) | (one.begin[:, None] > other.end)).all()
     assert set(one.run) == {"a", "c"}
+
+
+def test_numbers_that_are_not_finite_are_refused() -> None:
+    dataset = as_dataset(turning(np.arange(0.0, 60.0, 0.5)))
+    for name in ("step", "interval"):
+        for value in (np.nan, np.inf, 0.0, -1.0):
+            with pytest.raises(DataError, match="must be positive and finite"):
+                cut_windows(dataset, **{"horizon": 5, "step": 1.0, "interval": 2.0, name: value})
+
+
+def test_an_interval_far_below_the_rows_gives_every_row() -> None:
+    dataset = as_dataset(turning(np.arange(0.0, 60.0, 0.5)))
+    every = cut_windows(dataset, horizon=5, step=1.0, interval=0.5)
+    for interval in (0.1, 1e-3, 1e-12):
+        np.testing.assert_array_equal(cut_windows(dataset, horizon=5, step=1.0, interval=interval).t, every.t)
