@@ -27,7 +27,18 @@ from shipid.data.dataset import (
 )
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices
-from shipid.logs.mapping import Clock, Column, FileClock, Mapping, Parts, Segment, Source, read_mapping, to_si
+from shipid.logs.mapping import (
+    Clock,
+    Column,
+    FileClock,
+    Mapping,
+    Parts,
+    Segment,
+    Source,
+    clock_seconds,
+    read_mapping,
+    to_si,
+)
 from shipid.logs.readers import (
     Format,
     Progress,
@@ -336,7 +347,7 @@ def _times(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path
     if clock.unit == "date":
         times = _column(log, clock.source, file, f"{path}.from")
         return seconds(times if clock.date is None else dated(_column(log, clock.date, file, f"{path}.date"), times))
-    return _numbers(log, clock.source, form, file, f"{path}.from") * to_si(clock.unit, "t")
+    return clock_seconds(_numbers(log, clock.source, form, file, f"{path}.from"), clock.unit)
 
 
 def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:

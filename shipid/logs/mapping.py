@@ -6,12 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, SerializeAsAny
 
 from shipid import document
 from shipid.data.dataset import STANDARD_DEVIATIONS, optional, required, unit_of
 from shipid.errors import DocumentError, choices
-from shipid.logs.readers import READERS, Format, TextFormat
+from shipid.logs.readers import DAY, READERS, Format, TextFormat
 from shipid.logs.repairs import (
     INPUTS,
     REPAIRS,
@@ -28,9 +30,10 @@ from shipid.physics.signals import is_command, is_output, named
 from shipid.units import DEGREE, KNOT, RPM
 
 UNITS: dict[str, dict[str, float]] = {
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "date": 1.0},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": DAY}
+    | {"date": 1.0, "datenum": 1.0, "excel": 1.0},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
-    "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6},
+    "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
     "rad": {"rad": 1.0, "deg": DEGREE},
     "rad/s": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / 60.0},
     "rev/s": {"rev/s": 1.0, "rpm": RPM, "rad/s": 0.15915494309189535},
@@ -38,10 +41,13 @@ UNITS: dict[str, dict[str, float]] = {
     "N m": {"N m": 1.0, "kN m": 1e3, "Nm": 1.0, "kNm": 1e3},
     "-": {"-": 1.0, "%": 1e-2},
 }
-"""SI unit -> unit a log may use -> factor to SI (knot and nautical mile: BIPM, SI Brochure, 9th ed., table 8).
+"""SI unit -> unit a log may use -> factor to SI (knot and nautical mile: BIPM, SI Brochure, 9th ed., table 8;
+mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 
-`date` is read as seconds since 1970 (UTC).
+`date`, `datenum` and `excel` are read as seconds since 1970 (UTC), and so are the times of segments and breaks.
 """
+EPOCHS = {"datenum": 719529.0, "excel": 25569.0}
+"""Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system)."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
 ESTIMATED = ("u", "v", "r")
 Manoeuvre = Literal[
@@ -240,6 +246,16 @@ def read_mapping(name: str | Path) -> Mapping:
 def to_si(unit: str, name: str) -> float:
     """Return the factor from a unit of the log to the SI unit of a column."""
     return UNITS[str(INPUTS.get(name) or unit_of(name))][unit]
+
+
+def clock_seconds(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
+    """Numbers (N,) of a clock in one of its units as seconds; days of MATLAB and Excel as seconds since 1970."""
+    return (values - EPOCHS[unit]) * DAY if unit in EPOCHS else values * to_si(unit, "t")
+
+
+def is_dated(unit: str) -> bool:
+    """Whether a clock in this unit is read as seconds since 1970."""
+    return unit == "date" or unit in EPOCHS
 
 
 def _formats(raw: dict[str, Any], file: Path) -> dict[str, Any]:

@@ -80,7 +80,7 @@ MISTAKES = {
     "endless horizon": (["--parameters", ONE, "--horizon", "inf"], "finite number"),
     "horizon too short": (["--parameters", ONE, "--horizon", "1"], "must hold two steps"),
     "free run too short": (["--parameters", ONE, "--ahead", "-5"], "must hold two steps"),
-    "endless free run": (["--parameters", ONE, "--ahead", "inf"], "must hold two steps"),
+    "endless free run": (["--parameters", ONE, "--ahead", "inf"], "must be a finite number"),
     "prior without width": (["--parameters", ONE, "--prior", "hull.*"], "--prior: 'hull.*': write paths=0.3"),
     "prior of no number": (["--parameters", ONE, "--prior", "hull.*=wide"], "write paths=0.3"),
     "bounds backwards": (["--parameters", ONE, "--bounds", f"{ONE}=[2, 1]"], "low above high"),

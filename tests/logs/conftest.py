@@ -64,16 +64,34 @@ def as_dataset(*frames: pd.DataFrame, names: tuple[str, ...] = (), **metadata: o
     return Dataset(pd.concat(runs, ignore_index=True).astype({"flags": "int64"}), {"flags": ["break"], **metadata})
 
 
-def as_log(frame: pd.DataFrame, file: Path) -> Path:
-    """Write a frame as a log of the plain mapping: degrees 0..360, deg/min, rpm."""
+CLOCKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0}
+SPEEDS = {"m/s": 1.0, "kn": 1852 / 3600, "km/h": 1 / 3.6, "mph": 1609.344 / 3600, "cm/s": 1e-2, "mm/s": 1e-3}
+DATES = ("date", "datenum", "excel")
+
+
+def stamps(t: np.ndarray, unit: str) -> list[float] | list[str]:
+    """Write times t (N,) [s], for dates since 1970, in a unit of a clock, by the calendar and not by the importer."""
+    if unit in CLOCKS:
+        return [float(value / CLOCKS[unit]) for value in t]
+    moments = pd.to_datetime(np.round(1e9 * t).astype(np.int64), unit="ns")
+    if unit == "date":
+        return [moment.isoformat() for moment in moments]
+    zero = pd.Timestamp(1899, 12, 30)
+    days = [moment.toordinal() + 366 if unit == "datenum" else (moment - zero).days for moment in moments]
+    rests = (moments - moments.normalize()) / pd.Timedelta("1D")
+    return [float(day + rest) for day, rest in zip(days, rests, strict=True)]
+
+
+def as_log(frame: pd.DataFrame, file: Path, clock: str = "s", speed: str = "m/s") -> Path:
+    """Write a frame as a log of the plain mapping: degrees 0..360, deg/min, rpm; units of the clock and of u, v."""
     log = pd.DataFrame(
         {
-            "time": frame["t"],
+            "time": stamps(frame["t"].to_numpy(), clock),
             "N": frame["north"],
             "E": frame["east"],
             "heading": np.degrees(frame["psi"]) % 360.0,
-            "u": frame["u"],
-            "v": frame["v"],
+            "u": frame["u"] / SPEEDS[speed],
+            "v": frame["v"] / SPEEDS[speed],
             "rot": np.degrees(frame["r"]) * 60.0,
             "rpm": frame["port.n"] * 60.0,
         }

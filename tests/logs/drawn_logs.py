@@ -24,9 +24,21 @@ from tests.logs.drawn_words import FILE_NAMES, SIDES, STYLES, UNIT_SUFFIX, UNIT_
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 FACTORS = {  # SI units in one unit
-    **{"s": 1.0, "ms": 1e-3, "m": 1.0, "m/s": 1.0, "kn": 1852 / 3600, "km/h": 1 / 3.6, "rad": 1.0, "deg": np.pi / 180},
+    **{
+        "s": 1.0,
+        "ms": 1e-3,
+        "m": 1.0,
+        "m/s": 1.0,
+        "kn": 1852 / 3600,
+        "km/h": 1 / 3.6,
+        "mph": 1609.344 / 3600,
+        "rad": 1.0,
+        "deg": np.pi / 180,
+    },
+    **{"cm/s": 1e-2, "mm/s": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0},
     **{"rad/s": 1.0, "deg/s": np.pi / 180, "deg/min": np.pi / 10800, "rpm": 1 / 60, "rev/s": 1.0},
 }
+CLOCKS = ("seconds", "ms", "us", "ns", "min", "h", "d", "datenum", "excel", "iso")
 DECIMALS = {"m": 3, "m/s": 3, "kn": 2, "km/h": 2, "rad": 4, "deg": 2, "rad/s": 5, "deg/s": 3, "deg/min": 1, "rpm": 1}
 
 
@@ -161,8 +173,11 @@ class Column:
     side: int | None = None
 
 
-def draw(seed: int, folder: Path) -> Drawn:
-    """Draw a log by a seed, write it into the folder, and return it with its truth."""
+def draw(seed: int, folder: Path, clock: str | None = None, speed: str | None = None) -> Drawn:
+    """Draw a log by a seed, write it into the folder, and return it with its truth.
+
+    clock, speed : units of the clock (one of `CLOCKS`) and of velocities, instead of those drawn.
+    """
     random = np.random.default_rng([2026, seed])
     ship = _ship(random)
     style = str(random.choice(STYLES, p=[0.17, 0.14, 0.17, 0.17, 0.13, 0.08, 0.06, 0.08]))
@@ -178,6 +193,7 @@ def draw(seed: int, folder: Path) -> Drawn:
     ]
     faults = _faults(ship, step, random)
     plan = _plan(layout, ship, random)
+    plan["speed unit"] = speed or plan["speed unit"]
     story = {"style": style, "layout": layout, "length": round(ship.length, 1), "step": step, **faults, **plan}
     frames, runs = [], []
     for _, _, motion in drawn_motions:
@@ -185,6 +201,7 @@ def draw(seed: int, folder: Path) -> Drawn:
         runs.append(truth)
         frames.append(columns)
     form = _form(style, several, random)
+    form["time"] = clock or form["time"]
     story |= {key: value for key, value in form.items() if key != "names"}
     names = _names(frames[0], style, plan, form, random)
     drawn = Drawn(folder, runs, _present(plan), story=story, kinds=[kind for kind, _, _ in drawn_motions])
@@ -358,7 +375,7 @@ def _heading(psi: Array, plan: dict[str, Any]) -> list[Column]:
 
 def _velocity(ground: Any, psi: Array, plan: dict[str, Any]) -> list[Column]:
     unit, kind = plan["speed unit"], plan["velocity"]
-    factor, decimals = FACTORS[unit], 2 if unit != "m/s" else 3
+    factor, decimals = FACTORS[unit], {"m/s": 3, "cm/s": 1, "mm/s": 0}.get(unit, 2)
     if kind in ("speed course", "speed"):
         course = np.degrees(np.angle(ground)) % 360
         both = [Column("speed", unit, np.abs(ground) / factor, decimals), Column("course", "deg", course, 1)]
@@ -429,10 +446,11 @@ def _names(
     columns: list[Column], style: str, plan: dict[str, Any], form: dict[str, Any], random: np.random.Generator
 ) -> list[str]:
     """Return a name for every column, none twice; units in the names or collected for a row."""
-    units = ["s" if form["time"] in ("seconds", "epoch") else "ms" if form["time"] == "ms" else ""]
+    of_time = form["time"] if form["time"] in FACTORS else ""
+    units = ["s" if form["time"] in ("seconds", "epoch") else of_time]
     time = str(random.choice(WORDS["time"][style])) if style != "numbers" else "1"
-    if form["time"] == "ms":
-        time = "time_ms" if style == "snake" else "Time [ms]"
+    if of_time:
+        time = f"time_{of_time}" if style == "snake" else f"Time [{of_time}]"
     elif form["time"] not in ("seconds",):
         time = time.partition(" [")[0].partition(" (")[0].replace("_s", "").replace("Sec", "")
     names, chosen = [time], {}
@@ -516,8 +534,18 @@ def _clock(t: Array, form: dict[str, Any]) -> list[str]:
             return [f"{start.timestamp() + value:.3f}" for value in t]
         case "iso":
             return [str((start + pd.Timedelta(value, "s")).isoformat(timespec="milliseconds")) for value in t]
-        case "ms":
-            return [f"{1000 * value:.0f}" for value in t]
+        case "ms" | "us" | "ns" as unit:
+            return [f"{value / FACTORS[unit]:.0f}" for value in t]
+        case "min" | "h" | "d" as unit:
+            return [f"{value / FACTORS[unit]:.9f}" for value in t]
+        case "datenum" | "excel":  # days since the year 0, and since 30 December 1899
+            midnight = start.normalize()
+            day = (
+                midnight.toordinal() + 366
+                if form["time"] == "datenum"
+                else (midnight - pd.Timestamp(1899, 12, 30)).days
+            )
+            return [f"{day + ((start - midnight).total_seconds() + value) / 86400:.9f}" for value in t]
         case "clock":
             return [(start + pd.Timedelta(value, "s")).strftime("%H:%M:%S.%f")[:-3] for value in t]
         case "dotted":
@@ -528,7 +556,7 @@ def _clock(t: Array, form: dict[str, Any]) -> list[str]:
 def _since(form: dict[str, Any]) -> float:
     """Seconds to add to t so that it is the clock of a right import."""
     start = pd.Timestamp("2023-06-15 09:12:31", tz="UTC")
-    if form["time"] in ("epoch", "iso", "dotted"):
+    if form["time"] in ("epoch", "iso", "dotted", "datenum", "excel"):
         return float(start.timestamp())
     return 9 * 3600 + 12 * 60 + 31 if form["time"] == "clock" else 0.0
 

@@ -73,15 +73,18 @@ def as_bridge(frame: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def state_of(columns: dict[str, np.ndarray], t: np.ndarray) -> State:
-    """Return the start of a guess of columns (N,) at instants t (N,) [s]."""
-    return State(t, "s", columns, windows(t))
+def state_of(columns: dict[str, np.ndarray], t: np.ndarray, unit: str = "s") -> State:
+    """Return the start of a guess of columns (N,) at instants t (N,) [s], drafted from a clock in this unit."""
+    return State(t, unit, columns, windows(t))
 
 
-def state_with_pose(columns: dict[str, np.ndarray]) -> State:
-    """Return a guess of columns (N,) at the instants of `si_log()`, whose position and heading are already known."""
+def state_with_pose(columns: dict[str, np.ndarray], wrong: float = 1.0, unit: str = "s") -> State:
+    """Return a guess of columns (N,) at the instants of `si_log()`, whose position and heading are already known.
+
+    wrong : times that these instants are too long, as where the clock is drafted in a wrong unit.
+    """
     log = si_log()
-    state = state_of(columns, log["t"].to_numpy())
+    state = state_of(columns, wrong * log["t"].to_numpy(), unit)
     state.position = np.asarray(log["north"] + 1j * log["east"])
     state.psi = log["psi"].to_numpy()
     return state

@@ -11,7 +11,7 @@ from shipid.data.checks import check_dataset
 from shipid.data.dataset import Dataset, pieces
 from shipid.errors import DataError, DocumentError
 from shipid.logs.importing import digest_of, import_log, read_mapping
-from tests.logs.conftest import PLAIN, as_log, turning
+from tests.logs.conftest import DATES, PLAIN, as_log, stamps, turning
 
 Write = Callable[..., Path]
 T = np.arange(0.0, 120.0, 0.5)
@@ -94,6 +94,21 @@ latency = {late["compass"]}
     one = digest_of(read_mapping(mapping), log)
     (tmp_path / "gps.txt").write_text((tmp_path / "gps.txt").read_text() + "\n")
     assert digest_of(read_mapping(mapping), log) != one  # the digest covers every file
+
+
+@pytest.mark.parametrize("unit", DATES)
+def test_files_with_dates_in_other_units_share_a_clock(unit: str, plain_mapping: Write, tmp_path: Path) -> None:
+    t = 1.7e9 + 0.5 * np.arange(100)
+    log = as_log(turning(t), tmp_path / "log.csv", "datenum")
+    pd.DataFrame({"when": stamps(t[::2] + 0.25, unit), "place": t[::2] - t[0]}).to_csv(
+        tmp_path / "gps.csv", index=False
+    )
+    more = f'[file.gps]\npath = "gps.csv"\nclock = {{ from = "when", unit = "{unit}" }}\n'
+    mapping = plain_mapping(more, ('from = "N"', 'from = "place"\nfile = "gps"'))
+    mapping.write_text(mapping.read_text().replace('from = "time"', 'from = "time"\nunit = "datenum"\nmax_gap = 5.0'))
+    rows = import_log(read_mapping(mapping), log).frame
+    np.testing.assert_allclose(rows["north"], rows["t"] - t[0] - 0.25, atol=1e-4)
+    assert len(rows) == 98
 
 
 def test_a_step_of_the_mapping_holds_orders_and_passes_north(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from shipid.data.dataset import Dataset, flag_bit, pieces, read_dataset, write_d
 from shipid.errors import DataError
 from shipid.logs import readers
 from shipid.logs.importing import _unwrap, even_clock, evenly, import_log, read_mapping, rounding_of
-from tests.logs.conftest import as_log, turning
+from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, stamps, turning
 
 Write = Callable[..., Path]
 T = np.arange(0.0, 120.0, 0.5)
@@ -153,6 +153,42 @@ def test_segments_at_unix_time(plain_mapping: Write, tmp_path: Path) -> None:
     assert frame["t"].iloc[[0, -1]].tolist() == [1.7e9, 1.7e9 + 10.0]
     with pytest.raises(DataError, match="is not in the log"):
         imported(motion, plain_mapping(segment.format(1699999999.0)), tmp_path)
+
+
+@pytest.mark.parametrize("clock", [*CLOCKS, *DATES])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_log_imports_to_the_same_numbers_from_every_unit(
+    seed: int, clock: str, plain_mapping: Write, tmp_path: Path
+) -> None:
+    """Segments and breaks are on the clock of the log, those of dates in seconds since 1970."""
+    random = np.random.default_rng([11, seed])
+    begin = random.uniform(8e8, 1.9e9) if clock in DATES else random.uniform(0.0, 1e4)
+    t = np.round(begin, 3) + np.cumsum(random.choice([0.25, 0.5, 1.0], 120))
+    motion = turning(t, psi0=6.0 - 0.05 * t[0])
+    speed = str(random.choice(list(SPEEDS)))
+    size = CLOCKS.get(clock, 1.0)
+    start, end, hole = (float(t[row] + 0.125) / size for row in (20, 99, 60))
+    more = f'[[segment]]\nrun = "a"\nstart = {start!r}\nend = {end!r}\n'
+    more += f'[[repair]]\nkind = "break"\nintervals = [[{hole!r}, {hole + 2.25 / size!r}]]\nreason = "x"\n'
+    mapping = plain_mapping(more, ('from = "time"', f'from = "time"\nunit = "{clock}"'))
+    mapping.write_text(mapping.read_text().replace('"m/s"', f'"{speed}"'))
+    rows = import_log(read_mapping(mapping), as_log(motion, tmp_path / "log.csv", clock, speed)).frame
+    expected = motion.iloc[21:100]
+    expected = expected[(expected["t"] < hole * size) | (expected["t"] > hole * size + 2.25)]
+    for name, tolerance in (("t", 2e-5), ("u", 1e-12), ("v", 1e-12), ("r", 1e-12), ("north", 1e-9)):
+        np.testing.assert_allclose(rows[name], expected[name], rtol=1e-12, atol=tolerance, err_msg=name)
+    assert np.flatnonzero(rows["flags"]).tolist() == [int((expected["t"] < hole * size).sum())]
+
+
+@pytest.mark.parametrize("clock", [*CLOCKS, *DATES])
+def test_every_is_seconds_in_every_unit_of_the_clock(clock: str, plain_mapping: Write, tmp_path: Path) -> None:
+    t = (1.7e9 if clock in DATES else 0.0) + 0.25 * np.arange(200)
+    log = as_log(turning(t), tmp_path / "log.csv")
+    pd.read_csv(log).assign(time=stamps(np.floor(t), clock)).to_csv(log, index=False)
+    declared = plain_mapping("", ('from = "time"', f'from = "time"\nunit = "{clock}"\nevery = 0.25'))
+    rows = import_log(read_mapping(declared), log).frame
+    np.testing.assert_allclose(np.diff(rows["t"]), 0.25, atol=1e-6)
+    assert abs(rows["t"].iloc[0] - t[0]) < 1.0
 
 
 def test_clock_in_minutes(plain_mapping: Write, tmp_path: Path) -> None:

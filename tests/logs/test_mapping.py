@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from shipid.document import bundled
 from shipid.errors import DocumentError
-from shipid.logs.mapping import INPUTS, UNITS, read_mapping, to_si
+from shipid.logs.mapping import INPUTS, UNITS, clock_seconds, is_dated, read_mapping, to_si
 from shipid.logs.repairs import REPAIRS, Despike
 
 Write = Callable[..., Path]
@@ -24,9 +26,17 @@ def test_bundled_mappings_are_valid_and_have_a_source(name: str) -> None:
 
 
 DEFINED = {  # from the definitions: an inch is 25.4 mm, a nautical mile 1852 m, a turn 2 pi
-    "s": {"s": 1, "ms": 1 / 1000, "us": 1 / 1000**2, "ns": 1 / 1000**3, "min": 60, "h": 60 * 60, "date": 1},
+    "s": {"s": 1, "ms": 1 / 1000, "us": 1 / 1000**2, "ns": 1 / 1000**3, "min": 60, "h": 60 * 60, "d": 24 * 60 * 60}
+    | {"date": 1, "datenum": 1, "excel": 1},
     "m": {"m": 1, "cm": 1 / 100, "mm": 1 / 1000, "km": 1000, "ft": 12 * 0.0254, "nmi": 1852},
-    "m/s": {"m/s": 1, "kn": 1852 / 3600, "km/h": 1000 / 3600},
+    "m/s": {
+        "m/s": 1,
+        "kn": 1852 / 3600,
+        "km/h": 1000 / 3600,
+        "mph": 1609.344 / 3600,
+        "cm/s": 1 / 100,
+        "mm/s": 1 / 1000,
+    },
     "rad": {"rad": 1, "deg": 2 * math.pi / 360},
     "rad/s": {"rad/s": 1, "deg/s": 2 * math.pi / 360, "deg/min": 2 * math.pi / 360 / 60},
     "rev/s": {"rev/s": 1, "rpm": 1 / 60, "rad/s": 1 / (2 * math.pi)},
@@ -54,6 +64,35 @@ def test_every_unit_is_as_it_is_defined(si: str) -> None:
 )
 def test_units_of_columns(unit: str, name: str, factor: float) -> None:
     assert to_si(unit, name) == pytest.approx(factor)
+
+
+@pytest.mark.parametrize(
+    ("unit", "value", "moment"),
+    [
+        ("datenum", 738000.25, "2020-07-28 06:00"),  # MATLAB: datestr(738000.25)
+        ("datenum", 719529.0, "1970-01-01 00:00"),
+        ("excel", 44040.25, "2020-07-28 06:00"),  # a sheet shows the cell 44040.25 so
+        ("excel", 25569.0, "1970-01-01 00:00"),
+        ("excel", 61.0, "1900-03-01 00:00"),  # after 29 February 1900, which only Excel has
+    ],
+)
+def test_days_of_matlab_and_excel_are_dates(unit: str, value: float, moment: str) -> None:
+    since = datetime.fromisoformat(moment).replace(tzinfo=UTC).timestamp()
+    assert clock_seconds(np.array([value]), unit).tolist() == [since]
+    assert is_dated(unit)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("unit", UNITS["s"])
+def test_a_clock_has_the_same_seconds_in_every_unit(unit: str, seed: int) -> None:
+    """Differences are those of the unit; only MATLAB's and Excel's days have another zero."""
+    random = np.random.default_rng([7, seed])
+    days = random.uniform(44000.0, 46000.0) if unit in ("excel", "datenum") else random.uniform(0.0, 2.0)
+    values = days + np.cumsum(random.uniform(1e-6, 1e-3, 50))
+    t = clock_seconds(values, unit)
+    size = 24 * 3600 if unit in ("excel", "datenum") else DEFINED["s"][unit]
+    np.testing.assert_allclose(np.diff(t), np.diff(values) * size, rtol=1e-4, atol=1e-9 * size)
+    assert is_dated(unit) or t[0] == pytest.approx(values[0] * size)
 
 
 def test_every_table_of_units_holds_its_si_unit() -> None:

@@ -20,7 +20,7 @@ from shipid.logs.guess.bound import name_commands
 from shipid.logs.guess.clues import Finding, Question, State, Suggestion, unit_in_name
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from shipid.logs.guess.defects import defects_of_motion, defects_of_rows, defects_of_spikes, take_spikes
-from shipid.logs.guess.motion import choose_velocities, choose_yaw_rate
+from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import Frame, choose_pose
 from shipid.logs.guess.sniff import Sniffed
@@ -98,6 +98,7 @@ def guess(
     if state.numbered:  # or a yaw rate, which a sway speed resembles, may be taken for one
         choose_yaw_rate(state, 0.05)
     choose_velocities(state)
+    check_clock(state)
     if state.r is None:
         choose_yaw_rate(state)
     choose_commands(state)

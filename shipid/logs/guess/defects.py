@@ -12,8 +12,8 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import Sniffed
-from shipid.logs.mapping import to_si
-from shipid.logs.readers import date_of
+from shipid.logs.mapping import is_dated, to_si
+from shipid.logs.readers import LAST_DATE, date_of
 from shipid.physics.signals import is_shaft
 
 POSITIONS = ("latitude", "longitude", "north", "east")
@@ -157,7 +157,8 @@ def _jumps(state: State, path: Complex) -> None:
 
 def _when(state: State, t: float) -> str:
     """A time [s] as the clock of the log has it: a date, or a number."""
-    return date_of(t) if state.clock_unit == "date" and t > DATED else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
+    dated = is_dated(state.clock_unit) and DATED < t < LAST_DATE
+    return date_of(t) if dated else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
 
 
 def _heading_offset(state: State) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -15,8 +16,8 @@ from shipid.logs import segments as cutting
 from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
 from shipid.logs.guess.columns import Guess
 from shipid.logs.importing import import_log, sha256_of
-from shipid.logs.mapping import Mapping, Segment, read_mapping, to_si
-from shipid.logs.readers import LARGE, date_of
+from shipid.logs.mapping import Mapping, Segment, is_dated, read_mapping, to_si
+from shipid.logs.readers import LARGE, LAST_DATE, date_of
 
 ENABLED = 0.8  # a repair less sure than this is drafted switched off
 ORDER = ("wrap_interpolation", "break", "despike", "latency", "scale", "heading_offset", "lever_arm")
@@ -65,19 +66,20 @@ def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
 def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
     """Return segments as TOML, to be corrected by hand; `unit` is the unit of the log's clock."""
     blocks = ["\n# Segmented by helm and heading: correct names, starts and ends, and remove what is no run."]
-    if unit == "date":
+    if is_dated(unit):
         blocks.append("# Starts and ends are seconds since 1970; the dates are UTC.")
+    digits = 3 + max(0, math.ceil(math.log10(to_si(unit, "t"))))  # to 1 ms, of hours and days, too
     for segment in segments:
         values = {key: value for key, value in segment.model_dump().items() if value is not None}
-        values |= {end: round(values[end], 3) for end in ("start", "end")}
-        dates = f"    # {moment(segment.start, unit)} to {moment(segment.end, unit)}" if unit == "date" else ""
+        values |= {end: round(values[end], digits) for end in ("start", "end")}
+        dates = f"    # {moment(segment.start, unit)} to {moment(segment.end, unit)}" if is_dated(unit) else ""
         blocks.append("\n".join([f"[[segment]]{dates}", *_lines(values)]))
     return "\n".join(blocks) + "\n"
 
 
 def moment(value: float, unit: str) -> str:
     """Return a moment on the log's clock as text: a date in UTC, or the number."""
-    return date_of(value) if unit == "date" else f"{value:.10g}"
+    return date_of(value) if is_dated(unit) and value < LAST_DATE else f"{value:.10g}"
 
 
 def _read(text: str) -> Mapping:

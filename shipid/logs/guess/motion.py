@@ -13,13 +13,17 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, names_another, unit_in_name
 from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.words import fits, is_order
-from shipid.logs.mapping import UNITS, to_si
+from shipid.logs.mapping import UNITS, is_dated, to_si
+from shipid.logs.readers import DAY
 
 CLEAR = 1.5  # times the unexplained share of the best, that a hypothesis with fitting names may leave
 LEFT, NAMED_LEFT = 0.1, 0.5  # unexplained share of the track, at most: of columns without fitting names, and with
 SAME = 0.8  # ratio of two unexplained shares, above which neither is better
 MISLED = 0.1  # unexplained share of the heading, and distance from a unit, at most: of a rate with a misleading name
+FAR = 2.0  # a factor that no sensor has
+FASTEST, HARDEST, SLOWEST = 100.0, 20.0, 0.02  # m/s, m/s^2, m/s: no ship goes or turns harder, no trial is slower
 OFF_UNIT = 0.15  # relative distance of a fitted scale from a unit
+PLAIN, OFF_RARE = ("m/s", "kn", "km/h"), 0.03  # units that logs have, and the same distance for a unit that few have
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ def _hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
                 change = state.chosen.change(path)
                 keep = evidence.robust(seen, change)
                 result = evidence.fit(seen[keep], change[keep])
-                known = min(abs(result.scale / factor - 1) for factor in UNITS["m/s"].values()) < OFF_UNIT
+                known = _is_unit(result.scale)
                 if result.scale > 0 and (score >= 0.45 or known):
                     yield Velocities(result, first, second, frame, score, path)
 
@@ -202,15 +206,28 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
 def _speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: bool = False) -> tuple[str, bool]:
     """Return the unit nearest to the fitted scale, and whether a factor remains; report another unit in the name."""
     units = UNITS["m/s"]
-    unit = min(units, key=lambda name: abs(np.log(max(fit.scale, 1e-9) / units[name])))
+    unit = min(PLAIN, key=lambda name: abs(np.log(max(fit.scale, 1e-9) / units[name])))
     written = unit_in_name(sources[0], "m/s")
+    rare = next((name for name in units if name not in PLAIN and abs(fit.scale / units[name] - 1) < OFF_RARE), None)
+    clocked = next(
+        (one for one in ((written,) if written else PLAIN) if _clock_unit(state, fit.scale / units[one])), None
+    )
+    if clocked and (rare is None or not is_possible(state)):
+        return clocked, True
+    if clocked and rare != written:
+        other = _clock_unit(state, fit.scale / units[clocked])
+        words = f"in {rare} and the clock in {state.clock_unit}, or in {clocked} and the clock in {other}"
+        state.ask(("t", "u", "v", "speed"), f"is {sources[0]!r} {words}? The track is the same")
+    near = written in PLAIN and abs(fit.scale / units[written] - 1) < OFF_UNIT  # a factor, and no mile per hour
+    if rare and abs(fit.scale / units[unit] - 1) > OFF_UNIT / 2 and not near:
+        unit = rare
     if (
         written is not None
         and abs(fit.scale / units[written] - 1) < OFF_UNIT
         and abs(fit.scale / units[unit] - 1) > 0.05
     ):
         unit = written
-    if unit != (written or ("m/s" if not quiet else unit)) and abs(fit.scale / units[unit] - 1) < 0.08:
+    if unit != (written or (unit if quiet and unit in PLAIN else "m/s")) and abs(fit.scale / units[unit] - 1) < 0.08:
         word = "knots" if "kn" in (unit, written) else "speed unit"
         wanted = f"the name says {written}" if written else "nothing says so"
         sentence = f"the track is {fit.scale:.3f} times the integral: {sources[0]!r} is in {unit} ({wanted})"
@@ -220,8 +237,37 @@ def _speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: bool = 
     return unit, abs(fit.scale / units[unit] - 1) > 0.004
 
 
-def _factor(state: State, remains: bool, fit: Fit, sources: tuple[str, str], unit: str) -> None:
+def _is_unit(scale: float) -> bool:
+    """Whether a scale is nearly that of a unit of speed."""
+    away = {unit: abs(scale / factor - 1) for unit, factor in UNITS["m/s"].items()}
+    return any(distance < (OFF_UNIT if unit in PLAIN else OFF_RARE) for unit, distance in away.items())
+
+
+def _clock_unit(state: State, ratio: float) -> str | None:
+    """Return the unit of the clock with which the track would be the integral, if it is `ratio` times the integral."""
+    if state.clock_unit == "date":
+        return None
+    now = DAY if is_dated(state.clock_unit) else to_si(state.clock_unit, "t")
+    others = {unit: factor / now for unit, factor in UNITS["s"].items() if not is_dated(unit) and factor != now}
+    return next((unit for unit, factor in others.items() if abs(ratio / factor - 1) < OFF_RARE), None)
+
+
+def _factor(
+    state: State, remains: bool, fit: Fit, sources: tuple[str, ...], unit: str, columns: tuple[str, ...] = ("u", "v")
+) -> None:
     """Report a factor that remains after the unit: shown by the rounding of the values, or larger than its error."""
+    pair = " and ".join(repr(source) for source in sources)
+    begins = f"the track is {fit.scale:.4g} times the integral of {pair} in {unit}"
+    if (other := _clock_unit(state, fit.scale)) is not None:
+        why = f"{begins}: a clock in {other}, not {state.clock_unit}, or another unit of the positions would explain it"
+        state.find("clock unit", sources, 0.9, why)
+        state.ask(("t", *columns), f"is the clock in {other}? The draft says {state.clock_unit}, with which {begins}")
+        return
+    if not 1 / FAR <= fit.scale <= FAR:
+        sentence = f"{begins}: the unit of the clock, of the positions or of the speeds is another one"
+        state.find("factor", sources, 0.6, sentence)
+        state.ask(("t", *columns), f"are the units of the clock, of the positions and of {pair} right? {begins}")
+        return
     per_knot = 1.0 / (UNITS["m/s"]["kn"] / UNITS["m/s"][unit])
     rounds = [evidence.lattice(state.columns[source], 0.85 * per_knot, 1.15 * per_knot) for source in sources]
     near = [entry for entry in rounds if entry[1] > 0.9]
@@ -233,16 +279,15 @@ def _factor(state: State, remains: bool, fit: Fit, sources: tuple[str, str], uni
                 f"{count} values are round in knots if these were divided by {multiplier:.4f}, not {per_knot:.4f}"
             )
             sentence += f" (the track says {fit.scale:.3f} +- {fit.error:.3f})"
-            repair = {"kind": "scale", "columns": ["u", "v"], "factor": round(factor, 4)}
+            repair = {"kind": "scale", "columns": list(columns), "factor": round(factor, 4)}
             state.find("factor", sources, 0.95, sentence, repair)
         return
     off = abs(fit.scale - 1.0)
     if not remains or not np.isfinite(fit.error) or off < max(3 * fit.error, 0.004):
         return
     sure = float(np.clip(off / (5 * fit.error + 1e-9), 0.2, 0.9))
-    pair = f"{sources[0]!r} and {sources[1]!r} in {unit}"
-    sentence = f"the track is {fit.scale:.4f} +- {fit.error:.4f} times the integral of {pair}"
-    repair = {"kind": "scale", "columns": ["u", "v"], "factor": round(fit.scale, 4)}
+    sentence = f"the track is {fit.scale:.4f} +- {fit.error:.4f} times the integral of {pair} in {unit}"
+    repair = {"kind": "scale", "columns": list(columns), "factor": round(fit.scale, 4)}
     state.find("factor", sources, sure, sentence, repair)
 
 
@@ -273,7 +318,7 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
                     / (0.3 + score)
                     * (0.7 if turn == (unit_in_name(course, "rad") or "deg") else 1.0)
                 )
-                known = min(abs(fit.scale / factor - 1) for factor in UNITS["m/s"].values()) < OFF_UNIT
+                known = _is_unit(fit.scale)
                 if (
                     (known or (score >= 1.5 and fit.scale > 0))
                     and fit.left < bound
@@ -283,13 +328,40 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
     if best is None:
         return False
     _, speed, course, turn, fit, way = best
-    unit, _ = _speed_unit(fit, (speed, course), state, quiet=True)
+    unit, rest = _speed_unit(fit, (speed, course), state, quiet=True)
+    factor = to_si(unit, "u")
     why = f"along the course [{turn}] it leaves {100 * fit.left:.2g} % of the track unexplained"
     state.suggest("speed", speed, unit, 0.9, why)
     state.suggest("course", course, turn, 0.9, why, wrap=True)
     state.velocity = np.asarray(to_si(unit, "u") * state.columns[speed] * way)
     state.body = np.asarray(state.velocity * np.exp(-1j * state.psi))
+    _factor(state, rest, Fit(fit.scale / factor, fit.error / factor, fit.left), (speed,), unit, ("speed",))
     return True
+
+
+def pace(state: State) -> tuple[float, float]:
+    """Return how fast the ship goes [m/s] and turns [m/s^2] by the drafted clock: nine of ten windows have less."""
+    assert state.position is not None
+    assert state.psi is not None
+    span = state.t[state.chosen.last] - state.t[state.chosen.first]
+    speeds = np.abs(state.chosen.change(state.position)) / span
+    rates = np.abs(state.chosen.change(state.psi)) / span
+    return float(np.percentile(speeds, 90)), float(np.percentile(speeds * rates, 90))
+
+
+def is_possible(state: State) -> bool:
+    """Whether a ship may go and turn as this one does by the drafted clock."""
+    speed, across = pace(state)
+    return SLOWEST < speed < FASTEST and across < HARDEST
+
+
+def check_clock(state: State) -> None:
+    """Ask for the unit of the clock where no ship goes so fast, or so slowly, and no velocity has said so already."""
+    if is_possible(state) or any("t" in question.about for question in state.questions):
+        return
+    speed, across = pace(state)
+    goes = f"by the drafted clock, in {state.clock_unit}, the ship goes {speed:.3g} m/s and turns at {across:.3g} m/s^2"
+    state.ask(("t", "north", "east"), f"{goes}: are the units of the clock and of the positions right?")
 
 
 def choose_yaw_rate(state: State, most: float = 0.3) -> None:

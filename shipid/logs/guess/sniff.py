@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.guess.words import is_run, parts_of
+from shipid.logs.guess.words import is_run, parts_of, units_in
 from shipid.logs.importing import even_clock, repeated_rows, rounding_of
+from shipid.logs.mapping import EPOCHS, clock_seconds
 from shipid.logs.readers import (
+    DAY,
     DAY_OF,
     LONGEST_LINE,
     LOOKED_AT,
@@ -44,7 +46,7 @@ CLOCK_WORDS = frozenset(
     (
         "t tvec time timestamp stamp clock sec secs seconds date datetime utc ms zeit messzeit zeitstempel "
         "tid tidspunkt sekunden millis epoch zulu hora temps heure elapsed stempel mess uhrzeit klokke tiempo "
-        "gmt"
+        "gmt datenum"
     ).split()
 )
 PACKED = {
@@ -58,14 +60,24 @@ PACKED = {
     b"\x89HDF": "an HDF5 file",
 }
 """First bytes of a file that is no log as it is -> what it is."""
-FINE = {
-    "ns": (1e-9, 1e17, ("ns", "nsec", "nanos", "nanosec", "nanoseconds")),
-    "us": (1e-6, 1e14, ("us", "usec", "micros", "microsec", "microseconds")),
+WRITTEN = {
+    "ns": "ns nsec nanos nanosec nanoseconds",
+    "us": "us usec micros microsec microseconds",
+    "ms": "ms msec millis millisec milliseconds",
+    "s": "s sec secs second seconds sekunden",
+    "min": "min mins minute minutes minuten",
+    "h": "h hr hrs hour hours stunden",
+    "d": "d day days tage",
 }
-"""Unit -> factor to s, least number that counts from 1970 in it, and words at the end of a name."""
+"""Unit of a clock -> words for it, in brackets or at the end of a name."""
+FINE = {"ns": (1e17, 1e8), "us": (1e14, 1e5)}
+"""Unit of a clock -> least number that counts from 1970 in it, and least step of whole numbers: 0.1 s."""
+DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in {**EPOCHS, "d": 0.0}.items()}
+"""Unit of a clock in days -> its numbers of 1990 and 2050, `d` since 1970; modified Julian dates are later."""
+SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
 NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
 _UNIT = re.compile(
-    r"[\[(]?(s|secs?|seconds|ms|min|h|m|mm|cm|km|meters?|metres?|ft|deg(rees)?|°|grad|rad|m/s|mps|m\*s-1|kn|kts?|knots?|km/h|kmh|"
+    r"[\[(]?(s|secs?|seconds|ms|us|ns|mins?|minutes|h|hrs?|hours?|d|days?|m|mm|cm|km|meters?|metres?|ft|deg(rees)?|°|grad|rad|m/s|mps|m\*s-1|kn|kts?|knots?|km/h|kmh|mph|cm/s|mm/s|"
     r"(deg|°|grad)/(s|sec|min)|dps|rad/s(ec)?|rpm|rps|1/(s|min)|u/min|min-1|s-1|hz|n|kn|nm|knm|kw|w|%|pct|percent|bar|v|a|°c|c|"
     r"l/h|kg/h|t|t/h|m/s2|m/s\^2|m/s²|-|utc|iso|\[-\]|)[\])]?$"
 )
@@ -393,16 +405,16 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
     rounded = [name for name in called or unnamed if name in finite and name not in rising]
     for name in [*candidates[:1], *rounded] if candidates and candidates[0] in called else [*rounded, *candidates[:1]]:
-        factor, unit = _unit_of_clock(name, finite[name])
-        t = np.asarray(factor * finite[name], dtype=np.float64)
+        unit = _unit_of_clock(name, finite[name])
+        t = clock_seconds(finite[name], unit)
         rate = _rate(t) if name in rounded or _is_coarse(t) else None
         if rate is not None:
             return {"from": name, "unit": unit, "every": rate[0]}, rate[1]
         if name in rising:
             return {"from": name, "unit": unit}, t
     if rising:
-        factor, unit = _unit_of_clock(rising[0], finite[rising[0]])
-        return {"from": rising[0], "unit": unit}, np.asarray(factor * finite[rising[0]], dtype=np.float64)
+        unit = _unit_of_clock(rising[0], finite[rising[0]])
+        return {"from": rising[0], "unit": unit}, clock_seconds(finite[rising[0]], unit)
     fault = f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
     raise DataError(f"no column can be the clock: {fault}", file=file)
 
@@ -432,21 +444,25 @@ def _looks_dated(column: pd.Series[Any]) -> bool:
     return bool(len(texts) and dated.all())
 
 
-def _unit_of_clock(name: str, values: Array) -> tuple[float, str]:
-    """Return the factor to seconds and the unit of a clock: as its name says, else ms if it counts in them."""
-    inside = re.search(r"[\[(]\s*(ns|us|[µμ]s|ms|msec|s|sec|min|h)\s*[\])]", name.lower())
-    written = inside.group(1).replace("µ", "u").replace("μ", "u") if inside else ""
-    if written in ("min", "h"):
-        return {"min": 60.0, "h": 3600.0}[written], written
+def _unit_of_clock(name: str, values: Array) -> str:
+    """Return the unit of a clock: as its name says; else dates in days, or ms, us or ns if it counts in them."""
+    inside = [text.strip().lower().replace("µ", "u").replace("μ", "u") for text in units_in(name)]
+    parts = parts_of(name)
+    last = [] if "of" in parts else parts[-1:]  # seconds of the day
+    written, ends = (next((one for one in WRITTEN if {*WRITTEN[one].split()} & {*said}), "") for said in (inside, last))
     steps = np.diff(values)
-    counting = not written and np.median(steps) >= 20 and not np.any(values % 1)
-    last = parts_of(name)[-1:] or ("",)
-    for unit, (scale, least, words) in FINE.items():
-        if written == unit or (not written and (last[0] in words or (counting and values[0] > least))):
-            return scale, unit
-    if written.startswith("ms") or (not written and (last[0] in ("ms", "millis", "msec") or counting)):
-        return 1e-3, "ms"
-    return 1.0, "s"
+    rising = steps[steps > 0]  # a rounded clock often stands
+    short = len(rising) > 0 and float(np.median(rising)) < SHORT_DAY
+    dates = next((unit for unit in EPOCHS if DATES[unit][0] < values[0] < DATES[unit][1]), "")
+    if dates and (written == "d" if written else short and ends in ("", "d")):
+        return dates
+    if written or ends not in ("", "s"):
+        return written or ends
+    if len(steps) and np.median(steps) >= 20 and not np.any(values % 1):
+        slow = DATES["d"][0] < 1e-3 * values[0] / DAY < DATES["d"][1]  # milliseconds since 1970, however far apart
+        step = 0.0 if slow else float(np.median(steps))
+        return next((unit for unit, (least, far) in FINE.items() if values[0] > least or step >= far), "ms")
+    return "s"
 
 
 def _is_coarse(t: Array) -> bool:

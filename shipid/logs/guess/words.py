@@ -225,7 +225,11 @@ SOURCES = frozenset(
     ).split()
 )
 """Parts that say where a value comes from, and nothing of what it is."""
-UNIT_PARTS = frozenset(("deg degs dpm dps grad kmh kn knm kw nm knots kt kts min mps ms pct rad rads rps sec").split())
+UNIT_PARTS = frozenset(
+    (
+        "cmps cms deg degs dpm dps grad kmh kn knm kw nm knots kt kts min mmps mms mph mps ms pct rad rads rps sec"
+    ).split()
+)
 """Parts that are a unit at the end of a name."""
 SIDE_WORDS = {
     "port": "port|ps|bb|bab|br|babord|backbord|p|prt|portside|left|babor|bakboord|bagbord|sinistra|sx|links|gauche|bd",

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.logs.drawn_logs import draw, judge
+from shipid.logs.guess.columns import guess
+from tests.logs.drawn_logs import CLOCKS, Drawn, draw, judge
 from tests.logs.judged_raw import judge_raw
 from tests.strangers_raw import raw_stranger
 
+SEEDS = (302, 306, 323)  # velocities of north and east, speed and course, along and across without units in names
 LEAST = 0.85  # share right of the logs of a range
 RAW, RUNS = {870183: "right", 870176: "reported"}, 4  # raw folders: all that the log can decide; a frame with z upwards
 
@@ -34,6 +36,32 @@ def test_a_log_is_the_same_for_the_same_seed(tmp_path: Path) -> None:
     files = [sorted(file for file in (tmp_path / name).rglob("*") if file.is_file()) for name in ("a", "b")]
     assert [file.read_bytes() for file in files[0]] == [file.read_bytes() for file in files[1]]
     assert first.asks == second.asks
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_a_clock_in_any_unit_is_read_as_one_in_seconds(clock: str, tmp_path: Path) -> None:
+    """Same ship, same columns: the verdict is that of the log in seconds, and nothing is asked of a right clock."""
+    seed = SEEDS[CLOCKS.index(clock) % len(SEEDS)]
+    words = []
+    for one in ("seconds", clock):
+        drawn = draw(seed, tmp_path / one / "logs", one)
+        words.append(judge(drawn).word)
+        assert quiet(drawn)
+    assert words == ["right", "right"]
+
+
+@pytest.mark.parametrize("unit", ["m/s", "kn", "km/h", "mph", "cm/s", "mm/s"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_speeds_in_any_unit_are_read(unit: str, seed: int, tmp_path: Path) -> None:
+    drawn = draw(seed, tmp_path / "logs", speed=unit)
+    assert judge(drawn).word == "right"
+    assert unit == "mm/s" or quiet(drawn)  # which is asked where no name says it
+
+
+def quiet(drawn: Drawn) -> bool:
+    """Whether a guess says nothing of the clock and of factors."""
+    proposal = guess(drawn.path)
+    return not proposal.kinds & {"clock unit", "factor"} and not any("t" in one.about for one in proposal.questions)
 
 
 @pytest.mark.parametrize("seed", RAW)

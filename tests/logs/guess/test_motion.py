@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.motion import choose_velocities, choose_yaw_rate
+from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate, is_possible
+from tests.logs.conftest import CLOCKS, SPEEDS
 from tests.logs.simulated import KNOT, si_log, state_with_pose
 
 LOG = si_log()
@@ -69,6 +70,86 @@ def test_a_factor_is_seen_with_its_error() -> None:
     assert finding.kind == "factor"
     assert finding.repair is not None
     assert finding.repair["factor"] == pytest.approx(1 / 1.05, abs=0.003)
+
+
+def spoken(unit: str, kind: str, named: bool, factor: float = 1.0) -> dict[str, np.ndarray]:
+    """Body velocities, or speed and course, in a unit that the names say or not."""
+    more, size = f" [{unit}]" * named, factor / SPEEDS[unit]
+    if kind == "body":
+        return {f"u{more}": size * U, f"v{more}": size * V}
+    return {f"sog{more}": size * np.abs(GROUND), "cog": np.degrees(np.angle(GROUND)) % 360.0}
+
+
+@pytest.mark.parametrize("unit", SPEEDS)
+@pytest.mark.parametrize("kind", ["body", "speed and course"])
+@pytest.mark.parametrize("named", [True, False], ids=["named", "not named"])
+def test_every_unit_of_speed_is_drafted(unit: str, kind: str, named: bool) -> None:
+    """A unit in the name is no finding; another than m/s that no name says is one, of speeds over ground if it is rare.
+
+    Millimetres a second, and a clock in ms, leave one track: without a name that is asked.
+    """
+    state = state_with_pose(spoken(unit, kind, named))
+    choose_velocities(state)
+    assert {one.unit for one in state.suggestions if one.name != "course"} == {unit}
+    usual = unit == "m/s" or (kind != "body" and unit in ("kn", "km/h"))
+    assert kinds(state) == (set() if named or usual else {"knots"} if unit == "kn" else {"speed unit"})
+    assert len(state.questions) == (unit == "mm/s" and not named)
+    assert state.velocity is not None
+    np.testing.assert_allclose(state.velocity, GROUND, atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", SPEEDS)
+@pytest.mark.parametrize("kind", ["body", "speed and course"])
+@pytest.mark.parametrize("factor", [0.94, 1.06, 1.149])
+def test_a_factor_does_not_pass_for_another_unit_than_the_name_says(unit: str, kind: str, factor: float) -> None:
+    """A knot is 1.15 miles per hour: the name decides, and the factor is found."""
+    state = state_with_pose(spoken(unit, kind, True, factor))
+    choose_velocities(state)
+    assert {one.unit for one in state.suggestions if one.name != "course"} == {unit}
+    (finding,) = state.findings
+    assert finding.repair is not None
+    assert finding.repair["columns"] == (["u", "v"] if kind == "body" else ["speed"])
+    assert finding.repair["factor"] == pytest.approx(1 / factor, rel=0.005)
+
+
+@pytest.mark.parametrize("said", [*CLOCKS, "datenum"])
+@pytest.mark.parametrize("true", CLOCKS)
+@pytest.mark.parametrize("kind", ["body", "speed and course"])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_clock_in_another_unit_than_drafted_is_asked(said: str, true: str, kind: str, seed: int) -> None:
+    random = np.random.default_rng([3, seed])
+    unit, named = str(random.choice(list(SPEEDS))), bool(random.random() < 0.5)
+    wrong = CLOCKS.get(said, 86400.0) / CLOCKS[true]
+    state = state_with_pose(spoken(unit, kind, named), wrong, said)
+    choose_velocities(state)
+    check_clock(state)
+    asked = [question for question in state.questions if "t" in question.about]
+    if wrong == 1.0:
+        assert len(asked) == (unit == "mm/s" and not named)
+    else:
+        assert len(asked) == 1
+        assert state.velocity is None or "factor" in kinds(state) or "clock unit" in kinds(state)
+        if named or unit == "m/s":
+            assert f"is the clock in {true}?" in asked[0].sentence
+
+
+@pytest.mark.parametrize(("wrong", "asked"), [(1.0, 0), (3.0, 0), (60.0, 1), (3600.0, 1), (1e-3, 1), (1e-6, 1)])
+def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> None:
+    """Without velocities in the log the pace of the track says that the clock has another unit."""
+    state = state_with_pose({}, 1.0 / wrong)
+    assert is_possible(state) == (not asked)
+    check_clock(state)
+    check_clock(state)  # once is enough
+    assert len(state.questions) == asked
+
+
+def test_a_factor_that_no_sensor_has_is_asked_and_not_repaired() -> None:
+    state = state_with_pose({"u [m/s]": U / 7.0, "v [m/s]": V / 7.0})
+    choose_velocities(state)
+    (finding,) = state.findings
+    assert (finding.kind, finding.repair) == ("factor", None)
+    assert "the track is 7 times" in finding.sentence
+    assert len(state.questions) == 1
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,9 @@ def test_encodings(encoding: str, expected: str, tmp_path: Path) -> None:
     ("clock", "unit", "t"),
     [
         ((1000 * T).astype(int), "ms", T),
+        ((1e3 * (1.7e9 + 240 * T)).astype(np.int64), "ms", 1.7e9 + 240 * T),
+        ((1e6 * T).astype(np.int64), "us", T),
+        ((1e9 * (5.0 + T)).astype(np.int64), "ns", 5.0 + T),
         ((1e6 * (1.7e9 + T)).astype(np.int64), "us", 1.7e9 + T),
         ((1e9 * (1.7e9 + T)).astype(np.int64), "ns", 1.7e9 + T),
         (1.7e9 + T, "s", 1.7e9 + T),
@@ -81,6 +84,71 @@ def test_the_unit_of_the_clock(clock: object, unit: str, t: np.ndarray, tmp_path
     sniffed = sniff(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "time", "unit": unit}
     np.testing.assert_allclose(sniffed.t, t, atol=1e-6)
+
+
+START = pd.Timestamp("2024-05-14 08:00:05")
+DAYS_OF = {
+    "datenum": START.toordinal() + 366 + 8 / 24,
+    "excel": (START - pd.Timestamp(1899, 12, 30)) / pd.Timedelta("1D"),
+}
+DAYS_OF["datenum"] += 5 / 86400
+
+
+@pytest.mark.parametrize("unit", DAYS_OF)
+@pytest.mark.parametrize("name", ["time", "Time [d]", "datenum", "t_days", "Time [days]"])
+@pytest.mark.parametrize("step", [0.01, 0.5, 10.0])
+def test_days_of_matlab_and_excel_are_known_by_their_size(unit: str, name: str, step: float, tmp_path: Path) -> None:
+    """A double has such a day to 1e-5 s, a table to as much as it writes."""
+    t = step * np.arange(60)
+    table = pd.DataFrame({name: [f"{DAYS_OF[unit] + one / 86400:.10f}" for one in t], "N": t, "psi": t})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": name, "unit": unit}
+    np.testing.assert_allclose(sniffed.t, START.timestamp() + t, atol=3e-5)
+
+
+@pytest.mark.parametrize("unit", DAYS_OF)
+@pytest.mark.parametrize(("step", "digits"), [(0.25, 5), (0.5, 6), (1.0, 5)])
+def test_rounded_days_keep_their_rate(unit: str, step: float, digits: int, tmp_path: Path) -> None:
+    """Five digits of a day are 0.86 s: rows of 4 Hz appear three or four times at one time."""
+    t = step * np.arange(400)
+    stamps = [f"{DAYS_OF[unit] + one / 86400:.{digits}f}" for one in t]
+    pd.DataFrame({"time": stamps, "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "time", "unit": unit, "every": pytest.approx(step, rel=1e-3)}
+    np.testing.assert_allclose(sniffed.t, START.timestamp() + t, atol=1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "unit"),
+    [
+        ("t_min", T / 60, "min"),
+        ("Time [hours]", T / 3600, "h"),
+        ("elapsed_hours", T / 3600, "h"),
+        ("Zeit / min", T / 60, "min"),
+        ("Time (d)", T / 86400, "d"),
+        ("time_d", 134.3 + T / 86400, "d"),  # the day of the year
+        ("Time [d]", 60443.3 + T / 86400, "d"),  # a modified Julian date is no date of Excel
+        ("time", 45000.0 + T, "s"),  # seconds of a day, half past twelve
+        ("time", np.floor(45000.0 + T), "s"),  # the same, in whole seconds: most steps are 0
+        ("time_of_day", 45000.0 + T, "s"),
+        ("time_s", 45000.0 + T / 1e4, "s"),
+        ("Time [s]", 738000.3 + T / 1e4, "s"),
+        ("time", 738000.3 + T, "s"),
+    ],
+)
+def test_what_a_clock_counts_in(name: str, values: np.ndarray, unit: str, tmp_path: Path) -> None:
+    table = TABLE.assign(time=values).rename(columns={"time": name})
+    table.to_csv(tmp_path / "log.csv", index=False, float_format="%.10f")
+    assert sniff(tmp_path / "log.csv").clock["unit"] == unit
+
+
+def test_a_row_of_units_says_that_of_the_clock(tmp_path: Path) -> None:
+    lines = ["time,u,v", "h,mph,mm/s", *(f"{k / 3600:.8f},{0.1 * k:.1f},{k}" for k in range(30))]
+    sniffed = sniff(log_of(tmp_path, lines))
+    assert sniffed.clock == {"from": "time [h]", "unit": "h"}
+    np.testing.assert_allclose(sniffed.t, np.arange(30), atol=1e-4)
+    assert list(sniffed.columns) == ["u [mph]", "v [mm/s]"]
 
 
 @pytest.mark.parametrize("day", ["%d.%m.%Y", "%Y-%m-%d", "%Y/%m/%d", "%m/%d/%Y", "%d.%m.%y"])
