@@ -1,10 +1,12 @@
 """`python -m shipid`: the command line."""
 
+import os
 import sys
 
 
 def run() -> None:
     """Run the command line; Ctrl-C while it is being imported ends it as quietly as later."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by NumPy's import; on a busy machine waits cost half
     try:
         from shipid.cli import main
     except KeyboardInterrupt:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -23,6 +24,17 @@ def test_a_mistake_is_one_line_and_status_1() -> None:
     assert result.stderr.startswith("error: ")
     assert "did you mean 'mariner'?" in result.stderr
     assert len(result.stderr.splitlines()) == 1
+
+
+def test_the_command_takes_one_thread_for_products_unless_the_user_says_more() -> None:
+    code = "import os, sys, shipid.__main__ as m; sys.argv = ['shipid', '--help']; sys.stdout = open(os.devnull, 'w')\n"
+    code += "try: m.run()\nfinally: sys.stderr.write(os.environ['OPENBLAS_NUM_THREADS'])"
+    for given, expected in ({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3"):
+        clean = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+        result = subprocess.run(
+            [sys.executable, "-c", code], env=clean | given, capture_output=True, text=True, timeout=60, check=False
+        )
+        assert result.stderr == expected
 
 
 def test_ctrl_c_during_the_imports_ends_quietly() -> None:

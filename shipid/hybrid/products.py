@@ -39,3 +39,11 @@ def hidden(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
     units = np.matmul(values.numpy(), weight.numpy())
     units += offset.numpy()
     return torch.from_numpy(np.tanh(units, out=units))
+
+
+def sums_of_squares(values: Tensor) -> Tensor:
+    """Return the sums of squares (F, C) of values (F, b, C) over their rows."""
+    if not by_numpy(values):
+        return values.square().sum(dim=1)
+    array = values.numpy()
+    return torch.from_numpy(np.einsum("fbc,fbc->fc", array, array))

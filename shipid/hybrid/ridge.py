@@ -14,7 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import Inputs, choose_features, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
 from shipid.hybrid.mirror import reflection as _reflection
-from shipid.hybrid.products import gram, hidden, matmul
+from shipid.hybrid.products import gram, hidden, matmul, sums_of_squares
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import seed_of
 from shipid.hybrid.trials import diverged
@@ -69,7 +69,8 @@ class _Part:
 
     def rotated(self, windows: Tensor) -> Tensor:
         """Features of some windows (...) on the axes, (..., M)."""
-        return matmul(self.features[windows], self.axes)
+        every = torch.arange(len(self.features), device=windows.device)
+        return matmul(self.features if torch.equal(windows, every) else self.features[windows], self.axes)
 
 
 @dataclass(frozen=True)
@@ -379,7 +380,7 @@ def _left_out(
         """Sums of squares over all folds, (K,), and over all but one, (F, K)."""
         by_fold = torch.zeros_like(others[0])
         for piece, one in zip(pieces, made, strict=True):
-            squares = one.square().sum(dim=1).reshape(len(one), len(piece.sides), -1, terms)
+            squares = sums_of_squares(one).reshape(len(one), len(piece.sides), -1, terms)
             by_fold[piece.folds] += squares.sum(dim=(1, 3))
         return by_fold.sum(dim=0), by_fold.sum(dim=0) - by_fold
 
@@ -446,31 +447,34 @@ class _FewRows:
     def missed(self, ridge: float) -> Tensor:
         """What the fit of all windows misses of the targets, (folds, b, K r), in single precision."""
         weights = (self.part.product / (self.part.eigenvalues + ridge)[:, None]).float()
-        return (self.targets - matmul(self.flat, weights)).view(*self.shape, -1)
+        fitted = matmul(self.flat, weights)
+        return torch.sub(self.targets, fitted, out=fitted).view(*self.shape, -1)
 
     def without(self, ridge: float, missed: Tensor) -> Tensor:
         """What a fit without each block misses of it; by Cholesky's factors of I - H_bb.
 
-        In double precision where a squared pivot is below `SOUND`, which limits the digits.
+        In double precision for blocks with a squared pivot below `SOUND`, which limits the digits.
         """
         diagonal = self.part.eigenvalues + ridge
-        remainder = self.unit - matmul(self.rows, self.columns * (1 / diagonal).float()[:, None])
-        lower, failed = torch.linalg.cholesky_ex(remainder)
-        if failed.any() or lower.diagonal(dim1=1, dim2=2).min() ** 2 < SOUND:
-            return self._double(diagonal)
-        return matmul(torch.cholesky_inverse(lower), missed)
+        hat = matmul(self.rows, self.columns * (1 / diagonal).float()[:, None])
+        lower, failed = torch.linalg.cholesky_ex(torch.sub(self.unit, hat, out=hat))
+        unsound = failed.bool() | (lower.diagonal(dim1=1, dim2=2).amin(dim=1) ** 2 < SOUND)
+        lower[unsound] = self.unit
+        inverse = torch.linalg.solve_triangular(lower, self.unit, upper=False)
+        errors = matmul(inverse.mT, matmul(inverse, missed))
+        if unsound.any():
+            errors = errors.double()
+            errors[unsound] = self._double(self.block.out[unsound], diagonal)
+        return errors
 
-    def _double(self, diagonal: Tensor) -> Tensor:
-        rows, targets = self._exact
+    def _double(self, out: Tensor, diagonal: Tensor) -> Tensor:
+        """Errors of some blocks (folds, b) of windows without themselves, (folds, b, K r), in double precision."""
+        rows = self.part.rotated(out)
         weighted = rows / diagonal
         remainder = self.unit.double() - matmul(weighted, rows.mT)
-        solved: Tensor = torch.linalg.solve(remainder, targets - matmul(weighted, self.part.product))
+        missed = self.part.targets[out] - matmul(weighted, self.part.product)
+        solved: Tensor = torch.linalg.solve(remainder, missed)
         return solved
-
-    @cached_property
-    def _exact(self) -> tuple[Tensor, Tensor]:
-        """Features (folds, b, M) and targets (folds, b, K r) of the blocks."""
-        return self.part.rotated(self.block.out), self.part.targets[self.block.out]
 
 
 class _ManyRows:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
+from threadpoolctl import threadpool_limits
 
 from shipid.errors import ResultError
 from shipid.files import temporary_folder, write_table, write_text
@@ -96,7 +97,8 @@ def _write(folder: Path, say: Say | None) -> Path:
     plan = store.stored_plan(folder)
     with temporary_folder(folder) as place:
         read = place.stat().st_mtime_ns
-    report, whole = _write_parts(plan, folder, say) if plan.parts else _write_one(folder, say)
+    with threadpool_limits(1, user_api="blas"):  # products are small: on a busy machine threads cost half of the time
+        report, whole = _write_parts(plan, folder, say) if plan.parts else _write_one(folder, say)
     if not whole:
         os.utime(report, ns=(read, read))
     return report

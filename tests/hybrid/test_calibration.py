@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import f_oneway
 
-from shipid.hybrid.calibration import _alike, _fitted, _runs, calibrated, radii
+from shipid.hybrid.calibration import _alike, _fitted, _rising, _runs, calibrated, radii
 from tests.hybrid.runs import NAMES, made, runs
 
 AT = [49, 79, 89]  # 50, 80, 90 %
@@ -25,6 +25,12 @@ def test_radii_hold_their_share_of_new_runs(count: int, alike: float) -> None:
         held.append([(scores[count:] <= one).mean() for one in radius])
     np.testing.assert_allclose(np.mean(held, axis=0), [0.5, 0.8, 0.9], atol=0.03)
     assert np.mean(held, axis=0)[2] > 0.885  # rather more than less
+
+
+@pytest.mark.parametrize("digits", [0, 1, 3, 16])
+def test_equal_scores_keep_their_order(digits: int) -> None:
+    scores = np.random.default_rng(digits).random(500).round(digits)
+    np.testing.assert_array_equal(_rising(scores), np.argsort(scores, kind="stable"))
 
 
 @pytest.mark.parametrize(("count", "windows"), [(3, 2), (4, 12), (9, 5)])

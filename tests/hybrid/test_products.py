@@ -33,6 +33,12 @@ def test_a_gram_matrix_is_one_of_products() -> None:
     torch.testing.assert_close(products.gram(values), torch.einsum("si,sj->ij", values, values), rtol=1e-13, atol=1e-13)
 
 
+def test_squares_are_summed_over_rows() -> None:
+    values = torch.randn(3, 4, 5, generator=torch.Generator().manual_seed(4), dtype=torch.float64)
+    for one in (values, values.mT):
+        torch.testing.assert_close(products.sums_of_squares(one), (one**2).sum(1), rtol=1e-13, atol=1e-13)
+
+
 def test_a_layer_is_the_tanh_of_its_sums() -> None:
     generator = torch.Generator().manual_seed(3)
     values, weight, offset = (

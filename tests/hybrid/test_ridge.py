@@ -99,6 +99,28 @@ def test_single_precision_ends_where_digits_would():
         assert (errors.dtype == torch.float32) == single, ridge
 
 
+def test_one_unsound_block_is_in_double_precision_and_leaves_the_others_as_they_are():
+    """Three features that only one run has let it nearly fit itself: I - H_bb is almost singular, for it alone."""
+    rng, ridge = np.random.default_rng(2), 1e-3
+    runs = ALL.reshape(6, 20)
+    features = np.concatenate([rng.normal(size=(len(ALL), 12)) / 12**0.5, np.zeros((len(ALL), 3))], axis=1)
+    features[runs[1][:3], [12, 13, 14]] = 3.0
+    wanted = rng.normal(size=(len(ALL), 4))
+    (block,) = _blocks([(np.setdiff1d(ALL, run), run) for run in runs], ALL, "cpu")
+    few = _FewRows(part_of(features, wanted), block)
+    errors = few.without(ridge, few.missed(ridge))
+    off = np.empty(len(runs))
+    for fold, run in enumerate(runs):
+        others = np.setdiff1d(ALL, run)
+        weights = np.linalg.solve(
+            features[others].T @ features[others] + ridge * np.eye(15), features[others].T @ wanted[others]
+        )
+        off[fold] = np.abs(errors[fold].numpy() - (wanted[run] - features[run] @ weights)).max()
+    assert off[1] < 1e-9
+    assert (np.delete(off, 1) > 1e-9).all()
+    assert off.max() < 1e-5
+
+
 @pytest.mark.parametrize("units", [12, 300])  # fewer and more than windows
 @pytest.mark.parametrize("ridge", [1e-3, 5.0])
 @pytest.mark.parametrize("kind", ["runs", "more left out than judged", "one pair"])
