@@ -23,6 +23,7 @@ DEEPEST = 40  # tables and lists inside one another
 MOST_NUMBER, MOST_INTEGER = 1e24, 10**15
 MUST, BE = "must ", "be "
 REQUIRED = {
+    "missing": "missing",
     "string_type": "must be text",
     "bool_type": "must be true or false",
     "bool_parsing": "must be true or false",
@@ -41,10 +42,12 @@ REQUIRED = {
     "tuple_type": "must be a list",
     "dict_type": "must be a table",
     "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
     "too_short": "must have {min_length} or more entries, not {actual_length}",
     "too_long": "must have {max_length} or fewer entries, not {actual_length}",
     "string_too_short": "must have {min_length} or more characters",
     "string_too_long": "must have {max_length} or fewer characters",
+    "string_pattern_mismatch": "must match the pattern {pattern}",
 }
 """Type of a problem that pydantic reports -> what the value must be."""
 LEAST_NUMBER = 1e-100  # but for 0: a quotient of two numbers of a document stays finite
@@ -285,7 +288,9 @@ def plain(value: Any) -> Any:
 
 def match(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
     """Paths that match a pattern; `*` matches any characters, also dots."""
-    expression = re.compile(".*".join(re.escape(piece) for piece in pattern.split("*")))
+    first, *rest = (re.escape(piece) for piece in pattern.split("*"))
+    inner = "".join(f"(?>.*?{piece})" for piece in rest[:-1] if piece)  # never tried again: many stars take no longer
+    expression = re.compile(f"{first}{inner}.*{rest[-1]}" if rest else first)
     return [path for path in paths if expression.fullmatch(path)]
 
 
@@ -355,13 +360,11 @@ def _place(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
     """The parts of a pydantic location that are keys or indices of the data, without the names of union members."""
     location = problem["loc"]
     for position, part in enumerate(location):
-        if isinstance(data, Mapping):
-            if part not in data and not (problem["type"] == "missing" and position == len(location) - 1):
-                continue
-            data = data.get(part)
+        if isinstance(data, Mapping) and part in data:
+            data = data[part]
         elif isinstance(data, list) and isinstance(part, int) and part < len(data):
             data = data[part]
-        else:
+        elif problem["type"] != "missing" or position < len(location) - 1:
             continue
         yield str(part)
 

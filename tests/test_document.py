@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import pytest
 from pydantic import BaseModel, ConfigDict, Field
@@ -140,6 +140,34 @@ def test_parse_says_where_what_and_what_would_be_right(data: Any, path: str, mes
     assert caught.value.path == path
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+class Fast(BaseModel):
+    kind: Literal["fast"]
+
+
+class Slow(BaseModel):
+    kind: Literal["slow"]
+
+
+class Named(BaseModel):
+    name: str = Field(pattern="^[a-z]+$")
+    pair: tuple[float, float] = (0.0, 1.0)
+    part: Annotated[Fast | Slow, Field(discriminator="kind")] | None = None
+
+
+@pytest.mark.parametrize(
+    ("data", "path", "message"),
+    [
+        ({"name": "A 1"}, "top.name", "'A 1': must match the pattern ^[a-z]+$"),
+        ({"name": "a", "pair": [1.0]}, "top.pair.1", "missing"),
+        ({"name": "a", "part": -1}, "top.part", "-1: must be a table"),
+    ],
+)
+def test_no_message_is_a_sentence_of_pydantic(data: Any, path: str, message: str) -> None:
+    with pytest.raises(DocumentError) as caught:
+        documents.parse(Named, data, "x.toml", "top")
+    assert (caught.value.path, caught.value.message) == (path, message)
 
 
 def test_a_quoted_key_may_hold_dots() -> None:

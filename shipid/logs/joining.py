@@ -30,7 +30,8 @@ def join(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
 
     Raises
     ------
-    DataError : the commands or the vessels differ, positions have no common origin, or clocks cannot be one.
+    DataError : the commands or the vessels differ, a run is in two datasets, positions have no common origin, or clocks
+        cannot be one.
     """
     if len(datasets) < 2:
         raise DataError(f"{len(datasets)} dataset: joining needs two or more")
@@ -67,22 +68,18 @@ def _check_alike(datasets: Mapping[Path, Dataset]) -> None:
 
 
 def _check_copies(datasets: Mapping[Path, Dataset]) -> None:
-    """Raise DataError for a run whose motion is, row by row, that of a run in another dataset, whatever its name."""
-    known: dict[Path, np.ndarray] = {}
-    for file, one in datasets.items():
-        rows = pd.util.hash_pandas_object(one.frame[["u", "v", "r"]], index=False)
-        distinct = ~rows.duplicated(keep=False)  # a ship at rest is no copy of another one at rest
-        for other, seen in known.items():
-            copied = rows.isin(seen) & distinct
-            of_runs = copied.groupby(one.frame["run"], sort=False).sum() / one.frame.groupby("run", sort=False).size()
-            if of_runs.max() > COPIED:
-                run = of_runs.idxmax()
-                raise DataError(
-                    f"run {run!r} has {of_runs.max():.0%} of its rows from {other.name}: a copy would train on what it "
-                    "tests; leave one of them out",
-                    file=file,
-                )
-        known[file] = rows[distinct].to_numpy()
+    """Raise DataError for a run whose motion is, row by row, in another dataset too, whatever its name is there."""
+    rows = {
+        file: pd.util.hash_pandas_object(one.frame[["u", "v", "r"]], index=False).drop_duplicates(keep=False)
+        for file, one in datasets.items()  # once only: a ship at rest is no copy of another one at rest
+    }
+    for first, second in combinations(datasets, 2):
+        for file, other in ((second, first), (first, second)):  # a run may be a part of a longer one
+            run = datasets[file].frame["run"]
+            shares = rows[file].isin(rows[other]).groupby(run).sum() / run.groupby(run).size()
+            if shares.max() > COPIED:
+                copied = f"run {shares.idxmax()!r} has {shares.max():.0%} of its rows from {other.name}"
+                raise DataError(f"{copied}: a copy would train on what it tests; leave one of them out", file=file)
 
 
 def _columns(datasets: Mapping[Path, Dataset], notes: list[str]) -> list[str]:

@@ -70,6 +70,16 @@ def test_a_run_that_is_in_two_datasets_is_refused_whatever_it_is_called(seed: in
     joined(*(Dataset(one.frame.assign(**still), one.metadata) for one in (first, other)))
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_run_that_is_a_part_of_a_longer_one_is_refused_in_either_order(turned: bool) -> None:
+    """A manoeuvre cut from the log of a day, which is in the other file as one run."""
+    day = recording(3, ("a", "b", "c", "d", "e", "f"))
+    cut = Dataset(day.frame[day.frame["run"] == "d"].reset_index(drop=True), day.metadata)
+    whole = Dataset(day.frame.assign(run="day").astype({"run": "str"}), day.metadata)
+    with pytest.raises(DataError, match=r"run 'd' has 100% of its rows from day \d\.parquet: a copy would train"):
+        joined(*((whole, cut) if turned else (cut, whole)))
+
+
 def test_joining_is_associative() -> None:
     a, b, c = recording(1), recording(2, ("c",), begin=500.0), recording(3, ("d", "e"), begin=900.0)
     left, right = joined(joined(a, b)[0], c)[0], joined(a, joined(b, c)[0])[0]
