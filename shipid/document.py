@@ -78,8 +78,11 @@ def find(name: str | Path, kind: str, relative_to: Path | None = None) -> Path:
         raise DocumentError("an empty name: give a bundled name, or the path of a document")
     if "/" in name or "\\" in name or name.endswith(".toml"):
         for folder in filter(None, (relative_to, Path())):
-            if (folder / name).is_file():
-                return folder / name
+            try:
+                if (folder / name).is_file():
+                    return folder / name
+            except OSError as error:  # a name that is too long
+                raise DocumentError(f"cannot be read ({error.strerror})", file=name) from None
         if any((folder / name).is_dir() for folder in filter(None, (relative_to, Path()))):
             raise DocumentError("is a folder: name a document in it", file=name)
         raise DocumentError("no such file", file=name)
@@ -360,9 +363,8 @@ def _place(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
     """The parts of a pydantic location that are keys or indices of the data, without the names of union members."""
     location = problem["loc"]
     for position, part in enumerate(location):
-        if isinstance(data, Mapping) and part in data:
-            data = data[part]
-        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+        listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
+        if listed or (isinstance(data, Mapping) and part in data):
             data = data[part]
         elif problem["type"] != "missing" or position < len(location) - 1:
             continue
