@@ -11,7 +11,7 @@ import tempfile
 import time
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -132,8 +132,8 @@ def write_new(text: str, file: Path, kind: str = "mapping") -> Path:
     return file
 
 
-def write_together(texts: Mapping[Path, str], gone: Iterable[Path] = ()) -> list[Path]:
-    """Write text files of one folder that belong together; `gone` are files of an earlier set that are removed.
+def write_together(texts: Mapping[Path, str]) -> list[Path]:
+    """Write text files of one folder that belong together.
 
     A process that is killed leaves the old set, the new one or a set with files missing, never files of both.
     """
@@ -143,7 +143,7 @@ def write_together(texts: Mapping[Path, str], gone: Iterable[Path] = ()) -> list
         for file, text in texts.items():
             (above / file.name).write_text(text, encoding="utf-8", newline="\n")
             sync(above / file.name)
-        for file in (*gone, *texts):
+        for file in texts:
             file.unlink(missing_ok=True)
         sync(folder)
         for file in texts:

@@ -21,12 +21,13 @@ class Guarded(typer.core.TyperCommand):
     """A command that refuses numbers that are not finite, and a file named to be read and written, or written twice."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command; ShipidError for a file named twice, or for a device or pipe as an output."""
+        """Run the command; ShipidError for a number that is not finite, or for a file that must not be written."""
         for one in self.params:
             values = ctx.params.get(one.name)
             for value in values if isinstance(values, list | tuple) else [values]:
                 if isinstance(value, float) and not isfinite(value):
-                    raise ShipidError(f"{value:g}: must be a finite number", path=one.opts[0])
+                    path = one.opts[0] if one.param_type_name == "option" else one.name.upper()
+                    raise ShipidError(f"{value:g}: must be a finite number", path=path)
         options = {one.name for one in self.params if one.param_type_name == "option"}
         written = {name: value for name, value in ctx.params.items() if name in OUTPUTS and name in options and value}
         read = [one for name, value in ctx.params.items() if name not in written for one in _files(value)]

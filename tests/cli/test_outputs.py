@@ -120,6 +120,8 @@ def test_numbers_are_finite(words: str, value: str) -> None:
     status, _, error = ended(*f"{words}={value}".split())
     assert status == 1
     assert re.fullmatch(rf"error: --\w+: {value}: must be a finite number\n", error)
+    status, _, error = ended("manoeuvre", "./ship.toml", "turning", "--", value)
+    assert (status, error) == (1, f"error: ANGLES: {value}: must be a finite number\n")
 
 
 def test_every_command_is_guarded() -> None:
