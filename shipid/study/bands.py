@@ -114,7 +114,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
     """
     level, test, rows = results.plan.level, results.test, []
     kinds = kinds_of(results.dataset, test.spans)
-    kind = np.array([kinds.get(str(run), "other") for run in test.run])
+    kind = np.array([kinds[str(run)] for run in test.run])
     speed = np.hypot(test.columns["u"], test.columns["v"])
     edges = np.quantile(speed, np.linspace(0, 1, SPEEDS + 1))
     decimals = max(0, 1 - math.floor(math.log10(max(float(edges[-1]), 1e-3))))  # two digits of the greatest speed
@@ -181,7 +181,7 @@ def worst_frame(results: Results) -> pd.DataFrame:
         reach = region.reach(errors).max(axis=0)
         for run, mine in places.items():
             inside = float((reach[mine] <= 1).mean())
-            entry = {"model": row["model"], "run": run, "kind": kinds.get(run, "other"), "coverage": inside}
+            entry = {"model": row["model"], "run": run, "kind": kinds[run], "coverage": inside}
             rows.append({**entry, "reach": float(reach[mine].max())})
     columns = ["model", "run", "kind", "coverage", "reach"]
     return pd.DataFrame(rows, columns=columns).sort_values(["coverage", "reach"], ascending=[True, False])

@@ -54,7 +54,7 @@ class Prepared:
     estimates : foundation -> what its observer knows at every row of the runs, where it has one and its numbers do not
         depend on the batch.
     notes : what was assumed, redrawn or left out, in sentences.
-    kinds : kind of manoeuvre by run, where it is declared or can be seen.
+    kinds : run -> kind of manoeuvre, see `kinds_of`.
     """
 
     data: Dataset

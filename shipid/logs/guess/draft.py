@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from shipid.data.dataset import DATED
 from shipid.errors import ShipidError
 from shipid.logs import segments as cutting
 from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
@@ -66,20 +67,24 @@ def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
 def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
     """Return segments as TOML, to be corrected by hand; `unit` is the unit of the log's clock."""
     blocks = ["\n# Segmented by helm and heading: correct names, starts and ends, and remove what is no run."]
-    if is_dated(unit):
+    segments = list(segments)
+    dated = is_dated(unit) and all(segment.start > DATED for segment in segments)
+    if dated:
         blocks.append("# Starts and ends are seconds since 1970; the dates are UTC.")
+    elif is_dated(unit):
+        blocks.append("# Starts and ends are seconds since the midnight before the log, whose clock has no date.")
     digits = 3 + max(0, math.ceil(math.log10(to_si(unit, "t"))))  # to 1 ms, of hours and days, too
     for segment in segments:
         values = {key: value for key, value in segment.model_dump().items() if value is not None}
         values |= {end: round(values[end], digits) for end in ("start", "end")}
-        dates = f"    # {moment(segment.start, unit)} to {moment(segment.end, unit)}" if is_dated(unit) else ""
+        dates = f"    # {moment(segment.start, unit)} to {moment(segment.end, unit)}" if dated else ""
         blocks.append("\n".join([f"[[segment]]{dates}", *_lines(values)]))
     return "\n".join(blocks) + "\n"
 
 
 def moment(value: float, unit: str) -> str:
     """Return a moment on the log's clock as text: a date in UTC, or the number."""
-    return date_of(value) if is_dated(unit) and value < LAST_DATE else f"{value:.10g}"
+    return date_of(value) if is_dated(unit) and DATED < value < LAST_DATE else f"{value:.10g}"
 
 
 def _read(text: str) -> Mapping:

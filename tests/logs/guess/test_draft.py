@@ -108,6 +108,14 @@ def test_segments_on_a_clock_of_days_since_a_zero_say_when(unit: str) -> None:
     assert moment(1e13, unit) == "1e+13"  # beyond the year 9999
 
 
+def test_segments_on_times_of_day_have_no_date() -> None:
+    """A clock of times without dates is read as seconds since a midnight: not one of 1970."""
+    text = segments_text([Segment(run="zigzag 1", start=28805.0, end=28980.0)], "date")
+    assert "1970" not in text
+    assert "# Starts and ends are seconds since the midnight before the log" in text
+    assert moment(28805.0, "date") == "28805"
+
+
 @pytest.mark.parametrize("unit", UNITS["s"])
 def test_segments_keep_a_millisecond_in_every_unit(unit: str) -> None:
     size = UNITS["s"][unit]
