@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
@@ -109,9 +109,9 @@ def is_alive(process: int) -> bool:
 
 
 def write_text(file: Path, text: str) -> None:
-    """Write a UTF-8 text file."""
+    """Write a UTF-8 text file; bytes of a name of a file that are not UTF-8 are written out, as escapes."""
     with whole(file) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def check_new(file: Path, kind: str) -> None:
@@ -141,7 +141,7 @@ def write_together(texts: Mapping[Path, str]) -> list[Path]:
     make_folder(folder)
     with temporary_folder(folder) as above:
         for file, text in texts.items():
-            (above / file.name).write_text(text, encoding="utf-8", newline="\n")
+            (above / file.name).write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
             sync(above / file.name)
         for file in texts:
             file.unlink(missing_ok=True)
@@ -195,7 +195,8 @@ def write_table(file: Path, frame: DataFrame) -> None:
         if file.suffix == ".csv":
             frame.to_csv(temporary, index=False)
         else:
-            frame.to_parquet(temporary, index=False)
+            with temporary.open("wb") as stream:  # Arrow takes no name that is not UTF-8
+                frame.to_parquet(stream, index=False)
 
 
 def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bool = False) -> None:
@@ -204,13 +205,20 @@ def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bo
         (np.savez_compressed if compressed else np.savez)(stream, allow_pickle=False, **arrays)
 
 
+def open_file(file: str | os.PathLike[str]) -> BinaryIO:
+    """Open a file to be read; OSError for a device or a pipe, too, which might never give anything."""
+    if Path(file).exists() and not (Path(file).is_file() or Path(file).is_dir()):
+        raise OSError(errno.EINVAL, "a device or a pipe, not a file", str(file))
+    return Path(file).open("rb")
+
+
 def read_arrays(file: str | os.PathLike[str], *beginnings: str) -> dict[str, np.ndarray]:
     """Read the arrays of a `.npz`, or those whose names begin so; never a pickle.
 
     OSError if it cannot be opened, ValueError for anything else.
     """
     try:
-        with Path(file).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
+        with open_file(file) as stream, np.load(stream, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files if name.startswith(beginnings or "")}
     except (zipfile.BadZipFile, zlib.error, EOFError, TypeError, AttributeError, NotImplementedError) as error:
         raise ValueError(f"{file} is not a whole .npz") from error

@@ -253,3 +253,14 @@ def test_names_are_as_short_as_is_clear() -> None:
     assert documents.short_names(one_letter) == ("inertia.m", "K_T.J", "R_0")
     two_of_a_name = ["hull.derivatives.Y_v", "port.D_p", "starboard.D_p"]
     assert documents.short_names(two_of_a_name) == ("Y_v", "port.D_p", "starboard.D_p")
+
+
+def test_match_takes_many_stars_as_soon_as_few() -> None:
+    assert documents.match("*" * 3000 + "x", ["hull.derivatives.N_v|v|" * 3]) == []
+    assert documents.match("*.*e*" * 20 + "x", ["hull.derivatives.N_v|v|" * 3]) == []
+    assert documents.match("***u*l***", ["hull"]) == ["hull"]
+
+
+def test_a_path_that_is_too_long_is_no_document() -> None:
+    with pytest.raises(DocumentError, match="cannot be read"):
+        documents.find("./" + "a" * 5000 + ".toml", "models")

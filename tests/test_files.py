@@ -246,3 +246,21 @@ def test_devices_pipes_and_circles_are_refused(tmp_path: Path) -> None:
         with pytest.raises(OSError, match=why):
             files.write_text(place, "new")
         assert not place.is_file()
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.npz")
+    with pytest.raises(OSError, match="a device or a pipe"):
+        files.read_arrays(tmp_path / "pipe.npz")
+
+
+def test_a_table_may_have_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
+    file = tmp_path / os.fsdecode(b"\xe9.parquet")
+    files.write_table(file, pd.DataFrame({"a": [1.0]}))
+    with file.open("rb") as stream:
+        assert pd.read_parquet(stream)["a"].tolist() == [1.0]
+
+
+def test_text_may_name_a_file_that_is_not_utf_8(tmp_path: Path) -> None:
+    files.write_text(tmp_path / "a.html", f"made in {os.fsdecode(b'caf')}{os.fsdecode(bytes([0xE9]))}")
+    assert (tmp_path / "a.html").read_text() == r"made in caf\udce9"

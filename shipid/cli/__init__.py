@@ -36,6 +36,7 @@ GROUPS = {"vessel": vessel.app, "data": data.app, "study": study.app}
 def main() -> None:
     """Run the command line: an error that the user can correct is one line, never a traceback."""
     try:
+        _check_utf_8(sys.argv[1:])
         _named(sys.argv[1:])()
     except ShipidError as error:
         sys.stderr.write(f"error: {error}\n")
@@ -51,6 +52,13 @@ def main() -> None:
     except OSError as error:  # a full disk, a folder that is a file, a place where one may not write
         sys.stderr.write(f"error: {error.filename or 'system'}: {error.strerror or error}\n")
         sys.exit(1)
+
+
+def _check_utf_8(arguments: Sequence[str]) -> None:
+    """Raise ShipidError for an argument that is not UTF-8: documents, pages and tables could not name such a file."""
+    for argument in arguments:
+        if any("\ud800" <= sign <= "\udfff" for sign in argument):
+            raise ShipidError("is not UTF-8: rename the file or folder, or write the text in UTF-8", path=argument)
 
 
 def _before(

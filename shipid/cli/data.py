@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -182,7 +183,8 @@ def data_join(
 
     if out.suffix != ".parquet":
         raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
-    twice = next((file for file in datasets if [one.resolve() for one in datasets].count(file.resolve()) > 1), None)
+    places = [os.path.realpath(file) for file in datasets]
+    twice = next((file for file, place in zip(datasets, places, strict=True) if places.count(place) > 1), None)
     if twice is not None:
         raise ShipidError("is named twice: name each dataset once", file=twice)
     joined, notes = join({file: read_dataset(file) for file in datasets})

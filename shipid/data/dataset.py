@@ -17,7 +17,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from shipid.errors import DataError, choices
-from shipid.files import whole
+from shipid.files import open_file, whole
 from shipid.physics.signals import SIGNALS, is_command, is_output, named, signal_of
 
 Array = NDArray[np.float64]
@@ -292,8 +292,8 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
     table = pyarrow.Table.from_pandas(dataset.frame, preserve_index=False)
     table = table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: json.dumps(metadata).encode()})
     try:
-        with whole(target) as part:
-            pyarrow.parquet.write_table(table, part, compression="zstd")
+        with whole(target) as part, part.open("wb") as stream:  # Arrow takes no name that is not UTF-8
+            pyarrow.parquet.write_table(table, stream, compression="zstd")
     except OSError as error:
         raise DataError(f"cannot be written ({error.strerror or error})", file=target) from None
     return target
@@ -304,12 +304,15 @@ def read_dataset(file: str | os.PathLike[str]) -> Dataset:
     if os.path.isdir(file):
         raise DataError("is a folder: name one dataset; `shipid data join` makes one of several", file=file)
     try:
-        table = pyarrow.parquet.read_table(file)
+        with open_file(file) as stream:
+            table = pyarrow.parquet.read_table(stream)
     except (pyarrow.ArrowException, ValueError, TypeError):
         hint = "make one from a log with `shipid data import`, or give the log with --mapping where there is one"
         raise DataError(f"not a Parquet file: {hint}", file=file) from None
+    except FileNotFoundError:
+        raise DataError("cannot be read (no such file)", file=file) from None
     except OSError as error:
-        raise DataError(f"cannot be read ({error.strerror or 'no such file'})", file=file) from None
+        raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
     stored = (table.schema.metadata or {}).get(_KEY)
     if stored is None:
         raise DataError("a Parquet file, but not a dataset of shipid: no metadata under 'shipid'", file=file)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -105,8 +107,10 @@ def write_function(function: ca.Function, names: Mapping[str, Any], file: Path) 
     """Write `file` (for `casadi.Function.load`) and `file.json` with the names of inputs and outputs."""
     listing = listing_of(file)
     listing.unlink(missing_ok=True)  # never the names of another function
-    with whole(file) as temporary:
-        function.save(str(temporary))
+    with whole(file) as temporary, tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder, "function.casadi")  # CasADi takes no name that is not UTF-8
+        function.save(str(plain))
+        shutil.copyfile(plain, temporary)
     write_json(
         listing,
         {"shipid": __version__, "casadi": str(ca.CasadiMeta.version()), **json.loads(json.dumps(names, default=str))},

@@ -162,6 +162,9 @@ def runs_of(source: Source, log: Path) -> dict[str, Path]:
     files = sorted(file for file in log.glob(source.runs) if file.is_file() and file not in left)
     if not files:
         raise DataError(f"no file {source.runs!r} in this folder", file=log, path="source.runs")
+    foreign = [file for file in files if any("\ud800" <= sign <= "\udfff" for sign in str(file.relative_to(log)))]
+    if foreign:
+        raise DataError("its name is not UTF-8, and names the run: rename it", file=foreign[0])
     return {run_of(file, log, source.runs): file for file in files}
 
 

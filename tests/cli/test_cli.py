@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -145,3 +146,10 @@ def test_notes_of_the_library_are_shown_on_request(tiny_run: Path, tmp_path: Pat
     assert loud.returncode == 0
     assert f"shipid.study.contents: report written: {folder / 'report.html'}" in loud.stderr
     assert quiet.stdout == loud.stdout
+
+
+def test_an_argument_that_is_not_utf_8_is_refused_before_any_work() -> None:
+    """Documents, pages and tables would have to name the file."""
+    code, _, error = ended("study", "run", os.fsdecode(b"caf\xe9.toml"))
+    assert code == 1
+    assert error == "error: caf\\udce9.toml: is not UTF-8: rename the file or folder, or write the text in UTF-8\n"

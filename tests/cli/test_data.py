@@ -14,7 +14,7 @@ from shipid.cli.data import data_import
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.logs.guess.pose import Frame
 from shipid.study.store import DATASET
-from tests.cli.running import BAD, output_of
+from tests.cli.running import BAD, ended, output_of
 from tests.logs.simulated import as_bridge, si_log
 
 
@@ -76,3 +76,11 @@ def test_the_frames_of_the_command_are_those_of_the_draft() -> None:
     """They are written twice: the help of the command does not load the draft."""
     declared, _ = get_args(get_type_hints(data_import)["frame"])
     assert get_args(declared) == get_args(Frame)
+
+
+def test_data_join_of_a_link_to_itself_is_refused(tmp_path: Path, tiny_run: Path) -> None:
+    loop = tmp_path / "loop.parquet"
+    loop.symlink_to(loop)
+    code, _, error = ended("data", "join", tiny_run / DATASET, loop, "--out", tmp_path / "all.parquet")
+    assert code == 1
+    assert error.startswith(f"error: {loop}: cannot be read")

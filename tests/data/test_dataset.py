@@ -1,6 +1,7 @@
 """The schema refuses what it should, and Parquet gives back what went in."""
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -203,3 +204,15 @@ def test_sample_unwraps_angles() -> None:
 )
 def test_unit_of(name: str, unit: str | None) -> None:
     assert unit_of(name) == unit
+
+
+def test_a_name_that_is_not_utf_8_is_written_and_read(tmp_path: Path) -> None:
+    dataset = as_dataset(turning(T))
+    file = write_dataset(dataset, tmp_path / os.fsdecode(b"\xe9.parquet"))
+    assert read_dataset(file).digest == dataset.digest
+
+
+def test_a_pipe_is_no_dataset(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.parquet")
+    with pytest.raises(DataError, match="a device or a pipe"):
+        read_dataset(tmp_path / "pipe.parquet")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -122,3 +123,9 @@ def test_do_mpc_takes_the_function(tmp_path):
         order = controller.make_step(now)
         now = np.array(step(now, ca.vertcat(1.3, order), [], np.zeros(3), listed["defaults"]["parameters"], 10.0))
     assert abs(now[at.index("east"), 0] - 20) < 8
+
+
+def test_a_name_that_is_not_utf_8_can_be_written(tmp_path):
+    file, _ = export_vessel(load_vessel("mariner"), "casadi", tmp_path / os.fsdecode(b"\xe9.casadi"))
+    os.rename(file, tmp_path / "plain.casadi")
+    assert ca.Function.load(str(tmp_path / "plain.casadi")).n_in() > 0

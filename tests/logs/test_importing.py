@@ -1,6 +1,7 @@
 """The real log is imported to known facts; defects put into synthetic logs are detected and repaired."""
 
 import csv
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import pytest
 from shipid.data.dataset import Dataset, flag_bit, pieces, read_dataset, write_dataset
 from shipid.errors import DataError
 from shipid.logs import readers
-from shipid.logs.importing import _unwrap, even_clock, evenly, import_log, read_mapping, rounding_of
+from shipid.logs.importing import _unwrap, even_clock, evenly, import_log, read_mapping, rounding_of, runs_of
+from shipid.logs.mapping import Source
 from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, stamps, turning
 
 Write = Callable[..., Path]
@@ -444,3 +446,9 @@ def test_a_heading_that_counts_on_or_begins_anew_needs_no_wrap(tmp_path: Path) -
     (tmp_path / "m.toml").write_text(text)
     frame = import_log(read_mapping(tmp_path / "m.toml"), tmp_path / "log.csv").frame
     assert frame["psi"].max() > 4 * np.pi
+
+
+def test_a_run_is_named_by_a_file_in_utf_8(tmp_path: Path) -> None:
+    (tmp_path / os.fsdecode(b"a\xe9.csv")).touch()
+    with pytest.raises(DataError, match="its name is not UTF-8"):
+        runs_of(Source(runs="*.csv"), tmp_path)

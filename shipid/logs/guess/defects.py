@@ -49,6 +49,7 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
                 state.find("clipped", (column.source,), 0.7, sentence)
     steps = np.diff(sniffed.t)
     holes = int(np.sum(steps > evidence.GAP * np.median(steps)))
+    holes = max(holes - sniffed.seams, 0)
     if holes:
         sentence = f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s"
         state.find("holes in time", (sniffed.clock["from"],), 0.99, sentence)

@@ -89,7 +89,7 @@ class Sniffed:
     """An unknown log as numbers: how it is written, its clock and all other columns, NaN where a value is missing.
 
     `form` holds the keys of [format] and `clock` those of [clock]; `t` [s] rises; `notes` are sentences on columns
-    that were left out.
+    that were left out. `seams` counts the places where the rows of a large log were not read.
     """
 
     form: dict[str, Any]
@@ -97,6 +97,7 @@ class Sniffed:
     t: Array
     columns: dict[str, Array]
     notes: tuple[str, ...]
+    seams: int = 0
 
     @property
     def scattered(self) -> bool:
@@ -122,6 +123,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     form = _format(head[:200_000], file, names)
     model = READERS[form.get("kind", "text")].options.model_validate(form)
     notes: tuple[str, ...] = ()
+    sampled = False
     if isinstance(model, TextFormat):
         widest(head, model.separator, file)
         sampled = size > SAMPLE
@@ -153,7 +155,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     form.pop("ragged", None) if form.get("ragged") == "refuse" else None
     if not once.all():
         notes += ("rows that repeat the row before are left out",)
-    return Sniffed(form, clock, t, kept, notes + empty)
+    return Sniffed(form, clock, t, kept, notes + empty, BLOCKS if sampled else 0)
 
 
 def _sample(file: Path, encoding: str, size: int) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.logs.guess import sniff
 from shipid.logs.guess.columns import Guess, guess
 from shipid.logs.guess.draft import draft_mapping
 from shipid.logs.importing import import_log, read_mapping
@@ -104,3 +105,15 @@ def test_a_log_with_drawn_spikes_is_healed_by_its_draft(seed: int, tmp_path: Pat
     healed, clean = (import_log(read_mapping(mapping), file).frame for file in (drafted.file, tmp_path / "clean.csv"))
     for name, most in (("u", 0.5), ("v", 0.5), ("r", 0.02), ("north", 6.0), ("east", 6.0)):
         assert (healed[name] - clean[name]).abs().max() < most, name
+
+
+def test_what_was_not_looked_at_is_no_hole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a large log only samples are read: the clock jumps from one to the next."""
+    rows = len(CLEAN.to_csv(index=False))
+    monkeypatch.setattr(sniff, "SAMPLE", rows // 2)
+    monkeypatch.setattr(sniff, "BLOCK", rows // 30)
+    seen = guessed(tmp_path, CLEAN)
+    assert "places of" in draft_mapping(seen)
+    assert "holes in time" not in seen.kinds
+    with_a_hole = CLEAN.drop(CLEAN.index[20:60])  # in the head, which is read
+    assert "holes in time" in guessed(tmp_path, with_a_hole).kinds
