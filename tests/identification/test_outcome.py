@@ -92,6 +92,19 @@ def test_a_fit_sees_no_moment_of_a_run_held_out(log: Dataset) -> None:
         run_identification(off(), everything, settings(), held_out=["M05"])
 
 
+def test_runs_that_share_an_end_alone_are_not_said_to_share_nothing(log: Dataset) -> None:
+    """Segments cut one after another have one row in common."""
+    place = log.frame["run"].map({"M01": 0, "M02": 1, "M03": 2, "M04": 3, "M05": 4})
+    t = log.frame["t"] + place * log.frame["t"].max()
+    frame = log.frame.assign(t=t, run=log.frame["run"].where(place == 4, "M01"))
+    frame = frame.drop_duplicates(["run", "t"], ignore_index=True)
+    apart, _, warnings = outcome.without_shared(Dataset(frame, {**log.metadata, "clock": "shared"}), ["M01"], ["M05"])
+    assert len(apart.frame) == len(frame) - 1
+    assert warnings == (
+        "run M01 shares less than 1% of its rows in time with the runs held out: they take no part in the fit",
+    )
+
+
 def test_it_tells_what_the_parts_tell(identified: Identified, log: Dataset) -> None:
     alone = identify(off(), log, ["M01", "M02", "M03", "M04"], settings())
     assert identified.runs == alone.runs
