@@ -11,7 +11,7 @@ WORDS = {
     LOW_SPEED: r"berth\w*|dock\w*|undock\w*|moor\w*|harbou?r\w*|low\W?speed|station\w*|dp",
     COASTING: r"coast\w*|drift\w*|freewheel\w*",
     "stop": r"stop\w*|crash\w*",
-    RANDOM: r"random\w*|rnd|rand|aprbs|prbs|multisine\w*|excitation\w*",
+    RANDOM: r"random\w*|rnd|rand|aprbs|prbs|multisine\w*|excitation\w*|^steps$",
     "spiral": r"spiral\w*|dieudonne|bech",
     "pull-out": r"pull\W?out\w*",
     "speed run": r"speed\W?runs?|speed\W?trials?|speed|accel\w*|decel\w*|mile",

@@ -504,8 +504,8 @@ KINDS: dict[str, type[Manoeuvre]] = {
 
 
 def name_of(manoeuvre: Manoeuvre) -> str:
-    """Name of the kind of a manoeuvre in `KINDS`; of a class that is not there, its own."""
-    return next((name for name, kind in KINDS.items() if type(manoeuvre) is kind), type(manoeuvre).__name__)
+    """Name of the kind of a manoeuvre in `KINDS`."""
+    return next(name for name, kind in KINDS.items() if type(manoeuvre) is kind)
 
 
 def order_unit(command: str) -> float:

@@ -53,8 +53,9 @@ def test_a_simulated_run_is_of_the_kind_that_was_drawn(tmp_path: Path) -> None:
         {"kind": "turning", "n_rpm": [100.0, 200.0], "alpha_deg": [-30.0, 30.0]},
         {"kind": "turning_circle", "n_rpm": 150.0},
         {"kind": "excitation", "n_rpm": [100.0, 200.0], "angle_deg": 20.0, "signal": "aprbs"},
+        {"kind": "steps", "n_rpm": [100.0, 200.0], "alpha_deg": [-30.0, 30.0]},
     ]
-    for block, kind in zip(blocks, ["zigzag", "turning", "turning", RANDOM], strict=True):
+    for block, kind in zip(blocks, ["zigzag", "turning", "turning", RANDOM, RANDOM], strict=True):
         plan = tiny_plan(tmp_path, {"truth.manoeuvre": [block], "truth.manoeuvres": 10})
         assert set(kinds_of(obtain(plan)).values()) == {kind}
 
