@@ -196,7 +196,7 @@ def cut_windows(
     ------
     DataError : a number that is not positive and finite, or no run is as long as past and horizon together.
     """
-    if not (horizon >= 1 and 0 < step < np.inf and 0 < interval < np.inf):
+    if not (1 <= horizon < np.inf and 0 < step < np.inf and 0 < interval < np.inf):
         raise DataError(f"horizon {horizon}, step {step:g} s and interval {interval:g} s must be positive and finite")
     shared = shares_clock(dataset)
     parts = []
@@ -235,7 +235,7 @@ def _instants(t: Array, past: float, ahead: float, interval: float) -> Array:
     if last > MANY * len(t):  # so close that no row is left out
         rows = np.flatnonzero((t >= first - slack) & (t <= t[-1] - ahead + slack))
         return np.asarray(t[rows])
-    wanted = first + interval * np.arange(int(last) + 1)
+    wanted = first + interval * np.arange(max(0, int(last) + 1))
     rows = np.unique(np.searchsorted(t, wanted + slack, side="right") - 1)
     return np.asarray(t[rows[t[rows] >= first - slack]])
 

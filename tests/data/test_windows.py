@@ -448,6 +448,15 @@ def test_numbers_that_are_not_finite_are_refused() -> None:
         for value in (np.nan, np.inf, 0.0, -1.0):
             with pytest.raises(DataError, match="must be positive and finite"):
                 cut_windows(dataset, **{"horizon": 5, "step": 1.0, "interval": 2.0, name: value})
+    with pytest.raises(DataError, match="horizon inf, step 1 s and interval 2 s must be positive and finite"):
+        cut_windows(dataset, horizon=np.inf, step=1.0, interval=2.0)
+
+
+@pytest.mark.parametrize("step", [1e4, 1e24, 1e300])
+def test_a_step_far_above_the_runs_is_refused(step: float) -> None:
+    dataset = as_dataset(turning(np.arange(0.0, 60.0, 0.5)))
+    with pytest.raises(DataError, match="no run is as long as the horizon of"):
+        cut_windows(dataset, horizon=5, step=step, interval=2.0)
 
 
 def test_an_interval_far_below_the_rows_gives_every_row() -> None:
