@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.study.store import read_rows
+from shipid.study.store import DATASET, read_rows
 from tests.cli.running import BAD, output_of
 
 
@@ -19,3 +19,15 @@ def test_predict_on_a_raw_log(tmp_path: Path, tiny_run: Path, monkeypatch: pytes
             *("predict", tiny_run, BAD / "logs" / "good.csv", "--cell", read_rows(tiny_run)["cell"].iloc[0]),
             *("--mapping", BAD / "logs" / "plain.toml"),
         )
+
+
+def test_the_default_file_is_not_written_over_the_log(
+    tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    cell = read_rows(tiny_run)["cell"].iloc[0]
+    log = Path(f"{cell}.parquet")
+    log.write_bytes((tiny_run / DATASET).read_bytes())
+    with pytest.raises(ShipidError, match="--out: is named twice, and would be written over"):
+        output_of("predict", tiny_run, log, "--cell", cell)
+    assert log.read_bytes() == (tiny_run / DATASET).read_bytes()
