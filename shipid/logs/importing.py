@@ -699,7 +699,7 @@ def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Pat
         start, end = segment.start * unit, segment.end * unit
         inside = (t >= start - slack) & (t <= end + slack)
         if start < t[0] - step - slack or end > t[-1] + step + slack or inside.sum() < 2:
-            message = f"run {segment.run!r}, {span_of(start, end)}, is not in the log, {span_of(t[0], t[-1])}"
+            message = f"run {segment.run!r}, {span_of(start, end)}, is not in the log, which has {span_of(t[0], t[-1])}"
             raise DataError(message, file=file, path=f"segment.{index}")
         part = rows if inside.all() else rows.loc[inside].reset_index(drop=True)
         runs.append(_named(part, segment.run))

@@ -60,7 +60,7 @@ MAPPINGS = {
 
 AGAINST_LOG = {
     "not_in_log": ("columns.propeller.n.from", "did you mean 'rpm'?"),
-    "segment_outside_log": ("segment.1", "is not in the log, 0 to 20 s"),
+    "segment_outside_log": ("segment.1", "is not in the log, which has 0 to 20 s"),
     "wrong_names": ("format.names", "2 names for the 8 columns"),
     "other_file": ("source.sha256", "fetch that file"),
     "skips_everything": ("format.skip_rows", "no line is left after 100 skipped lines"),
