@@ -43,13 +43,18 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
         raise OSError(errno.ELOOP, "a link that leads to itself", str(target))
     if target.exists() and not (target.is_file() or target.is_dir()):
         raise OSError(errno.EINVAL, "a device or a pipe: name a file to write", str(target))
-    make_folder(target.parent)
-    with temporary_folder(target.parent) as folder:
-        temporary = folder / name
-        yield temporary
-        sync(temporary)
-        os.replace(temporary, target)
-    sync(target.parent)
+    try:
+        make_folder(target.parent)
+        with temporary_folder(target.parent) as folder:
+            temporary = folder / name
+            yield temporary
+            sync(temporary)
+            os.replace(temporary, target)
+        sync(target.parent)
+    except OSError as error:
+        if error.errno is not None and error.filename is None:  # a write that fails, as on a full disk, names no file
+            error.filename = str(target)
+        raise
 
 
 def make_folder(folder: Path) -> None:

@@ -264,3 +264,15 @@ def test_a_table_may_have_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
 def test_text_may_name_a_file_that_is_not_utf_8(tmp_path: Path) -> None:
     files.write_text(tmp_path / "a.html", f"made in {os.fsdecode(b'caf')}{os.fsdecode(bytes([0xE9]))}")
     assert (tmp_path / "a.html").read_text() == r"made in caf\udce9"
+
+
+def test_a_write_that_fails_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a full disk the system says that there is no space, and not for which file."""
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space") as caught:
+        files.write_json(tmp_path / "a.json", {})
+    assert caught.value.filename == str(tmp_path / "a.json")

@@ -69,8 +69,10 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
     if len(folders) < 2:
         raise ShipidError("name two folders or more")
     places = [Path(folder) for folder in folders]
-    if len({place.resolve() for place in places}) < len(places):
-        raise ShipidError("a folder is named twice")
+    real = [os.path.realpath(place) for place in places]
+    twice = next((place for place, one in zip(places, real, strict=True) if real.count(one) > 1), None)
+    if twice is not None:
+        raise ShipidError("is named twice: name each folder once", file=twice)
     return compare_results([read_results(place) for place in places], pairs)
 
 

@@ -56,13 +56,15 @@ def open_folder(folder: Path, plan: Plan) -> None:
     It appears with all that says what it is, so that of two runs that begin at once only one makes it; the other joins
     it, or is refused if it is of another plan.
     """
+    if folder.is_symlink() and not folder.exists():
+        raise ResultError("is a link that leads nowhere: choose another --out", file=folder)
     if folder.exists() and not folder.is_dir():
         raise ResultError("is a file: choose another --out", file=folder)
     try:
         make_folder(folder.parent)
         sweep(folder.parent)
         if not (folder / STUDY).exists():
-            if folder.resolve() == Path.cwd():  # it is made anew, under the feet of this process
+            if os.path.realpath(folder) == os.getcwd():  # it is made anew, under the feet of this process
                 raise ResultError("is the working folder: name a new one by --out, such as --out run", file=folder)
             _make(folder, plan)
     except OSError as error:

@@ -174,7 +174,7 @@ def test_nothing_in_common_is_one_line(made: Made, tiny_run: Path) -> None:
     assert _remedy(one, other, named=False).startswith("name counterparts by --pair FIRST=OTHER; they have no N_D in")
     with pytest.raises(ShipidError, match="two folders or more"):
         compare([tiny_run])
-    with pytest.raises(ShipidError, match="named twice"):
+    with pytest.raises(ShipidError, match=f"{tiny_run}: is named twice"):
         compare([tiny_run, tiny_run])
 
 

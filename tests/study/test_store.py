@@ -128,3 +128,10 @@ def test_each_kind_of_session_is_noted_once(tmp_path: Path) -> None:
     notes = [store.note_session(folder, session) for session in (one, one, other, one, other)]
     assert notes == [[], [], ["processor was one, now other"], ["processor was other, now one"], []]
     assert read_json(folder / store.PROVENANCE)["sessions"] == [one, other]
+
+
+@pytest.mark.parametrize("target", ["loop", "gone"])
+def test_a_link_that_leads_nowhere_is_no_folder_of_a_run(target: str, tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to(target)
+    with pytest.raises(ResultError, match="loop: is a link that leads nowhere: choose another --out"):
+        store.open_folder(tmp_path / "loop", tiny_plan(tmp_path))
