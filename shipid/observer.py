@@ -40,6 +40,7 @@ from shipid.engine.rollout import rollout
 from shipid.engine.samples import on_samples
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.metrics import position_error
+from shipid.units import GRAVITY
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
@@ -55,7 +56,6 @@ NUMBERS = (
 )
 COLUMNS = (*MEASURED, "X", "Y", "N", "current_north", "current_east")
 """Estimates as columns, `observer.u`, ...; X, Y, N are the slow force as acceleration, M^-1 tau [m/s^2, rad/s^2]."""
-GRAVITY = 9.81  # m/s^2
 DIVERGED = 1e9  # SI: no state, variance or likelihood of a sound filter is so large
 SPIKE = 300.0  # standard deviations: a measurement as far off is a fault of the log and moves nothing
 FADES = (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, 1e6)  # x sqrt(L / g): between which `tune_observer` chooses

@@ -1,4 +1,4 @@
-"""Factors from common units to SI: value in SI = value * factor."""
+"""Factors from common units to SI: value in SI = value * factor; and the acceleration of gravity."""
 
 import math
 
@@ -10,3 +10,5 @@ KNOT = 1852.0 / 3600.0
 """Metres per second in one knot (the international nautical mile is 1,852 m)."""
 MINUTE = 60.0
 """Seconds in one minute."""
+GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2], where a vessel gives no other one."""

@@ -32,8 +32,8 @@ from shipid.simulation.approach import Controls, NotStraight
 from shipid.simulation.log import aboard, horizontal
 from shipid.simulation.manoeuvre import Approached, Excitation
 from shipid.simulation.perform import perform
-from shipid.simulation.standard import FROUDE, GRAVITY, length_of, shaft_speed, standard
-from shipid.units import RPM
+from shipid.simulation.standard import FROUDE, length_of, shaft_speed, standard
+from shipid.units import GRAVITY, RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveFloat, PositiveInt
 
+from shipid.units import GRAVITY
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import uniform
 from shipid.vessel.schema import term_blocks
 
 Array = np.ndarray
-GRAVITY = 9.81  # m/s^2, default of constants.g: dispersion in deep water, k = omega^2 / g
 LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.2 % of the energy of a JONSWAP spectrum lies between
 SIDE = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}  # symmetry in the relative heading: 1 even, -1 odd
 

@@ -22,10 +22,10 @@ from shipid.simulation.manoeuvre import (
     TurningCircle,
     Zigzag,
 )
-from shipid.units import RPM
+from shipid.units import GRAVITY, RPM
 from shipid.vessel.load import Vessel
 
-FROUDE, GRAVITY = 0.2, 9.81  # default speed: U = 0.2 sqrt(g L)
+FROUDE = 0.2  # default speed: U = 0.2 sqrt(g L)
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
 LEAST_STEPS, MOST_STEPS = 10, 1e7  # steps for a ship length, and of a manoeuvre
 MOST_HELM, MOST_HEADING = 90.0, 180.0  # deg; the first angle of a reverse spiral is a rate in deg/s

@@ -26,12 +26,12 @@ from shipid.hybrid.physics import assumed, check_columns
 from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import order_keys
-from shipid.simulation.standard import GRAVITY, length_of, service_speed, shaft_speed
+from shipid.simulation.standard import length_of, service_speed, shaft_speed
 from shipid.study.first_look import Look, first_look
 from shipid.study.plan import NO_MODEL, Plan, build_plan
 from shipid.study.prepare import obtain, partition, prepare
 from shipid.study.survey import Survey, helm_sense, separation, survey, typical_runs
-from shipid.units import RPM
+from shipid.units import GRAVITY, RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import order_of

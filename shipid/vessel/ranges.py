@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import Any
 
 from shipid import document as documents
-from shipid.vessel.regressions import GRAVITY
+from shipid.units import GRAVITY
 
 UNUSUAL = "unusual"
 """Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""

@@ -11,9 +11,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.units import GRAVITY
+
 Array = NDArray[np.float64]
 
-GRAVITY = 9.81
 BLADES, AREA_RATIO = 4, 0.55  # of the screw: usual for merchant ships
 PITCHES = (0.4, 1.5)  # P / D of the Wageningen B-series, 0.5 to 1.4, with a little on either side
 

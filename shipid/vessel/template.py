@@ -19,6 +19,7 @@ import numpy as np
 from shipid.document import bundled, get, read
 from shipid.errors import ShipidError, choices
 from shipid.physics.signals import is_shaft, neutral
+from shipid.units import GRAVITY
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 from shipid.vessel.regressions import (
@@ -33,7 +34,7 @@ from shipid.vessel.regressions import (
     wetted_surface,
 )
 
-RHO_SEA, RHO_FRESH, RHO_AIR, G = 1025.0, 1000.0, 1.225, 9.81  # sea and fresh water at 15 deg C, air; SI
+RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
 LEAST_YAW = 0.005  # of Clarke's N_rdot: a tenth of what ships have
 PROPULSORS = ("propeller-rudder", "azimuth", "differential")
@@ -98,7 +99,7 @@ class Particulars:
     @property
     def service(self) -> float:
         """Service speed [m/s]: as given, else that of a Froude number of 0.2."""
-        return 0.2 * math.sqrt(G * self.length) if self.speed is None else self.speed
+        return 0.2 * math.sqrt(GRAVITY * self.length) if self.speed is None else self.speed
 
     @property
     def volume(self) -> float:
@@ -223,7 +224,7 @@ def _ranges(given: Particulars) -> Iterator[tuple[str, float, float, float]]:
     yield "block", given.block, 0.4, 0.9
     yield "length / beam", given.length / given.beam, 3.0, 9.0
     yield "beam / draught", given.beam / given.draught, 1.8, 6.0
-    yield "speed [m/s]", given.service, 0.1, 0.4 * math.sqrt(G * given.length)
+    yield "speed [m/s]", given.service, 0.1, 0.4 * math.sqrt(GRAVITY * given.length)
     yield "shafts", given.units, 1, 2
     for what, value, low, high in (
         ("scale", given.scale, 1.0, 400.0),
@@ -322,7 +323,7 @@ def _resistance(given: Particulars) -> Value:
 def waves(given: Particulars) -> Values:
     """Wave resistance as a sixth power of the speed, through that of Holtrop and Mennen (1982) at the service speed."""
     sizes = given.length, given.beam, given.draught, given.block
-    R_W = wave_resistance(*sizes, given.service) * given.rho * G * given.volume
+    R_W = wave_resistance(*sizes, given.service) * given.rho * GRAVITY * given.volume
     note = f"wave resistance {R_W:.3g} N at {given.service:.3g} m/s (Holtrop and Mennen 1982), as u^6"
     return {"R_4": Value(R_W / given.service**6, "kg m^-5 s^4", note)}
 

@@ -10,7 +10,6 @@ import pytest
 from pydantic import ValidationError
 
 from shipid.simulation.sea import (
-    GRAVITY,
     Sea,
     draw_components,
     fourier,
@@ -19,6 +18,7 @@ from shipid.simulation.sea import (
     spread_angles,
     wave_loads,
 )
+from shipid.units import GRAVITY
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.simulation.linear import MIRROR, all_round, heading_weights, lagrange, linear

@@ -14,8 +14,9 @@ import pytest
 from shipid.engine.native import compiler
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.physics.frames import skew
-from shipid.simulation.sea import GRAVITY, Sea, draw_components, jonswap, wave_loads
+from shipid.simulation.sea import Sea, draw_components, jonswap, wave_loads
 from shipid.simulation.truth import Truth, simulate
+from shipid.units import GRAVITY
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.simulation.linear import AXES, EVERY, HEAVE, PITCH, ROLL, SPEEDS, UPRIGHT, Linear, linear

@@ -460,6 +460,8 @@ def _unit_of_clock(name: str, values: Array) -> str:
         return dates
     if written or ends not in ("", "s"):
         return written or ends
+    if ends and DATES["d"][0] < values[0] / DAY < DATES["d"][1]:
+        return "s"  # since 1970, however far apart; without the name it may be milliseconds of some weeks
     if len(steps) and np.median(steps) >= 20 and not np.any(values % 1):
         slow = DATES["d"][0] < 1e-3 * values[0] / DAY < DATES["d"][1]  # milliseconds since 1970, however far apart
         step = 0.0 if slow else float(np.median(steps))

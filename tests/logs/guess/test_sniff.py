@@ -135,6 +135,8 @@ def test_rounded_days_keep_their_rate(unit: str, step: float, digits: int, tmp_p
         ("time_s", 45000.0 + T / 1e4, "s"),
         ("Time [s]", 738000.3 + T / 1e4, "s"),
         ("time", 738000.3 + T, "s"),
+        ("time_s", 1.7e9 + 40 * T, "s"),  # since 1970, a row every 20 s
+        ("time", 1.7e9 + 40 * T, "ms"),  # since 20 days, a row every 20 ms
     ],
 )
 def test_what_a_clock_counts_in(name: str, values: np.ndarray, unit: str, tmp_path: Path) -> None:
