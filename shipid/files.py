@@ -52,8 +52,8 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
             os.replace(temporary, target)
         sync(target.parent)
     except OSError as error:
-        if error.errno is not None and error.filename is None:  # a write that fails, as on a full disk, names no file
-            error.filename = str(target)
+        if error.errno is not None and TEMPORARY in str(error.filename or TEMPORARY):
+            error.filename = str(target)  # a write that fails, as on a full disk, names no file, or the temporary one
         raise
 
 

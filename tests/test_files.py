@@ -266,6 +266,18 @@ def test_text_may_name_a_file_that_is_not_utf_8(tmp_path: Path) -> None:
     assert (tmp_path / "a.html").read_text() == r"made in caf\udce9"
 
 
+def test_a_folder_that_cannot_be_written_is_no_temporary_one_to_the_user(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(place: str, *_: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), place)
+
+    monkeypatch.setattr(os, "mkdir", refused)
+    with pytest.raises(OSError, match="Read-only") as caught:
+        files.write_json(tmp_path / "a.json", {})
+    assert caught.value.filename == str(tmp_path / "a.json")
+
+
 def test_a_write_that_fails_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """On a full disk the system says that there is no space, and not for which file."""
 

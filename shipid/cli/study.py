@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -469,7 +470,8 @@ def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, d
     resume = f"{plan.program} study resume {folder}"
     try:
         events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, leave=leave)
-        end = draw(events, Watch(plan, folder))
+        with closing(events):  # where a line cannot be printed, claims are given back before the process ends
+            end = draw(events, Watch(plan, folder))
     except KeyboardInterrupt:
         sys.stderr.write(f"interrupted; what is finished is kept. Continue with: {resume}\n")
         sys.exit(130)

@@ -6,7 +6,7 @@ import os
 import platform
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -81,7 +81,7 @@ def run_study(
     scheduler: str | None = None,
     device: str = "cpu",
     leave: bool = False,
-) -> Iterator[Event]:
+) -> Generator[Event, None, None]:
     """Run what is not finished yet of a plan and store it in the folder; yields events.
 
     Numbers do not depend on the workers or on interruptions: an interrupted unit of work is done again, its searches go

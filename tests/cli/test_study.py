@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,7 +19,7 @@ from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
 from tests.cli.running import ended, output_of
-from tests.study.tiny import without_figures, without_workers
+from tests.study.tiny import TINY, without_figures, without_workers
 
 
 def test_studies_and_variants(study: Path) -> None:
@@ -175,3 +177,21 @@ def test_check_ends_with_1_where_a_file_is_wrong(tmp_path: Path, tiny_run: Path)
     result = CliRunner().invoke(app, ["study", "check", str(folder)])
     assert result.exit_code == 1
     assert "missing: `shipid study resume` computes it again" in result.output
+
+
+def test_a_run_whose_lines_cannot_be_printed_gives_its_claims_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Standard output on a full disk: the events end before the process does."""
+    taken: list[Any] = []
+
+    def full(events: Any, _: object) -> None:
+        taken.append(events)
+        next(events)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("shipid.cli.study.draw", full)
+    code, _, error = ended("study", "run", TINY, "--out", tmp_path / "run", "--workers", "1")
+    assert (code, error) == (1, "error: system: No space left on device\n")
+    assert taken[0].gi_frame is None, "the generator is closed"
+    assert not (tmp_path / "run" / "claims").exists()
