@@ -89,6 +89,8 @@ def _probed() -> tuple[str, bytes] | None:
             if failure is None:
                 return command, library.read_bytes()
             log.warning("the C compiler %s cannot be used (%s)", command, failure.splitlines()[0])
+    if not tried:
+        log.warning("engine 'native' is not used, others are slower: there is no C compiler (gcc, cc or clang)")
     return None
 
 

@@ -204,3 +204,17 @@ def test_one_divergence_harms_no_other_distance(draw_inputs: Callable[..., Any])
     assert (harmed.diverged[0] == ~others).all()
     np.testing.assert_array_equal(harmed.total[:, others], sound.total[:, others])
     assert harmed.tally.sum() == sound.tally.sum() == 55
+
+
+def test_a_machine_without_a_compiler_is_told_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    native._probed.cache_clear()
+    try:
+        with caplog.at_level("WARNING"):
+            assert native.engine() == native.engine() == "casadi"
+    finally:
+        native._probed.cache_clear()
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert line == "engine 'native' is not used, others are slower: there is no C compiler (gcc, cc or clang)"
