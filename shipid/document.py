@@ -315,7 +315,11 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
     from pydantic import ValidationError
 
     try:
-        return model.__pydantic_validator__.validate_python(data)  # what `model_validate` does, see `Checked`
+        parsed = model.__pydantic_validator__.validate_python(data)  # what `model_validate` does, see `Checked`
+        for path, value in _no_numbers(data, parsed):
+            where = ".".join(filter(None, (prefix, path)))
+            raise DocumentError(f"{value!r}: must be a number", file=file, path=where)
+        return parsed
     except ValidationError as error:
         problems = error.errors(include_url=False)
         first = next((entry for entry in problems if entry["type"] == "extra_forbidden"), problems[0])
@@ -331,6 +335,21 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
             shown = "" if isinstance(first["input"], dict | list) else f"{first['input']!r}: "
             message = shown + required(*(entry for entry, place in zip(problems, places, strict=True) if place == path))
         raise DocumentError(message, file=file, path=path) from None
+
+
+def _no_numbers(data: Any, parsed: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Path and value of truth values and texts that pydantic has taken for numbers: true for 1, "5" for 5."""
+    if isinstance(data, bool | str):
+        if isinstance(parsed, int | float) and not isinstance(parsed, bool):
+            yield path, data
+    elif isinstance(data, list) and isinstance(parsed, list | tuple):
+        for number, pair in enumerate(zip(data, parsed, strict=False)):
+            yield from _no_numbers(*pair, f"{path}.{number}".removeprefix("."))
+    elif isinstance(data, Mapping):
+        names = {field.alias or name: name for name, field in getattr(type(parsed), "model_fields", {}).items()}
+        values = parsed if isinstance(parsed, Mapping) else {key: getattr(parsed, name) for key, name in names.items()}
+        for key in data.keys() & values.keys():
+            yield from _no_numbers(data[key], values[key], f"{path}.{key}".removeprefix("."))
 
 
 def _of_no_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:

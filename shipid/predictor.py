@@ -282,12 +282,14 @@ class _Header(BaseModel):
 
 
 def _check_arrays(arrays: Mapping[str, Array], file: str | os.PathLike[str]) -> None:
-    """Raise ResultError for an array that holds anything but numbers, or that holds NaN."""
+    """Raise ResultError for an array of anything but numbers, one with NaN, or spreads that are not above 0."""
     for name, array in arrays.items():
         numbers = array.dtype.kind in "fiub"
         if not numbers or np.isnan(array).any():
             what = "NaN" if numbers else f"{array.dtype}"
             raise ResultError(f"damaged: {name!r} holds {what}: run the study again", file=file)
+        if name.rpartition(".")[2] in ("std", "spread", "deviation") and not (array > 0).all():
+            raise ResultError(f"damaged: {name!r} must be above 0: run the study again", file=file)
 
 
 def fit(

@@ -142,6 +142,32 @@ def test_parse_says_where_what_and_what_would_be_right(data: Any, path: str, mes
     assert "\n" not in str(caught.value)
 
 
+class Numbers(BaseModel):
+    count: int = 0
+    share: float = Field(default=0.0, alias="part")
+    pair: tuple[float, float] = (0.0, 1.0)
+    by_name: dict[str, float] = {}
+    on: bool = False
+    inner: Inner | None = None
+
+
+@pytest.mark.parametrize(
+    ("data", "path", "value"),
+    [
+        ({"count": True}, "top.count", "True"),
+        ({"part": "5"}, "top.part", "'5'"),
+        ({"pair": [1.0, False]}, "top.pair.1", "False"),
+        ({"by_name": {"a": "1e3"}}, "top.by_name.a", "'1e3'"),
+        ({"inner": {"speed": True}}, "top.inner.speed", "True"),
+    ],
+)
+def test_truth_values_and_texts_are_no_numbers(data: Any, path: str, value: str) -> None:
+    with pytest.raises(DocumentError) as caught:
+        documents.parse(Numbers, data, "x.toml", "top")
+    assert (caught.value.path, caught.value.message) == (path, f"{value}: must be a number")
+    assert documents.parse(Numbers, {"count": 1, "part": 2, "on": True}, "x.toml").on is True
+
+
 class Fast(BaseModel):
     kind: Literal["fast"]
 

@@ -193,6 +193,7 @@ def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
         ({"corrector": 3}, "damaged"),
         ({"0.basis": None}, "missing in the saved compensator"),
         ({"0.mean": np.zeros(3)}, "do not fit together"),
+        ({"0.std": np.zeros(1)}, "'0.std' must be above 0"),
         ({"vessel": {"document": {"name": "x"}, "file": "x.toml"}}, "damaged"),
     ],
 )
