@@ -229,11 +229,15 @@ def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
     for name, unit in units_of(names).items():
         if units.get(name, unit) != unit:
             raise DataError(f"metadata['units'] says {units[name]!r}, must be {unit!r}", path=name)
-    for run, t in frame.groupby("run", sort=False)["t"]:
-        backwards = np.flatnonzero(np.diff(t.to_numpy()) <= 0)
-        if len(backwards):
-            at = t.to_numpy()[backwards[0] + 1]
-            raise DataError(f"run {run!r}: time does not increase at t = {at:g} s", path="t")
+    run, names_of_runs = pd.factorize(frame["run"])
+    t = frame["t"].to_numpy()
+    if np.any(run[1:] < run[:-1]):  # rows of runs are mixed
+        order = np.argsort(run, kind="stable")
+        run, t = run[order], t[order]
+    backwards = np.flatnonzero((t[1:] <= t[:-1]) & (run[1:] == run[:-1]))
+    if len(backwards):
+        row = backwards[0] + 1
+        raise DataError(f"run {names_of_runs[run[row]]!r}: time does not increase at t = {t[row]:g} s", path="t")
 
 
 def check_metadata(metadata: Any) -> None:

@@ -413,7 +413,9 @@ def _large_text(
         index: pd.to_numeric(_decimal(first.iloc[:, index], form), errors="coerce").notna().any() for index in places
     }
     skip = form.skip_rows + int(form.header and form.names is None)
-    table: dict[int, list[Any]] = {index: [] for index in places}
+    expected = int(1.02 * size * len(first) / max(1, len(text))) + 1000  # rows: what is not filled takes no memory
+    numbers = {index: np.empty(expected) for index in places if plain[index]}
+    texts: dict[int, list[Any]] = {index: [] for index in places if not plain[index]}
     try:
         reader = arrow.open_csv(
             file,
@@ -421,7 +423,7 @@ def _large_text(
                 column_names=[str(i) for i in range(len(names))],
                 skip_rows=skip,
                 encoding=form.encoding,
-                block_size=8_000_000,
+                block_size=1_000_000,
                 use_threads=True,
             ),
             arrow.ParseOptions(delimiter=form.separator, ignore_empty_lines=True),
@@ -435,16 +437,26 @@ def _large_text(
         )
         rows = 0
         for batch in reader:
-            rows += batch.num_rows
+            before, rows = rows, rows + batch.num_rows
             for place, column in zip(places, batch.columns, strict=True):
-                table[place].append(column.to_numpy(zero_copy_only=False))
+                values = column.to_numpy(zero_copy_only=False)
+                if place in texts:
+                    texts[place].append(values)
+                    continue
+                if rows > len(numbers[place]):
+                    more = np.empty(max(rows - len(numbers[place]), len(numbers[place]) // 4))
+                    numbers[place] = np.concatenate([numbers[place], more])
+                numbers[place][before:rows] = values
             if progress is not None and rows:
                 progress(min(1.0, rows * (len(text) / max(1, len(first))) / size))
     except (pyarrow.ArrowException, UnicodeError, ValueError):
         return None
-    joined: dict[str, Any] = {}
-    for place in places:
-        joined[names[place]] = np.concatenate(table.pop(place)) if table[place] else np.empty(0)
+    joined = {
+        names[place]: numbers[place][:rows]
+        if place in numbers
+        else np.concatenate([np.empty(0, object), *texts[place]])
+        for place in places
+    }
     return pd.DataFrame(joined, copy=False)
 
 

@@ -109,6 +109,18 @@ def test_schema_names_what_is_wrong(change: object, place: str | None, remedy: s
     assert remedy in caught.value.message
 
 
+def test_rows_of_runs_may_be_mixed_and_time_is_each_runs_own() -> None:
+    dataset = as_dataset(turning(T))
+    other = dataset.frame.assign(run="other", t=dataset.frame["t"] + 0.1)
+    mixed = pd.concat([dataset.frame, other]).sort_values("t", ignore_index=True)
+    assert Dataset(mixed, dataset.metadata).runs == [*dataset.runs, "other"]
+    both = pd.concat([other, dataset.frame], ignore_index=True)  # the second begins before the first has ended
+    assert Dataset(both, dataset.metadata).runs == ["other", *dataset.runs]
+    back = mixed.assign(t=mixed["t"].where(mixed["run"] != "other", -mixed["t"]))
+    with pytest.raises(DataError, match="run 'other': time does not increase at t = "):
+        Dataset(back, dataset.metadata)
+
+
 def test_units_that_contradict_the_schema_are_refused() -> None:
     with pytest.raises(DataError, match="must be 'rad'"):
         as_dataset(turning(T), units={"psi": "deg"})

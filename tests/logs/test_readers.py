@@ -199,6 +199,19 @@ def test_a_large_text_is_read_by_blocks_as_a_small_one(
     assert list(read_table(file, form, "a", ("b",))) == ["a", "b"]
 
 
+@pytest.mark.parametrize("first", [0, 200], ids=["short lines", "long lines first"])
+def test_a_large_text_whose_lines_become_shorter_is_read_to_its_end(
+    first: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The number of rows is guessed from the first megabyte: with long lines there, it is guessed too low."""
+    lines = [f"{row}.{'0' * first if row < 6000 else ''}5,{2 * row}" for row in range(150_000)]
+    (tmp_path / "log.csv").write_text("a,b\n" + "\n".join(lines) + "\n")
+    monkeypatch.setattr(readers, "LARGE", 1)
+    table = read_table(tmp_path / "log.csv", TextFormat(), "a", ("b",))
+    assert len(table) == len(lines)
+    np.testing.assert_array_equal(table["b"], 2.0 * np.arange(len(lines)))
+
+
 @pytest.mark.parametrize("bad", ["2.5,oops,z", "2.5,3"], ids=["a word", "a short line"])
 def test_what_blocks_cannot_read_is_left_to_the_thorough_way(
     bad: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
