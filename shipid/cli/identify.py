@@ -94,6 +94,8 @@ def identify(
 
     if structures is None and folds is not None:
         raise ShipidError("goes with --structures: name structures to compare, or leave it out", path="--folds")
+    if band is not None and not 0 < band < 1:
+        raise ShipidError(f"{band:g}: must be between 0 and 1, such as 0.9", path="--band")
     file = out or Path(f"{stem(vessel)}-{'structure' if structures else 'identified'}.toml")
     check_new(file, "vessel" if structures else "patch")
     if html is not None and html.suffix != ".html":

@@ -12,6 +12,7 @@ import typer
 from shipid.cli.completion import bundled_or_file, files
 from shipid.errors import DocumentError, ShipidError
 
+HIGHEST = 0.99  # level of the bands of a predictor; `shipid.hybrid.bands.LEVELS` ends there
 VesselName = Annotated[
     str,
     typer.Argument(
@@ -73,7 +74,9 @@ Adaptive = Annotated[
 
 
 def check_band(level: float | None, kind: str | None, adaptive: float | None) -> None:
-    """Raise ShipidError where --kind or --adaptive come without --level, or the rate is none."""
+    """Raise ShipidError for a level or a rate that is none, and where --kind or --adaptive come without --level."""
+    if level is not None and not 0 < level <= HIGHEST:
+        raise ShipidError(f"{level:g}: must be above 0 and up to {HIGHEST:g}, such as 0.9", path="--level")
     if level is None and (kind is not None or adaptive is not None):
         raise ShipidError("goes with a band: give --level too, such as --level 0.9", path="--kind or --adaptive")
     if adaptive is not None and not 0 < adaptive <= 1:
