@@ -21,6 +21,8 @@ FOLDER = "seals"
 TRIES = 10  # looks at files that other processes may write at the same time
 FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results.parquet"}
 """Name of a seal that is not of a batch -> the first file in it."""
+DAMAGED = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, NotImplementedError, RecursionError)
+"""What readers raise for bytes that are not those of a whole file, such as a key of pandas' notes in a table."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ def _readable(file: Path) -> bool:
     """Whether a file is a whole one of its kind, so that another digest is an edit and no damage."""
     try:
         _READERS.get(file.suffix, Path.read_text)(file)
-    except (OSError, ValueError, RecursionError, ShipidError):
+    except (OSError, ShipidError, *DAMAGED):
         return False
     return True
 

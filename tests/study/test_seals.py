@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from shipid.errors import ResultError
@@ -80,6 +81,18 @@ def test_what_cannot_be_read_is_computed_again(kind: str, pattern: str, folder: 
     (words,) = list(seals.mend(folder))
     assert "computed again" in words
     assert seals.faults(folder) == []
+
+
+def test_a_table_with_any_byte_of_its_notes_changed_is_an_edit_or_damage_and_no_traceback(tmp_path: Path) -> None:
+    """pandas keeps notes on columns as JSON in the file, which Arrow repeats in letters; some changes are KeyErrors."""
+    pd.DataFrame({"a": [1.0, 2.0], "b": ["x", "y"]}).to_parquet(tmp_path / "table.parquet", index=False)
+    whole = (tmp_path / "table.parquet").read_bytes()
+    answers = []
+    for place in range(whole.index(b'{"index_columns"'), len(whole)):
+        (tmp_path / "changed.parquet").write_bytes(whole[:place] + b"B" + whole[place + 1 :])
+        answers.append(seals._readable(tmp_path / "changed.parquet"))
+    assert seals._readable(tmp_path / "table.parquet")
+    assert {True, False} == set(answers)
 
 
 def test_what_was_edited_is_refused(folder: Path) -> None:
