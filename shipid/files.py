@@ -204,6 +204,18 @@ def write_table(file: Path, frame: DataFrame) -> None:
                 frame.to_parquet(stream, index=False)
 
 
+def read_table(file: Path) -> DataFrame:
+    """Read a Parquet table that `write_table` wrote; OSError if it cannot be opened, ValueError for anything else."""
+    import pandas as pd
+    import pyarrow
+
+    try:
+        with open_file(file) as stream:
+            return pd.read_parquet(stream)
+    except (pyarrow.ArrowException, LookupError, TypeError, AttributeError, ArithmeticError) as error:
+        raise ValueError(f"{file} is not a whole table") from error  # such as a word of pandas' notes that is another
+
+
 def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bool = False) -> None:
     """Write arrays by name as one `.npz` without pickles."""
     with whole(file) as temporary, temporary.open("wb") as stream:

@@ -15,7 +15,7 @@ import pandas as pd
 from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
-from shipid.files import make_folder, sweep, write_table, write_text
+from shipid.files import make_folder, read_table, sweep, write_table, write_text
 from shipid.logs.importing import sha256_of
 from shipid.study.claims import Claims
 from shipid.study.error_table import ErrorTable
@@ -149,7 +149,7 @@ def _read(file: Path) -> pd.DataFrame | None:
     try:
         if _seal(file).read_text(encoding="utf-8") != sha256_of(file):
             return None
-        return pd.read_parquet(file)
+        return read_table(file)
     except (OSError, ValueError):
         return None
 

@@ -15,14 +15,12 @@ from pathlib import Path
 
 from shipid.data.dataset import read_dataset
 from shipid.errors import ResultError, ShipidError
-from shipid.files import read_arrays, write_text
+from shipid.files import read_arrays, read_table, write_text
 
 FOLDER = "seals"
 TRIES = 10  # looks at files that other processes may write at the same time
 FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results.parquet"}
 """Name of a seal that is not of a batch -> the first file in it."""
-DAMAGED = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, NotImplementedError, RecursionError)
-"""What readers raise for bytes that are not those of a whole file, such as a key of pandas' notes in a table."""
 
 
 @dataclass(frozen=True)
@@ -147,19 +145,13 @@ def _readable(file: Path) -> bool:
     """Whether a file is a whole one of its kind, so that another digest is an edit and no damage."""
     try:
         _READERS.get(file.suffix, Path.read_text)(file)
-    except (OSError, ShipidError, *DAMAGED):
+    except (OSError, ValueError, RecursionError, ShipidError):
         return False
     return True
-
-
-def _table(file: Path) -> object:
-    import pandas as pd
-
-    return pd.read_parquet(file)
 
 
 _READERS: dict[str, Callable[[Path], object]] = {
     ".json": lambda file: json.loads(file.read_text(encoding="utf-8")),
     ".npz": read_arrays,
-    ".parquet": lambda file: read_dataset(file) if file.name == "dataset.parquet" else _table(file),
+    ".parquet": lambda file: read_dataset(file) if file.name == "dataset.parquet" else read_table(file),
 }
