@@ -348,8 +348,10 @@ def _no_numbers(data: Any, parsed: Any, path: str = "") -> Iterator[tuple[str, A
     elif isinstance(data, Mapping):
         names = {field.alias or name: name for name, field in getattr(type(parsed), "model_fields", {}).items()}
         values = parsed if isinstance(parsed, Mapping) else {key: getattr(parsed, name) for key, name in names.items()}
-        for key in data.keys() & values.keys():
-            yield from _no_numbers(data[key], values[key], f"{path}.{key}".removeprefix("."))
+        values = {**values, **(getattr(parsed, "model_extra", None) or {})}
+        for key, value in data.items():
+            if key in values:
+                yield from _no_numbers(value, values[key], f"{path}.{key}".removeprefix("."))
 
 
 def _of_no_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:
