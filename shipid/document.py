@@ -316,7 +316,7 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
 
     try:
         parsed = model.__pydantic_validator__.validate_python(data)  # what `model_validate` does, see `Checked`
-        for path, value in _no_numbers(data, parsed):
+        for path, value in taken_for_numbers(data, parsed):
             where = ".".join(filter(None, (prefix, path)))
             raise DocumentError(f"{value!r}: must be a number", file=file, path=where)
         return parsed
@@ -337,21 +337,22 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
         raise DocumentError(message, file=file, path=path) from None
 
 
-def _no_numbers(data: Any, parsed: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+def taken_for_numbers(data: Any, parsed: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """Path and value of truth values and texts that pydantic has taken for numbers: true for 1, "5" for 5."""
     if isinstance(data, bool | str):
-        if isinstance(parsed, int | float) and not isinstance(parsed, bool):
+        taken = parsed if isinstance(parsed, list | tuple) else [parsed]  # a key may take one value for a list of it
+        if any(isinstance(one, int | float) and not isinstance(one, bool) for one in taken):
             yield path, data
     elif isinstance(data, list) and isinstance(parsed, list | tuple):
         for number, pair in enumerate(zip(data, parsed, strict=False)):
-            yield from _no_numbers(*pair, f"{path}.{number}".removeprefix("."))
+            yield from taken_for_numbers(*pair, f"{path}.{number}".removeprefix("."))
     elif isinstance(data, Mapping):
         names = {field.alias or name: name for name, field in getattr(type(parsed), "model_fields", {}).items()}
         values = parsed if isinstance(parsed, Mapping) else {key: getattr(parsed, name) for key, name in names.items()}
         values = {**values, **(getattr(parsed, "model_extra", None) or {})}
         for key, value in data.items():
             if key in values:
-                yield from _no_numbers(value, values[key], f"{path}.{key}".removeprefix("."))
+                yield from taken_for_numbers(value, values[key], f"{path}.{key}".removeprefix("."))
 
 
 def _of_no_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:

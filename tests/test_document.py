@@ -1,15 +1,21 @@
 from __future__ import annotations
 
+import random
+import shutil
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pytest
+import tomlkit
 from pydantic import BaseModel, ConfigDict, Field
 
 from shipid import document as documents
-from shipid.errors import DocumentError
+from shipid.errors import DocumentError, ShipidError
 from shipid.identification.settings import Identify
+from shipid.logs.mapping import read_mapping
 from shipid.simulation.truth import Truth
+from shipid.study.plan import read_plan
+from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family
 
 NESTED: dict[str, Any] = {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
@@ -166,6 +172,28 @@ def test_truth_values_and_texts_are_no_numbers(data: Any, path: str, value: str)
         documents.parse(Numbers, data, "x.toml", "top")
     assert (caught.value.path, caught.value.message) == (path, f"{value}: must be a number")
     assert documents.parse(Numbers, {"count": 1, "part": 2, "on": True}, "x.toml").on is True
+
+
+READ = {"studies": read_plan, "models": load_vessel, "studies/mappings": lambda file: read_mapping(Path(file))}
+
+
+@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in READ for name in documents.bundled(kind)])
+def test_no_number_of_a_document_may_be_a_truth_value_or_a_text(kind: str, name: str, tmp_path: Path) -> None:
+    source, file = documents.bundled(kind)[name], tmp_path / "changed.toml"
+    document = documents.read(source)
+    if (source.parent / "tables").is_dir():
+        shutil.copytree(source.parent / "tables", tmp_path / "tables")
+    file.write_text(tomlkit.dumps(document), encoding="utf-8")
+    READ[kind](str(file))
+    places = [path for path, _ in documents.leaves(document)]
+    numbers = [path for path, value in documents.leaves(document) if type(value) in (int, float)]
+    for path in random.Random(name).sample(numbers, min(len(numbers), 6)):
+        for value in (True, "5"):
+            changed = documents.replace(document, {path: value})
+            if [place for place, _ in documents.leaves(changed)] == places:  # a key with dots is not one path
+                file.write_text(tomlkit.dumps(changed), encoding="utf-8")
+                with pytest.raises(ShipidError):
+                    READ[kind](str(file))
 
 
 class Fast(BaseModel):

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
-from shipid.document import required
+from shipid.document import required, taken_for_numbers
 from shipid.errors import choices
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre
 
@@ -75,11 +75,14 @@ class Draw(BaseModel):
             given["duration"] = duration
         given.setdefault(COURSE, _between(0.0, 360.0, at("psi")))
         try:
-            return kind.model_validate(given)
+            manoeuvre = kind.model_validate(given)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             key = ".".join(str(part) for part in first["loc"] if part != "orders")
             raise ValueError(f"{key or self.kind}: {required(first)}") from None
+        for key, value in taken_for_numbers(given, manoeuvre):
+            raise ValueError(f"{key}: {value!r}: must be a number")
+        return manoeuvre
 
 
 def _flat(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
