@@ -61,6 +61,11 @@ def _rebuild(
     return cls(message, file=file, path=path, others=others)
 
 
+def is_utf_8(text: str) -> bool:
+    """Whether a name that the system gave is UTF-8 throughout: Python keeps other bytes as lone surrogates."""
+    return not any("\ud800" <= sign <= "\udfff" for sign in text)
+
+
 def visible(text: str) -> str:
     """The text with every character that is not printable written out: contents of a file must not control a terminal.
 

@@ -27,6 +27,7 @@ from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
 FORMAT = 4
+DIVISORS = ("std", "spread", "deviation")  # last words of the names of arrays by which inputs or traits are divided
 BANDS = "bands."  # before the names of arrays of a band in a saved predictor
 MOST_STEPS = 100_000  # of a horizon
 
@@ -282,13 +283,13 @@ class _Header(BaseModel):
 
 
 def _check_arrays(arrays: Mapping[str, Array], file: str | os.PathLike[str]) -> None:
-    """Raise ResultError for an array of anything but numbers, one with NaN, or spreads that are not above 0."""
+    """Raise ResultError for an array of anything but numbers, one with NaN, or a divisor that is not above 0."""
     for name, array in arrays.items():
         numbers = array.dtype.kind in "fiub"
         if not numbers or np.isnan(array).any():
             what = "NaN" if numbers else f"{array.dtype}"
             raise ResultError(f"damaged: {name!r} holds {what}: run the study again", file=file)
-        if name.rpartition(".")[2] in ("std", "spread", "deviation") and not (array > 0).all():
+        if name.rpartition(".")[2] in DIVISORS and not (array > 0).all():
             raise ResultError(f"damaged: {name!r} must be above 0: run the study again", file=file)
 
 

@@ -11,4 +11,4 @@ KNOT = 1852.0 / 3600.0
 MINUTE = 60.0
 """Seconds in one minute."""
 GRAVITY = 9.81
-"""Acceleration of gravity [m/s^2], where a vessel gives no other one."""
+"""Acceleration of gravity [m/s^2], where a vessel gives no other one; 9.80665 (BIPM, SI Brochure) to three digits."""

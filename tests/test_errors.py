@@ -1,10 +1,11 @@
 from __future__ import annotations
 
+import os
 import pickle
 
 import pytest
 
-from shipid.errors import DataError, DocumentError, ResultError, ShipidError, choices, visible
+from shipid.errors import DataError, DocumentError, ResultError, ShipidError, choices, is_utf_8, visible
 
 ERRORS = pytest.mark.parametrize("error", [ShipidError, DocumentError, DataError, ResultError])
 
@@ -49,3 +50,8 @@ def test_choices_list_what_is_valid() -> None:
 def test_control_characters_are_made_visible(name: str) -> None:
     assert visible(f"ship {name}\nsea").replace("\n", "").isprintable()
     assert visible("R/V Gunnerus, 28.9 m ä 船\n") == "R/V Gunnerus, 28.9 m ä 船\n"
+
+
+def test_names_with_bytes_that_are_not_utf_8_are_told_from_others() -> None:
+    assert is_utf_8("Fahrt \u00e4\u6d77\U0001f6a2.csv")
+    assert not is_utf_8(os.fsdecode(b"fahrt \xe4.csv"))

@@ -194,6 +194,8 @@ def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
         ({"0.basis": None}, "missing in the saved compensator"),
         ({"0.mean": np.zeros(3)}, "do not fit together"),
         ({"0.std": np.zeros(1)}, "'0.std' must be above 0"),
+        ({"bands.spread": np.array([1.0, 0.0])}, "'bands.spread' must be above 0"),
+        ({"bands.deviation": -np.ones(5)}, "'bands.deviation' must be above 0"),
         ({"vessel": {"document": {"name": "x"}, "file": "x.toml"}}, "damaged"),
     ],
 )

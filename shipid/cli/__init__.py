@@ -11,7 +11,7 @@ import typer
 from shipid.cli import data, export, identify, predict, replay, schema, simulation, study, vessel
 from shipid.cli.outputs import Guarded
 from shipid.cli.terminal import log_to_stderr
-from shipid.errors import ShipidError
+from shipid.errors import ShipidError, is_utf_8
 
 OPTIONS: dict[str, Any] = {
     "no_args_is_help": True,
@@ -57,7 +57,7 @@ def main() -> None:
 def _check_utf_8(arguments: Sequence[str]) -> None:
     """Raise ShipidError for an argument that is not UTF-8: documents, pages and tables could not name such a file."""
     for argument in arguments:
-        if any("\ud800" <= sign <= "\udfff" for sign in argument):
+        if not is_utf_8(argument):
             raise ShipidError("is not UTF-8: rename the file or folder, or write the text in UTF-8", path=argument)
 
 

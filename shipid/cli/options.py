@@ -74,7 +74,7 @@ Adaptive = Annotated[
 
 
 def check_band(level: float | None, kind: str | None, adaptive: float | None) -> None:
-    """Raise ShipidError for a level or a rate that is none, and where --kind or --adaptive come without --level."""
+    """Raise ShipidError for a level or a rate out of range, and where --kind or --adaptive come without --level."""
     if level is not None and not 0 < level <= HIGHEST:
         raise ShipidError(f"{level:g}: must be above 0 and up to {HIGHEST:g}, such as 0.9", path="--level")
     if level is None and (kind is not None or adaptive is not None):

@@ -26,7 +26,7 @@ from shipid.data.dataset import (
     wraps,
 )
 from shipid.data.kinematics import Noise, smooth
-from shipid.errors import DataError, choices
+from shipid.errors import DataError, choices, is_utf_8
 from shipid.logs.mapping import (
     Clock,
     Column,
@@ -162,7 +162,7 @@ def runs_of(source: Source, log: Path) -> dict[str, Path]:
     files = sorted(file for file in log.glob(source.runs) if file.is_file() and file not in left)
     if not files:
         raise DataError(f"no file {source.runs!r} in this folder", file=log, path="source.runs")
-    foreign = [file for file in files if any("\ud800" <= sign <= "\udfff" for sign in str(file.relative_to(log)))]
+    foreign = [file for file in files if not is_utf_8(str(file.relative_to(log)))]
     if foreign:
         raise DataError("its name is not UTF-8, and names the run: rename it", file=foreign[0])
     return {run_of(file, log, source.runs): file for file in files}

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pydantic import Field, SerializeAsAny
 
 from shipid import document
-from shipid.data.dataset import STANDARD_DEVIATIONS, optional, required, unit_of
+from shipid.data.dataset import DATED, STANDARD_DEVIATIONS, optional, required, unit_of
 from shipid.errors import DocumentError, choices
-from shipid.logs.readers import DAY, READERS, Format, TextFormat
+from shipid.logs.readers import DAY, LAST_DATE, READERS, Format, TextFormat
 from shipid.logs.repairs import (
     INPUTS,
     REPAIRS,
@@ -256,6 +256,11 @@ def clock_seconds(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]
 def is_dated(unit: str) -> bool:
     """Whether a clock in this unit is read as seconds since 1970."""
     return unit == "date" or unit in EPOCHS
+
+
+def is_date(t: float, unit: str) -> bool:
+    """Whether a time [s] on a clock in this unit is a date: it counts from 1970, not from a midnight, to year 9999."""
+    return is_dated(unit) and DATED < t < LAST_DATE
 
 
 def _formats(raw: dict[str, Any], file: Path) -> dict[str, Any]:

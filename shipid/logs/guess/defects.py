@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.dataset import DATED, Array
+from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import Sniffed
-from shipid.logs.mapping import is_dated, to_si
-from shipid.logs.readers import LAST_DATE, date_of
+from shipid.logs.mapping import is_date, to_si
+from shipid.logs.readers import date_of
 from shipid.physics.signals import is_shaft
 
 POSITIONS = ("latitude", "longitude", "north", "east")
@@ -158,8 +158,7 @@ def _jumps(state: State, path: Complex) -> None:
 
 def _when(state: State, t: float) -> str:
     """A time [s] as the clock of the log has it: a date, or a number."""
-    dated = is_dated(state.clock_unit) and DATED < t < LAST_DATE
-    return date_of(t) if dated else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
+    return date_of(t) if is_date(t, state.clock_unit) else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
 
 
 def _heading_offset(state: State) -> None:

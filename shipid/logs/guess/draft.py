@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from shipid.data.dataset import DATED
 from shipid.errors import ShipidError
 from shipid.logs import segments as cutting
 from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
 from shipid.logs.guess.columns import Guess
 from shipid.logs.importing import import_log, sha256_of
-from shipid.logs.mapping import Mapping, Segment, is_dated, read_mapping, to_si
-from shipid.logs.readers import LARGE, LAST_DATE, date_of
+from shipid.logs.mapping import Mapping, Segment, is_date, is_dated, read_mapping, to_si
+from shipid.logs.readers import LARGE, date_of
 
 ENABLED = 0.8  # a repair less sure than this is drafted switched off
 ORDER = ("wrap_interpolation", "break", "despike", "latency", "scale", "heading_offset", "lever_arm")
@@ -68,7 +67,7 @@ def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
     """Return segments as TOML, to be corrected by hand; `unit` is the unit of the log's clock."""
     blocks = ["\n# Segmented by helm and heading: correct names, starts and ends, and remove what is no run."]
     segments = list(segments)
-    dated = is_dated(unit) and all(segment.start > DATED for segment in segments)
+    dated = all(is_date(segment.start, unit) for segment in segments)  # whose times are seconds then
     if dated:
         blocks.append("# Starts and ends are seconds since 1970; the dates are UTC.")
     elif is_dated(unit):
@@ -84,7 +83,7 @@ def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
 
 def moment(value: float, unit: str) -> str:
     """Return a moment on the log's clock as text: a date in UTC, or the number."""
-    return date_of(value) if is_dated(unit) and DATED < value < LAST_DATE else f"{value:.10g}"
+    return date_of(value) if is_date(value, unit) else f"{value:.10g}"
 
 
 def _read(text: str) -> Mapping:
