@@ -541,10 +541,6 @@ def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
     table = pd.DataFrame(rows).reindex(columns=["time", *NMEA_COLUMNS])
     again = table["time"].ne(table["time"].shift()).cumsum()  # sentences of one instant are one row
     table = table.groupby(again).first().reset_index(drop=True)
-    if table[["rpm", "rpm_2"]].isna().all(axis=None):  # no sentence of a shaft: the engines' are all that there is
-        engines = {"rpm": "engine_rpm", "rpm_2": "engine_rpm_2"}
-        table = table.assign(**{name: table[one] for name, one in engines.items()})
-        table[list(engines.values())] = np.nan
     table.attrs["unreadable"] = unreadable
     return table
 

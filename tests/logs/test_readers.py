@@ -401,7 +401,7 @@ def test_nmea(time: str, midnight: float, tmp_path: Path) -> None:
 )
 @pytest.mark.parametrize("source", ["S", "E", "both"])
 def test_stamps_before_sentences_and_speeds_of_shafts(written: Any, source: str, tmp_path: Path) -> None:
-    """6 May, not 5 June; shafts by their number, and engines where no shaft is logged."""
+    """6 May, not 5 June; shafts and engines by their number."""
     begin = datetime(2025, 5, 6, 7, 8, 9, 500000, tzinfo=UTC)
     lines = []
     for second in range(20):
@@ -415,10 +415,11 @@ def test_stamps_before_sentences_and_speeds_of_shafts(written: Any, source: str,
     assert READERS["nmea"].detect(file, file.read_bytes()) == {"kind": "nmea", "time": "line"}
     table = READERS["nmea"].read(file, NmeaFormat(kind="nmea", time="line"), "time")
     np.testing.assert_allclose(table["time"], begin.timestamp() + np.arange(20.0), atol=1e-3)
-    base = 500.0 if source == "E" else 100.0
-    np.testing.assert_allclose(table["rpm"], base + 10 + np.arange(20))
-    np.testing.assert_allclose(table["rpm_2"], base + 20 + np.arange(20))
-    assert table["engine_rpm"].notna().all() == (source == "both")
+    for kind, name, base in (("S", "rpm", 100.0), ("E", "engine_rpm", 500.0)):
+        for column, number in ((name, 1), (f"{name}_2", 2)):
+            logged = source in (kind, "both")
+            expected = base + 10 * number + np.arange(20) if logged else np.full(20, np.nan)
+            np.testing.assert_allclose(table[column], expected)
 
 
 @pytest.mark.parametrize("stamp", ["06/05/2025 12:00:00,", "12:00:01 ", "\\s:GPS*1C\\", "bridge "])
