@@ -1,18 +1,25 @@
 """`python -m shipid`: the command line."""
 
+import gc
 import os
 import sys
+
+FEW_LOOKS = 50_000  # objects made between two looks for garbage: imports make many objects, and no garbage
 
 
 def run() -> None:
     """Run the command line; Ctrl-C while it is being imported ends it as quietly as later."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by NumPy's import; on a busy machine waits cost half
+    gc.set_threshold(FEW_LOOKS)
     try:
         from shipid.cli import main
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         sys.exit(130)
-    main()
+    try:
+        main()
+    finally:
+        gc.freeze()  # the end of the process looks for garbage once more: it frees all in any case
 
 
 if __name__ == "__main__":

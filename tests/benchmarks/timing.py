@@ -13,10 +13,16 @@ def clock(run: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def best_of(ways: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
-    """Least wall time [s] of each way over `rounds` rounds, every round calling all of them in turn."""
+def best_of(ways: Mapping[str, Callable[[], object]], rounds: int, *, settled: bool = False) -> dict[str, float]:
+    """Least wall time [s] of each way over `rounds` rounds, every round calling all of them in turn.
+
+    settled : call a way once more before it is timed, so that it does not pay for what the way before leaves behind:
+        threads that still wait actively, and other data in the caches.
+    """
     best = dict.fromkeys(ways, float("inf"))
     for _ in range(rounds):
         for name, run in ways.items():
+            if settled:
+                run()
             best[name] = min(best[name], clock(run))
     return best
