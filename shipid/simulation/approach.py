@@ -28,8 +28,10 @@ PROBE_SPEED, PROBE_SHAFT, PROBE_HELM = (
     0.1,
 )  # m/s, rev/s, rad: values at which the effect of commands is tested
 NOTHING = 1e-12  # m/s^2, rad/s^2
-CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach
+CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach of a small ship
+PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose speed settles over some 20
 SETTLED = 1e-3  # m/s, rad/s: greatest change of a velocity over the last chunk, and greatest yaw rate
+SLOW = 0.02  # the same times U^2 / L, for a large and slow ship: her speed is then right to about 1 %
 KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
 LENGTH, FASTEST = 100.0, 100.0  # m, of a ship whose document does not say; m/s
 REMEDY = 'let a helmsman hold the course (approach = "helmsman"), or start from rest (approach = "rest")'
@@ -163,12 +165,13 @@ class Approach:
 def steady(controls: Controls, n: Array, *, step: float, method: Method, engine: str, held: bool = False) -> Approach:
     """Steady straight motion in calm water at shaft speeds n (S,) [rev/s].
 
-    Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s, with the helm amidships,
-    or held on course by a helmsman. Position and heading are then set to 0.
+    Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s (of a large and slow ship:
+    by 0.02 U^2 / L), with the helm amidships, or held on course by a helmsman. Position and heading are then set to 0.
 
     Raises
     ------
-    ShipidError : it diverges, is not steady after an hour, or turns with the helm amidships (`NotStraight`).
+    ShipidError : it diverges, is not steady after an hour and 200 ship lengths, or turns with the helm amidships
+        (`NotStraight`).
     """
     asked = _Asked(dynamics(controls.vessel), tuple(controls.vessel.parameters.values()), _length(controls), controls)
     known = _steady(asked, tuple(map(float, n)), step, method, engine, held)
@@ -203,7 +206,10 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
         orders |= _course(controls, n)
     moving = np.arange(count)
     num_steps = max(round(CHUNK / step), 1)
-    for _ in range(int(LONGEST / CHUNK)):
+    reached = np.array([_speed(controls, shaft) for shaft in speeds])
+    longest = max(LONGEST, *(PASSING * asked.length / reached))
+    settled = np.minimum(SETTLED, SLOW * reached**2 / asked.length)
+    for _ in range(int(longest / CHUNK)):
         path = rollout(
             vessel,
             {name: values[moving] for name, values in state.items()},
@@ -224,13 +230,14 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
             )
         velocities = model.state[model.num_dof :]
         changed = np.max([np.abs(path[name][-1, 0] - state[name][moving]) for name in velocities], axis=0)
+        unsettled = changed >= settled[moving]
         if held:  # on course, too: a slow integral part changes the velocities little
-            changed = np.maximum(changed, np.abs(path["psi"][-1, 0]))
+            unsettled |= np.abs(path["psi"][-1, 0]) >= SETTLED
         for name in names:
             state[name][moving] = path[name][-1, 0]
         for name, values in memory.items():
             values[moving] = path[f"actual.{name}"][-1, 0]
-        moving = moving[changed >= SETTLED]  # steady samples are frozen: no result may depend on the other samples
+        moving = moving[unsettled]  # steady samples are frozen: no result may depend on the other samples
         if not len(moving):
             if not held:
                 _check_straight(vessel, n, state["r"])
@@ -240,7 +247,7 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
             return Approach(state | {name: np.zeros(count) for name in anew}, kept, helm)
     remedy = 'start from rest (approach = "rest")' if held else REMEDY
     raise NotStraight(
-        f"{vessel.name} is not steady after {LONGEST:g} s straight ahead at {_rpm(n[moving], moving >= 0)} rpm: "
+        f"{vessel.name} is not steady after {longest:.0f} s straight ahead at {_rpm(n[moving], moving >= 0)} rpm: "
         f"{remedy}"
     )
 

@@ -10,6 +10,7 @@ from shipid.errors import DocumentError, ShipidError
 from shipid.simulation.approach import Controls, NotStraight, acceleration, helm_effect, steady, thrust_sharing
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.template import Particulars, first_guess
 from tests.conftest import PATCHED
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -132,6 +133,15 @@ def test_an_approach_that_never_settles_or_diverges_is_reported() -> None:
     )
     with pytest.raises(ShipidError, match=r"not steady after 3600 s straight ahead at 145 rpm: let a helmsman"):
         steady(ponderous, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
+
+
+def test_a_large_and_slow_ship_reaches_her_speed_whatever_time_that_takes() -> None:
+    given = Particulars(length=300.0, beam=58.0, draught=20.8, block=0.82, speed=8.0)
+    tanker = Controls.of(first_guess(given, "tanker", "tanker.toml").vessel)
+    for shaft in (0.15, 0.4):
+        steadily = steady(tanker, np.array([shaft]), step=1.0, method="euler", engine="casadi")
+        balanced = fsolve(lambda u, n=shaft: acceleration(tanker.vessel, float(u[0]), tanker.ahead(n))[0], 8 * shaft)
+        assert steadily.state["u"][0] == pytest.approx(balanced[0], rel=0.015)
 
 
 def test_a_vessel_that_turns_with_the_helm_amidships_has_no_straight_approach() -> None:
