@@ -190,9 +190,11 @@ def worst_frame(results: Results) -> pd.DataFrame:
 def refused_frame(results: Results) -> pd.DataFrame:
     """Models without a band of the study's level at the largest N_D, and why: model, N_D, reason."""
     level, rows = results.plan.level, []
-    for row in results.rows:
+    done = [row for row in results.rows if row["status"] == "ok"]
+    most = max((row["N_D"] for row in done), default=0)
+    for row in done:
         bands = results.bands.get(row["cell"])
-        if row["status"] == "ok" and (bands is None or not bands.promises(level)):
+        if row["N_D"] == most and (bands is None or not bands.promises(level)):
             rows.append({"model": row["model"], "N_D": row["N_D"], "reason": results.no_band.get(row["cell"], "")})
     return pd.DataFrame(rows, columns=["model", "N_D", "reason"]).drop_duplicates(ignore_index=True)
 

@@ -214,6 +214,13 @@ def test_refits_calibrate_what_has_no_errors_left_out(tmp_path: Path) -> None:
     assert stored.bands is not None
 
 
+def test_why_no_band_is_promised_is_the_reason_of_the_cells_with_most_runs(results: Results) -> None:
+    most = max(row["N_D"] for row in results.rows)
+    reasons = {row["cell"]: f"{NO_BAND}{row['N_D']} runs calibrate it" for row in results.rows}
+    ((sentence, _),) = bands.answer(replace(results, bands={}, no_band=reasons))
+    assert sentence == f"No band is promised: {most} runs calibrate it."
+
+
 def test_a_method_without_errors_on_runs_left_out_says_which_key_gives_them(tiny_run: Path) -> None:
     results = read_results(tiny_run)
     without = replace(results, no_band=dict.fromkeys(results.paths, f"{NO_BAND}{NO_REFITS}"))
