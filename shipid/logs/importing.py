@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import (
     BREAK,
     STANDARD_DEVIATIONS,
+    Array,
     Dataset,
     clock_slack,
     optional,
@@ -283,6 +284,9 @@ def _columns(
         channels[name] = (times - column.latency if column.latency else times, values)
     read = len(log)
     if mapping.resamples:
+        for name, (times, values) in channels.items():  # afterwards the jump is not seen: it is between two instants
+            if mapping.columns[name].interpolation != "angle":
+                _check_wraps(times, values, name, mapping.columns[name], file)
         t = _common_clock(channels, t, mapping.clock.step, file)
         gap = mapping.clock.max_gap or np.inf
         how = {name: _interpolation(name, column) for name, column in mapping.columns.items()}
@@ -469,7 +473,8 @@ def _common_clock(
 
 def _interpolation(name: str, column: Column) -> str:
     """Return the rule of interpolation: as declared, else `previous` for orders, `angle` where it wraps, `linear`."""
-    return column.interpolation or ("previous" if is_command(name) else "angle" if column.wrap else "linear")
+    usual = "short way" if name == "longitude" else "linear"
+    return column.interpolation or ("previous" if is_command(name) else "angle" if column.wrap else usual)
 
 
 def _brought(
@@ -486,6 +491,11 @@ def _brought(
         return np.full(len(t), values[0])
     result = np.interp(t, times, np.unwrap(values) if how == "angle" else values)
     index = after.astype(int)
+    if how == "short way":  # from 180 to -180 deg, or from 360 to 0: nothing else is changed, a wrong value stays one
+        step = values[index] - values[index - 1]
+        share = (t - times[index - 1]) / (times[index] - times[index - 1])
+        around = values[index - 1] + share * (step - np.sign(step) * TURN)
+        result = np.where(_is_turn(step), np.remainder(around + np.pi, TURN) - np.pi, result)
     on_sample = (t == times[index]) | (t == times[index - 1])
     return np.where((times[index] - times[index - 1] > max_gap + clock_slack(times)) & ~on_sample, np.nan, result)
 
@@ -530,8 +540,7 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column], file: Path) -> pd
     """Unwrap angles, and turn winds "from" into "towards"; DataError for a jump of one that does not wrap."""
     turned: dict[str, NDArray[np.float64]] = {}
     for name, column in columns.items():
-        if (wraps(name) or name == "course") and not column.wrap:
-            _check_wraps(rows, name, column.source, file)
+        _check_wraps(rows["t"].to_numpy(), rows[name].to_numpy(), name, column, file)
         if column.direction != "from" and not column.wrap:
             continue
         values = rows[name].to_numpy().copy()
@@ -549,16 +558,24 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column], file: Path) -> pd
     return rows.assign(**turned)
 
 
-def _check_wraps(rows: pd.DataFrame, name: str, source: str, file: Path) -> None:
+def _check_wraps(t: Array, values: Array, name: str, column: Column, file: Path) -> None:
     """Raise DataError where an angle jumps by a whole turn from row to row: the mean of 359 and 1 deg is 180."""
-    known = rows[["t", name]].dropna()
-    steps, jumps = np.diff(known["t"].to_numpy()), np.abs(np.diff(known[name].to_numpy()))
+    if column.wrap or not (wraps(name) or name == "course"):
+        return
+    known = np.isfinite(values)
+    times = t[known]
+    steps, jumps = np.diff(times), np.diff(values[known])
     near = steps < NEAR * np.median(steps) if len(steps) else steps > 0
-    places = np.flatnonzero(near & (np.abs(jumps - TURN) < ABOUT))
+    places = np.flatnonzero(near & _is_turn(jumps))
     if len(places):
-        times = "once" if len(places) == 1 else f"{len(places)} times, first"
-        sentence = f"{source!r} jumps by a whole turn, {times} at {moment_of(known['t'].iloc[places[0] + 1])}"
+        count = "once" if len(places) == 1 else f"{len(places)} times, first"
+        sentence = f"{column.source!r} jumps by a whole turn, {count} at {moment_of(times[places[0] + 1])}"
         raise DataError(f"{sentence}: write wrap = true", file=file, path=f"columns.{name}")
+
+
+def _is_turn(jumps: Array) -> NDArray[np.bool_]:
+    """Whether differences (N,) [rad] of an angle are those of one that begins again: a turn, or nearly."""
+    return np.asarray(np.abs(np.abs(jumps) - TURN) < ABOUT)
 
 
 def _unwrap(values: NDArray[np.float64]) -> None:

@@ -165,8 +165,8 @@ class Approach:
 def steady(controls: Controls, n: Array, *, step: float, method: Method, engine: str, held: bool = False) -> Approach:
     """Steady straight motion in calm water at shaft speeds n (S,) [rev/s].
 
-    Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s (of a large and slow ship:
-    by 0.02 U^2 / L), with the helm amidships, or held on course by a helmsman. Position and heading are then set to 0.
+    Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s (large and slow ships: by
+    0.02 U^2 / L), with the helm amidships, or held on course by a helmsman. Position and heading are then set to 0.
 
     Raises
     ------

@@ -270,3 +270,36 @@ class TestHsva:
         counts = failed.groupby("check")["run"].nunique()
         assert counts["heading rate"] == 13  # the scale is not known where nothing correlates
         assert counts["path"] == 10  # heading stays within a few degrees in the other three
+
+
+@pytest.mark.parametrize("how", ["step", "latency"])
+def test_a_heading_that_begins_anew_is_refused_before_it_is_interpolated(how: str, tmp_path: Path) -> None:
+    """Half way between 359 and 1 deg the ship would look back, and no two instants would differ by a whole turn."""
+    clock = f"{GAP[1]}\nstep = 0.2" if how == "step" else GAP[1]
+    late = "wrap = false" if how == "step" else "wrap = false\nlatency = 0.2"
+    mapping = changed(tmp_path, (GAP[0], clock), ("wrap = true", late))
+    log = logged(turning(T), tmp_path)
+    with pytest.raises(DataError, match=r"columns.psi: .* jumps by a whole turn, once at .* s: write wrap = true"):
+        import_log(read_mapping(mapping), log)
+    declared = mapping.read_text().replace("wrap = false", 'wrap = false\ninterpolation = "angle"')
+    mapping.write_text(declared)
+    motion, frame = turning(T), import_log(read_mapping(mapping), log).frame
+    psi = np.interp(frame["t"] + (0.0 if how == "step" else 0.2), motion["t"], motion["psi"])
+    assert np.abs(np.exp(1j * frame["psi"]) - np.exp(1j * psi)).max() < 1e-6
+
+
+@pytest.mark.parametrize("convention", [180.0, 360.0])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_longitude_goes_on_the_short_way_where_it_begins_anew(convention: float, way: float, tmp_path: Path) -> None:
+    longitude = convention + way * 1e-5 * (T - 60.2)
+    longitude = np.where(longitude > convention, longitude - 360.0, longitude)
+    log = pd.DataFrame({"t": T, "lat": -17.5, "lon": longitude, "psi": way * np.pi / 2, "u": 2.13, "v": 0.0, "r": 0.0})
+    log.to_csv(tmp_path / "log.csv", index=False)
+    units = {"latitude": ("lat", "deg"), "longitude": ("lon", "deg"), "psi": ("psi", "rad")}
+    units |= {name: (name, "rad/s" if name == "r" else "m/s") for name in ("u", "v", "r")}
+    text = 'name = "m"\n[clock]\nfrom = "t"\nstep = 0.13\nmax_gap = 3\n'
+    text += "".join(f'[columns.{name}]\nfrom = "{a}"\nunit = "{unit}"\n' for name, (a, unit) in units.items())
+    (tmp_path / "m.toml").write_text(text)
+    frame = import_log(read_mapping(tmp_path / "m.toml"), tmp_path / "log.csv").frame
+    metre = way * 1e-5 * np.radians(1.0) * 6378137.0 * np.cos(np.radians(17.5))
+    np.testing.assert_allclose(frame["east"], metre * frame["t"], rtol=1e-3, atol=0.01)
