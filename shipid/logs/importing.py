@@ -366,7 +366,7 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
     if len(wrong):
         row = int(wrong[0]) + 1
         if not np.isfinite(t[row]):
-            what = "no time here: remove the row"
+            what = _unread(log, clock, row, file, path)
         elif t[row] == t[row - 1]:
             what = (
                 f"the time {moment_of(t[row])} appears twice: remove one of the rows, or set [clock] repeated = 'drop'"
@@ -375,6 +375,19 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
             what = f"time goes back from {moment_of(t[row - 1])} to {moment_of(t[row])}: sort or split the log"
         raise DataError(what, file=file, path=f"row {row + 1}")
     return t
+
+
+def _unread(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path, path: str) -> str:
+    """Say what is wrong with the time of a row: nothing is there, or a text that is no date."""
+    places = {"from": clock.source, "date": clock.date} if clock.date is not None else {"from": clock.source}
+    cells = {key: _column(log, source, file, f"{path}.{key}").iloc[row] for key, source in places.items()}
+    if any(pd.isna(cell) or not str(cell).strip() for cell in cells.values()):
+        return "no time here: remove the row"
+    text = " ".join(str(cell).strip() for cell in reversed(cells.values()))
+    return (
+        f"{text!r} is no date or time of day that can be read: write dates as 2024-05-14 08:00:00; "
+        'for a number of seconds write [clock] unit = "s"'
+    )
 
 
 def evenly(t: NDArray[np.float64], every: float, file: Path) -> NDArray[np.float64]:

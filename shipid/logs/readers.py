@@ -34,9 +34,12 @@ LOOKED_AT = 300  # lines that a guess at the format looks at
 WIDEST, LONGEST_LINE = 10_000, 8_000_000  # cells and bytes of a line: more is no log
 LARGE = 32_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
 TIME_OF_DAY = r"\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?(\s*[AaPp][Mm])?\s*"
-DAY_OF = r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)"
+DAY_OF = (
+    r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)|\d\d?(?P<gap>[- ])[A-Za-z]{3}(?P=gap)\d{4}"
+)
 """A date without a time."""
 DAYS = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y", "%d-%m-%Y", "%m-%d-%Y")
+DAYS += ("%y/%m/%d", "%d-%b-%Y", "%d %b %Y")
 HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
 SAMPLES = 60  # texts by which the way of writing is looked for
@@ -145,8 +148,8 @@ def read_table(
 def seconds(dates: pd.Series[Any]) -> Array:
     """Return dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
 
-    Read are ISO 8601, dates and durations of pandas, and `DAYS` with `HOURS`; of day/month and month/day that which
-    every row can be, else that with which the log is shorter, else day/month. A time of day goes on after midnight. NaN
+    Read are ISO 8601, dates and durations of pandas, and `DAYS` with `HOURS`; of those that every row can be, that with
+    which the log is shorter, else day/month. A time of day goes on after midnight. NaN
     where there is none.
     """
     if isinstance(dates.dtype, pd.CategoricalDtype):
@@ -154,7 +157,7 @@ def seconds(dates: pd.Series[Any]) -> Array:
     if pd.api.types.is_timedelta64_dtype(dates.dtype):
         return np.array(dates.dt.total_seconds(), dtype=np.float64)
     if pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object:
-        texts = dates.dropna().astype(str).str.strip().str.replace(",", ".")
+        texts = dates.dropna().astype(str).str.strip().str.replace(r",\s+", " ", regex=True).str.replace(",", ".")
         if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
             return _since_midnight(dates)
         written = ways_of(texts)

@@ -1,6 +1,7 @@
 """One motion, written in every format a log may have, comes back as the same dataset."""
 
 import os
+import re
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -124,6 +125,11 @@ def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
         ("%m/%d/%Y %H:%M:%S.%f", True),
         ("%m/%d/%Y %I:%M:%S.%f %p", True),
         ("%d-%m-%Y %I:%M:%S.%f %p", True),
+        ("%d-%b-%Y %H:%M:%S.%f", True),
+        ("%d %b %Y %H:%M:%S.%f", True),
+        ("%y/%m/%d %H:%M:%S.%f", True),
+        ("%d/%m/%Y, %H:%M:%S.%f", True),
+        ("%m/%d/%Y, %I:%M:%S.%f %p", True),
         ("%H:%M:%S.%f", False),
         ("%I:%M:%S.%f %p", False),
     ],
@@ -154,6 +160,15 @@ def test_noon_and_midnight_of_twelve_hours() -> None:
 def test_what_is_no_date_is_not_a_number() -> None:
     times = seconds(pd.Series(["27.10.2022 08:00:00", "later", "27.10.2022 08:00:01"]))
     np.testing.assert_array_equal(times, [1666857600.0, np.nan, 1666857601.0])
+
+
+@pytest.mark.parametrize("text", ["14.05.2024 08:00:00 +02:00", "1715731140.5", "080000"])
+def test_a_time_that_cannot_be_read_is_shown(text: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    log.assign(time=text).to_csv(tmp_path / "log", index=False)
+    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
+    with pytest.raises(DataError, match=rf"'{re.escape(text)}' is no date or time of day .* unit = \"s\"") as caught:
+        import_log(read_mapping(mapping), tmp_path / "log")
+    assert caught.value.path == "row 1"
 
 
 @pytest.mark.parametrize(("day", "time"), [("%d.%m.%Y", "%H:%M:%S.%f"), ("%Y-%m-%d", "%H:%M:%S,%f")])

@@ -442,7 +442,7 @@ def _is_clock(name: str) -> bool:
 
 def _looks_dated(column: pd.Series[Any]) -> bool:
     texts = column.dropna().astype(str).head(20)
-    dated = texts.str.fullmatch(rf"{TIME_OF_DAY}|\d{{4}}-\d\d-\d\d[T ].*|(?:{DAY_OF}) .*")
+    dated = texts.str.fullmatch(rf"{TIME_OF_DAY}|\d{{4}}-\d\d-\d\d[T ].*|(?:{DAY_OF}),? .*")
     return bool(len(texts) and dated.all())
 
 
