@@ -384,6 +384,8 @@ def _unread(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path, p
     if any(pd.isna(cell) or not str(cell).strip() for cell in cells.values()):
         return "no time here: remove the row"
     text = " ".join(str(cell).strip() for cell in reversed(cells.values()))
+    if clock.unit != "date":
+        return f"{text} is no time of day, hours, minutes and seconds as in 123005.5: correct it, or write another unit"
     return (
         f"{text!r} is no date or time of day that can be read: write dates as 2024-05-14 08:00:00; "
         'for a number of seconds write [clock] unit = "s"'

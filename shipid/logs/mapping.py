@@ -13,7 +13,7 @@ from pydantic import Field, SerializeAsAny
 from shipid import document
 from shipid.data.dataset import DATED, STANDARD_DEVIATIONS, optional, required, unit_of
 from shipid.errors import DocumentError, choices
-from shipid.logs.readers import DAY, LAST_DATE, READERS, Format, TextFormat
+from shipid.logs.readers import DAY, LAST_DATE, NEXT_DAY, READERS, Format, TextFormat
 from shipid.logs.repairs import (
     INPUTS,
     REPAIRS,
@@ -31,7 +31,7 @@ from shipid.units import DEGREE, KNOT, RPM
 
 UNITS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": DAY}
-    | {"date": 1.0, "datenum": 1.0, "excel": 1.0},
+    | {"date": 1.0, "datenum": 1.0, "excel": 1.0, "hhmmss": 1.0},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
     "rad": {"rad": 1.0, "deg": DEGREE},
@@ -44,7 +44,8 @@ UNITS: dict[str, dict[str, float]] = {
 """SI unit -> unit a log may use -> factor to SI (knot and nautical mile: BIPM, SI Brochure, 9th ed., table 8;
 mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 
-`date`, `datenum` and `excel` are read as seconds since 1970 (UTC), and so are the times of segments and breaks.
+`date`, `datenum` and `excel` are read as seconds since 1970 (UTC), and so are the times of segments and breaks;
+`hhmmss` as seconds since the first midnight.
 """
 EPOCHS = {"datenum": 719529.0, "excel": 25569.0}
 """Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system)."""
@@ -250,7 +251,19 @@ def to_si(unit: str, name: str) -> float:
 
 def clock_seconds(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
     """Numbers (N,) of a clock in one of its units as seconds; days of MATLAB and Excel as seconds since 1970."""
+    if unit == "hhmmss":
+        return since_midnight(values)
     return (values - EPOCHS[unit]) * DAY if unit in EPOCHS else values * to_si(unit, "t")
+
+
+def since_midnight(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return numbers (N,) such as 123005.5, half past twelve, as seconds since the first midnight; NaN for no time."""
+    hour, minute, second = values // 10_000, values // 100 % 100, values % 100
+    since = 3600.0 * hour + 60.0 * minute + second
+    since[~((values >= 0) & (hour < 24) & (minute < 60) & (second < 61))] = np.nan  # 60: a leap second
+    known = np.flatnonzero(np.isfinite(since))
+    since[known] += DAY * np.cumsum(np.diff(since[known], prepend=since[known][:1]) < -NEXT_DAY)
+    return since
 
 
 def is_dated(unit: str) -> bool:

@@ -27,7 +27,7 @@ def test_bundled_mappings_are_valid_and_have_a_source(name: str) -> None:
 
 DEFINED = {  # from the definitions: an inch is 25.4 mm, a nautical mile 1852 m, a turn 2 pi
     "s": {"s": 1, "ms": 1 / 1000, "us": 1 / 1000**2, "ns": 1 / 1000**3, "min": 60, "h": 60 * 60, "d": 24 * 60 * 60}
-    | {"date": 1, "datenum": 1, "excel": 1},
+    | {"date": 1, "datenum": 1, "excel": 1, "hhmmss": 1},
     "m": {"m": 1, "cm": 1 / 100, "mm": 1 / 1000, "km": 1000, "ft": 12 * 0.0254, "nmi": 1852},
     "m/s": {
         "m/s": 1,
@@ -93,6 +93,13 @@ def test_a_clock_has_the_same_seconds_in_every_unit(unit: str, seed: int) -> Non
     size = 24 * 3600 if unit in ("excel", "datenum") else DEFINED["s"][unit]
     np.testing.assert_allclose(np.diff(t), np.diff(values) * size, rtol=1e-4, atol=1e-9 * size)
     assert is_dated(unit) or t[0] == pytest.approx(values[0] * size)
+
+
+def test_hours_minutes_and_seconds_in_one_number_go_on_after_midnight() -> None:
+    values = np.array([235958.5, 235959.5, 0.5, 1.5, 100.0, 123005.25])
+    since = [86398.5, 86399.5, 86400.5, 86401.5, 86460.0, 86400.0 + 45005.25]
+    np.testing.assert_allclose(clock_seconds(values, "hhmmss"), since, atol=1e-9)
+    assert np.isnan(clock_seconds(np.array([240000.0, 126000.0, 120061.0, -1.0, np.nan]), "hhmmss")).all()
 
 
 def test_every_table_of_units_holds_its_si_unit() -> None:

@@ -18,7 +18,7 @@ from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.guess.words import is_run, parts_of, units_in
 from shipid.logs.importing import even_clock, repeated_rows, rounding_of
-from shipid.logs.mapping import EPOCHS, clock_seconds
+from shipid.logs.mapping import EPOCHS, clock_seconds, since_midnight
 from shipid.logs.readers import (
     DAY,
     DAY_OF,
@@ -447,7 +447,7 @@ def _looks_dated(column: pd.Series[Any]) -> bool:
 
 
 def _unit_of_clock(name: str, values: Array) -> str:
-    """Return the unit of a clock: as its name says; else dates in days, or ms, us or ns if it counts in them."""
+    """Return the unit of a clock: as its name says; else dates, times of day, or ms, us or ns if it counts so."""
     inside = [text.strip().lower().replace("µ", "u").replace("μ", "u") for text in units_in(name)]
     parts = parts_of(name)
     last = [] if "of" in parts else parts[-1:]  # seconds of the day
@@ -460,6 +460,8 @@ def _unit_of_clock(name: str, values: Array) -> str:
         return dates
     if written or ends not in ("", "s"):
         return written or ends
+    if _is_time_of_day(values):
+        return "hhmmss"
     if ends and DATES["d"][0] < values[0] / DAY < DATES["d"][1]:
         return "s"  # since 1970, however far apart; without the name it may be milliseconds of some weeks
     if len(steps) and np.median(steps) >= 20 and not np.any(values % 1):
@@ -467,6 +469,19 @@ def _unit_of_clock(name: str, values: Array) -> str:
         step = 0.0 if slow else float(np.median(steps))
         return next((unit for unit, (least, far) in FINE.items() if values[0] > least or step >= far), "ms")
     return "s"
+
+
+def _is_time_of_day(values: Array) -> bool:
+    """Whether numbers (N,) are hours, minutes and seconds: only so do they go on evenly where a minute is full.
+
+    As seconds they would leave out 41 s in every minute: 123059, 123100.
+    """
+    since, steps = since_midnight(values), np.diff(values)
+    full = np.flatnonzero(steps - np.diff(since) > 1.0)
+    if not np.isfinite(since).all() or not len(full):
+        return False
+    usual = float(np.median(np.diff(since)))
+    return bool(np.median(np.diff(since)[full]) <= 1.5 * usual and np.median(steps[full]) > 1.2 * np.median(steps))
 
 
 def _is_coarse(t: Array) -> bool:

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.guess.sniff import cells, plain, sniff
+from shipid.logs.guess.sniff import _is_time_of_day, cells, plain, sniff
 
 T = np.arange(0.0, 10.0, 0.5)
 TABLE = pd.DataFrame({"time": T, "N": 1.5 * T, "psi": 30.0 + T})
@@ -84,6 +84,25 @@ def test_the_unit_of_the_clock(clock: object, unit: str, t: np.ndarray, tmp_path
     sniffed = sniff(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "time", "unit": unit}
     np.testing.assert_allclose(sniffed.t, t, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["utc", "time", "t"])
+@pytest.mark.parametrize("step", [0.2, 1.0, 10.0])
+def test_hours_minutes_and_seconds_in_one_number_are_no_seconds(name: str, step: float, tmp_path: Path) -> None:
+    t = step * np.arange(900)
+    moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(t, "s")
+    log = pd.DataFrame({name: moments.strftime("%H%M%S.%f").str[:-4], "N": t, "psi": t})
+    log.to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": name, "unit": "hhmmss"}
+    np.testing.assert_allclose(sniffed.t, 8 * 3600 + 13 * 60 + 20 + t, atol=1e-6)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 50.0, 60.0, 100.0])
+@pytest.mark.parametrize("begin", [0.0, 37.0, 120.0, 86340.0, 123000.0])
+def test_seconds_are_no_hours_minutes_and_seconds(step: float, begin: float) -> None:
+    for count in (5, 40, 400):
+        assert not _is_time_of_day(begin + step * np.arange(count))
 
 
 START = pd.Timestamp("2024-05-14 08:00:05")
