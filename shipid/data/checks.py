@@ -326,11 +326,11 @@ def _repetition(
     states = ["north", "east", "psi", "u", "v", "r"]
     same = np.concatenate([(rows[states].diff().iloc[1:] == 0).all(axis=1).to_numpy() for rows in stretches])
     frozen = float(same.mean()) if len(same) else 0.0
-    yield _row("frozen", frozen, "1", FROZEN, f"{100 * frozen:.2g} % of the rows repeat the row before")
+    yield _row("frozen", frozen, "1", FROZEN, f"{100 * frozen:.3g} % of the rows repeat the row before")
     others = ((_within(whole[run], rows, shared), name) for name, rows in whole.items() if name != run)
     double, other = max(others, default=(0.0, ""))
     where = f", most in {other!r}" if double > 0 else ""
-    yield _row("overlap", double, "1", OVERLAP, f"{100 * double:.2g} % of the rows belong to another run, too{where}")
+    yield _row("overlap", double, "1", OVERLAP, f"{100 * double:.3g} % of the rows belong to another run, too{where}")
 
 
 def _within(mine: _Motion, other: _Motion, shared: bool) -> float:

@@ -69,6 +69,8 @@ def test_defect_fails_its_check(defect: Callable[[pd.DataFrame], pd.DataFrame], 
 
 def test_shared_rows_are_reported() -> None:
     assert "overlap" in failed(turning(T), turning(T + 10.0))
+    table = check_dataset(as_dataset(turning(T), turning(T)))
+    assert table.loc[table["check"].eq("overlap"), "sentence"].str.startswith("100 % of the rows belong").all()
 
 
 def test_straight_run_is_not_judged_by_its_heading() -> None:

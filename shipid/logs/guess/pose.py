@@ -366,9 +366,10 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     _ask_frame(state, best, clear, compass, undecided, heading not in sure and not state.numbered)
     names = ("latitude", "longitude") if best.on_globe else ("north", "east")
     why = f"course over ground keeps to the heading (agreement {agreement:.3f} of 1)"
+    length = "deg" if best.on_globe else _length_unit(north, east)
     for name, source, way in zip(names, (north, east), (1, best.east_sign), strict=True):
         more = {"sign": -1} if way < 0 else {}
-        state.suggest(name, source, "deg" if best.on_globe else "m", confidence, why, **more)
+        state.suggest(name, source, length, confidence, why, **more)
     if best.settled in state.columns and (best.east_sign < 0 or sign < 0):
         words = "counts clockwise from north" if fits(best.settled).get("course") else "is a speed to north"
         sentence = f"{best.settled!r} {words}, and agrees with the track only with {north!r} as north"
@@ -384,10 +385,17 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     if heading not in sure and not state.numbered:
         confidence = min(confidence, 0.5)
     state.suggest("psi", heading, unit, confidence, f"{why}; in {unit} rather than another unit", **extra)
-    place = plane(state, north, east, best.on_globe)
+    place = plane(state, north, east, best.on_globe) * (1.0 if best.on_globe else to_si(length, "north"))
     state.position = np.conj(place) if best.east_sign < 0 else place
     state.psi = sign * angle + np.radians(offset)
     state.chosen = evidence.windows(state.t, evidence.lively(state.t, state.psi, state.chosen))
+
+
+def _length_unit(north: str, east: str) -> str:
+    """Return the unit of length that both names say, else metres."""
+    units = {unit_in_name(name, "m") for name in (north, east)}
+    unit = units.pop() if len(units) == 1 else None
+    return "m" if unit is None else unit
 
 
 def _is_compass(name: str) -> bool:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from shipid.logs.guess.clues import SEEN, STRONG, State, unit_in_name, unit_of_another
+from shipid.logs.guess.clues import LIKELY, SEEN, STRONG, State, unit_in_name, unit_of_another
 from shipid.logs.guess.words import fits, is_order, parts_of, side_of, words_of_side
+from shipid.logs.mapping import UNITS
 
 OF_THROTTLES = frozenset("throttle throttles thrust thruster motor motors engine esc pwm power gas".split())
 REST, STILL, ALIKE = 0.05, 5, 0.02  # of the usual speed; windows at rest; of the range: how much alike values there are
@@ -33,6 +34,12 @@ def choose_twins(state: State, r: np.ndarray | None) -> None:
     turned = "starboard" if found[pair] > 0 else "port"
     why = f"by its side; the difference to the other side turns the ship to {turned} (t value {abs(found[pair]):.0f})"
     both = f"{pair[0]!r} and {pair[1]!r}"
+    unit = unit_in_name(pair[0], "rev/s")
+    if unit in UNITS["rev/s"] and unit == unit_in_name(pair[1], "rev/s"):  # the names say a shaft speed
+        _say_sides(state, pair, found[pair])
+        for side, name in zip(("port", "starboard"), pair, strict=True):
+            state.suggest(f"{side}.n", name, str(unit), LIKELY, why)
+        return
     state.ask(("n",), f"{both} turn the ship by their difference. Of which shaft speed is a value of 1? Write factor")
     stopped = _at_rest(state, pair)
     if stopped is None:
@@ -44,7 +51,12 @@ def choose_twins(state: State, r: np.ndarray | None) -> None:
             extra["offset"] = -stopped[side]
             said = f"{why}; {stopped[side]:g} while the ship is at rest"
         state.suggest(f"{side}.n", name, "rpm", CONFIDENCE, said, **extra)
-    if found[pair] < 0:
+    _say_sides(state, pair, found[pair])
+
+
+def _say_sides(state: State, pair: tuple[str, str], effect: float) -> None:
+    """Say so where more of the port screw turns the ship to port; effect: t value of port less starboard."""
+    if effect < 0:
         sentence = f"more of {pair[0]!r} turns the ship to port: are the sides swapped, or the yaw rate's sign?"
         state.find("sides of the screws", pair, 0.6, sentence)
 

@@ -45,6 +45,23 @@ def test_named_columns_in_degrees_or_radians() -> None:
         assert_motion(state)
 
 
+@pytest.mark.parametrize(
+    ("names", "unit", "size"),
+    [
+        (("North [ft]", "East [ft]"), "ft", 0.3048),
+        (("x_ft", "y_ft"), "ft", 0.3048),
+        (("Northing km", "Easting km"), "km", 1000.0),
+        (("north_mm", "east_mm"), "mm", 0.001),
+        (("North [m]", "East [m]"), "m", 1.0),
+        (("North [ft]", "East"), "m", 1.0),
+    ],
+)
+def test_positions_have_the_unit_of_length_in_their_names(names: tuple[str, str], unit: str, size: float) -> None:
+    state = chosen({names[0]: NORTH / size, names[1]: EAST / size, "heading": DEG})
+    assert [column.unit for column in state.suggestions[:2]] == [unit, unit]
+    assert_motion(state)
+
+
 def test_columns_without_names() -> None:
     """A mirror image fits as well, which is asked; a signal that is no motion is not taken."""
     state = chosen({"2": np.sin(T / 7), "3": DEG, "4": NORTH, "5": EAST})

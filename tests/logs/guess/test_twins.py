@@ -16,6 +16,7 @@ from shipid.logs.guess.twins import twins
 from shipid.vessel.load import load_vessel
 
 STEP = 0.2
+SIDES = {"left": "port", "right": "starboard"}
 NAMES = (
     ("cmd_port_pct", "cmd_stbd_pct"),
     ("throttle left", "throttle right"),
@@ -82,6 +83,18 @@ def test_a_screw_of_one_side_is_no_rudder(seed: int, names: tuple[str, str]) -> 
     log = craft(seed)
     columns = {name: 60.0 * log[side].to_numpy() for name, side in zip(names, ("port", "starboard"), strict=True)}
     assert not [one.name for one in guessed(log, columns).suggestions if one.name.endswith("delta")]
+
+
+@pytest.mark.parametrize(("ending", "unit"), [("rps", "rev/s"), ("hz", "rev/s")])
+def test_a_unit_of_a_shaft_in_both_names_is_taken(ending: str, unit: str) -> None:
+    log = craft(0)
+    columns = {f"{side}_{ending}": 15.0 * log[name].to_numpy() for side, name in SIDES.items()}
+    state = guessed(log, columns)
+    assert {(one.name, one.source, one.unit) for one in state.suggestions} == {
+        (f"{name}.n", f"{side}_{ending}", unit) for side, name in SIDES.items()
+    }
+    assert not any("factor" in one.extra for one in state.suggestions)
+    assert state.questions == []
 
 
 def test_swapped_sides_are_reported() -> None:
