@@ -540,6 +540,12 @@ def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str
     text = column.fillna("").astype(str).str.strip()
     missing = text.isin(read.missing)
     plain = text.str.replace(",", ".", regex=False) if read.decimal == "," else text
+    if read.decimal == "," and (grouped := _grouped(text)) is not None:
+        message = (
+            f"{text.iloc[grouped]!r} has a point, and the decimal is a comma (column {source!r}): is it a mark of "
+            "thousands? Take it out of the log. Is it the decimal of this column? Write a comma there"
+        )
+        raise DataError(message, file=file, path=f"row {grouped + 1}")
     numbers = pd.to_numeric(plain.mask(missing), errors="coerce").to_numpy(dtype=np.float64, copy=True)
     bad = np.flatnonzero(~np.isfinite(numbers) & ~missing.to_numpy())
     if len(bad):
@@ -549,6 +555,13 @@ def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str
         )
         raise DataError(message, file=file, path=f"row {bad[0] + 1}")
     return numbers
+
+
+def _grouped(text: pd.Series[Any]) -> int | None:
+    """Return the first row whose point may mark thousands, 1.250 for 1250; None where a point of a column may not."""
+    pointed = text.str.contains(".", regex=False)
+    groups = text.str.fullmatch(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?")
+    return int(np.argmax(pointed)) if pointed.any() and groups[pointed].all() else None
 
 
 def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column], file: Path) -> pd.DataFrame:

@@ -452,3 +452,24 @@ def test_a_run_is_named_by_a_file_in_utf_8(tmp_path: Path) -> None:
     (tmp_path / os.fsdecode(b"a\xe9.csv")).touch()
     with pytest.raises(DataError, match="its name is not UTF-8"):
         runs_of(Source(runs="*.csv"), tmp_path)
+
+
+@pytest.mark.parametrize("large", [False, True])
+@pytest.mark.parametrize("value", ["8.400", "-1.250", "1.250.000", "8.400,5"])
+def test_a_point_that_may_mark_thousands_is_refused_beside_a_decimal_comma(
+    value: str, large: bool, plain_mapping: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """8.400 rpm of a log with decimal commas are 8400 rpm: read as 8.4 they would be wrong without a word."""
+    monkeypatch.setattr(readers, "LARGE", 0 if large else readers.LARGE)
+    log = pd.read_csv(as_log(turning(T), tmp_path / "log.csv"))
+    mapping = plain_mapping('[format]\nseparator = ";"\ndecimal = ","\n')
+    log.assign(rpm=[value if row % 3 else "840" for row in range(len(log))]).to_csv(
+        tmp_path / "log.csv", sep=";", decimal=",", index=False
+    )
+    with pytest.raises(DataError, match=r"has a point, and the decimal is a comma \(column 'rpm'\): .* thousands\?"):
+        import_log(read_mapping(mapping), tmp_path / "log.csv")
+    log.assign(rpm=[f"0.{row:03d}" for row in range(len(log))]).to_csv(
+        tmp_path / "log.csv", sep=";", decimal=",", index=False
+    )
+    shaft = import_log(read_mapping(mapping), tmp_path / "log.csv").frame["propeller.n"]
+    np.testing.assert_allclose(60 * shaft, 0.001 * np.arange(len(log)), atol=1e-9)

@@ -227,8 +227,8 @@ SOURCES = frozenset(
 """Parts that say where a value comes from, and nothing of what it is."""
 UNIT_PARTS = frozenset(
     (
-        "cm cmps cms deg degs dpm dps feet ft grad kmh kn knm kw nm knots kt kts min mm mmps mms mph mps ms nmi pct rad "
-        "rads rps sec"
+        "cm cmps cms deg degs dpm dps feet ft grad kmh kn knm kw nm knots kt kts min mm mmps mms mph mps ms nmi pct "
+        "rad rads rps sec"
     ).split()
 )
 """Parts that are a unit at the end of a name."""
