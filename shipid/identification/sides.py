@@ -172,10 +172,16 @@ def shown(groups: pd.DataFrame) -> list[list[str]]:
             str(row["rows"]),
             *(f"{row[name]:.3g}" for name in ("u", "v")),
             f"{row['r'] / DEGREE:.3g}",
-            "" if row["turning"] != row["turning"] else f"{100 * row['turning']:+.1f} +-{100 * row['error']:.1f}",
+            _turning(float(row["turning"]), float(row["error"])),
         ]
         for row in groups.to_dict("records")
     ]
+
+
+def _turning(turning: float, error: float) -> str:
+    """Return the error of the turning [%] with its standard error, where more than one piece shows it."""
+    share = "" if np.isnan(turning) else f"{100 * turning:+.1f}"
+    return f"{share} +-{100 * error:.1f}" if share and np.isfinite(error) else share
 
 
 HEADS = ("group", "turning to", "rows", "u [m/s]", "v [m/s]", "r [deg/s]", "turning [%]")

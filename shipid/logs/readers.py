@@ -602,9 +602,11 @@ def _is_stamp(text: str) -> bool:
 
 
 def _values_of(sentence: Any) -> dict[str, float]:
-    """Return the values of a sentence by column; none for an invalid fix (RMC, GLL: V; GGA: quality 0)."""
+    """Return the values of a sentence by column; none of an invalid one (status V; GGA: quality 0; VTG: mode N)."""
     kind = getattr(sentence, "sentence_type", "")
     if getattr(sentence, "status", "A") == "V" or str(getattr(sentence, "gps_qual", 1)) == "0":
+        return {}
+    if kind == "VTG" and getattr(sentence, "faa_mode", None) == "N":
         return {}
     values = {name: read(sentence) for name, read in SENTENCES.get(kind, {}).items()}
     return {name: float(value) for name, value in values.items() if value not in (None, "")}
@@ -628,6 +630,11 @@ def _revolutions(source: str, *numbers: str) -> Callable[[Any], Any]:
     return lambda sentence: sentence.speed if _turns(sentence, source) in numbers else None
 
 
+def _rudder(side: str) -> Callable[[Any], Any]:
+    """Return the angle of the rudder of a side; nothing where its status says that it is invalid."""
+    return lambda s: None if getattr(s, f"rsa_{side}_status", "A") == "V" else getattr(s, f"rsa_{side}")
+
+
 def _speed(sentence: Any) -> Any:
     """Return the apparent wind speed [m/s] from a value in N (knots), K (km/h) or M (m/s)."""
     if sentence.reference != "R" or not sentence.wind_speed:
@@ -648,7 +655,7 @@ SENTENCES: dict[str, dict[str, Callable[[Any], Any]]] = {
     "VTG": {"sog": lambda s: s.spd_over_grnd_kts, "cog": lambda s: s.true_track},
     "HDT": {"heading": lambda s: s.heading},
     "ROT": {"rot": lambda s: s.rate_of_turn},
-    "RSA": {"rudder": lambda s: s.rsa_starboard, "rudder_port": lambda s: s.rsa_port},
+    "RSA": {"rudder": _rudder("starboard"), "rudder_port": _rudder("port")},
     "RPM": {
         "rpm": _revolutions("S", "0", "1"),
         "rpm_2": _revolutions("S", "2"),

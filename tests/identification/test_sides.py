@@ -134,3 +134,10 @@ def test_a_craft_without_an_angle_has_no_groups_by_helm() -> None:
     log = Dataset(pd.DataFrame({"run": "A", "t": t, **still, "flags": 0}), {"clock": "run", "flags": []})
     groups = by_group(series, "after", load_vessel("otter"), log)
     assert {name.split()[0] for name in groups["group"]} == {"all", "speed"}
+
+
+def test_a_turning_that_one_piece_shows_has_no_error_beside_it() -> None:
+    groups = compared(port=-0.14, starboard=0.02)
+    lone = groups.assign(error=np.inf)
+    assert {row[-1] for row in shown(lone) if row[1] == "port"} == {"-14.0"}
+    assert not any("inf" in cell for row in shown(lone) for cell in row)

@@ -371,6 +371,21 @@ def bridge_log(time: str, midnight: float, motion: pd.DataFrame) -> tuple[str, p
     return "\r\n".join(lines) + "\r\n", motion
 
 
+def test_values_that_a_sentence_calls_invalid_are_not_taken(tmp_path: Path) -> None:
+    begin = [
+        "GPRMC,120000,A,4807.0,N,01131.0,E,5.0,84.0,271022,,,A",
+        "AGRSA,10.5,A,4.0,V",
+        "GPVTG,54.0,T,,M,5.5,N,,K,A",
+    ]
+    later = ["GPRMC,120001,A,4807.0,N,01131.0,E,,,271022,,,A", "AGRSA,33.0,V,,", "GPVTG,99.0,T,,M,77.0,N,,K,N"]
+    (tmp_path / "log").write_text("\n".join(map(sentence, begin + later)))
+    table = readers.read_table(tmp_path / "log", readers.NmeaFormat(kind="nmea"), "time")
+    assert table["rudder"].tolist() == pytest.approx([10.5, np.nan], nan_ok=True)
+    assert table["rudder_port"].isna().all()
+    assert table["sog"].tolist() == pytest.approx([5.0, np.nan], nan_ok=True)
+    assert table.attrs["unreadable"] == 0
+
+
 def test_times_of_day_that_go_back_are_of_the_next_day() -> None:
     """Trials of three days in one file, each from eight in the morning; a minute back is an error, and stays one."""
     hours = pd.Series(["08:00:00", "11:30:00", "08:15:00", "16:00:00", "08:05:00", "08:04:00"])
