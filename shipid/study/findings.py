@@ -86,8 +86,8 @@ def _full_scale(results: Results, claims: Claims) -> list[Finding]:
     return judged(Rivals(table, good, bad, _steps(results, table.amounts[-1])))
 
 
-def judged(rivals: Rivals) -> list[Finding]:
-    """Verdicts on R1-R4; all undecided with fewer test manoeuvres than give an interval."""
+def judged(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs in turn") -> list[Finding]:
+    """Verdicts on R1-R4; all undecided with fewer test manoeuvres than give an interval, which needs a remedy."""
     table, good, bad = rivals.table, rivals.good, rivals.bad
     place = len(table.amounts) - 1
     gains = table.compare([[(1.0, model, ALONE), (-1.0, model, place)] for model in (good, bad)])
@@ -126,7 +126,7 @@ def judged(rivals: Rivals) -> list[Finding]:
     }
     note = too_few(table.runs)
     if note:
-        note += ": `shipid study rotate` tests other runs in turn"
+        note += f": {remedy}"
     return [
         Finding(
             id=key,

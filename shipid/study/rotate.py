@@ -197,7 +197,7 @@ def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
     table = ErrorTable((1,), np.ones(len(H)), alone, errors)
     steps = {name: values[0].mean(axis=0)[None] for name, values in errors.items()}
     steps |= {f"{name} alone": values[None] for name, values in alone.items()}
-    return judged(Rivals(table, good, bad, steps))
+    return judged(Rivals(table, good, bad, steps), remedy="name more runs with --tests")
 
 
 def _per_turn(frame: pd.DataFrame) -> pd.DataFrame:

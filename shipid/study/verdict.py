@@ -57,13 +57,18 @@ def undecided(claims: Mapping[str, str], reason: str) -> list[Finding]:
 
 
 def metres(value: float) -> str:
-    """Return a length with two decimals, from 10 m on with one."""
-    return f"{value:.2f} m" if abs(value) < 9.995 else f"{value:.1f} m"
+    """Return a length with two decimals, from 10 m on with one, of a model below 0.1 m with two digits or more."""
+    return f"{value:.{_decimals(value)}f} m"
+
+
+def _decimals(value: float) -> int:
+    sizes = {1: 9.995, 2: 0.0995, 3: 0.00995, 4: 0.00005}
+    return next((count for count, least in sizes.items() if abs(value) >= least), 2)
 
 
 def interval(low: float, high: float) -> str:
     """Return ` [low, high]`, or nothing where there is no interval."""
-    decimals = 2 if max(abs(low), abs(high)) < 9.995 else 1
+    decimals = _decimals(max(abs(low), abs(high)))
     return f" [{low:.{decimals}f}, {high:.{decimals}f}]" if np.isfinite([low, high]).all() else ""
 
 

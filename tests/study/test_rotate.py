@@ -179,6 +179,7 @@ def test_findings_over_turns_by_hand(claimed: Plan, tmp_path: Path) -> None:
 
 def test_few_turns_decide_nothing(claimed: Plan) -> None:
     claims = turn_findings(by_hand(), claimed)
+    assert all(one["evidence"].endswith("5 would: name more runs with --tests") for one in claims)
     assert {one["verdict"] for one in claims} == {"undecided"}
     assert "3 test manoeuvres give no interval, 5 would" in claims[0]["evidence"]
 

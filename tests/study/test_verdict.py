@@ -44,6 +44,14 @@ def test_numbers_in_words() -> None:
     assert metres(9.99) == "9.99 m"
     assert metres(9.996) == "10.0 m"
     assert interval(1.0, 12.0) == " [1.0, 12.0]"
+    assert [metres(value) for value in (0.42, 0.0423, -0.00423, 0.000423, 1e-6)] == [
+        "0.42 m",
+        "0.042 m",
+        "-0.0042 m",
+        "0.0004 m",
+        "0.00 m",
+    ]
+    assert interval(-0.001, 0.0123) == " [-0.001, 0.012]"
     assert interval(np.nan, np.nan) == ""
     assert runs(1) == "1 run"
     assert too_few(1) == "1 test manoeuvre gives no interval, 5 would"
