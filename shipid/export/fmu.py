@@ -289,7 +289,14 @@ def _vessel_wrapper(name: str, sizes: Mapping[str, int], num_states: int, variab
     given = ", ".join(
         f"self->values + {at[group]}" for group in ("carry", "commands", "environment", "loads", "parameters")
     )
-    begin = f"    {name}_begin(self->values, self->values + {at['commands']});\n" if sizes["carry"] > num_states else ""
+    begin = f"""    double carry[{sizes["carry"]}];
+    int i;
+    memcpy(carry, self->values, sizeof carry);
+    {name}_begin(carry, self->values + {at["commands"]});
+    for (i = {num_states}; i < {sizes["carry"]}; ++i) if (!set[i]) self->values[i] = carry[i]; /* actuators: at their orders */
+    (void)t;
+"""
+    begin = begin if sizes["carry"] > num_states else "    (void)self;\n    (void)set;\n    (void)t;\n"
     return f"""
 #define NUM_REALS {total}
 #define NUM_BOOLEANS 0
@@ -305,11 +312,9 @@ static void Model_init(Model *self)
     memcpy(self->values, start_values, sizeof start_values);
 }}
 
-static const char *Model_begin(Model *self, double t)
+static const char *Model_begin(Model *self, const unsigned char *set, double t)
 {{
-    (void)t;
-{begin or "    (void)self;"}
-    return 0;
+{begin}    return 0;
 }}
 
 static const char *Model_step(Model *self, double t, double h)
@@ -418,9 +423,10 @@ static const char *predict_from(Model *self, {name} *kept, double t)
 }}
 
 /* The path at the start: from a copy, since the first step keeps this row. */
-static const char *Model_begin(Model *self, double t)
+static const char *Model_begin(Model *self, const unsigned char *set, double t)
 {{
     {name} kept = self->kept;
+    (void)set;
     return predict_from(self, &kept, t);
 }}
 
@@ -505,6 +511,7 @@ typedef struct {
     Model model;
     Phase phase;
     double time;
+    unsigned char set[NUM_REALS]; /* by the importer */
     int logging;
     char *name;
     fmi2CallbackFunctions call;
@@ -628,7 +635,7 @@ FMI2_STATUS FMI2(fmi2ExitInitializationMode)(fmi2Component c)
     const char *message;
     if (self->phase != INITIALIZING) return refuse(self, fmi2Error, "there is no initialisation to end");
     self->phase = STEPPING;
-    message = Model_begin(&self->model, self->time);
+    message = Model_begin(&self->model, self->set, self->time);
     return message ? refuse(self, fmi2Error, "%s", message) : fmi2OK;
 }
 
@@ -644,6 +651,7 @@ FMI2_STATUS FMI2(fmi2Reset)(fmi2Component c)
 {
     Instance *self = (Instance *)c;
     Model_init(&self->model);
+    memset(self->set, 0, sizeof self->set);
     self->phase = INSTANTIATED;
     self->time = 0;
     return fmi2OK;
@@ -672,7 +680,10 @@ FMI2_STATUS FMI2(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr[], si
         if (!isfinite(value[i]))
             return refuse(self, fmi2Discard, "variable %u: %g is not a finite number", vr[i], value[i]);
     }
-    for (i = 0; i < n; ++i) self->model.values[vr[i]] = value[i];
+    for (i = 0; i < n; ++i) {
+        self->model.values[vr[i]] = value[i];
+        self->set[vr[i]] = 1;
+    }
     return fmi2OK;
 }
 

@@ -225,6 +225,23 @@ def test_wrong_values_are_refused_and_the_instance_goes_on(ship, folder):
 
 
 @pytest.mark.slow
+def test_an_actuator_begins_where_the_importer_says_else_at_its_order(ship, folder):
+    _, state, commands, weather = start_values()
+    one = Instance(ship, folder).begin()
+    reached = [name for name in one.at if name.startswith("actual.")]
+    assert reached
+    chosen = {reached[0]: 0.05}
+    for given in ({}, chosen, {}):  # the last after a reset
+        one.set(**state, **commands, **weather, **given)
+        one.fmu.exitInitializationMode()
+        orders = {name: commands[name.removeprefix("actual.")] for name in reached}
+        assert one.get(*reached) == list({**orders, **given}.values())
+        one.fmu.reset()
+        one.fmu.enterInitializationMode()
+    one.fmu.freeInstance()
+
+
+@pytest.mark.slow
 def test_ten_copies_do_not_know_each_other(ship, folder):
     copies = [Instance(ship, folder, f"copy {i}").begin() for i in range(10)]
     for i, one in enumerate(copies):
