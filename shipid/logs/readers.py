@@ -407,6 +407,8 @@ def _large_text(
         return None
     widest(head, form.separator, file)
     text = head.decode(form.encoding, "replace").rpartition("\n")[0]
+    if not text:  # lines end with a carriage return alone
+        return None
     first = parse_text(io.StringIO(text), form.model_copy(update={"ragged": "drop"}), file)
     names = [str(name) for name in first.columns]
     places = [index for index, name in enumerate(names) if name in wanted]
@@ -446,6 +448,8 @@ def _large_text(
                 if place in texts:
                     texts[place].append(values)
                     continue
+                if np.count_nonzero(np.isnan(values)) > column.null_count:  # a word that this mapping does not declare
+                    return None
                 if rows > len(numbers[place]):
                     more = np.empty(max(rows - len(numbers[place]), len(numbers[place]) // 4))
                     numbers[place] = np.concatenate([numbers[place], more])
@@ -460,7 +464,11 @@ def _large_text(
         else np.concatenate([np.empty(0, object), *texts[place]])
         for place in places
     }
-    return pd.DataFrame(joined, copy=False)
+    table = pd.DataFrame(joined, copy=False)
+    blank = np.ones(len(table), dtype=bool)
+    for name in table:
+        blank &= table[name].isna().to_numpy()
+    return None if blank.any() else table  # whether such a line is empty, only all its cells tell
 
 
 def _decimal(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:

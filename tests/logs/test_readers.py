@@ -214,6 +214,19 @@ def test_a_large_text_is_read_by_blocks_as_a_small_one(
     assert list(read_table(file, form, "a", ("b",))) == ["a", "b"]
 
 
+@pytest.mark.parametrize(
+    "text",
+    ["a,b,c\r0.5,1,x\r1.5,2,y\r", "a,b,c\n0.5,1,x\n1.5,2,y\n,,\n", "a,b,c\n0.5,NAN,x\n1.5,2,y\n"],
+    ids=["carriage returns alone", "an empty line of separators", "another word for no number"],
+)
+def test_a_large_text_is_read_as_a_small_one(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "log.csv"
+    file.write_bytes(text.encode())
+    small = read_table(file, TextFormat(), "a", ("b", "c"))
+    monkeypatch.setattr(readers, "LARGE", 1)
+    pd.testing.assert_frame_equal(read_table(file, TextFormat(), "a", ("b", "c")), small)
+
+
 @pytest.mark.parametrize("first", [0, 200], ids=["short lines", "long lines first"])
 def test_a_large_text_whose_lines_become_shorter_is_read_to_its_end(
     first: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
