@@ -420,9 +420,12 @@ def quadratic_wash(
     """Slipstream of a screw with a quadratic law of thrust, (3): inflow [m/s], slipstream speed [m/s], D_p [m].
 
     Its signed square is c_uu u_P|u_P| + c_un n u_P + c_nn n|n| (van Berlekom and Goddard 1972), and with a diameter
-    u_P|u_P| + 8 T / (pi rho D_p^2) more, as momentum theory has it; see `slipstream`.
+    u_P|u_P| + 8 T / (pi rho D_p^2) more, as momentum theory has it; see `slipstream`. With none of these numbers there
+    is no slipstream, and a rudder is in the inflow.
     """
     u_P = (1 - w_P0) * nu_r[0]
+    if not any(given(number, 0.0) for number in (D_p, c_uu, c_un, c_nn)):
+        return vector(u_P, u_P, D_p)
     still, driven = SX(1, 1), c_uu * u_P * ca.fabs(u_P) + c_un * n * u_P + c_nn * n * ca.fabs(n)
     if given(D_p, 0.0):
         thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)

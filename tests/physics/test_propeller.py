@@ -256,6 +256,11 @@ def test_a_driven_screw_gives_its_share_against_its_sense() -> None:
     assert quadratic_wrench(1.0, 20.0, k_driven=0.0)[0] == quadratic_wrench(1.0, 20.0)[0]
 
 
+@pytest.mark.parametrize("u", [2.0, 0.0, -1.0])
+def test_a_quadratic_screw_without_a_slipstream_leaves_a_rudder_in_the_inflow(u: float) -> None:
+    np.testing.assert_allclose(quadratic_flow(u, 10.0, w_P0=0.1), [0.9 * u, 0.9 * u, 0.0], atol=1e-12)
+
+
 def test_race_of_a_quadratic_screw() -> None:
     """Momentum theory, or c^2 = c_un u n + c_nn n^2; a screw astern takes at most all flow of a ship going ahead."""
     u, n = 0.7, 20.0
