@@ -38,8 +38,8 @@ DAY_OF = (
     r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)|\d\d?(?P<gap>[- ])[A-Za-z]{3}(?P=gap)\d{4}"
 )
 """A date without a time."""
-DAYS = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y", "%d-%m-%Y", "%m-%d-%Y")
-DAYS += ("%y/%m/%d", "%d-%b-%Y", "%d %b %Y")
+DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y")
+DAYS += ("%d-%m-%Y", "%m-%d-%Y", "%y/%m/%d", "%d-%b-%Y", "%d %b %Y")
 HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
 SAMPLES = 60  # texts by which the way of writing is looked for

@@ -422,5 +422,6 @@ def _backwards(windows: Windows) -> list[str]:
 def _shown(vessel: Vessel, change: Change) -> str:
     """A change in words: the first of its numbers, from and to."""
     path = next(iter(change.values))
-    others = f" and {len(change.values) - 1} with it" if len(change.values) > 1 else ""
+    more = len(change.values) - 1
+    others = f" ({more} more number{'s' if more > 1 else ''} by the same factor)" if more else ""
     return f"{path} = {change.values[path]:.4g} in place of {vessel.parameters[path]:.4g}{others}"

@@ -11,7 +11,18 @@ from shipid.data.dataset import Dataset
 from shipid.identification.plausible import outside
 from shipid.simulation.manoeuvre import Steps, TurningCircle, Zigzag
 from shipid.simulation.perform import perform
-from shipid.study.first_look import GROUPS, Look, _backwards, _members, _some, _Trial, first_look, steady_speed
+from shipid.study.first_look import (
+    GROUPS,
+    Change,
+    Look,
+    _backwards,
+    _members,
+    _shown,
+    _some,
+    _Trial,
+    first_look,
+    steady_speed,
+)
 from shipid.vessel.load import Vessel, load_vessel
 
 SHIP, RPM = "kvlcc2-l7", 627.0
@@ -129,4 +140,18 @@ def test_no_number_is_proposed_that_no_ship_has(log: Dataset) -> None:
     assert view.changes
     assert outside(view.vessel, view.values) <= outside(
         view.vessel, {path: view.vessel.parameters[path] for path in view.values}
+    )
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [(0, ""), (1, " (1 more number by the same factor)"), (2, " (2 more numbers by the same factor)")],
+)
+def test_a_change_says_how_many_numbers_it_scales(more: int, words: str) -> None:
+    ship = load_vessel(SHIP)
+    paths = [D_P, RUDDER, "hull.mmg.R_0"][: more + 1]
+    change = Change(GROUPS[0], 0.5, {path: 0.5 * ship.parameters[path] for path in paths}, 1.0)
+    assert (
+        _shown(ship, change)
+        == f"{D_P} = {0.5 * ship.parameters[D_P]:.4g} in place of {ship.parameters[D_P]:.4g}{words}"
     )
