@@ -17,6 +17,7 @@ from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import Unit, course_keeping
 from shipid.physics.signals import is_shaft, neutral, steers
+from shipid.units import GRAVITY
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
@@ -32,6 +33,7 @@ CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, an
 PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose speed settles over some 20
 SETTLED = 1e-3  # m/s, rad/s: greatest change of a velocity over the last chunk, and greatest yaw rate
 SLOW = 0.02  # the same times U^2 / L, for a large and slow ship: her speed is then right to about 1 %
+CREEPING = 0.02  # Froude number: a ship that is slower, or at rest, is taken for one of it
 KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
 LENGTH, FASTEST = 100.0, 100.0  # m, of a ship whose document does not say; m/s
 REMEDY = 'let a helmsman hold the course (approach = "helmsman"), or start from rest (approach = "rest")'
@@ -206,7 +208,8 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
         orders |= _course(controls, n)
     moving = np.arange(count)
     num_steps = max(round(CHUNK / step), 1)
-    reached = np.array([_speed(controls, shaft) for shaft in speeds])
+    slowest = CREEPING * np.sqrt(GRAVITY * asked.length)
+    reached = np.array([max(_speed(controls, shaft), slowest) for shaft in speeds])
     longest = max(LONGEST, *(PASSING * asked.length / reached))
     settled = np.minimum(SETTLED, SLOW * reached**2 / asked.length)
     for _ in range(int(longest / CHUNK)):

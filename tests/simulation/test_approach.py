@@ -142,6 +142,8 @@ def test_a_large_and_slow_ship_reaches_her_speed_whatever_time_that_takes() -> N
         steadily = steady(tanker, np.array([shaft]), step=1.0, method="euler", engine="casadi")
         balanced = fsolve(lambda u, n=shaft: acceleration(tanker.vessel, float(u[0]), tanker.ahead(n))[0], 8 * shaft)
         assert steadily.state["u"][0] == pytest.approx(balanced[0], rel=0.015)
+    stopped = steady(tanker, np.array([0.0, 1e-4]), step=1.0, method="euler", engine="casadi")
+    np.testing.assert_allclose(stopped.state["u"], 0.0, atol=0.05)  # at rest at once, not after hours of approach
 
 
 def test_a_vessel_that_turns_with_the_helm_amidships_has_no_straight_approach() -> None:
