@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import sys
@@ -9,7 +10,7 @@ import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -46,8 +47,9 @@ from shipid.study.prepare import (
     window_memory,
 )
 from shipid.study.workers import import_for_workers, on_workers
+from shipid.version import __version__
 
-PACKAGES = ("shipid", "casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
+PACKAGES = ("casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
 
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
 SESSIONS = "sessions"  # name of the claim on the record of what a run is computed with
@@ -217,8 +219,21 @@ def session_on(device: str) -> dict[str, Any]:
     """What results depend on beside the plan, to the last digit: versions, engine, processor and device."""
     computer = machine()
     packages = computer["packages"]
-    session = {"shipid": packages.pop("shipid"), "engine": engine(), "processor": computer["processor"]}
+    session = {
+        "shipid": f"{packages.pop('shipid')}, code {code()}",
+        "engine": engine(),
+        "processor": computer["processor"],
+    }
     return {**session, "python": computer["python"], "device": device, "packages": packages}
+
+
+@cache
+def code() -> str:
+    """Digest (8 hex digits) of the source files of shipid: two commits of a copy may have one version."""
+    package = Path(__file__).parents[1]
+    files = sorted((file.relative_to(package).as_posix(), file) for file in package.rglob("*.py"))
+    lines = (f"{name} {hashlib.sha256(file.read_bytes()).hexdigest()}\n" for name, file in files)
+    return hashlib.sha256("".join(lines).encode()).hexdigest()[:8]
 
 
 def _shared(
@@ -460,7 +475,7 @@ def _promise(plan: Plan, predictor: Predictor, instants: Instants, paths: Array,
 
 def machine() -> dict[str, Any]:
     """What the results were computed with: interpreter, packages, machine."""
-    packages = {}
+    packages = {"shipid": __version__}
     for name in PACKAGES:
         with suppress(PackageNotFoundError):  # an extra that is not installed
             packages[name] = version(name)
@@ -500,7 +515,7 @@ def _predictor(
             "foundation": foundation.name,
             "method": way.name,
             "runs": list(windows.spans),
-            "shipid": version("shipid"),
+            "shipid": __version__,
         },
     )
 

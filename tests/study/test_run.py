@@ -21,12 +21,14 @@ from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
-from shipid.study import seals, store
+from shipid.study import run, seals, store
+from shipid.study.check import check_folder
 from shipid.study.claims import Claims
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
-from shipid.study.results import read_results
+from shipid.study.results import provenance_words, read_results
 from shipid.study.run import run_batch, run_study, run_unit
+from shipid.version import __version__
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import events_here, mixed_plan, run_here, tiny_plan
 
@@ -61,6 +63,29 @@ def test_interrupted_on_workers_and_resumed_here_gives_the_same_numbers(tmp_path
     assert stored[0].read_bytes() == before
     assert numbers(folder) == numbers(tiny_run)
     assert read_results(folder).complete
+
+
+@pytest.mark.parametrize(
+    ("name", "other", "words"),
+    [("__version__", "9.8.7", "now 9.8.7, code"), ("code", lambda: "12345678", "code 12345678")],
+)
+def test_another_shipid_that_goes_on_is_noted(
+    name: str, other: Any, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another version, which the metadata of an editable install do not know, or another commit of one version."""
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    for event in events_here(plan, folder):
+        if event.kind == "cell":
+            break
+    monkeypatch.setattr(run, name, other)
+    notes = [event.text for event in events_here(plan, folder) if event.kind == "note"]
+    assert any("computed otherwise: shipid was" in note and words in note for note in notes)
+    assert any(words in line for line in check_folder(folder).lines)
+    assert words in provenance_words(read_results(folder))["computed in parts"]
+    if name == "__version__":
+        assert read_json(folder / store.PROVENANCE)["machine"]["packages"]["shipid"] == other
+        stored = [Predictor.load(file).provenance["shipid"] for file in (folder / "cells").glob("*.npz")]
+        assert set(stored) == {__version__, other}
 
 
 def test_a_dask_cluster_gives_the_same_numbers(tmp_path: Path, tiny_run: Path) -> None:
