@@ -31,6 +31,7 @@ from shipid.files import (
 from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.plan import WITH, Foundation, Plan, Unit, build_plan
+from shipid.version import __version__
 from shipid.vessel.load import check_vessel
 
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", "provenance.json", "foundations.json"
@@ -133,7 +134,10 @@ def _describe(folder: Path, plan: Plan) -> None:
 
 
 def stored_plan(folder: Path) -> Plan:
-    """The plan of a run from its folder alone: the study and the vessels as they were when the run began."""
+    """The plan of a run from its folder alone: the study and the vessels as they were when the run began.
+
+    Raises ResultError where it is no folder of a run, is damaged, or is of a version whose documents were different.
+    """
     if not (folder / STUDY).is_file():
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
     provenance = _provenance(folder)
@@ -146,13 +150,27 @@ def stored_plan(folder: Path) -> Plan:
         vessels = {name: check_vessel(entry["document"], entry["file"]) for name, entry in stored.items()}
     except (TypeError, KeyError, AttributeError, ValueError):
         raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
-    plan = build_plan(document, Path(provenance["file"]), vessels, provenance.get("sources", {}))
+    except DocumentError as error:
+        raise _of_another_version(error, folder / VESSELS) from None
+    try:
+        plan = build_plan(document, Path(provenance["file"]), vessels, provenance.get("sources", {}))
+    except DocumentError as error:
+        raise _of_another_version(error, folder / STUDY) from None
     if plan.digest != provenance["digest"]:
         raise ResultError(
             "its study or vessels were changed by hand, or this shipid has other defaults: run the study again",
             file=folder,
         )
     return plan
+
+
+def _of_another_version(error: DocumentError, file: Path) -> ResultError:
+    """The error for a document in the folder of a run that was right when the run began."""
+    message = (
+        f"shipid {__version__} does not take it ({error.message}): "
+        "if the run is of another version, read its report.html, and run the study again into a new folder"
+    )
+    return ResultError(message, file=file, path=error.path)
 
 
 def _provenance(folder: Path) -> dict[str, Any]:

@@ -62,6 +62,24 @@ def test_a_study_changed_by_hand_is_refused(tmp_path: Path) -> None:
         store.stored_plan(tmp_path)
 
 
+def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(tmp_path: Path) -> None:
+    """The file of the study may be gone, or be written anew as the message says: what is in the folder stays."""
+    plan, study, ship = tiny_plan(tmp_path), tmp_path / "study", tmp_path / "ship"
+    for folder in (study, ship):
+        store.open_folder(folder, plan)
+    text = (study / store.STUDY).read_text()
+    (study / store.STUDY).write_text(text.replace("ahead = 5.0", "horizon = 5"))
+    with pytest.raises(ResultError, match=r"prediction.horizon: shipid .* does not take it .*new folder") as caught:
+        store.stored_plan(study)
+    assert caught.value.file == str(study / store.STUDY)
+    assert "\n" not in str(caught.value)
+    vessels = (ship / store.VESSELS).read_text()
+    (ship / store.VESSELS).write_text(vessels.replace('"inertia"', '"inertias"'))
+    with pytest.raises(ResultError, match="does not take it") as caught:
+        store.stored_plan(ship)
+    assert caught.value.file == str(ship / store.VESSELS)
+
+
 def test_rows_are_those_of_the_finished_batches(tmp_path: Path) -> None:
     batches = [Unit(batch, (("right", "drawn"),), batch.key) for batch in (Batch(4, 1), Batch(4, 0), Batch(2, 0))]
     row = dict.fromkeys(store.METRICS, 1.0) | {"cell": "", "trials": [], "foundation": "right", "method": "drawn"}
