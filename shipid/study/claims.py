@@ -73,6 +73,7 @@ class Claims:
         self._me = self._folder / f".{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
         self._mine: set[str] = set()
         self._apart: set[str] = set()  # claims that are no links
+        self._ahead: dict[tuple[int, int], float] = {}  # file and its time in the future -> when that was first seen
         self._lock, self._stop = threading.RLock(), threading.Event()
         since = datetime.now(UTC).isoformat(timespec="seconds")
         owner = {"host": socket.gethostname(), "owner": _user(), "process": os.getpid(), "since": since}
@@ -256,10 +257,14 @@ class Claims:
         except OSError:
             return False
         try:
-            return self._me.stat().st_mtime - status.st_mtime > LATE
+            age = self._me.stat().st_mtime - status.st_mtime
         except FileNotFoundError:
             self._sign_in()
-            return self._me.stat().st_mtime - status.st_mtime > LATE
+            age = self._me.stat().st_mtime - status.st_mtime
+        if age < -LATE:  # the clock was set back: a living process renews its file with the time of now
+            first = self._ahead.setdefault((status.st_ino, status.st_mtime_ns), time.monotonic())
+            return time.monotonic() - first > LATE
+        return age > LATE
 
     def _is_mine(self, file: Path) -> bool:
         try:

@@ -66,6 +66,26 @@ def test_a_claim_of_another_machine_is_taken_over_when_it_is_late(tmp_path: Path
         assert mine.take("a")
 
 
+def test_a_claim_of_before_the_clock_was_set_back_is_taken_over_when_nobody_renews_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A machine with a wrong clock was switched off: its claim lies a year ahead, and is watched instead."""
+    clock = [1000.0]
+    monkeypatch.setattr(claims.time, "monotonic", lambda: clock[0])
+    (tmp_path / "claims").mkdir()
+    claim = tmp_path / "claims" / "a"
+    claim.write_text("elsewhere 1\n")
+    ahead = time.time() + 3e7
+    with Claims(tmp_path) as mine:
+        for later in (0.0, 10.0):  # the second is renewed, by a clock that is still wrong
+            os.utime(claim, (ahead + later, ahead + later))
+            assert not mine.take("a")
+            clock[0] += claims.LATE - 5
+            assert not mine.take("a")
+        clock[0] += 10.0
+        assert mine.take("a")
+
+
 def test_the_number_of_a_process_says_nothing_on_another_system(tmp_path: Path) -> None:
     """A container may have the name of this host and other numbers: its claim is late before it is taken over."""
     process = os.fork()
