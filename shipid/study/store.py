@@ -108,6 +108,7 @@ def _write_vessels(folder: Path, plan: Plan) -> None:
 
 def _make(folder: Path, plan: Plan) -> None:
     """Make the folder at once; nothing happens where another run has just made it."""
+    folder = Path(os.path.realpath(folder))  # a folder takes the place of an empty one, not of a link to it
     with temporary_folder(folder.parent) as above:
         _describe(above / folder.name, plan)
         try:

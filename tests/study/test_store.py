@@ -62,6 +62,16 @@ def test_a_study_changed_by_hand_is_refused(tmp_path: Path) -> None:
         store.stored_plan(tmp_path)
 
 
+def test_a_link_to_an_empty_folder_is_a_place_for_a_run(tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "run").symlink_to("disk")
+    plan = tiny_plan(tmp_path)
+    store.open_folder(tmp_path / "run", plan)
+    assert (tmp_path / "run").is_symlink()
+    assert store.stored_plan(tmp_path / "disk").digest == plan.digest
+    assert not list(tmp_path.glob(".shipid-*"))
+
+
 def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(tmp_path: Path) -> None:
     """The file of the study may be gone, or be written anew as the message says: what is in the folder stays."""
     plan, study, ship = tiny_plan(tmp_path), tmp_path / "study", tmp_path / "ship"
