@@ -5,13 +5,15 @@ from __future__ import annotations
 import logging
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from shipid.errors import ShipidError
+from shipid.study.code import code_digest
+from shipid.version import __version__
 
 DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed in seconds
     "distributed.admin.large-graph-warning-threshold": "1GB",
@@ -127,12 +129,15 @@ def _given(shared: Shared) -> Shared:
 class _Watch:
     """Looks at a scheduler: OSError where it is gone, a warning where it has no worker for a while.
 
+    Workers that have joined are asked for their code: one that lacks what a task needs dies of it without a word.
+
     threads : of all workers at the last look; at least 1, so that there is something to wait for.
     """
 
     def __init__(self, client: Any) -> None:
         self._client, self._alone, self._warned = client, time.monotonic(), False
         self._looked, self.threads = float("-inf"), 1
+        self._asked: set[str] = set()
 
     def look(self) -> None:
         """Look, if the last look is some time ago."""
@@ -143,11 +148,31 @@ class _Watch:
         workers = self._client.sync(self._client.scheduler.identity, callback_timeout=SILENT)["workers"]
         self._looked = time.monotonic()
         self.threads = max(sum(worker["nthreads"] for worker in workers.values()), 1)
+        self._ask(workers.keys() - self._asked)
         if workers:
             self._alone, self._warned = time.monotonic(), False
         elif not self._warned and time.monotonic() - self._alone > PATIENCE:
             log.warning("the Dask scheduler has no workers: waiting for one")
             self._warned = True
+
+    def _ask(self, workers: Collection[str]) -> None:
+        """Ask workers for their code, once each; a warning for each where it is another."""
+        if not workers:
+            return
+        self._asked |= set(workers)
+        ask = self._client._run  # `Client.run` has no limit of time
+        answers: dict[str, Any] = {}
+        with suppress(OSError, TimeoutError):  # a worker that is slow to answer gets its tasks all the same
+            answers = self._client.sync(
+                ask, code_digest, workers=list(workers), on_error="return", callback_timeout=SILENT
+            )
+        for address, answer in sorted(answers.items()):
+            if isinstance(answer, Exception):
+                log.warning(
+                    "the worker %s has no shipid %s as here, and may die of a task (%s)", address, __version__, answer
+                )
+            elif answer != code_digest():
+                log.warning("the worker %s has another shipid: code %s, here %s", address, answer, code_digest())
 
 
 @contextmanager

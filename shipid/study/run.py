@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
+import logging
 import os
 import platform
 import sys
@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from shipid.metrics import position_error, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
 from shipid.study.claims import WAIT, Claims, Holder, TakenOver, pause
+from shipid.study.code import code_digest
 from shipid.study.envelope import envelope
 from shipid.study.foundations import Prediction, predictions
 from shipid.study.plan import Batch, Foundation, Plan, Unit, Way
@@ -56,6 +57,8 @@ SESSIONS = "sessions"  # name of the claim on the record of what a run is comput
 MENDING, MENDED = "mending", "mended"  # claims: on the look at all files, and of the process that has looked
 Results = list[store.Cell]
 Computed = Iterator[tuple[Unit, Results | str]]
+
+log = logging.getLogger(__name__)
 
 ACCURACY = {"A": "mean", "A_90": "p90", "A_rms": "rms"}  # of the physics alone
 
@@ -220,20 +223,11 @@ def session_on(device: str) -> dict[str, Any]:
     computer = machine()
     packages = computer["packages"]
     session = {
-        "shipid": f"{packages.pop('shipid')}, code {code()}",
+        "shipid": f"{packages.pop('shipid')}, code {code_digest()}",
         "engine": engine(),
         "processor": computer["processor"],
     }
     return {**session, "python": computer["python"], "device": device, "packages": packages}
-
-
-@cache
-def code() -> str:
-    """Digest (8 hex digits) of the source files of shipid: two commits of a copy may have one version."""
-    package = Path(__file__).parents[1]
-    files = sorted((file.relative_to(package).as_posix(), file) for file in package.rglob("*.py"))
-    lines = (f"{name} {hashlib.sha256(file.read_bytes()).hexdigest()}\n" for name, file in files)
-    return hashlib.sha256("".join(lines).encode()).hexdigest()[:8]
 
 
 def _shared(
@@ -545,7 +539,9 @@ def _compute(
         if session not in noted:
             noted.append(session)
             with Claims(folder) as claims, claims.alone(SESSIONS):
-                store.note_session(folder, session)
+                changed = store.note_session(folder, session)
+            if changed:
+                log.warning("computed otherwise on the cluster: %s", "; ".join(changed))
         yield unit, results
 
 

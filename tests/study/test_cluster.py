@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +16,7 @@ from typing import Any
 
 import pytest
 
+import shipid
 from shipid.errors import ShipidError
 from shipid.study import cluster
 from shipid.study.cluster import on_dask
@@ -130,6 +133,38 @@ def test_a_worker_dies_and_another_joins(tmp_path: Path, monkeypatch: pytest.Mon
             second.wait()
     assert sorted(done) == [(i, 10 + i) for i in range(6)]
     assert "has no workers: waiting for one" in caplog.text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("other", ["nothing", "a commit"])
+def test_a_worker_with_another_shipid_is_named(other: str, tmp_path: Path, caplog: Any) -> None:
+    """It finds the package of its folder first: an empty one, or a copy with another file."""
+    from dask.distributed import Client
+
+    package = tmp_path / "there" / "shipid"
+    if other == "nothing":
+        package.mkdir(parents=True)
+        (package / "__init__.py").touch()
+    else:
+        shutil.copytree(Path(shipid.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+        (package / "new.py").touch()
+    with (
+        a_cluster(tmp_path, workers=0) as (address, _),
+        a_worker(address, package.parent, "--no-nanny"),
+        Client(address) as client,
+    ):
+        client.wait_for_workers(1)
+        cluster._Watch(client).look()
+    words = "may die of a task .*No module named" if other == "nothing" else "has another shipid: code"
+    assert re.search(words, caplog.text)
+    assert len(caplog.records) == 1
+
+
+@pytest.mark.slow
+def test_a_worker_with_the_same_shipid_is_not_named(tmp_path: Path, caplog: Any) -> None:
+    with a_cluster(tmp_path) as (address, _):
+        assert list(on_dask(address, napping(0.0), 10, [("t", 1)], "x")) == [(1, 11)]
+    assert not caplog.records
 
 
 def _late(address: str) -> list[str]:

@@ -67,7 +67,7 @@ def test_interrupted_on_workers_and_resumed_here_gives_the_same_numbers(tmp_path
 
 @pytest.mark.parametrize(
     ("name", "other", "words"),
-    [("__version__", "9.8.7", "now 9.8.7, code"), ("code", lambda: "12345678", "code 12345678")],
+    [("__version__", "9.8.7", "now 9.8.7, code"), ("code_digest", lambda: "12345678", "code 12345678")],
 )
 def test_another_shipid_that_goes_on_is_noted(
     name: str, other: Any, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
