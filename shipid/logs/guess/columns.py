@@ -74,7 +74,8 @@ def guess(
     ----------
     path : text, Parquet, MATLAB or NMEA 0183; a folder or a glob of such files, one run each.
     names : of the columns of a text log that has no header.
-    vessel : whose names the commands take. frame : of x, y and the heading, where a person knows it.
+    vessel : whose names the commands take, and whose length says which speeds are possible.
+    frame : of x, y and the heading, where a person knows it.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def guess(
     if state.numbered:  # or a yaw rate, which a sway speed resembles, may be taken for one
         choose_yaw_rate(state, 0.05)
     choose_velocities(state)
-    check_clock(state)
+    check_clock(state, np.inf if vessel is None else vessel.document.get("particulars", {}).get("L_pp", np.inf))
     if state.r is None:
         choose_yaw_rate(state)
     choose_commands(state)

@@ -15,6 +15,7 @@ from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.words import fits, is_order
 from shipid.logs.mapping import UNITS, is_dated, to_si
 from shipid.logs.readers import DAY
+from shipid.units import GRAVITY
 
 CLEAR = 1.5  # times the unexplained share of the best, that a hypothesis with fitting names may leave
 LEFT, NAMED_LEFT = 0.1, 0.5  # unexplained share of the track, at most: of columns without fitting names, and with
@@ -22,6 +23,7 @@ SAME = 0.8  # ratio of two unexplained shares, above which neither is better
 MISLED = 0.1  # unexplained share of the heading, and distance from a unit, at most: of a rate with a misleading name
 FAR = 2.0  # a factor that no sensor has
 FASTEST, HARDEST, SLOWEST = 100.0, 20.0, 0.02  # m/s, m/s^2, m/s: no ship goes or turns harder, no trial is slower
+FROUDE = 4.0  # U / sqrt(g L): nothing that is steered in trials is faster for its length
 OFF_UNIT = 0.15  # relative distance of a fitted scale from a unit
 PLAIN, OFF_RARE = ("m/s", "kn", "km/h"), 0.03  # units that logs have, and the same distance for a unit that few have
 
@@ -349,15 +351,18 @@ def pace(state: State) -> tuple[float, float]:
     return float(np.percentile(speeds, 90)), float(np.percentile(speeds * rates, 90))
 
 
-def is_possible(state: State) -> bool:
-    """Whether a ship may go and turn as this one does by the drafted clock."""
+def is_possible(state: State, length: float = np.inf) -> bool:
+    """Whether a ship of this length [m] may go and turn as this one does by the drafted clock."""
     speed, across = pace(state)
-    return SLOWEST < speed < FASTEST and across < HARDEST
+    return SLOWEST < speed < min(FASTEST, FROUDE * np.sqrt(GRAVITY * length)) and across < HARDEST
 
 
-def check_clock(state: State) -> None:
-    """Ask for the unit of the clock where no ship goes so fast, or so slowly, and no velocity has said so already."""
-    if is_possible(state) or any("t" in question.about for question in state.questions):
+def check_clock(state: State, length: float = np.inf) -> None:
+    """Ask for the unit of the clock where no ship goes so fast, or so slowly, and no velocity has said so already.
+
+    length : of the ship [m], where it is known. A slow model whose clock is in minutes goes as a fast ship does.
+    """
+    if is_possible(state, length) or any("t" in question.about for question in state.questions):
         return
     speed, across = pace(state)
     goes = f"by the drafted clock, in {state.clock_unit}, the ship goes {speed:.3g} m/s and turns at {across:.3g} m/s^2"

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate, is_possible
+from shipid.logs.guess.motion import (
+    FASTEST,
+    HARDEST,
+    check_clock,
+    choose_velocities,
+    choose_yaw_rate,
+    is_possible,
+    pace,
+)
+from shipid.units import GRAVITY
 from tests.logs.conftest import CLOCKS, SPEEDS
 from tests.logs.simulated import KNOT, si_log, state_with_pose
 
@@ -140,6 +149,21 @@ def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> Non
     assert is_possible(state) == (not asked)
     check_clock(state)
     check_clock(state)  # once is enough
+    assert len(state.questions) == asked
+
+
+@pytest.mark.parametrize(("wrong", "asked"), [(1.0, 0), (3.0, 0), (60.0, 1)])
+def test_a_slow_model_that_goes_as_none_of_its_length_does_is_asked(wrong: float, asked: int) -> None:
+    """With its clock in minutes it goes as a fast ship: only its length says that it does not."""
+    state = state_with_pose({}, 1.0 / wrong)
+    speed, across = pace(state)
+    scale = min(1.0, 0.5 * HARDEST / across, 0.5 * FASTEST / speed)
+    assert state.position is not None
+    state.position = np.asarray(scale * state.position)
+    check_clock(state)
+    assert not state.questions
+    fastest = speed * scale / wrong  # m/s, by a right clock
+    check_clock(state, (fastest / 0.1) ** 2 / GRAVITY)  # Froude number 0.1
     assert len(state.questions) == asked
 
 
