@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import tempfile
 import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator
@@ -19,6 +20,7 @@ from shipid.errors import ShipidError
 from shipid.interrupts import uninterrupted
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # of multiprocessing; forks are less safe elsewhere
+LONGEST = 107 - len("/pymp-12345678/listener-12345678")  # bytes of a folder in which a forkserver has its socket
 PRELOADED = ["shipid.study.run", "shipid.hybrid.training", "shipid.hybrid.ridge"]
 """Modules that workers need, PyTorch with them: a name that cannot be imported is passed over without a word."""
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  # read at import
@@ -33,7 +35,7 @@ def import_for_workers() -> None:
     Once per process. The workers ignore Ctrl-C, as their source does: this process stops them. Nothing happens where
     workers are not forked, or in a thread, which cannot set signals; then each worker imports for itself.
     """
-    if METHOD != "forkserver" or threading.current_thread() is not threading.main_thread():
+    if _method() != "forkserver" or threading.current_thread() is not threading.main_thread():
         return
     from multiprocessing import forkserver
 
@@ -76,9 +78,14 @@ def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int
         workers.close()
 
 
+def _method() -> str:
+    """METHOD, or `spawn` where the path of the temporary folder (TMPDIR) is too long for the socket of a forkserver."""
+    return METHOD if len(os.fsencode(tempfile.gettempdir())) <= LONGEST else "spawn"
+
+
 def _start(work: Callable[[Any], Any], workers: ExitStack) -> Connection:
     """Start a process that does the work, ended when `workers` closes; returns the connection to it."""
-    context: Any = get_context(METHOD)
+    context: Any = get_context(_method())
     here, there = Pipe()
     process = context.Process(target=_serve, args=(there, work), daemon=True)
     process.start()

@@ -9,12 +9,14 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.study.workers import METHOD, ONE_THREAD, PRELOADED, import_for_workers, on_workers
+from shipid.study.workers import LONGEST, METHOD, ONE_THREAD, PRELOADED, import_for_workers, on_workers
 
 forked = pytest.mark.skipif(METHOD != "forkserver", reason="workers are forked on Linux only")
 
@@ -53,6 +55,26 @@ def test_every_task_is_done_once(count: int) -> None:
     tasks = [4.0, 1.0, 0.0, 9.0][: 4 if count < 3 else 2]  # also fewer tasks than processes
     assert sorted(on_workers(math.sqrt, tasks, count)) == [(task, task**0.5) for task in sorted(tasks)]
     assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize("much", [0, 1])
+def test_workers_start_whatever_the_length_of_the_temporary_folder(much: int, tmp_path: Path) -> None:
+    """A path of a socket has 107 bytes at most; batch systems give every job a folder of its own."""
+    program = """
+import math
+from shipid.study.workers import import_for_workers, on_workers
+if __name__ == "__main__":
+    import_for_workers()
+    print(list(on_workers(math.sqrt, [4.0], 1)))
+"""
+    (tmp_path / "program.py").write_text(program)
+    with tempfile.TemporaryDirectory(dir="/tmp") as short:  # that of a test may be too long itself
+        folder = Path(short) / ("t" * (LONGEST + much - len(short) - 1))
+        folder.mkdir()
+        environment = os.environ | {"TMPDIR": str(folder)}
+        command = [sys.executable, tmp_path / "program.py"]
+        process = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert process.stdout == "[(4.0, 2.0)]\n", process.stderr
 
 
 def test_nothing_to_do_starts_nothing() -> None:
