@@ -18,13 +18,13 @@ from shipid.errors import DocumentError, choices
 from shipid.files import make_folder, read_table, sweep, write_table, write_text
 from shipid.logs.importing import sha256_of
 from shipid.study.claims import Claims
+from shipid.study.code import code_digest
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings import Rivals, judged
 from shipid.study.plan import NO_MODEL, Batch, Plan
 from shipid.study.prepare import all_windows, partition, prepare
 from shipid.study.run import run_unit
 from shipid.study.verdict import Finding
-from shipid.version import __version__
 
 KEYS = [
     *("test", "foundation", "family", "method", "N_D", "seed", "A", "H", "H_90"),
@@ -120,8 +120,8 @@ def _computed(
 
 
 def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:
-    """Folder of the finished turns of an interrupted rotation: one for each study, dataset, device and version."""
-    decides = [plan.digest, dataset.digest, device, __version__]
+    """Folder of the finished turns of an interrupted rotation: one for each study, dataset, device and code."""
+    decides = [plan.digest, dataset.digest, device, code_digest()]
     return file.with_name(f"{file.name}.turns") / documents.digest(decides)
 
 

@@ -120,8 +120,10 @@ def test_two_rotations_to_one_file_share_the_work(
     assert not kept.exists()
 
 
-def test_what_is_kept_belongs_to_one_question(recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path) -> None:
-    """Another setting, other data or another device has another folder; a damaged or edited file is computed again."""
+def test_what_is_kept_belongs_to_one_question(
+    recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Other settings, data, devices or code have another folder; a damaged or edited file is computed again."""
     plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
     file = tmp_path / "rows.csv"
     other, _ = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 6.0}, grid={"N_D": [5]})
@@ -130,7 +132,9 @@ def test_what_is_kept_belongs_to_one_question(recorded: Callable[..., tuple[Plan
         rotate_module.kept_folder(file, *one)
         for one in ((plan, dataset), (other, dataset), (plan, moved), (plan, dataset, "cuda"))
     ]
-    assert len(set(folders)) == 4
+    monkeypatch.setattr(rotate_module, "code_digest", lambda: "another commit")
+    folders.append(rotate_module.kept_folder(file, plan, dataset))
+    assert len(set(folders)) == 5
     first = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
     next(folders[0].glob("*.parquet")).write_bytes(b"PAR1 no more")
     again = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
