@@ -49,6 +49,13 @@ def main() -> None:
     except MemoryError:
         sys.stderr.write("error: out of memory: longer steps, fewer runs, members or --workers take less\n")
         sys.exit(1)
+    except ImportError as error:  # a compiled package for which memory is short, or of another system
+        if not str(error.path).endswith((".so", ".pyd")):
+            raise
+        sys.stderr.write(
+            f"error: {error.path}: cannot be loaded ({error.msg}): raise `ulimit -v`, or install it anew\n"
+        )
+        sys.exit(1)
     except OSError as error:  # a full disk, a folder that is a file, a place where one may not write
         sys.stderr.write(f"error: {error.filename or 'system'}: {error.strerror or error}\n")
         sys.exit(1)

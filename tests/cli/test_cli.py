@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,27 @@ def test_help_reads_the_same_whatever_is_built_for_it() -> None:
         assert light.exit_code == whole.exit_code == 0
         assert light.output == whole.output
     assert cli._named(["no-such"]) is cli._named([]) is app
+
+
+def test_a_compiled_package_that_cannot_be_loaded_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As under a limit of memory; a name that is missing in Python code is a fault of that code, with its traceback."""
+
+    def refused(error: ImportError) -> Callable[..., Any]:
+        def command(_: Any) -> Any:
+            raise error
+
+        return command
+
+    monkeypatch.setattr(sys, "argv", ["shipid", "study"])
+    monkeypatch.setattr(cli, "_named", refused(ImportError("failed to map", path="/lib/_C.so")))
+    with pytest.raises(SystemExit, match="1"):
+        cli.main()
+    assert capsys.readouterr().err.startswith("error: /lib/_C.so: cannot be loaded (failed to map): ")
+    monkeypatch.setattr(cli, "_named", refused(ImportError("cannot import name", path="/lib/mine.py")))
+    with pytest.raises(ImportError, match="cannot import name"):
+        cli.main()
 
 
 def test_help_names_every_command() -> None:
