@@ -164,13 +164,3 @@ def _ranks(values: Array) -> Array:
     _, place, counts = np.unique(values, return_inverse=True, return_counts=True)
     ranks: Array = (np.cumsum(counts) - (counts - 1) / 2)[place]
     return ranks
-
-
-def median_slope(x: Array, y: Array) -> float:
-    """Return the median slope of y over x (n,) over all pairs of points (Theil 1950, Sen 1968).
-
-    It is robust against single outliers. NaN if all x are equal.
-    """
-    i, j = np.triu_indices(len(x), k=1)
-    apart = x[i] != x[j]
-    return float(np.median((y[j] - y[i])[apart] / (x[j] - x[i])[apart])) if apart.any() else float("nan")

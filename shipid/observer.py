@@ -143,7 +143,7 @@ class Bank:
 
     @property
     def num_filters(self) -> int:
-        """K."""
+        """Number of filters K."""
         return len(self.numbers)
 
 

@@ -106,15 +106,6 @@ def test_rank_correlation_knows_order_alone():
     assert metrics.rank_correlation(x, np.ones(4)) == 0.0
 
 
-def test_median_slope_ignores_a_point_far_off():
-    x = np.arange(7.0)
-    y = 3.0 + 0.5 * x
-    y[6] = 100.0
-    assert metrics.median_slope(x, y) == pytest.approx(0.5)
-    assert metrics.median_slope(np.array([0.0, 0.0, 2.0]), np.array([5.0, 1.0, 3.0])) == pytest.approx(0.0)
-    assert np.isnan(metrics.median_slope(np.ones(3), np.arange(3.0)))
-
-
 def test_a_tally_has_every_error_in_its_bin() -> None:
     """Bins double in 512 equal steps from 1 mm on; what lies beyond, or is no number, joins an end."""
     edges = np.array([2.0**-10, 2.0**-10 * (1 + 1 / 512), 1.0, 3.0, 2.0**20])

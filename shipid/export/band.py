@@ -38,7 +38,7 @@ class Radii(Block):
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """T."""
+        """Number of steps T."""
         return int(self.steps.shape[1])
 
     @cached_property

@@ -154,7 +154,7 @@ class Dense(Block):
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """O."""
+        """Number of outputs."""
         return len(self.bias)
 
     @cached_property
@@ -209,7 +209,7 @@ class Mirrored(Block):
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """P + q."""
+        """Number of outputs p + q."""
         return int(self.x.shape[1] + self.y.shape[1])
 
     @cached_property

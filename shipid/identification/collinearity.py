@@ -27,8 +27,6 @@ from shipid.document import short_names
 Array = NDArray[np.float64]
 
 MOST_COLLINEAR = 15.0  # Brun et al.: "critical" from 10 to 15 on
-MOST_CONDITION = 30.0  # Belsley et al.
-HALF = 0.5  # share of the variance of a parameter from which on a direction harms it (Belsley et al.)
 UNSEEN = 1e-10  # of the largest eigenvalue, with columns of unit length: below it no data, only rounding
 
 

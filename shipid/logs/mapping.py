@@ -27,15 +27,15 @@ from shipid.logs.repairs import (
     WrapInterpolation,
 )
 from shipid.physics.signals import is_command, is_output, named
-from shipid.units import DEGREE, KNOT, RPM
+from shipid.units import DEGREE, KNOT, MINUTE, RPM
 
 UNITS: dict[str, dict[str, float]] = {
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": DAY}
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": MINUTE, "h": 3600.0, "d": DAY}
     | {"date": 1.0, "datenum": 1.0, "excel": 1.0, "hhmmss": 1.0},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
     "rad": {"rad": 1.0, "deg": DEGREE},
-    "rad/s": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / 60.0},
+    "rad/s": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / MINUTE},
     "rev/s": {"rev/s": 1.0, "rpm": RPM, "rad/s": 0.15915494309189535},
     "N": {"N": 1.0, "kN": 1e3},
     "N m": {"N m": 1.0, "kN m": 1e3, "Nm": 1.0, "kNm": 1e3},

@@ -10,7 +10,6 @@ import numpy as np
 from shipid.measures.record import Measures
 from shipid.units import DEGREE
 
-SOURCE = "IMO MSC.137(76)"
 SHORTEST = 100.0  # m: length from which the standards apply
 SAME = 0.5 * DEGREE  # tolerance of the angle of a test
 

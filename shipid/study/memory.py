@@ -223,7 +223,7 @@ def _accuracy(results: Results, foundation: str, N_D: int) -> float:
 
 
 def observer_frame(results: Results) -> pd.DataFrame:
-    """What the observer of one foundation thinks along the shown test runs; no rows in a study without observers.
+    """Estimates of the observer of one foundation along the shown test runs; no rows in a study without observers.
 
     Columns: run, t [s]; u, v, r as measured; `observer.u`, ... as filtered; `observer.X`, `.Y` [m/s^2], `.N` [rad/s^2];
     `observer.current_north`, `.current_east` [m/s]; `observer.test` [1]; model; fade [s], the time constant of the

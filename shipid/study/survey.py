@@ -18,7 +18,7 @@ OF_A_KIND = 3  # runs of a kind from which one may be set aside
 
 @dataclass(frozen=True)
 class Survey:
-    """What the choices are made from.
+    """Measures of the runs of a dataset, from which `study new` makes its choices.
 
     runs : a row per run, by name: `duration` [s] of its longest unbroken piece, `kind` (see `kinds_of`), `speed`
         [m/s], `rate` [rad/s] (RMS of r), `helm` [rad] (spread of the angles), `whole`, `sound` (passes its checks,

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from shipid.metrics import median_slope, rank_correlation
+from shipid.metrics import rank_correlation
 from shipid.study.findings import Rivals
 from shipid.study.findings_simulation import Grid
 from shipid.study.plan import NO_MODEL
@@ -18,6 +18,16 @@ from shipid.study.verdict import Verdict
 
 Array = np.ndarray
 Means = Mapping[str, Array]  # model -> (amounts,)
+
+
+def median_slope(x: Array, y: Array) -> float:
+    """Return the median slope of y over x (n,) over all pairs of points (Theil 1950, Sen 1968).
+
+    It is robust against single outliers. NaN if all x are equal.
+    """
+    i, j = np.triu_indices(len(x), k=1)
+    apart = x[i] != x[j]
+    return float(np.median((y[j] - y[i])[apart] / (x[j] - x[i])[apart])) if apart.any() else float("nan")
 
 
 def verdict(always: bool, on_average: bool) -> Verdict:

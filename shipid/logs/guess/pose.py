@@ -25,7 +25,6 @@ COMPASS = frozenset(("heading hdg hdt head compass kompass gyro kreisel kurs cou
 YAW = frozenset(["yaw", "gier", "gir", "theta"])
 TURNED = np.radians(8.0)  # range of a heading that no name says, at least
 SEARCHED = 24  # columns at most, where no name helps
-EARTH = 111_000.0  # m in a degree of latitude
 
 Frame = Literal["ned", "enu", "zup", "ros"]
 """Where x, y point and from where the heading counts; see `in_frame`."""
