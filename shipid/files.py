@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import shlex
 import shutil
 import socket
 import tempfile
@@ -111,6 +112,12 @@ def is_alive(process: int) -> bool:
     except (OSError, OverflowError):
         return True
     return True
+
+
+def as_argument(file: str | os.PathLike[str]) -> str:
+    """The path as one types it in a command: quoted where a shell needs it, and never taken for an option."""
+    path = str(file)
+    return shlex.quote(f"./{path}" if path.startswith("-") else path)
 
 
 def write_text(file: Path, text: str) -> None:

@@ -288,3 +288,11 @@ def test_a_write_that_fails_names_the_file(tmp_path: Path, monkeypatch: pytest.M
     with pytest.raises(OSError, match="No space") as caught:
         files.write_json(tmp_path / "a.json", {})
     assert caught.value.filename == str(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("path", "typed"),
+    [("results/a", "results/a"), ("a b", "'a b'"), ("-x", "./-x"), ("-x y", "'./-x y'"), ("/a/-x", "/a/-x")],
+)
+def test_a_path_in_a_command_can_be_typed_as_it_is(path: str, typed: str) -> None:
+    assert files.as_argument(Path(path)) == typed

@@ -56,9 +56,7 @@ def study_new(
     as_json: Json = False,
 ) -> None:
     """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
-    import shlex
-
-    from shipid.files import check_new, write_new
+    from shipid.files import as_argument, check_new, write_new
     from shipid.schemas import with_schema
     from shipid.study.new import draft_study
 
@@ -86,7 +84,7 @@ def study_new(
         names = [model.name for model in draft.plan.foundations]
         sentence = f"{draft.plan.cells} cells of {len(names)} foundations ({', '.join(names)}) -> {file}"
         answer.say(sentence, file=file, cells=draft.plan.cells, foundations=names, warnings=draft.warnings)
-        answer.say(f"run it with: {shlex.join(['shipid', 'study', 'run', str(file)])}")
+        answer.say(f"run it with: shipid study run {as_argument(file)}")
 
 
 def _written(value: Any) -> str:
@@ -463,11 +461,12 @@ def _before_work(
 
 
 def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool) -> None:
+    from shipid.files import as_argument
     from shipid.study import run
     from shipid.study.contents import ANSWER, share_pages
     from shipid.study.progress import Watch
 
-    resume = f"{plan.program} study resume {folder}"
+    resume = f"{plan.program} study resume {as_argument(folder)}"
     try:
         events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, leave=leave)
         with closing(events):  # where a line cannot be printed, claims are given back before the process ends

@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from shipid.errors import ResultError, ShipidError
+from shipid.files import as_argument
 from shipid.study.evidence import over_worlds
 from shipid.study.findings import findings
 from shipid.study.plan import NO_MODEL
@@ -44,7 +45,7 @@ def read_worlds(folders: Sequence[Path]) -> list[Results]:
     worlds = [read_results(folder) for folder in folders]
     for results in worlds:
         if not results.complete:
-            message = f"is not finished: continue with `shipid study resume {results.folder}`"
+            message = f"is not finished: continue with `shipid study resume {as_argument(results.folder)}`"
             raise ResultError(message, file=results.folder)
         if not (results.cells["status"] == "ok").any():
             raise ResultError("has no cell with a result", file=results.folder)

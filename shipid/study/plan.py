@@ -20,6 +20,7 @@ from shipid import document as documents
 from shipid.data.windows import Commands
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
+from shipid.files import as_argument
 from shipid.hybrid.method import Method
 from shipid.hybrid.methods import method_of
 from shipid.identification.settings import Identify, unknowns
@@ -413,7 +414,7 @@ class Plan:
 
         A line before it says what the script is where a method is the user's and no script has started this process.
         """
-        name = self.name if documents.bundled("studies").get(self.name) == Path(self.file) else shlex.quote(self.file)
+        name = self.name if documents.bundled("studies").get(self.name) == Path(self.file) else as_argument(self.file)
         changes = (f"--set {shlex.quote(f'{path}={json.dumps(value)}')}" for path, value in self.changes.items())
         words = " ".join([self.program, "study run", name, *changes])
         missing = self.program != "shipid" and not _script()

@@ -156,16 +156,17 @@ def test_an_incomplete_folder_has_a_provisional_report(tmp_path: Path, tiny_run:
     assert len(pd.read_parquet(folder / "results.parquet")["cell"].unique()) == 4
 
 
-def test_interruption_says_how_to_go_on(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("folder", "typed"), [("mine", "mine"), ("-my run", "'./-my run'")])
+def test_interruption_says_how_to_go_on(folder: str, typed: str, study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from shipid.study import run
 
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(run, "run_study", interrupted)
-    result = CliRunner().invoke(app, ["study", "run", str(study), "--out", "mine"])
+    result = CliRunner().invoke(app, ["study", "run", str(study), "--out", folder])
     assert result.exit_code == 130
-    assert "Continue with: shipid study resume mine" in result.stderr
+    assert f"Continue with: shipid study resume {typed}\n" in result.stderr
 
 
 def test_check_ends_with_1_where_a_file_is_wrong(tmp_path: Path, tiny_run: Path) -> None:
