@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from shipid.data.kinematics import STATES, Noise, _move, _transition, smooth
+from shipid.data.kinematics import STATES, Noise, _move, _start, _transition, smooth
 from tests.logs.conftest import turning
 
 T = np.arange(0.0, 120.0, 1.0)
@@ -89,3 +89,12 @@ def test_what_is_logged_makes_the_rest_surer() -> None:
     position = {name: motion[name].to_numpy() for name in ("north", "east", "psi")}
     alone, with_u = smooth(T, position, given), smooth(T, position | {"u": motion["u"].to_numpy()}, given)
     assert np.all(with_u.deviation("u")[1:] < alone.deviation("u")[1:])
+
+
+def test_a_straight_way_begins_with_its_velocities() -> None:
+    """Two velocities in the axes of the ship from the places alone, at any heading."""
+    t, psi, u, v = np.arange(0.0, 20.0), 1.0, 3.0, 0.4
+    ways = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
+    logged = {"north": 5.0 + ways[0] * t, "east": -2.0 + ways[1] * t, "psi": np.full_like(t, psi)}
+    first, _ = _start(t, logged, noise(0.01, 1e-4, 0.02, 1e-3))
+    np.testing.assert_allclose(first, [5.0, -2.0, psi, u, v, 0.0], atol=1e-9)

@@ -16,6 +16,7 @@ from shipid.hybrid.features import (
     group_of,
     past_error,
     planned_means,
+    steps_of,
 )
 from shipid.hybrid.physics import Physics
 from shipid.physics.signals import mirror_sign
@@ -177,3 +178,10 @@ def test_planned_means_by_hand() -> None:
         | {f"port.planned-{number}.alpha": 0.0 for number in (1, 2, 3)}
     )
     assert list(planned_means({"a.n": np.zeros(1)}, {"a.n": np.ones((2, 1))})) == ["a.planned-1.n", "a.planned-2.n"]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "step", "steps"), [(8.0, 1.0, 8), (8.0, 0.5, 16), (8.0, 2.0, 4), (0.3, 0.1, 3), (0.1, 1.0, 1)]
+)
+def test_seconds_are_so_many_steps(seconds: float, step: float, steps: int) -> None:
+    assert steps_of(seconds, step) == steps

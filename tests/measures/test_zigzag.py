@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from shipid.measures import zigzag
+from shipid.measures.record import HelmOver, Record
+from shipid.measures.zigzag import last_over
 from shipid.units import DEGREE
 from tests.measures.made_records import (
     GAIN,
@@ -84,3 +86,15 @@ def test_noise_of_a_compass_is_averaged() -> None:
     for number in range(1, 5):
         name = f"overshoot_{number}"
         assert noisy[name].value / DEGREE == pytest.approx(clean[name].value / DEGREE, abs=0.15)
+
+
+def test_a_manoeuvre_after_a_long_pause_is_not_of_the_zigzag() -> None:
+    """The helm is over for 20 s at a time; after 100 s amidships it is put over once more."""
+    t = np.arange(0.0, 200.0)
+    helm = np.select([t < 10, t < 30, t < 50, t < 52, t < 70, t < 170, t < 185], [0, 10, -10, 0, 10, 0, 10], 0) * DEGREE
+    still = np.zeros_like(t)
+    record = Record(t, still, still, still, still, still, still, helm)
+    over = HelmOver(start=10.0, row=10, angle=10 * DEGREE, side=1.0)
+    assert last_over(record, over) == 69
+    soon = replace(record, t=np.interp(t, [0, 70, 170, 199], [0, 70, 80, 109]))  # amidships for 10 s only
+    assert last_over(soon, over) == 184
