@@ -22,6 +22,8 @@ from shipid.physics.grammar import (
 from shipid.physics.hull import SPEED_FLOOR, about_service_speed
 from shipid.physics.propeller import drift, signed_root
 
+TIGHTEST = 2.0  # r L / U: turns of ships under rudders are wider, with r L / U up to 1.2
+
 
 def rudder(
     nu_r: SX,
@@ -144,7 +146,8 @@ def rudder_polynomial(
 
     wash : (u_P, u_race, D_p) as of `rudder`. Along: u_R = epsilon sqrt(u_P^2 + k_x (u_race^2 - u_P^2)), signed. Across:
     v_R = U x the sum of value x monomial in v' = v / U and r' = r L_pp / U, with the sign of `rudder` (-gamma_R is the
-    value of "v"). F_N and the forces of it are those of `rudder`.
+    value of "v"). U is at least |r| L_pp / TIGHTEST: beyond any turn in which such a polynomial was measured a cubic of
+    r' would grow without limit on a ship that turns on the spot. F_N and the forces of it are those of `rudder`.
     """
     F_N = polynomial_normal_force(
         nu_r, delta, wash, A_R=A_R, f_alpha=f_alpha, epsilon=epsilon, k_x=k_x, v_R=v_R, L_pp=L_pp, rho=rho
@@ -167,7 +170,8 @@ def polynomial_normal_force(
 ) -> SX:
     """Normal force F_N [N] on the blade of `rudder_polynomial`, > 0 turns the ship to starboard."""
     u_P, u_race = wash[0], wash[1]
-    U = ca.sqrt(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, SPEED_FLOOR**2))
+    turning = nu_r[5] * L_pp / TIGHTEST
+    U = ca.sqrt(ca.fmax(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, turning**2), SPEED_FLOOR**2))
     prime = {"v": nu_r[1] / U, "r": nu_r[5] * L_pp / U}
     across = U * sum((value * cross_flow_monomial(name).value(prime) for name, value in v_R.items()), SX(1, 1))
     still = u_P * ca.fabs(u_P)

@@ -129,6 +129,16 @@ def test_a_rudder_with_a_polynomial_flow_by_hand() -> None:
     np.testing.assert_allclose(forces, [X, Y, 0, -0.2 * Y, 0.2 * X, N], rtol=2e-4)
 
 
+def test_a_cubic_flow_stays_within_bounds_on_a_ship_that_turns_on_the_spot() -> None:
+    """However slow she is, the flow across is at most that of a turn with r' = 2 at the same rate."""
+    cubic = {**POLYNOMIAL, "v_R": {"rrr": 0.3}}
+    r = 0.08
+    for u in (0.2, 1e-2, 1e-6, 0.0):
+        given = ca.SX(np.array([u, 0, 0, 0, 0, r])), ca.SX(0.0), ca.SX(np.zeros(3))
+        Y = float(ca.evalf(rudder_polynomial(*given, **cubic))[1])
+        assert Y == pytest.approx(1.312 * 500 * 0.0539 * 2.747 * (r * L / 2 * 0.3 * 2**3) ** 2, rel=1e-3)
+
+
 def test_rudder_coefficients_by_hand() -> None:
     """1/2 rho L^2 (Y |c|c delta + ...), moments with L^3; c between inflow and race; even parts favour one side."""
     values = {"Y_|c|cdelta": -0.02, "Y_cc|delta|": -0.001, "X_ccdeltadelta": -0.01, "N_|c|c|beta|betadelta": 0.03}
