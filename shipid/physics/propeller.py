@@ -222,14 +222,17 @@ def wash(
 ) -> SX:
     """Propeller slipstream at a rudder behind it, (3): inflow u_P [m/s], slipstream speed far behind [m/s], D_p [m].
 
-    Momentum theory: u_race^2 = u_P^2 + 8 K_T n^2 D_p^2 / pi, that is u_P^2 (1 + 8 K_T / (pi J^2)). Astern the race
-    goes forward, and the rudder is in the water that the screw draws in: the flow over its whole height is u_P less
-    k_suction times the speed that momentum theory adds, sqrt(u_P^2 + 8 K n^2 D_p^2 / pi) - |u_P|. By the same theory
-    that share is 1/2 at the disc and falls away from it. Without k_suction a screw astern does not reach the rudder.
+    Momentum theory: u_race^2 = u_P^2 + 8 K_T n^2 D_p^2 / pi, that is u_P^2 (1 + 8 K_T / (pi J^2)); on a ship that goes
+    astern, u_P < 0, it is a signed square: a stopped screw adds nothing. With the screw astern the race goes forward,
+    and the rudder is in the water that the screw draws in: the flow over its whole height is u_P less k_suction times
+    the speed that momentum theory adds, sqrt(u_P^2 + 8 K n^2 D_p^2 / pi) - |u_P|. By the same theory that share is 1/2
+    at the disc and falls away from it. Without k_suction a screw astern does not reach the rudder.
     """
     u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
     K = thrust_coefficient(u_P, n, D_p, K_T, SX(J_min), SX(J_max))
-    race = ca.sqrt(ca.fmax(u_P**2 + 8 / ca.pi * K * (n * D_p) ** 2, 0) + SPEED_FLOOR**2)
+    driven = 8 / ca.pi * K * (n * D_p) ** 2
+    ahead = ca.sqrt(ca.fmax(u_P**2 + driven, 0) + SPEED_FLOOR**2)
+    race = ca.if_else(u_P >= 0, ahead, signed_root(SPEED_FLOOR**2 - u_P**2 + ca.fmax(driven, 0)))
     if given(k_suction, 0.0):
         K_a = thrust_coefficient(u_P, n, D_p, K_T_astern or K_T, SX(J_min), SX(J_max))
         added = 8 / ca.pi * k_astern * ca.fmax(K_a, 0) * (n * D_p) ** 2
@@ -325,12 +328,12 @@ def controllable_wash(
 ) -> SX:
     """Slipstream of a controllable-pitch propeller, (3): inflow [m/s], slipstream speed far behind [m/s], D_p [m].
 
-    u_race^2 = u_P^2 + 8 T / (pi rho D_p^2) by momentum theory; no race where the propeller drives astern.
+    By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream`. So the flow at a rudder
+    has no step where the pitch goes through zero.
     """
     u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
-    lift = 8 / ca.pi * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
-    race = ca.sqrt(ca.fmax(u_P**2 + lift, 0) + SPEED_FLOOR**2)
-    return ca.vertcat(u_P, ca.if_else(pitch * n >= 0, race, u_P), D_p)
+    driven = 8 / ca.pi * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
+    return ca.vertcat(u_P, slipstream(u_P, u_P * ca.fabs(u_P), driven), D_p)
 
 
 def quadratic_thrust(

@@ -75,6 +75,23 @@ def test_no_race_astern() -> None:
     assert u_P == race
 
 
+@pytest.mark.parametrize("u", [-0.8, 0.0, 0.8])
+def test_race_has_no_step_where_the_screw_stops(u: float) -> None:
+    """Going astern with a stopped screw a rudder feels the flow from astern, on either side of no revolutions."""
+    for n in (-1e-6, 0.0, 1e-6):
+        u_P, race, _ = washed([u, 0.1, 0, 0, 0, 0], n)
+        assert race == pytest.approx(u_P, abs=0.011)
+
+
+def test_race_has_no_step_where_the_ship_stops() -> None:
+    below, above = (washed([u, 0, 0, 0, 0, 0], 5.0)[1] for u in (-1e-7, 1e-7))
+    assert below == pytest.approx(above, abs=1e-5)
+    u_P, race, _ = washed([-0.3, 0, 0, 0, 0, 0], 5.0)
+    J = u_P / (5.0 * 0.216)
+    K_T = 0.2931 - 0.2753 * J - 0.1385 * J**2
+    assert race == pytest.approx(np.sqrt(8 / np.pi * K_T * (5.0 * 0.216) ** 2 - u_P**2), rel=1e-3)
+
+
 @pytest.mark.parametrize(("v", "C_2"), [(-0.3, 1.6), (0.3, 1.1)])
 def test_wake_with_drift(v: float, C_2: float) -> None:
     """Drift to port (v < 0: beta > 0) takes C_2_plus; the inflow rises by 1 + (1 - exp(-2 beta)) (C_2 - 1)."""
@@ -339,7 +356,15 @@ def test_race_of_a_controllable_pitch_propeller_is_momentum_theory() -> None:
     u_P, race, D_p = flow(10.4, 0.721)
     assert (u_P, D_p) == (pytest.approx(0.7074), pytest.approx(0.216))
     assert race / u_P == pytest.approx(2.438, abs=0.002)
-    assert flow(10.4, -0.5)[1] == flow(10.4, -0.5)[0]
+    assert flow(10.4, -0.5)[1] == 0  # drives astern, and takes all the flow
+
+
+@pytest.mark.parametrize("u", [-0.8, 0.8])
+@pytest.mark.parametrize("n", [0.0, 6.0])
+def test_race_of_a_controllable_pitch_propeller_has_no_step_at_zero_pitch(u: float, n: float) -> None:
+    nu_r = ca.SX(np.array([u, 0, 0, 0, 0, 0]))
+    across = [ca.evalf(controllable_wash(nu_r, ca.SX(n), ca.SX(pitch), **VARIABLE))[1] for pitch in (-1e-7, 1e-7)]
+    assert float(across[0]) == pytest.approx(float(across[1]), abs=1e-4)
 
 
 def test_a_ship_with_one_takes_pitch_as_an_order_and_her_rudder_its_wash() -> None:
