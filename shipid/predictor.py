@@ -70,6 +70,10 @@ class Predictor:
     bands: Bands | None = None
     run_up: float = 0.0
 
+    def __post_init__(self) -> None:
+        """A number of NumPy's becomes a plain one, as in `Physics`."""
+        object.__setattr__(self, "run_up", float(self.run_up))
+
     @property
     def vessel(self) -> Vessel | None:
         """The vessel of the physics; None for pure data-driven."""

@@ -66,6 +66,14 @@ def test_every_field_survives_a_file(tmp_path: Path) -> None:
         np.testing.assert_array_equal(again.bands.arrays()[name], values)
 
 
+def test_numbers_of_numpy_are_saved_and_exported(tmp_path: Path) -> None:
+    physics = Physics(load_vessel("mariner"), np.int64(3), np.float64(0.5))  # type: ignore[arg-type]
+    one = Predictor(physics, "alone", Unchanged({}), run_up=np.float64(2.0))
+    assert Predictor.load(one.save(tmp_path / "one.npz")).physics == physics
+    for file in one.export("c", tmp_path / "aboard"):
+        assert "np.float64(" not in file.read_text(encoding="utf-8")
+
+
 def test_a_level_gives_a_band_or_one_sentence(tiny_run: Path) -> None:
     predictor = Predictor.load(cell_file(tiny_run, CELL))
     instants = read_test(tiny_run)[0].instants()

@@ -59,7 +59,8 @@ def rollout_gradient(
     """Value and exact gradient of a loss on a rollout of many samples by one variant.
 
     Reverse mode: the cost does not grow with the number of parameters. It is the derivative of the discrete motion, so
-    it agrees with finite differences of `rollout` for any step; at a kink it is the derivative of one side.
+    it agrees with finite differences of `rollout` for any step. Exactly on a kink, such as |v| at v = 0, it is finite;
+    where several kinks meet, as at rest, it may be the derivative of neither side.
 
     Parameters
     ----------

@@ -46,6 +46,10 @@ class Job:
     rows: tuple[int, ...]
     device: str = "cpu"
 
+    def __post_init__(self) -> None:
+        """A step of NumPy's becomes a plain number: printed in C, it must read as one."""
+        object.__setattr__(self, "step", float(self.step))
+
 
 def cores() -> int:
     """Number of cores that this process may use, at most `OMP_NUM_THREADS`."""

@@ -43,6 +43,11 @@ class Physics:
     observer: Observer | None = None
     path: Literal["position", "velocity"] = "position"
 
+    def __post_init__(self) -> None:
+        """Numbers of NumPy's become plain ones: a saved or exported predictor writes them out."""
+        object.__setattr__(self, "horizon", int(self.horizon))
+        object.__setattr__(self, "step", float(self.step))
+
     def with_values(self, values: Mapping[str, Any]) -> Physics:
         """Return the same physics with other numbers, dotted path -> value."""
         return self if self.vessel is None else replace(self, vessel=self.vessel.with_values(values))

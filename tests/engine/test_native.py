@@ -84,6 +84,15 @@ def test_groups_and_remainders(count: int, draw_inputs: Callable[..., Any]) -> N
     np.testing.assert_array_equal(rollout(SHIP, **part, **options).states, whole[:, :, :count])
 
 
+@pytest.mark.parametrize("kind", [np.float64, np.float32, int])
+def test_a_step_may_be_a_number_of_numpy(kind: type, draw_inputs: Callable[..., Any]) -> None:
+    given, goal = draw_inputs(SHIP, 3), np.zeros((2, 3, 2))
+    for step in (1.0, kind(1)):
+        path = rollout(SHIP, **given, step=step, num_steps=2, keep=("north", "east"), engine="native")
+        far = distances(SHIP, **given, goal=goal, step=step, engine="native").total
+        np.testing.assert_allclose(far[0], position_error(path.states[1:, 0], goal).sum(axis=0))
+
+
 def test_a_library_is_made_once(empty_cache: Path, draw_inputs: Callable[..., Any]) -> None:
     """Another variant, size or number of steps needs no compilation; another step or method does."""
 

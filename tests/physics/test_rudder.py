@@ -136,7 +136,7 @@ def test_a_cubic_flow_stays_within_bounds_on_a_ship_that_turns_on_the_spot() -> 
     for u in (0.2, 1e-2, 1e-6, 0.0):
         given = ca.SX(np.array([u, 0, 0, 0, 0, r])), ca.SX(0.0), ca.SX(np.zeros(3))
         Y = float(ca.evalf(rudder_polynomial(*given, **cubic))[1])
-        assert Y == pytest.approx(1.312 * 500 * 0.0539 * 2.747 * (r * L / 2 * 0.3 * 2**3) ** 2, rel=1e-3)
+        assert pytest.approx(1.312 * 500 * 0.0539 * 2.747 * (r * L / 2 * 0.3 * 2**3) ** 2, rel=1e-3) == Y
 
 
 def test_rudder_coefficients_by_hand() -> None:
