@@ -56,6 +56,8 @@ NUMBERS = (
 )
 COLUMNS = (*MEASURED, "X", "Y", "N", "current_north", "current_east")
 """Estimates as columns, `observer.u`, ...; X, Y, N are the slow force as acceleration, M^-1 tau [m/s^2, rad/s^2]."""
+AGE = "observer.age"
+"""Column: time [s] since the first row of the unbroken stretch. An observer needs some 20 sqrt(L / g) to settle."""
 DIVERGED = 1e9  # SI: no state, variance or likelihood of a sound filter is so large
 SPIKE = 300.0  # standard deviations: a measurement as far off is a fault of the log and moves nothing
 FADES = (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, 1e6)  # x sqrt(L / g): between which `tune_observer` chooses
@@ -369,24 +371,27 @@ def begin(filters: Bank, measured: Array, commands: Array, memory: Array | None 
 class Estimates:
     """What the observer knows at every row of a dataset, from that row and those before it alone.
 
-    columns : `observer.u`, ... (N,), in the order of the table; see COLUMNS. `observer.test` is the normalised
+    columns : `observer.u`, ... (N,), in the order of the table; see COLUMNS and AGE. `observer.test` is the normalised
         innovation squared over the number of measurements, less those left out: 1 in the mean where the assumptions
         hold.
     innovation, spread : (N, 6), measured less predicted, and its variance; NaN in the first row of a stretch.
     weights : (N, K) of the filters.
-    age : time [s] since the first row of the stretch, (N,): the observer needs some 20 sqrt(L / g) to settle.
     """
 
     columns: dict[str, Array]
     innovation: Array
     spread: Array
     weights: Array
-    age: Array
+
+    @property
+    def age(self) -> Array:
+        """Time [s] since the first row of the stretch, (N,): `observer.age`."""
+        return self.columns[AGE]
 
     def select(self, rows: Array) -> Estimates:
         """Estimates at some rows: a mask or indices."""
         columns = {name: values[rows] for name, values in self.columns.items()}
-        return Estimates(columns, *(part[rows] for part in (self.innovation, self.spread, self.weights, self.age)))
+        return Estimates(columns, *(part[rows] for part in (self.innovation, self.spread, self.weights)))
 
 
 def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, *, calls: float = 1) -> Estimates:
@@ -441,7 +446,8 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
         squares = innovation**2 / spread
         given = squares < SPIKE**2  # false for NaN, and for a fault of the log, which moves nothing
     columns["observer.test"] = np.where(given, squares, 0.0).sum(axis=1) / np.maximum(given.sum(axis=1), 1)
-    return Estimates(columns, innovation, spread, weights, age)
+    columns[AGE] = age
+    return Estimates(columns, innovation, spread, weights)
 
 
 def _mixed(results: Sequence[Array], count: int) -> tuple[Array, ...]:
@@ -575,6 +581,7 @@ def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict
         rows, chosen = np.flatnonzero(names == run), windows.run == run
         index[chosen] = rows[np.searchsorted(t[rows], windows.t[chosen] + clock_slack(t[rows]), side="right") - 1]
     known = {name: values[index] for name, values in estimates.columns.items()}
+    known[AGE] = known[AGE] + windows.t - t[index]
     turns = np.round((windows.columns["psi"] - known["observer.psi"]) / (2 * np.pi))
     return {**windows.columns, **known, "observer.psi": known["observer.psi"] + 2 * np.pi * turns}
 

@@ -21,7 +21,7 @@ from shipid.hybrid.calibration import calibrated
 from shipid.hybrid.method import Case, Corrector, Index, Method, Task
 from shipid.hybrid.methods import METHODS, kind_of
 from shipid.hybrid.physics import Physics, check_columns
-from shipid.observer import Observer
+from shipid.observer import AGE, Observer
 from shipid.physics.signals import SIGNALS, measurable
 from shipid.vessel.load import Vessel, check_vessel
 
@@ -56,8 +56,8 @@ class Predictor:
         in force in each step, `Instants.planned`, name -> (T, S).
     causal : columns of a log that were interpolated between fixes: inputs hold the last fix, see `shipid.data.causal`.
     bands : what says how far off a prediction may be; None where no runs could calibrate it.
-    run_up : time [s] from the begin of an unbroken stretch of rows to the earliest instant in training. An observer
-        that has run for less time has not settled as it had there, so such an instant is outside.
+    run_up : time [s] from the begin of an unbroken stretch of rows to the earliest instant in training; 0 without an
+        observer. One that has run for less time has not settled as it had there, so such an instant is outside.
     """
 
     physics: Physics
@@ -140,7 +140,7 @@ class Predictor:
         return Banded(
             predicted,
             self.band(predicted, instants, level, pointwise=pointwise, kind=kind),
-            self.outside(instants.columns),
+            self.outside({**instants.columns, **instants.estimates}),
         )
 
     def band(
@@ -173,19 +173,20 @@ class Predictor:
             raise DataError("this predictor was made for known commands: it needs those planned over the horizon")
         return instants
 
-    def outside(self, columns: Mapping[str, Array], since: Array | None = None) -> Array:
+    def outside(self, columns: Mapping[str, Array]) -> Array:
         """Whether each instant (S,) lies outside what training has seen, in any column; all do without any limits.
 
-        columns : name -> (S,); columns without limits, and limits without a column, are passed over.
-        since : (S,) time [s] since the begin of the unbroken stretch of rows, which `run_up` is compared with.
+        columns : name -> (S,), measured and, with an observer, its estimates: `observer.age` is compared with `run_up`,
+            and where it is missing nobody knows that the observer has settled. Columns without limits, and limits
+            without a column, are passed over.
         """
         outside = np.full(len(next(iter(columns.values()), ())), not self.limits)
         for name, (low, high) in self.limits.items():
             if name in columns:
                 slack = 1e-9 * max(1.0, abs(low), abs(high))
                 outside |= ~((columns[name] >= low - slack) & (columns[name] <= high + slack))
-        if since is not None:
-            outside |= since < self.run_up - 1e-3 * self.physics.step
+        if self.run_up > 0:
+            outside |= ~(columns.get(AGE, np.zeros(len(outside))) >= self.run_up - 1e-3 * self.physics.step)
         return outside
 
     def save(self, file: str | os.PathLike[str]) -> Path:

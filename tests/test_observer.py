@@ -20,9 +20,11 @@ from shipid.data.windows import Instants, Windows, cut_windows, from_frame
 from shipid.engine import samples
 from shipid.engine.native import compiler
 from shipid.errors import DocumentError
+from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.observer import (
+    AGE,
     COLUMNS,
     LOW,
     MEASURED,
@@ -44,11 +46,13 @@ from shipid.observer import (
     tau_extra,
     tune_observer,
 )
+from shipid.predictor import Predictor
 from shipid.study.prepare import at_instants, window_memory
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.benchmarks.observer import World, errors, physics, world
 from tests.conftest import structure
+from tests.hybrid.runs import made
 from tests.study.test_commands import weaving
 
 
@@ -370,6 +374,23 @@ def test_without_measured_positions_a_path_starts_where_the_ship_is() -> None:
     columns = at_windows(far, observe(vessel, far, settings), windows)
     paths, _ = observed_paths(bank(vessel, settings), columns, 10, 1.0, planned=windows.planned)
     assert position_error(paths, windows.future).max() < 0.2
+
+
+def test_a_band_is_promised_once_the_observer_has_run_as_long_as_in_training() -> None:
+    """In every unbroken stretch anew, at instants between rows too; where nobody knows how long it ran, never."""
+    vessel, log = load_vessel("gunnerus-28.9"), weaving("ab")
+    broken = (log.frame["run"] == "a") & (log.frame["t"] == 20)
+    log = Dataset(log.frame.assign(flags=broken.astype(int)), {**log.metadata, "flags": ["break"]})
+    windows, bands = cut_windows(log, horizon=8, interval=0.7), made(0)[1]
+    physics = Physics(vessel, 8, 1.0, "rk4", Observer(waves=(0.0,), change=(1.0,)))
+    columns = at_windows(log, observe(vessel, log, physics.observer), windows)
+    predictor = Predictor(physics, "alone", Unchanged({}), {"u": (-50.0, 50.0)}, bands=bands, run_up=9.0)
+    since = windows.t - np.where((windows.run == "a") & (windows.t >= 20), 20.0, 0.0)
+    prediction = predictor.predict(windows.instants(estimates=columns), level=0.5)
+    np.testing.assert_array_equal(prediction.outside, since < 9.0 - 1e-3)
+    assert 10 < prediction.outside.sum() < len(windows) - 10
+    nobody = {name: values for name, values in columns.items() if name != AGE}
+    assert predictor.predict(windows.instants(estimates=nobody), level=0.5).outside.all()
 
 
 def test_a_vessel_without_a_length_is_refused() -> None:

@@ -126,7 +126,7 @@ def _along(
         alone = predictor.alone(instants)[:, 0] if predictor.vessel is not None else np.full_like(predicted, np.nan)
         region = None if band is None else predictor.band(predicted[:, None], instants, band.level, kind=band.kind)
         latency = time.perf_counter() - begin
-        outside = bool(predictor.outside(instants.columns, t[i : i + 1] - t[0])[0])
+        outside = bool(predictor.outside({**instants.columns, **instants.estimates})[0])
         points, error, reach = _judged(predictor, rows, i, predicted, alone, region)
         points.insert(0, "run", run)
         points.insert(1, "t", t[i])

@@ -159,7 +159,7 @@ def _along(
         course = np.arctan2(region.ahead[..., 1], region.ahead[..., 0]) + columns["psi"]
         result["band_along"], result["band_across"] = region.along.T.ravel(), region.across.T.ravel()
         result["band_course"] = np.mod(course, 2 * np.pi).T.ravel()
-    result["outside"] = np.repeat(predictor.outside(columns, columns["t"] - t[0]), steps)
+    result["outside"] = np.repeat(predictor.outside({**columns, **known}), steps)
     return pd.DataFrame(result)
 
 

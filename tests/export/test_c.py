@@ -28,7 +28,7 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import pace, variety
 from tests.export.compiled import SANITIZERS, compile_, compiler, library, paths, pointer, run_example, write
-from tests.export.strange import KINDS, drawn, network_of
+from tests.export.strange import KINDS, bands_of, drawn, network_of
 
 NEAR = 1e-12  # m
 INVALID, OUTSIDE, DIVERGED, NO_PAST, TIME = 1, 2, 4, 8, 16
@@ -203,7 +203,9 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
     table = inputs.table(physics, instants)
     names = [name for name in table if "." not in name or rng.random() < 0.6]
     network = network_of(rng, names, table, physics.horizon, 3, False)
-    predictor = Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}), {"u": (0.0, 9.0)}, run_up=9.0)
+    bands = bands_of(rng, physics, instants, ("u",), 1.0)
+    corrector = type(corrector)(inputs, (network,), {})
+    predictor = Predictor(physics, "path-drawn", corrector, {"u": (0.0, 9.0)}, bands=bands, run_up=9.0)
     exported = model(predictor)
     files = predictor_files(exported, "odd", Precision())
     size = _size_of_struct(files, tmp_path)
@@ -214,7 +216,7 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
     assert loaded.odd_predict(pointer(kept), None, pointer(path)) == NO_PAST
     order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    predicted = []
+    predicted, alarms = [], []
     for i in range(len(t)):
         row = np.ascontiguousarray(rows.iloc[i][list(order)].to_numpy(dtype=float))
         row[order.index("psi")] = (row[order.index("psi")] + np.pi) % (2 * np.pi) - np.pi
@@ -228,8 +230,12 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
         assert result == (NO_PAST if t[i] < t[0] + 4.0 - 1e-9 else 0 if settled else OUTSIDE)
         if t[i] > t[0] + 4.0:
             predicted.append(path.copy())
-    expected = predictor.predict(instants)
-    np.testing.assert_allclose(np.stack(predicted, axis=1), expected, rtol=0, atol=1e-10)  # filters amplify rounding
+            alarms.append(result == OUTSIDE)
+    expected = predictor.predict(instants, level=0.5)
+    np.testing.assert_allclose(
+        np.stack(predicted, axis=1), expected.paths, rtol=0, atol=1e-10
+    )  # filters amplify rounding
+    np.testing.assert_array_equal(alarms, expected.outside)
 
 
 def _size_of_struct(files, folder):

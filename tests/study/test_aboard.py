@@ -12,6 +12,7 @@ from shipid.data.dataset import Dataset, pieces, read_dataset, write_dataset
 from shipid.errors import DataError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
+from shipid.observer import Observer, observe
 from shipid.predictor import Predictor
 from shipid.study import aboard, apply
 from shipid.study.aboard import play, summary, write
@@ -82,12 +83,14 @@ def test_the_alarm_stands_until_the_observer_has_run_as_long_as_in_training(pred
     frame["flags"] = (np.arange(len(frame)) == 30).astype(np.int64)
     dataset = write_dataset(Dataset(frame, {"clock": "run", "flags": names}), tmp_path / "log.parquet")
     whole = replace(Predictor.load(predictor), limits={"u": (0.0, 9.0)}, run_up=run_up)
+    whole = replace(whole, physics=replace(whole.physics, observer=Observer(waves=(0.0,), change=(1.0,))))
     cell = whole.save(tmp_path / "cell.npz")
     since = 5.0 * (np.arange(len(frame)) % 30)
     played = play(cell, dataset, every=5.0)
     np.testing.assert_array_equal(played.instants["outside"], since[: len(played.instants)] < run_up)
     known = read_dataset(dataset)
-    tables = [apply._along(Predictor.load(cell), known, run, rows, None) for run, rows in pieces(known)]
+    estimates = observe(whole.vessel, known, whole.physics.observer)
+    tables = [apply._along(Predictor.load(cell), known, run, rows, estimates) for run, rows in pieces(known)]
     table = pd.concat(tables).groupby("t")["outside"].first()
     np.testing.assert_array_equal(table, pd.Series(since < run_up, index=frame["t"].to_numpy())[table.index])
 
