@@ -410,9 +410,10 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
     longest = max(map(len, places))
     table = {name: frame[name].to_numpy(dtype=float) for name in map(str, frame) if name not in ("run", "flags")}
     zero = np.zeros(len(frame))
-    commands = np.stack([table[name] for name in model.commands], axis=1)
-    weather = np.stack([table.get(name, zero) for name in model.environment] or [zero], axis=1)
-    weather = weather[:, : len(model.environment)]
+    commands, weather = (
+        np.array([table.get(name, zero) for name in names]).reshape(-1, len(frame)).T
+        for names in (model.commands, model.environment)  # a ship adrift has no commands
+    )
     measured = np.stack([table[name] for name in MEASURED], axis=1)
     measured[:, [name not in filters.settings.measured for name in MEASURED]] = np.nan
     noise = np.tile(filters.noise, (len(frame), 1))

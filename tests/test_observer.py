@@ -393,6 +393,15 @@ def test_a_band_is_promised_once_the_observer_has_run_as_long_as_in_training() -
     assert predictor.predict(windows.instants(estimates=nobody), level=0.5).outside.all()
 
 
+def test_a_ship_adrift_is_observed_too() -> None:
+    vessel, log = load_vessel("gunnerus-28.9"), weaving("ab")
+    off = {f"thruster.{name}.off": True for name in vessel.document["thruster"]}
+    adrift = vessel.with_values(off)
+    assert not dynamics(adrift).commands
+    estimates = observe(adrift, log, Observer(waves=(0.0,), change=(1.0,)))
+    assert all(np.isfinite(values).all() for values in estimates.columns.values())
+
+
 def test_a_vessel_without_a_length_is_refused() -> None:
     vessel = load_vessel("gunnerus-28.9")
     document = {key: value for key, value in vessel.document.items() if key != "particulars"}

@@ -23,6 +23,7 @@ from shipid.errors import ShipidError
 
 Array = np.ndarray
 LONGEST = 600  # operations of one C function
+_ARRAY = re.compile(r"real (\w+)\[\d+\];")
 _VALUE, _TARGET = re.compile(r"\ba\d+\b"), re.compile(r"const real (a\d+) = ")
 
 _CALLS = {
@@ -661,7 +662,7 @@ def _function(lines: Sequence[str], given: Sequence[str], name: str, more: Seque
     heads = ", ".join([*(f"const real *{key}" for key in given), *more])
     declared = [line for line in lines if line.startswith(("static const", "int ", "real ", "float "))]
     rest = lines[len(declared) :] if lines[: len(declared)] == declared else lines
-    declared = declared if rest is not lines else []
+    declared = [line for line in declared if _is_used(line, "\n".join(rest))] if rest is not lines else []
     text = "\n".join(f"    {line}" for line in (*declared, *unused, *rest))
     return f"static void {name}({heads})\n{{\n{text}\n}}\n"
 
@@ -692,6 +693,12 @@ def _chain(lines: Sequence[str], given: Sequence[str], name: str) -> str:
     texts = [_function(part, given, f"{name}_{k}", ("real *w", "real *out")) for k, part in enumerate(parts)]
     calls = [f"{name}_{k}({', '.join([*given, 'w', 'out'])});" for k in range(len(parts))]
     return "\n".join([*texts, _function([f"real w[{max(1, count)}];", *calls], given, name)])
+
+
+def _is_used(declaration: str, text: str) -> bool:
+    """Whether a text uses the array of a declaration: one without entries, as of a ship without orders, is not."""
+    array = _ARRAY.fullmatch(declaration)
+    return array is None or _mentions(text, array[1])
 
 
 def _mentions(text: str, name: str) -> bool:
