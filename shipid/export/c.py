@@ -357,8 +357,8 @@ class PredictorParts:
 
     @property
     def filters(self) -> Bank | None:
-        """The filters of the observer, where there is one."""
-        physics = self.model.physics
+        """The filters of the observer, where there is one: of the vessel without the terms of the method, as in Python."""
+        physics = self.model.predictor.physics
         if physics.observer is None or physics.vessel is None:
             return None
         return bank(physics.vessel, physics.observer)
@@ -525,7 +525,7 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
         blocks: list[Block] = [model.graph]
         advance = _advance(model.vessel) if names.reached else None
         filters = self.filters
-        filtering = None if filters is None else _filter(filters)
+        filtering = None if filters is None else _filter(filters, names.parameters)
         blocks += [block for block in (advance, filtering, model.radii, model.band) if block is not None]
         text, call = c_functions(blocks, self.precision)
         return f"""{comment([f"Predictor, written by shipid {__version__}; see {name}.h."])}
@@ -827,18 +827,18 @@ double {name}_factor(double miss, double level, int kind)
         if (t - {names.num_past * step!r} < self->t[self->first] - slack) return {name}_NO_PAST;
         for (k = 0; k < {names.num_past}; ++k) {{
             double at = t - {step!r} * ({names.num_past} - k), t0, t1, share;
-            const real *before, *after;
+            const real *before, *after, *order;
             real *entry = past + k * {width};
             if (at < self->t[self->first]) at = self->t[self->first];
-            while (j + 1 < self->count && self->t[(self->first + j + 1) % {cap}] <= at + slack) ++j;
+            while (j + 1 < self->count && self->t[(self->first + j + 1) % {cap}] <= at) ++j;
             before = self->rows[(self->first + j) % {cap}];
             t0 = self->t[(self->first + j) % {cap}];
             after = j + 1 < self->count ? self->rows[(self->first + j + 1) % {cap}] : before;
             t1 = j + 1 < self->count ? self->t[(self->first + j + 1) % {cap}] : t0 + 1;
-            if (at < t0) at = t0;
+            order = t1 <= at + slack ? after : before; /* in force: that of a row which is only rounding away */
             share = (at - t0) / (t1 - t0);
             for (i = 0; i < {len(places)}; ++i)
-                entry[i] = holds[i] ? before[place[i]] : before[place[i]] + (real)share * (after[place[i]] - before[place[i]]);
+                entry[i] = holds[i] ? order[place[i]] : before[place[i]] + (real)share * (after[place[i]] - before[place[i]]);
             {{
 {position}
             entry[{width - 2}] = c * north + s * east;
@@ -920,11 +920,17 @@ def _size(filters: Bank) -> int:
     return sum(sizes(filters.model))
 
 
-def _filter(filters: Bank) -> Formula:
-    """(state, commands, environment, parameters, measured, numbers, dt) -> state after, estimate, innovation, spread."""
-    one = filter_function(filters.model)
+def _filter(filters: Bank, parameters: Sequence[str]) -> Formula:
+    """(state, commands, environment, parameters, measured, numbers, dt) -> state after, estimate, innovation, spread.
+
+    parameters : names of those that are given, the terms of the method among them.
+    """
+    one, given = filter_function(filters.model), SX.sym("parameters", len(parameters))
     symbols = {one.name_in(i): SX.sym(one.name_in(i), one.numel_in(i)) for i in range(one.n_in())}
-    results = one(*(SX(ca.DM(filters.noise)) if name == "noise" else symbol for name, symbol in symbols.items()))
+    symbols["parameters"] = given
+    taken = given[[parameters.index(name) for name in filters.model.parameters]]
+    constant = {"noise": SX(ca.DM(filters.noise)), "parameters": taken}
+    results = one(*(constant.get(name, symbol) for name, symbol in symbols.items()))
     kept = {name: symbol for name, symbol in symbols.items() if name != "noise"}
     result = ca.densify(ca.vertcat(*results[:2]))
     return Formula(ca.Function("filter", list(kept.values()), [result], list(kept), ["out"], {"cse": True}))

@@ -238,6 +238,73 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
     np.testing.assert_array_equal(alarms, expected.outside)
 
 
+def test_a_row_just_after_an_instant_of_the_past_is_not_taken_for_it(tmp_path):
+    """Its orders are in force, as for a row that is only rounding away; its motion is of its own time."""
+    t = np.array([0.0, 0.4, 1.0 + 5e-5, 2.0, 3.0])
+    strange = drawn("path-drawn", 7, vessel="actuators")
+    log = log_of(variety()["actuators"], 5, np.random.default_rng(1), 1.0).frame.assign(t=t)
+    log["u"] = [1.0, 5.0, 2.0, 3.0, 3.0]
+    corrector, physics = strange.predictor.corrector, Physics(variety()["actuators"], 3, 1.0)
+    inputs = type(corrector.inputs)(corrector.inputs.commands, Memory(history=(1.0, 2.0), error=(1.0,)))
+    along = memory_along(physics.vessel, {name: log[name].to_numpy() for name in inputs.commands}, t)
+    hidden = {name: values[-1:] for name, values in along.items()}
+    instants = Instants(sample(log, t[-1:]), past_of(log, t[-1:], 2, 1.0, "position"), None, hidden)
+    table = inputs.table(physics, instants)
+    network = network_of(np.random.default_rng(2), list(table), table, 3, 2, False)
+    exported = model(Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {})))
+    files = predictor_files(exported, "odd", Precision())
+    kept, path = np.zeros(_size_of_struct(files, tmp_path) + 64, dtype=np.uint8), np.zeros((3, 2))
+    loaded = library(files, tmp_path)
+    loaded.odd_init(pointer(kept))
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    for at, row in zip(t, log[list(order)].to_numpy(dtype=float), strict=True):
+        assert loaded.odd_record(pointer(kept), at, pointer(np.ascontiguousarray(row))) == 0
+    loaded.odd_predict(pointer(kept), None, pointer(path))
+    expected = exported.predictor.predict(instants)[:, 0]
+    np.testing.assert_allclose(path, expected, rtol=0, atol=1e-11)
+
+
+def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
+    """As in Python: the observer is that of the physics, to which the method adds its force afterwards."""
+    vessel = variety()["gunnerus-28.9"]
+    dataset = log_of(vessel, 8, np.random.default_rng(3), 1.0)
+    corrector = drawn("learned-force", 1, vessel="gunnerus-28.9").predictor.corrector
+    physics = Physics(vessel, 5, 1.0, "euler", Observer(waves=(0.0,), change=(1.0,)))
+    predictor = Predictor(physics, "learned-force", corrector, {"u": (-9.0, 9.0)})
+    exported, rows = model(predictor), dataset.frame
+    files = predictor_files(exported, "odd", Precision())
+    kept = np.zeros(_size_of_struct(files, tmp_path) + 64, dtype=np.uint8)
+    loaded, path = library(files, tmp_path), np.zeros((5, 2))
+    loaded.odd_init(pointer(kept))
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    predicted = []
+    for t, row in zip(rows["t"], rows[list(order)].to_numpy(dtype=float), strict=True):
+        assert loaded.odd_record(pointer(kept), t, pointer(np.ascontiguousarray(row))) == 0
+        assert loaded.odd_predict(pointer(kept), None, pointer(path)) == 0
+        predicted.append(path.copy())
+    columns = {name: rows[name].to_numpy() for name in order}
+    expected = predictor.predict(Instants(columns, estimates=observe(vessel, dataset, physics.observer).columns))
+    np.testing.assert_allclose(np.stack(predicted, axis=1), expected, rtol=0, atol=1e-10)
+
+
+def test_a_ship_without_orders_compiles_without_a_warning(tmp_path):
+    strange = drawn("one-step", 6, count=3, vessel="mariner")
+    vessel = variety()["mariner"]
+    adrift = vessel.with_values({f"thruster.{name}.off": True for name in vessel.document["thruster"]})
+    head = strange.predictor.corrector.heads[0]
+    names = ("u", "v", "r")
+    units = replace(
+        head.units, normaliser=replace(head.units.normaliser, names=names, mean=np.zeros(3), std=np.ones(3)),
+        weight=np.ones((3, 2)), offset=np.zeros(2), reflection=None,
+    )  # fmt: skip
+    heads = (replace(head, units=units, surge=np.ones((3, 1)), sway_yaw=np.ones((3, 2))),)
+    corrector = replace(strange.predictor.corrector, commands=(), heads=heads)
+    predictor = Predictor(Physics(adrift, 3, 1.0), "one-step", corrector)
+    library(predictor_files(model(predictor), "odd", Precision()), tmp_path)
+
+
 def _size_of_struct(files, folder):
     write(files, folder)
     (folder / "size.c").write_text(
