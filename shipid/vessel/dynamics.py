@@ -155,7 +155,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     available |= _gives(terms, available, bound, value_of, outputs=False)
     summed, mapped = _sum_of_terms(terms, available, states_of, bound, value_of)
     shown = _gives(terms, available, bound, value_of, outputs=True)
-    inverse = ca.inv_minor if len(rows) <= 4 else ca.inv  # minors grow too fast with the size
+    inverse = ca.inv_minor if len(rows) <= 3 else ca.inv  # four masses multiplied overflow single precision
     acceleration = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
     more = [
         _rates(TERMS[key], {**available, "state": states_of[path]}, _values(bound[path], value_of))

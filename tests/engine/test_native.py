@@ -203,6 +203,21 @@ def test_single_precision_follows_double(name: str, draw_inputs: Callable[..., A
     assert np.array_equal(near.diverged, exact.diverged)
 
 
+def test_a_large_ship_that_rolls_moves_in_single_precision(draw_inputs: Callable[..., Any]) -> None:
+    """The product of her four masses is beyond single precision: with it sway, roll and yaw stood still."""
+    large = {"inertia.m": 3e8, "inertia.I_x": 5e10, "inertia.I_z": 2e12}
+    size = {"particulars.L_pp": 350.0, "particulars.B": 50.0, "particulars.T": 17.0}
+    vessel = load_vessel("container-175").with_values(large | size)
+    given = draw_inputs(vessel, 5)
+    double, single = (
+        rollout(vessel, **given, step=1.0, num_steps=3, keep=("v", "p", "r"), engine=engine)
+        for engine in ("native", "single")
+    )
+    change, near = double.states[1:] - double.states[:1], single.states[1:] - single.states[:1]
+    assert (np.abs(change) > 0).all()
+    np.testing.assert_allclose(near, change, rtol=0.01, atol=1e-5)
+
+
 def test_one_divergence_harms_no_other_distance(draw_inputs: Callable[..., Any]) -> None:
     given = draw_inputs(SHIP, 11)
     goal = np.zeros((5, 11, 2))
