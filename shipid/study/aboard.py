@@ -23,11 +23,13 @@ from shipid.logs.readers import span_of
 from shipid.observer import observe
 from shipid.predictor import Predictor
 from shipid.study.apply import Band, along_run
+from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
 
 Array = np.ndarray
 TRACK = ["run", "t", "north", "east"]
 AHEAD = 5  # moments of the horizon that the summary shows
+CHANGED = "the ship, her loading or the weather is not that of the training, and bands do not hold"
 STANDARD = (0.5, 0.8, 0.9, 0.95)  # levels that the summary judges beside the one that was asked for
 
 
@@ -272,6 +274,10 @@ def _promise(played: Played) -> list[str]:
             f"band of {band.level:.0%}{of}{adapts}: it held {held[judged].mean():.0%} of the {judged.sum()} whole "
             f"paths that can be judged, {inside} without alarm, where it is promised"
         )
+        if promised.any():
+            _, most = share_interval(held[promised], instants["run"].to_numpy()[promised])
+            if most < band.level:
+                lines.append(f"  that is fewer than {band.level:.0%} by more than chance: {CHANGED}")
         usual = at_level(bands.table(band.kind), band.level)
         shares = []
         for level in (*STANDARD, band.level) if band.rate is None else ():

@@ -144,6 +144,20 @@ def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tm
     )
 
 
+def test_a_summary_says_when_bands_hold_less_than_promised_by_more_than_chance(banded, tmp_path):
+    """Eight runs like those of training; then of a ship that is far faster than her log says."""
+    fitted, _ = banded
+    file = replace(fitted, limits={"u": (0.0, 9.0)}).save(tmp_path / "cell.npz")
+    said = []
+    for share in (1.0, 10.0):
+        parts = [log(seed, 20).assign(run=f"r{seed}") for seed in range(8)]
+        for part in parts:
+            part[["north", "east"]] *= share
+        played = play(file, saved(pd.concat(parts, ignore_index=True), tmp_path), level=0.8)
+        said.append(any("by more than chance" in line for line in summary(played)))
+    assert said == [False, True]
+
+
 def test_a_band_adapts_to_the_past_alone(banded, tmp_path):
     _, file = banded
     whole = log()
