@@ -18,8 +18,10 @@ from shipid.data.windows import (
     Instants,
     Windows,
     cut_windows,
+    holes,
     nested_runs,
     part_folds,
+    reach_over,
     run_folds,
 )
 from shipid.engine.casadi import memory_along
@@ -132,7 +134,7 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
     test_runs = _test_runs(plan, windows)
     test = windows.select(np.isin(windows.run, test_runs))
     rest = windows.select(~np.isin(windows.run, test_runs))
-    notes: list[str] = []
+    notes = over_holes(dataset, windows)
     if windows.shared_clock:
         touching = rest.touching(test.spans.values())
         if touching.any():
@@ -149,6 +151,23 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
     if min(plan.study.grid.N_D) == 1:
         _check_single_runs(plan, rest)
     return rest, test, notes
+
+
+def over_holes(dataset: Dataset, windows: Windows) -> list[str]:
+    """A sentence on windows that reach over times without rows, longer than a step; none where there are none."""
+    found = holes(dataset, windows.step)
+    over = reach_over(windows, found)
+    if not over.any():
+        return []
+    named = {run: spans for run, spans in found.items() if (over & (windows.run == run)).any()}
+    run, (start, end) = max(
+        ((run, span) for run, spans in named.items() for span in spans), key=lambda one: one[1][1] - one[1][0]
+    )
+    return [
+        f"{int(over.sum())} of {len(windows)} windows hold a time without rows, the longest {end - start:.3g} s after "
+        f"t = {start:g} s of {run!r}: path and motion are only interpolated there; set max_gap in [clock] of the "
+        "mapping and import again"
+    ]
 
 
 def all_windows(plan: Plan, dataset: Dataset) -> Windows:

@@ -16,8 +16,10 @@ from shipid.data.windows import (
     cut_windows,
     fold_masks,
     from_frame,
+    holes,
     nested_runs,
     part_folds,
+    reach_over,
     run_folds,
     split_folds,
     split_runs,
@@ -464,3 +466,16 @@ def test_an_interval_far_below_the_rows_gives_every_row() -> None:
     every = cut_windows(dataset, horizon=5, step=1.0, interval=0.5)
     for interval in (0.1, 1e-3, 1e-12):
         np.testing.assert_array_equal(cut_windows(dataset, horizon=5, step=1.0, interval=interval).t, every.t)
+
+
+def test_windows_over_a_time_without_rows_are_found() -> None:
+    """A recorder that paused from 20 to 30 s; windows of 10 s that end at 20 s, or begin at 30 s, see nothing of it."""
+    paused = turning(T[(T <= 20) | (T >= 30)])
+    dataset = as_dataset(paused, turning(T))
+    found = holes(dataset, 1.0)
+    assert found == {"a": [(20.0, 30.0)]}
+    windows = cut_windows(dataset, horizon=10)
+    over = reach_over(windows, found)
+    np.testing.assert_array_equal(over, (windows.run == "a") & (windows.t > 10) & (windows.t < 30))
+    assert holes(dataset, 10.0) == {}  # a step of the prediction as long
+    assert holes(as_dataset(turning(T[::2]), turning(T)), 0.1) == {}  # rows of another interval are no hole

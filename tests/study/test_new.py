@@ -213,6 +213,15 @@ def test_a_log_that_fails_its_checks_is_named_before_the_vessel(
     assert re.search(look, drafted(tmp_path, dataset)[0].warnings[0])
 
 
+def test_windows_over_a_time_without_rows_warn(tmp_path: Path) -> None:
+    """A recorder that paused for 15 s, in a log imported without max_gap."""
+    dataset = trial()
+    t, run = dataset.frame["t"], dataset.frame["run"]
+    paused = (run == dataset.runs[0]) & (t > t.iloc[40]) & (t < t.iloc[40] + 15)
+    warnings = drafted(tmp_path, Dataset(dataset.frame[~paused].reset_index(drop=True), dataset.metadata))[0].warnings
+    assert sum("hold a time without rows, the longest 15 s" in warning for warning in warnings) == 1
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_the_test_run_holds_the_past_of_the_method(seed: int, tmp_path: Path) -> None:
     """Of runs of drawn lengths, some hold the horizon but not the past before it: none of these is set aside."""
