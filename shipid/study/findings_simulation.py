@@ -15,7 +15,7 @@ S4 : at the largest N_D at least one high member is better than pure data-driven
     seeds, each another nested order of runs, H of those that are worse varies more than that of the moderate members.
     Never decided with fewer than five seeds.
 S5 : the rank correlation of H and H_90 over cells is at least 0.95 and H_90 turns none of S1-S4 round; refuted if it is
-    below 0.8 or H_90 confirms what H refutes, or the other way round.
+    below 0.8 or H_90 confirms what H refutes, or the other way round. Undecided with too few manoeuvres, as all are.
 S6 : a moderate member with a small N_D (at most half of the largest) is better than pure data-driven with the next
     larger one, and one is better than physics alone that is more accurate than its physics.
 S7 : at the smallest N_D the roughness of pure data-driven paths is more than 1.5 times that of the true paths, and that
@@ -36,7 +36,7 @@ from scipy.special import stdtr
 from shipid.hybrid.method import Method
 from shipid.metrics import rank_correlation, roughness
 from shipid.study.error_table import ALONE, PLAIN, ErrorTable, Metric, error_table
-from shipid.study.evidence import LEVEL, Contrasts, at_least, by_chance, contrasts, doubling
+from shipid.study.evidence import FEWEST_RUNS, LEVEL, Contrasts, at_least, by_chance, contrasts, doubling
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
@@ -168,8 +168,9 @@ def _S1(grid: Grid) -> Finding:
         over_plain = shown(table.against(PLAIN, grid.moderate, 0).above).sum()
         plain = f" ({over_plain} of {count} beat networks without mirror symmetry, {metres(table.mean(PLAIN, 0))})"
     evidence = (
-        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models beat pure data-driven "
-        f"({grid.value(NO_MODEL, 0)}), by {_range(leads[0])}{plain}; that most keep the lead is {keeps}: "
+        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {_is(won[0])} shown to beat pure "
+        f"data-driven ({grid.value(NO_MODEL, 0)}), whose H less theirs is {_range(leads[0])}{plain}; "
+        f"that most keep the lead is {keeps}: "
         f"{', '.join(f'{number} at {N}' for number, N in zip(won[1:], amounts[1:], strict=True))}"
     )
     numbers = {
@@ -177,6 +178,11 @@ def _S1(grid: Grid) -> Finding:
         for number, N in ((won[0], amounts[0]), (won[-1], amounts[-1]))
     }
     return _finding("S1", weakest((begins, keeps)), evidence, **numbers)
+
+
+def _is(count: int) -> str:
+    """Verb of so many models."""
+    return "is" if count == 1 else "are"
 
 
 def _sides(differences: Sequence[Contrasts]) -> tuple[list[Array], list[Array]]:
@@ -247,8 +253,8 @@ def _S4(grid: Grid) -> Finding:
     orders = table.H[NO_MODEL].shape[1]
     names = ", ".join(f"{model} {grid.value(model, place)}" for model in worst[:3])
     evidence = (
-        f"at N_D = {last}, {better.sum()} of {len(better)} high models beat pure data-driven "
-        f"({grid.value(NO_MODEL, place)}), {len(worst)} {'is' if len(worst) == 1 else 'are'} worse"
+        f"at N_D = {last}, {better.sum()} of {len(better)} high models {_is(better.sum())} shown to beat pure "
+        f"data-driven ({grid.value(NO_MODEL, place)}), {len(worst)} {_is(len(worst))} shown to be worse"
         f"{f' ({names})' if names else ''}"
     )
     numbers = {
@@ -305,7 +311,7 @@ def _S5(H: Grid, H_90: Grid, by_H: list[Finding], by_H_90: list[Finding]) -> Fin
     evidence += ", ".join(f"{key} is {other} instead of {one}" for key, one, other in changed) or "S1-S4 are the same"
     decided = verdict(alike >= ALIKE and not opposite, opposite or alike < UNLIKE)
     numbers = {"rank correlation of H and H_90": alike, "verdicts of S1-S4 that differ": float(len(changed))}
-    return _finding("S5", decided if H.table.runs > 1 else "undecided", evidence, **numbers)
+    return _finding("S5", decided if H.table.runs >= FEWEST_RUNS else "undecided", evidence, **numbers)
 
 
 @dataclass(frozen=True)
