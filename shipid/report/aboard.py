@@ -15,6 +15,7 @@ from shipid.report.page import page, write
 from shipid.report.palette import INK, category
 from shipid.report.section import Section
 from shipid.report.selection import spread
+from shipid.report.wording import metres
 
 LOGGED, PATH, PHYSICS, BAND, ALARM = "logged track", "predicted path", "physics alone", "band", "alarm"
 COLOURS = {LOGGED: INK, PATH: category(0), PHYSICS: category(1), BAND: category(0), ALARM: INK}
@@ -127,8 +128,10 @@ def _trace(name: str, x: Floats, y: Floats, width: float) -> Trace:
 def along(content: AboardContent) -> Figure:
     """Error at the end of each path, size of the band there, and the alarm, over the time of a run."""
     error = content.instants["error"].median()
-    takeaway = f"Over all runs, the median error at the end of a path is {error:.2f} m"
-    takeaway += f"; the largest, {content.instants['error'].max():.2f} m, is in {content.runs[_worst(content)]}."
+    takeaway = f"Over all runs, the median error at the end of a path is {metres(error)}"
+    takeaway += (
+        f"; the largest, {metres(float(content.instants['error'].max()))}, is in {content.runs[_worst(content)]}."
+    )
     return Figure(
         id="along",
         title="Along the run",

@@ -371,7 +371,7 @@ def _stage(rows: pd.DataFrame, counts: Sequence[int], span: tuple[float, float],
     """Lay out the bars: the largest N_D in front, since H falls with N_D and short bars hide nothing."""
     last, deep = len(rows) - 1, len(counts) - 1
     shown = np.unique(np.linspace(0, last, min(len(rows), 8)).round().astype(int))
-    words = [f"{A:.1f}" if math.isfinite(A) else "none" for A in rows.A.iloc[shown]]
+    words = [number(A) if math.isfinite(A) else "none" for A in rows.A.iloc[shown]]
     x = axis("models by A [m]", tickvals=shown.tolist(), ticktext=words, showgrid=False)
     top = 1.03 * max(span[1] + back * deep, back * (deep + 1))
     y = axis("H, front row [m]", range=[0, top], tickvals=_heights(span[1]))

@@ -181,7 +181,7 @@ def line(
         "name": label(name),
         "meta": list(keys),
         "connectgaps": False,
-        "hovertemplate": f"{label(name)}: %{{y:.2f}} {label(unit)}<extra></extra>",
+        "hovertemplate": f"{label(name)}: %{{y:.4~r}} {label(unit)}<extra></extra>",
         **options,
     }
 

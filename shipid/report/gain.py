@@ -218,7 +218,7 @@ def _dot(name: str, value: float, row: int, key: str, symbol: str, colour: str, 
     marker = {"symbol": symbol, "size": 7 if small else 13, "color": colour, "line": {"width": 2, "color": colour}}
     what = "physics alone" if key == "before" else "with compensation"
     trace = line(name, [value], [row], [key], mode="markers", marker=marker, opacity=0.4 if small else 1.0)
-    trace["hovertemplate"] = f"{label(name)}, {what}: %{{x:.2f}} m<extra></extra>"
+    trace["hovertemplate"] = f"{label(name)}, {what}: %{{x:.4~r}} m<extra></extra>"
     return trace
 
 

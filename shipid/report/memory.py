@@ -418,7 +418,7 @@ def _cells(frame: pd.DataFrame, span: float) -> Plot:
 
 
 def _written(row: dict[Any, Any]) -> str:
-    value = number(round(float(row["difference"]), 2) + 0.0)  # no minus before a zero
+    value = number(float(row["difference"]))
     return f"<b>{value}</b>" if _sure(row) else value
 
 

@@ -237,6 +237,11 @@
   }
 
   const browser = document.getElementById("browser");
+  // as `number` of the pages: two digits at least, for a model of a metre too
+  function lengthOf(value) {
+    return value.toFixed(value >= 0.0995 || value < 0.00005 ? 2 : value >= 0.00995 ? 3 : 4);
+  }
+
   if (browser) {
     const slider = browser.querySelector("input[type=range]");
     const list = browser.querySelector(".errors");
@@ -260,7 +265,7 @@
         item.firstChild.style.setProperty("--line", line.color);
         const error = document.createElement("span");
         error.className = "value";
-        error.textContent = path[4] === null ? "diverged" : `${path[4].toFixed(2)} m`;
+        error.textContent = path[4] === null ? "diverged" : `${lengthOf(path[4])} m`;
         item.append(name, error);
         return item;
       }));

@@ -14,7 +14,7 @@ from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.selection import sizes
 from shipid.report.tables import Cell, Table, duration, figure, text
-from shipid.report.wording import counted, number, short
+from shipid.report.wording import counted, fixed, number, short
 
 MOST_DOTS = 1200  # in one panel: more hide each other
 MOST_CHOSEN = 200
@@ -186,11 +186,7 @@ def _frame(name: str, every: pd.Series[float]) -> dict[str, Any]:
 
 def _caption(frame: pd.DataFrame, name: str) -> str:
     correlation = importance(frame, name)
-    return (
-        f"rank correlation {number(round(correlation, 2) + 0.0)}"
-        if math.isfinite(correlation)
-        else "no rank correlation"
-    )
+    return f"rank correlation {fixed(correlation, 2)}" if math.isfinite(correlation) else "no rank correlation"
 
 
 def _yes_or_no(values: pd.Series[float]) -> bool:
@@ -221,7 +217,7 @@ def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
     correlations = {name: value for name, value in correlations.items() if math.isfinite(value)}
     if correlations:
         most = max(correlations, key=lambda name: abs(correlations[name]))
-        text += f"; {spoken(most)} is most correlated with it, rank correlation {number(correlations[most])}"
+        text += f"; {spoken(most)} is most correlated with it, rank correlation {fixed(correlations[most], 2)}"
     return f"{text}."
 
 

@@ -71,6 +71,7 @@ def decimals(values: pd.DataFrame | pd.Series[float]) -> int:
     return int(np.clip(2 - np.floor(np.log10(np.median(sizes))), 0, 3)) if len(sizes) else 2
 
 
+MOST_PLACES = 4  # decimals of a length [m]
 MISSING = 1e300  # sorts after every number (page.js knows it)
 # Column of the frame -> heading and, of numbers, the decimals.
 CELLS = {
@@ -205,7 +206,11 @@ def _range(mine: pd.DataFrame, quantity: str) -> Cell:
 def _table(
     id_: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, tuple[str, int | None]]
 ) -> Table:
-    present = {name: heading for name, heading in columns.items() if name in frame.columns}
+    present = {
+        name: (heading, _places(frame[name], places) if heading.endswith("[m]") and places is not None else places)
+        for name, (heading, places) in columns.items()
+        if name in frame.columns
+    }
     rows = []
     for record in frame.to_dict("records"):
         row = [
@@ -218,6 +223,13 @@ def _table(
         rows.append(row)
     headings = [heading for heading, _ in present.values()]
     return Table(id_, title, takeaway, headings, [decimals is not None for _, decimals in present.values()], rows)
+
+
+def _places(lengths: pd.Series[float], usual: int) -> int:
+    """Decimals of a column of lengths [m]: as many as usual, more where its middle one would have one digit or none."""
+    sizes = np.abs(pd.to_numeric(lengths, errors="coerce").to_numpy(dtype=float))
+    sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
+    return int(np.clip(1 - np.floor(np.log10(np.median(sizes))), usual, MOST_PLACES)) if len(sizes) else usual
 
 
 def duration(seconds: float) -> str:

@@ -10,11 +10,16 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float) -> str:
-    """Three digits, two decimals at most: 0.83, 12.4, 131; NaN is a dash."""
+    """Three digits, two decimals at most, and two digits below 0.1: 0.0083, 0.83, 12.4, 131; NaN is a dash."""
     if not math.isfinite(value):
         return "–"
-    decimals = 2 if abs(value) < 9.995 else 1 if abs(value) < 99.95 else 0
-    return fixed(value, decimals)
+    return fixed(value, _decimals(value))
+
+
+def _decimals(value: float) -> int:
+    """Decimals of a number: what a model of a metre errs by has more than two; what is below 0.00005 counts as 0."""
+    sizes = {0: 99.95, 1: 9.995, 2: 0.0995, 3: 0.00995, 4: 0.00005}
+    return next((count for count, least in sizes.items() if abs(value) >= least), 2)
 
 
 def fixed(value: float, decimals: int) -> str:

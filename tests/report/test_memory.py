@@ -152,15 +152,15 @@ def test_the_map_has_a_cell_for_each_model_and_amount(past: ReportContent) -> No
     figure = memory.difference_map(past)
     assert figure is not None
     boxes, words = figure.views["0"][0].figure.data
-    assert list(words.text) == ["<b>−0.10</b>", "−0.05", "<b>−0.60</b>", "<b>−0.40</b>", "<b>0.30</b>"]
+    assert list(words.text) == ["<b>−0.10</b>", "−0.050", "<b>−0.60</b>", "<b>−0.40</b>", "<b>0.30</b>"]
     assert list(words.y) == [0, 0, 1, 1, 2], "models by rising A, no physics on top"
     colours = dict(zip(words.text, boxes.marker.color, strict=True))
-    assert colours["<b>0.30</b>"] != colours["−0.05"]
+    assert colours["<b>0.30</b>"] != colours["−0.050"]
     assert boxes.marker.opacity[2] == max(boxes.marker.opacity)
 
 
 def test_no_minus_before_a_zero(past: ReportContent) -> None:
-    sums = past.frames["memory"].assign(difference=-0.001, low=-0.1, high=0.1)
+    sums = past.frames["memory"].assign(difference=-0.00001, low=-0.1, high=0.1)
     figure = memory.difference_map(replace(past, frames={**past.frames, "memory": sums}))
     assert figure is not None
     assert set(figure.views["0"][0].figure.data[1].text) == {"0.00"}

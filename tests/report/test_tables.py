@@ -49,6 +49,16 @@ def test_cells_count_their_trials(simulation):
     assert "trials [1]" not in cells(replace(simulation, trials=simulation.trials.iloc[:0])).columns
 
 
+def test_errors_of_a_small_model_are_no_zeros(simulation):
+    """A hundredth of the errors, as of a model of a metre: no column of 0.00."""
+    small = simulation.cells.assign(H=simulation.cells.H / 300, A=simulation.cells.A / 300)
+    table = cells(replace(simulation, cells=small))
+    for name in ("H [m]", "A [m]"):
+        texts = [row[list(table.columns).index(name)].text for row in table.rows]
+        assert not {"0.00", "0.000"} & set(texts)
+        assert len({len(text.partition(".")[2]) for text in texts if text != "–"}) == 1, "points align"
+
+
 def test_where_a_model_errs_is_shown_where_known(simulation):
     assert {"A along [m]", "A across [m]"} <= set(models(simulation).columns)
     bare = simulation.models.drop(columns=["A_along", "A_across"])

@@ -13,7 +13,14 @@ def test_three_digits():
         "131",
     ]
     assert number(-1.5) == "−1.50"
-    assert number(-0.001) == "0.00"
+    assert [number(x) for x in (0.0994, 0.0995, 0.00834, -0.00052, 0.00004, 0.0)] == [
+        "0.099",
+        "0.10",
+        "0.0083",
+        "−0.0005",
+        "0.00",
+        "0.00",
+    ], "a model of a metre errs by less"
     assert number(math.nan) == number(math.inf) == "–"
     assert metres(0.5) == "0.50 m"
     assert distance(963.2) == "963 m"
