@@ -10,7 +10,7 @@ from shipid.report.content import Floats
 
 Node = tuple[int, int]
 Edge = frozenset[Node]
-FEWEST = 6  # rows or columns that are enough to smooth
+FEWEST = 6.0  # times the radius: rows or columns that are enough to smooth, else the bell reaches over all of them
 NICE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # digits that a contour may have
 
 
@@ -29,14 +29,14 @@ def nice_levels(values: Floats, most: int) -> list[float]:
 def smoothed(values: Floats, radius: tuple[float, float]) -> Floats:
     """Positive values (m, n), each the geometric mean of its neighbours under a bell of `radius` rows and columns.
 
-    Values that are not finite stay so and have no weight. A grid with fewer than six rows or
-    columns is not smoothed along them.
+    Values that are not finite stay so and have no weight. A grid with fewer rows or columns than six radii is not
+    smoothed along them.
     """
     finite = np.isfinite(values) & (values > 0)
     total, weight = np.where(finite, np.log(np.where(finite, values, 1.0)), 0.0), finite.astype(float)
     for axis, width in enumerate(radius):
         count = values.shape[axis]
-        if count < FEWEST:
+        if count < FEWEST * width:
             continue
         distance = np.subtract.outer(np.arange(count), np.arange(count))
         bell = np.exp(-((distance / width) ** 2) / 2)

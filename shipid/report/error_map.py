@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.report.content import DATA_DRIVEN, Floats, ReportContent
-from shipid.report.contours import contour, length, nice_levels, smoothed
+from shipid.report.contours import FEWEST, contour, length, nice_levels, smoothed
 from shipid.report.figure import (
     Chip,
     Control,
@@ -70,9 +70,10 @@ def error_map(content: ReportContent) -> Figure | None:
     spots = _spots(content, means, rows)
     span = (float(means.H.min()), float(means.H.max()))
     pieces, bounds = _pieces(rows, counts, spots, content.frames.get("intervals"))
-    lined = " Lines of equal error follow H averaged over neighbouring models and N_D (where there are six or more of "
-    lined += "them), and none is drawn beside a cell without a result; pieces shorter than the distance of two N_D are "
-    lined += "left out."
+    many = [f"{FEWEST * width:.0f}" for width in NEIGHBOURS]
+    lined = f" Lines of equal error follow H, averaged over neighbouring models where there are {many[0]} or more, and "
+    lined += f"over neighbouring N_D where there are {many[1]} or more. No line is drawn beside a cell without a "
+    lined += "result; pieces shorter than the distance of two N_D are left out."
     if bounds:
         lined += " Dotted: the same lines through the ends of the 95 % interval of H over test manoeuvres. Between the "
         lined += "two dotted lines of a level the data do not say on which side of the level H lies."

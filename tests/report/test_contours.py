@@ -54,7 +54,7 @@ def test_levels_are_round_and_inside():
 
 def test_smoothing_keeps_what_is_smooth_and_calms_what_is_not():
     rng = np.random.default_rng(3)
-    flat = np.full((8, 9), 2.0)
+    flat = np.full((16, 9), 2.0)
     np.testing.assert_allclose(smoothed(flat, (2.0, 1.0)), flat)
     rough = flat * np.exp(0.2 * rng.normal(size=flat.shape))
     calm = smoothed(rough, (2.0, 1.0))
@@ -69,5 +69,11 @@ def test_smoothing_neither_fills_gaps_nor_takes_from_them():
     assert np.isnan(smooth[3, 4])
     assert np.isnan(smooth).sum() == 1
     np.testing.assert_allclose(smooth[np.isfinite(smooth)], 2.0)
-    few = np.arange(1.0, 13.0).reshape(3, 4)
-    np.testing.assert_allclose(smoothed(few, (2.0, 1.0)), few)
+
+
+def test_a_few_models_are_not_averaged_over():
+    """Six models of which two err twenty times as much: a line of 3 m does not run through their cells of 10 m."""
+    errors = np.repeat([[0.3], [0.6], [0.7], [0.6], [11.0], [10.0]], 2, axis=1)
+    np.testing.assert_allclose(smoothed(errors, (2.0, 1.0)), errors)
+    many = np.repeat(errors, 2, axis=0)
+    assert not np.allclose(smoothed(many, (2.0, 1.0)), many)
