@@ -25,6 +25,12 @@ HANDLER = "command line"
 """Name of the handler that writes log messages to standard error."""
 
 
+def length(value: float) -> str:
+    """Write a length [m] with two decimals, and below 0.1 m with two digits: errors of a small model are no zeros."""
+    sizes = {2: 0.0995, 3: 0.00995, 4: 0.00005}
+    return f"{value:.{next((count for count, least in sizes.items() if abs(value) >= least), 2)}f}"
+
+
 def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> Table:
     """Make a table of text: the headings of its columns, and rows of values."""
     from rich import box
@@ -302,7 +308,7 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
                     best = min((best or row, row), key=lambda r: r["H"])
                     worst = max((worst or row, row), key=lambda r: r["H"])
                 label = (
-                    f"best {best['cell']} {best['H']:.2f} m, worst {worst['cell']} {worst['H']:.2f} m"
+                    f"best {best['cell']} {length(best['H'])} m, worst {worst['cell']} {length(worst['H'])} m"
                     if best
                     else "cells"
                 )

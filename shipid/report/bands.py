@@ -14,7 +14,7 @@ from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label
 from shipid.report.palette import MUTED, styles
 from shipid.report.section import Section
 from shipid.report.selection import exemplars, sizes
-from shipid.report.tables import Cell, Table, figure, text
+from shipid.report.tables import Cell, Table, figure, length_places, text
 from shipid.report.wording import counted, listed, metres
 
 WORST = 12  # test runs in the table of those that pay
@@ -146,8 +146,8 @@ def table(content: ReportContent) -> Table | None:
             figure(row["N_D"], 0),
             Cell(_percent(row["level"]), row["level"]),
             _share(row),
-            figure(row["width"], 2),
-            figure(row["end"], 2),
+            figure(row["width"], length_places(frame["width"])),
+            figure(row["end"], length_places(frame["end"])),
             figure(row["lengths"], 3),
         ]
         for row in frame.to_dict("records")
@@ -191,7 +191,7 @@ def groups(content: ReportContent) -> Table | None:
             text(BY[row["by"]]),
             text(row["group"]),
             _share(row),
-            figure(row["width"], 2),
+            figure(row["width"], length_places(frame["width"])),
             figure(row["runs"], 0),
             text(row["note"] or None),
         ]

@@ -207,7 +207,10 @@ def _table(
     id_: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, tuple[str, int | None]]
 ) -> Table:
     present = {
-        name: (heading, _places(frame[name], places) if heading.endswith("[m]") and places is not None else places)
+        name: (
+            heading,
+            length_places(frame[name], places) if heading.endswith("[m]") and places is not None else places,
+        )
         for name, (heading, places) in columns.items()
         if name in frame.columns
     }
@@ -225,7 +228,7 @@ def _table(
     return Table(id_, title, takeaway, headings, [decimals is not None for _, decimals in present.values()], rows)
 
 
-def _places(lengths: pd.Series[float], usual: int) -> int:
+def length_places(lengths: pd.Series[float], usual: int = 2) -> int:
     """Decimals of a column of lengths [m]: as many as usual, more where its middle one would have one digit or none."""
     sizes = np.abs(pd.to_numeric(lengths, errors="coerce").to_numpy(dtype=float))
     sizes = sizes[np.isfinite(sizes) & (sizes > 0)]

@@ -65,6 +65,18 @@ def test_it_says_what_was_held(banded: ReportContent) -> None:
     assert worst.rows[0][0].text == "M003"
 
 
+def test_bands_of_a_small_model_are_no_zeros(banded: ReportContent) -> None:
+    frames = {name: frame.copy() for name, frame in banded.frames.items()}
+    for name in ("coverage", "coverage_groups"):
+        for column in {"width", "end"} & set(frames[name].columns):
+            frames[name][column] /= 1000
+    small = replace(banded, frames=frames)
+    for table in (bands.table(small), bands.groups(small)):
+        assert table is not None
+        place = list(table.columns).index("mean radius [m]")
+        assert not {"0.00", "0.000"} & {row[place].text for row in table.rows}
+
+
 def test_the_map_of_the_width(banded: ReportContent) -> None:
     figure = bands.width_map(banded)
     assert figure is not None
