@@ -22,6 +22,7 @@ BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
 PIXELS = 540  # twice the height of the error over time
 LONGEST = 14  # characters of a name beside a line
+LEADER, LETTER = 16, 7  # length of the line from an end to its name; width of a letter of a name, at most [px]
 STATISTICS = {  # option -> column of the frame, title of the axis, unit
     "mean": ("mean", "position error, mean", "m"),
     "90th percentile": ("p90", "position error, 90th percentile", "m"),
@@ -54,8 +55,10 @@ def horizon(content: ReportContent) -> Figure | None:
         y = axis(f"{title} [{unit}]", rangemode="tozero")
         names = _names_at_the_end(traces, float(means[column].max()))
         reach = float(means.ahead.max())
-        x = axis("time ahead [s]", range=[0.0, 1.28 * reach])
-        plot = layout(x, y, hovermode="x unified", annotations=names)
+        x = axis("time ahead [s]", range=[0.0, reach])
+        room = LEADER + LETTER * max((len(name["text"]) for name in names), default=0)  # that names fit any window
+        margin = {"l": 48, "r": max(12, room), "t": 12, "b": 44}
+        plot = layout(x, y, hovermode="x unified", annotations=names, margin=margin)
         views[f"{i}-{j}"] = [Panel(Plot(traces, plot))]
     return Figure(
         id="horizon",
@@ -202,7 +205,7 @@ def _names_at_the_end(traces: Sequence[Trace], most: float) -> list[dict[str, An
         short = shortened(short, LONGEST)
         colour = trace["line"]["color"]
         text = {"text": short, "xanchor": "left", "align": "left", "font": {"size": 11, "color": colour}}
-        leader = {"axref": "x", "ayref": "y", "ax": 1.04 * place, "ay": height, "arrowhead": 0, "arrowwidth": 1}
+        leader = {"axref": "pixel", "ayref": "y", "ax": LEADER, "ay": height, "arrowhead": 0, "arrowwidth": 1}
         notes.append({"x": place, "y": end, **text, **leader, "arrowcolor": colour, "showarrow": True})
     return notes
 

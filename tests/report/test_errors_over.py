@@ -77,6 +77,15 @@ def test_a_close_up_of_many_models_says_which(simulation, full_scale):
     assert "middle one" not in horizon(full_scale).how
 
 
+def test_names_at_the_ends_of_lines_fit_a_narrow_window(simulation):
+    """The room for them is in pixels: a share of the time axis cut them in a window of 390 px."""
+    plot = horizon(simulation).views["0-0"][0].figure
+    assert plot.layout.xaxis.range[1] == simulation.horizon.ahead.max()
+    longest = max(len(name.text) for name in plot.layout.annotations)
+    assert plot.layout.margin.r >= 16 + 7 * longest
+    assert all((name.axref, name.ax) == ("pixel", 16) for name in plot.layout.annotations)
+
+
 def test_what_failed_has_no_compensated_line(full_scale):
     names = [name for name in lines(horizon(full_scale), "0-0") if name.startswith("bare hull")]
     assert len(names) == 1
