@@ -12,7 +12,7 @@ from shipid.data.dataset import Dataset, cumulative_integral, pieces
 from shipid.physics.signals import steers
 from shipid.study.kinds import kinds_of, longest
 
-GRAVE = ("range",)  # checks that fail where a unit is wrong, or spikes are left
+GRAVE = ("range", "overlap")  # checks that fail where a unit is wrong, spikes are left, or a run is there twice
 OF_A_KIND = 3  # runs of a kind from which one may be set aside
 
 

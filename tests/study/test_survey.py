@@ -23,6 +23,15 @@ def test_a_steady_turn_is_described_by_its_numbers() -> None:
     assert summary.runs["whole"].all()
 
 
+def test_a_run_that_is_there_twice_is_a_fault() -> None:
+    """A copy in the training tells the test: no study of it says how well a ship is predicted."""
+    weave = turning(T).assign(u=4 + np.sin(T / 9), v=np.sin(T / 8), r=0.05 + 0.01 * np.sin(T / 7))
+    other = turning(T).assign(u=4 + np.cos(T / 9), v=np.cos(T / 8), r=0.05 + 0.01 * np.cos(T / 7))
+    (first, second) = survey(as_dataset(weave, weave, other, clock="run")).faults
+    assert first == "run 'a': 100 % of the rows belong to another run, too, most in 'b'"
+    assert second.endswith("most in 'a'")
+
+
 @pytest.mark.parametrize(("scale", "turn"), [(0.5, 0.0), (1.2, 0.3)])
 def test_the_factor_is_how_positions_differ_from_velocities(scale: float, turn: float) -> None:
     frame = turning(T)
