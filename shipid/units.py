@@ -1,4 +1,4 @@
-"""Factors from common units to SI: value in SI = value * factor; and the acceleration of gravity."""
+"""Factors from common units to SI: value in SI = value * factor; the acceleration of gravity; digits of lengths."""
 
 import math
 
@@ -12,3 +12,12 @@ MINUTE = 60.0
 """Seconds in one minute."""
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2], where a vessel gives no other one; 9.80665 (BIPM, SI Brochure) to three digits."""
+
+
+def decimals_of(length: float) -> int:
+    """Number of decimals that a length [m] is written with: two, or more where it has two digits only so, up to four.
+
+    So errors of a model ship are no zeros. What is below 0.00005 m counts as 0.
+    """
+    size = abs(length)
+    return 4 if 0.00005 <= size < 0.00995 else 3 if 0.00995 <= size < 0.0995 else 2

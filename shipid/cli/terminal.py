@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from shipid.errors import visible
+from shipid.units import decimals_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -26,9 +27,8 @@ HANDLER = "command line"
 
 
 def length(value: float) -> str:
-    """Write a length [m] with two decimals, and below 0.1 m with two digits: errors of a small model are no zeros."""
-    sizes = {2: 0.0995, 3: 0.00995, 4: 0.00005}
-    return f"{value:.{next((count for count, least in sizes.items() if abs(value) >= least), 2)}f}"
+    """Write a length [m] with two decimals, and below 0.1 m with two digits."""
+    return f"{value:.{decimals_of(value)}f}"
 
 
 def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> Table:

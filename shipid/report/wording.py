@@ -6,6 +6,8 @@ import math
 import re
 from collections.abc import Sequence
 
+from shipid.units import decimals_of
+
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -13,13 +15,7 @@ def number(value: float) -> str:
     """Three digits, two decimals at most, and two digits below 0.1: 0.0083, 0.83, 12.4, 131; NaN is a dash."""
     if not math.isfinite(value):
         return "–"
-    return fixed(value, _decimals(value))
-
-
-def _decimals(value: float) -> int:
-    """Decimals of a number: what a model of a metre errs by has more than two; what is below 0.00005 counts as 0."""
-    sizes = {0: 99.95, 1: 9.995, 2: 0.0995, 3: 0.00995, 4: 0.00005}
-    return next((count for count, least in sizes.items() if abs(value) >= least), 2)
+    return fixed(value, 0 if abs(value) >= 99.95 else 1 if abs(value) >= 9.995 else decimals_of(value))
 
 
 def fixed(value: float, decimals: int) -> str:

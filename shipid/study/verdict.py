@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from shipid.study.evidence import FEWEST_RUNS, LEVEL, Contrasts, holm
 from shipid.study.plan import NO_MODEL
+from shipid.units import decimals_of
 
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
 MOST_NAMES = 5  # in one sentence
@@ -58,18 +59,17 @@ def undecided(claims: Mapping[str, str], reason: str) -> list[Finding]:
 
 def metres(value: float) -> str:
     """Return a length with two decimals, from 10 m on with one, of a model below 0.1 m with two digits or more."""
-    return f"{value:.{_decimals(value)}f} m"
+    return f"{value:.{_places(value)}f} m"
 
 
-def _decimals(value: float) -> int:
-    sizes = {1: 9.995, 2: 0.0995, 3: 0.00995, 4: 0.00005}
-    return next((count for count, least in sizes.items() if abs(value) >= least), 2)
+def _places(value: float) -> int:
+    return 1 if abs(value) >= 9.995 else decimals_of(value)
 
 
 def interval(low: float, high: float) -> str:
     """Return ` [low, high]`, or nothing where there is no interval."""
-    decimals = _decimals(max(abs(low), abs(high)))
-    return f" [{low:.{decimals}f}, {high:.{decimals}f}]" if np.isfinite([low, high]).all() else ""
+    places = _places(max(abs(low), abs(high)))
+    return f" [{low:.{places}f}, {high:.{places}f}]" if np.isfinite([low, high]).all() else ""
 
 
 def measured(differences: Contrasts, index: int) -> str:
