@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
+
+from shipid.arguments import one_of, positive
 
 Array = np.ndarray
 Method = Literal["euler", "rk4"]
@@ -47,8 +49,8 @@ class Job:
     device: str = "cpu"
 
     def __post_init__(self) -> None:
-        """A step of NumPy's becomes a plain number: printed in C, it must read as one."""
-        object.__setattr__(self, "step", float(self.step))
+        one_of("method", self.method, get_args(Method))
+        object.__setattr__(self, "step", positive("step", self.step))  # engines write it into their code
 
 
 def cores() -> int:

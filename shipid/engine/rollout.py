@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from shipid.arguments import numbers, whole
 from shipid.engine.engines import REPEATED, Engine, chosen, done_by, named
 from shipid.engine.integrate import Array, Batch, Job, Method
 from shipid.errors import DataError, ShipidError, choices
@@ -40,7 +42,9 @@ class Trajectories:
     interval: float
 
     def __getitem__(self, name: str) -> Array:
-        """One channel, (num_records, num_variants, num_samples)."""
+        """One channel, (num_records, num_variants, num_samples); ShipidError for one that was not recorded."""
+        if name not in self.names:
+            raise ShipidError(f"no channel {name!r} was recorded: {choices(str(name), self.names)}")
         return self.states[..., self.names.index(name)]
 
 
@@ -70,7 +74,8 @@ def rollout(
     start : state name -> (S,), SI; names that the vessel does not have are ignored, missing ones raise DataError.
     commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step.
     step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
-    parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. Default: those of the vessel.
+    parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. A DataFrame, a Series or a dict
+        with dotted paths is read by these. Default: the numbers of the vessel.
     memory : hidden state -> (S,); default: each actuator has reached its first order.
     tau_extra : (n_dof,), (S, n_dof) or (num_steps, S, n_dof) extra force [N, N m]; zero by default.
     components : path of a term whose components are drawn (`waves.first_order`) -> (S, num_components, num_entries), as
@@ -81,12 +86,19 @@ def rollout(
         (eager), `compiled` (TorchInductor kernels, for a GPU), or `auto`: by size and by what there is; `repeated` is
         `auto` where so many calls follow that compiling pays for any size.
     device : a PyTorch device; the engines `native` and `casadi` are for the CPU.
+
+    Raises
+    ------
+    DataError : a state, command or signal of the environment that the vessel needs is missing.
+    ShipidError : an array of another shape or without numbers, a step or number of steps that is not positive, an
+        unknown method, engine, channel, parameter or component.
     """
     asked = named(engine, device)
-    if num_steps < 1 or every < 1 or num_steps % every:
-        raise ShipidError(f"num_steps must be a multiple of every, both 1 or more, not {num_steps} and {every}")
+    num_steps, every = whole("num_steps", num_steps, 1), whole("every", every, 1)
+    if num_steps % every:
+        raise ShipidError(f"num_steps must be a multiple of every, not {num_steps} and {every}")
     check_steps(num_steps)
-    given = start, commands, environment or {}, components or {}
+    given = start, commands, {} if environment is None else environment, components or {}
     model, batch = prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
     names = channels(model)
     kept = tuple(names if keep is None else keep)
@@ -182,17 +194,19 @@ def prepared(
 ) -> tuple[Dynamics, Batch]:
     """Equations, and inputs as a `Batch`; DataError or ShipidError for a missing input or a wrong shape."""
     model = dynamics(vessel, helmsman)
-    if not start:
+    first = None if start is None else next((name for name in model.state if name in start), None)
+    if first is None:
         raise DataError(f"start holds no state; {vessel.name} needs {', '.join(model.state)}")
-    num_samples = len(next(iter(start.values())))
+    shape = np.shape(start[first])
+    if len(shape) != 1:
+        raise ShipidError(f"state {first!r} must be (S,), a value for each of S samples, not {shape}")
+    num_samples = shape[0]
     if num_samples == 0:
         raise ShipidError("a rollout needs at least one sample")
-    values = np.array([list(vessel.parameters.values())]) if parameters is None else np.atleast_2d(parameters)
-    if values.shape[1] != len(model.parameters):
-        raise ShipidError(f"parameters must be (variants, {len(model.parameters)}), not {values.shape}")
+    values = _variants(vessel, model.parameters, parameters)
     begun = {**dict.fromkeys(model.hidden, np.zeros(num_samples)), **start}
     batch = Batch(
-        state=_channels((*model.state, *model.hidden), begun, num_samples, num_steps, "state", vessel)[0],
+        state=_channels((*model.state, *model.hidden), begun, num_samples, num_steps, "state", vessel, held=True)[0],
         memory=np.zeros((0, num_samples)),
         commands=_channels(model.commands, commands, num_samples, num_steps, "command", vessel),
         environment=_channels(model.environment, environment, num_samples, num_steps, "environment", vessel),
@@ -224,21 +238,47 @@ def finite(batch: Batch) -> Array:
     return np.asarray(np.isfinite(batch.parameters).all(axis=1)[:, None] & samples)
 
 
+def _variants(vessel: Vessel, names: Sequence[str], parameters: Any) -> Array:
+    """Numbers (V, P) of the variants in the order of the names; what has labels is read by them."""
+    if parameters is None:
+        return np.array([list(vessel.parameters.values())])
+    labels = parameters if isinstance(parameters, Mapping) else None
+    if hasattr(parameters, "to_numpy"):  # pandas, which the engine does not import
+        labels = getattr(parameters, "columns", getattr(parameters, "index", None))
+    if labels is not None and any(isinstance(label, str) for label in labels):
+        absent = next((name for name in names if name not in labels), None)
+        odd = next((label for label in labels if label not in names), None)
+        if absent is not None or odd is not None:
+            what = f"lack {absent!r}" if odd is None else f"hold {odd!r}, {choices(str(odd), names)}"
+            raise ShipidError(f"parameters {what}: give every parameter of {vessel.name}, and no other")
+        parameters = np.stack([numbers(f"parameter {name!r}", parameters[name]) for name in names], axis=-1)
+    values = np.atleast_2d(numbers("parameters", parameters))
+    if values.ndim != 2 or values.shape[1] != len(names) or not len(values):
+        raise ShipidError(f"parameters must be (variants, {len(names)}), not {values.shape}")
+    return np.ascontiguousarray(values)
+
+
 def _channels(
-    names: Sequence[str], given: Mapping[str, Array], num_samples: int, num_steps: int, what: str, vessel: Vessel
+    names: Sequence[str],
+    given: Mapping[str, Array],
+    num_samples: int,
+    num_steps: int,
+    what: str,
+    vessel: Vessel,
+    *,
+    held: bool = False,
 ) -> Array:
     """Named arrays as (T, channel, S), T = 1 when all are held; a missing name says which vessel needs it."""
+    shapes = [(num_samples,)] if held else [(num_samples,), (num_steps, num_samples)]
     columns = []
     for name in names:
         if name not in given:
             raise DataError(
                 f"{what} {name!r} is needed by {vessel.name} and missing: {choices(name, given)}", file=vessel.file
             )
-        column = np.asarray(given[name], dtype=float)
-        if column.shape not in ((num_samples,), (num_steps, num_samples)):
-            raise ShipidError(
-                f"{what} {name!r} must be ({num_samples},) or ({num_steps}, {num_samples}): {column.shape}"
-            )
+        column = numbers(f"{what} {name!r}", given[name])
+        if column.shape not in shapes:
+            raise ShipidError(f"{what} {name!r} must be {' or '.join(map(str, shapes))}: {column.shape}")
         columns.append(np.atleast_2d(column))
     length = max((len(column) for column in columns), default=1)
     stacked = [np.broadcast_to(column, (length, num_samples)) for column in columns]
@@ -252,7 +292,7 @@ def _memory(model: Dynamics, memory: Mapping[str, Array] | None, batch: Batch, n
     helm = {f"{HELM}.{name}": np.full(num_samples, float(value)) for name, value in begun.items()}
     if memory is not None:
         return np.asarray(
-            _channels(tuple(model.memory), {**helm, **memory}, num_samples, num_steps, "memory", vessel)[0]
+            _channels(tuple(model.memory), {**helm, **memory}, num_samples, num_steps, "memory", vessel, held=True)[0]
         )
     if model.helmsman is None:
         return np.asarray(batch.commands[0, [model.commands.index(name) for name in model.memory]])
@@ -265,10 +305,15 @@ def _memory(model: Dynamics, memory: Mapping[str, Array] | None, batch: Batch, n
 
 def _components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -> tuple[Array, ...]:
     """Components (num_entries, S, num_components) of each sum with drawn components; zeros if none are given."""
-    result = []
+    result, paths = [], [term.path for term in model.drawn]
+    unknown = next((path for path in given if path not in paths), None)
+    if unknown is not None:
+        raise ShipidError(
+            f"components: the vessel has no term {unknown!r} whose components are drawn: {choices(str(unknown), paths)}"
+        )
     for term in model.drawn:
         entries = sum(term.widths.values())
-        values = np.asarray(given.get(term.path, np.zeros((num_samples, 1, entries))), dtype=float)
+        values = numbers(f"components of {term.path}", given.get(term.path, np.zeros((num_samples, 1, entries))))
         if values.ndim != 3 or values.shape[::2] != (num_samples, entries):
             raise ShipidError(
                 f"components of {term.path} must be ({num_samples}, count, {entries}), not {values.shape}"
@@ -280,6 +325,10 @@ def _components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -
 def _tau(tau_extra: Array | None, num_dof: int, num_samples: int, num_steps: int) -> Array:
     if tau_extra is None:
         return np.zeros((1, num_dof, num_samples))
-    tau = np.asarray(tau_extra, dtype=float)
+    tau = numbers("tau_extra", tau_extra)
     length = num_steps if tau.ndim == 3 else 1
+    widest = (num_steps, num_samples, num_dof)[-tau.ndim :] if 1 <= tau.ndim <= 3 else ()
+    if tau.shape[-1:] != (num_dof,) or any(size not in (1, most) for size, most in zip(tau.shape, widest, strict=True)):
+        shapes = f"({num_dof},), ({num_samples}, {num_dof}) or ({num_steps}, {num_samples}, {num_dof})"
+        raise ShipidError(f"tau_extra must be {shapes}, not {tau.shape}")
     return np.ascontiguousarray(np.broadcast_to(tau, (length, num_samples, num_dof)).transpose(0, 2, 1))

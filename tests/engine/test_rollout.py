@@ -8,7 +8,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+import torch
 
 from shipid.engine.casadi import memory_along
 from shipid.engine.integrate import Method
@@ -330,3 +332,98 @@ def test_an_interrupt_waits_for_casadi_and_is_not_lost() -> None:
         work()
     assert reached
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def marked(vessel: Vessel) -> dict[str, dict[str, np.ndarray]]:
+    """Start, commands and environment of two samples, each channel with its own number."""
+    model = dynamics(vessel)
+    names = {"start": model.state, "commands": model.commands, "environment": model.environment}
+    return {
+        group: {name: np.array([1.0, 2.0]) / 8 + number / 64 for number, name in enumerate(channels)}
+        for group, channels in names.items()
+    }
+
+
+LOOKS: dict[str, Callable[[np.ndarray], Any]] = {
+    "list": list,
+    "series with another index": lambda values: pd.Series(values, index=range(len(values))[::-1]),
+    "tensor": torch.tensor,
+    "single": np.float32,
+    "every other": lambda values: np.repeat(values, 2)[::2],
+    "objects": lambda values: values.astype(object),
+}
+
+
+@pytest.mark.parametrize("look", LOOKS.values(), ids=LOOKS)
+def test_inputs_of_any_type_give_the_same_path(look: Callable[[np.ndarray], Any]) -> None:
+    ship = load_vessel("gunnerus-28.9")
+    given = marked(ship)
+    path = rollout(ship, **given, step=0.5, num_steps=4, engine="casadi")
+    looking = {group: {name: look(values) for name, values in part.items()} for group, part in given.items()}
+    again = rollout(ship, **looking, step=np.float32(0.5), num_steps=np.int64(4), engine="casadi")
+    np.testing.assert_array_equal(again.states, path.states)
+    frames = {group: pd.DataFrame(part) for group, part in given.items()}
+    framed: Any = rollout(ship, **frames, step=0.5, num_steps=4, engine="casadi")
+    np.testing.assert_array_equal(framed.states, path.states)
+
+
+def test_parameters_with_names_are_taken_by_name() -> None:
+    """A frame may have its columns in any order; before, the numbers were taken by place without a word."""
+    ship = load_vessel("gunnerus-28.9")
+    given = marked(ship)
+    turned = dict(reversed((ship.parameters | {"inertia.m": 5e5}).items()))
+    right = [turned[path] for path in ship.parameters]
+    path = rollout(ship, **given, step=0.5, num_steps=4, parameters=np.array([right, right]), engine="casadi")
+    for named in (pd.DataFrame([turned, turned]), pd.Series(turned), turned):
+        again = rollout(ship, **given, step=0.5, num_steps=4, parameters=named, engine="casadi")
+        np.testing.assert_array_equal(again.states[:, 0], path.states[:, 0])
+    assert pd.DataFrame([turned, turned]).shape[0] == path.states.shape[1]
+    for odd, message in (
+        ({"inertia.m": 5e5}, "parameters lack '"),
+        ({**turned, "inertia.M": 1.0}, r"parameters hold 'inertia\.M', did you mean 'inertia\.m'\?"),
+    ):
+        with pytest.raises(ShipidError, match=message):
+            rollout(ship, **given, step=0.5, num_steps=4, parameters=odd)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"method": "Euler"}, r"method 'Euler' is not known: did you mean 'euler'\?"),
+        ({"step": -0.5}, "step must be a number above 0"),
+        ({"step": "0.5"}, "step must be a number above 0"),
+        ({"num_steps": 4.5}, "num_steps must be a whole number, 1 or more, not 4.5"),
+        ({"every": 0}, "every must be a whole number, 1 or more, not 0"),
+        ({"tau_extra": 1e5}, r"tau_extra must be \(3,\), \(2, 3\) or \(4, 2, 3\), not \(\)"),
+        ({"tau_extra": np.zeros((2, 1))}, r"tau_extra must be .*, not \(2, 1\)"),
+        ({"tau_extra": np.zeros((4, 3))}, r"tau_extra must be .*, not \(4, 3\)"),
+        ({"components": {"waves": np.zeros((2, 1, 5))}}, "has no term 'waves' whose components are drawn"),
+        ({"parameters": np.zeros((0, 3))}, r"parameters must be \(variants, "),
+        ({"start": {"north": 0.0}}, r"state 'north' must be \(S,\), a value for each of S samples, not \(\)"),
+        ({"start": {}}, "start holds no state"),
+    ],
+)
+def test_a_wrong_argument_is_one_line(wrong: dict[str, Any], message: str) -> None:
+    """Before, an unknown method was rk4, and what is one number or one column was taken for all axes."""
+    ship = load_vessel("gunnerus-28.9")
+    with pytest.raises(ShipidError, match=message):
+        rollout(ship, **{**marked(ship), "step": 0.5, "num_steps": 4, **wrong})
+
+
+def test_a_start_has_no_series() -> None:
+    """Before, the first row was taken without a word."""
+    ship = load_vessel("mariner")
+    given, series = marked(ship), np.ones((4, 2))
+    for wrong, name in (
+        ({"start": {**given["start"], "u": series}}, "state 'u'"),
+        ({"memory": {"rudder.delta": series}}, "memory 'rudder.delta'"),
+    ):
+        with pytest.raises(ShipidError, match=rf"{name} must be \(2,\): \(4, 2\)"):
+            rollout(ship, **{**given, "step": 0.5, "num_steps": 4, **wrong})
+
+
+def test_a_channel_that_was_not_recorded_is_named() -> None:
+    ship = load_vessel("gunnerus-28.9")
+    path = rollout(ship, **marked(ship), step=0.5, num_steps=4, keep=["north", "east"])
+    with pytest.raises(ShipidError, match="no channel 'u' was recorded: valid: east, north"):
+        path["u"]

@@ -1,0 +1,56 @@
+"""Checks of what a caller from Python passes: one line names the argument, its value and what would be right."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.errors import ShipidError, choices
+
+Kind = type[ShipidError]
+
+
+def whole(name: str, value: Any, least: int = 0, error: Kind = ShipidError) -> int:
+    """Return a whole number, also one that NumPy holds or that is written as 10.0; raise `error` for anything else."""
+    try:
+        number = int(value) if isinstance(value, float | np.floating) and value == int(value) else operator.index(value)
+    except (TypeError, ValueError, OverflowError):
+        number = least - 1
+    if number < least or isinstance(value, bool | np.bool_):
+        raise error(f"{name} must be a whole number, {least} or more, not {value!r}")
+    return number
+
+
+def positive(name: str, value: Any, error: Kind = ShipidError) -> float:
+    """Return a number above 0 as a float, whatever type of number it was; raise `error` for anything else."""
+    number = float(value) if isinstance(value, int | float | np.number) and not np.iscomplexobj(value) else np.nan
+    if not 0 < number < np.inf or isinstance(value, bool):
+        raise error(f"{name} must be a number above 0 and finite, not {value!r}")
+    return number
+
+
+def one_of(name: str, value: Any, valid: Iterable[str], error: Kind = ShipidError) -> None:
+    """Raise `error` for a value that is none of the valid names."""
+    names = list(valid)
+    if value not in names:
+        raise error(f"{name} {value!r} is not known: {choices(str(value), names)}")
+
+
+def numbers(name: str, values: Any, error: Kind = ShipidError) -> NDArray[np.float64]:
+    """Return an array of floats, of a list, a series, a tensor or an array of any real type; masked values are NaN.
+
+    An array of floats is not copied. Raises `error` for text, complex numbers and whatever else holds no real numbers.
+    """
+    try:
+        if isinstance(values, np.ma.MaskedArray):
+            values = np.ma.filled(values.astype(float), np.nan)
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiubO":
+            raise TypeError(f"{array.dtype}")
+        return array.astype(float, copy=False)
+    except (TypeError, ValueError, RuntimeError) as reason:
+        raise error(f"{name} must be an array of numbers, not {type(values).__name__} ({reason})") from None
