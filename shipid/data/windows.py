@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.arguments import one_of, positive, whole
 from shipid.data.dataset import Array, Dataset, clock_slack, cumulative_integral, pieces, sample, shares_clock
 from shipid.errors import DataError
 
@@ -51,7 +52,8 @@ class Instants:
         return len(self.columns["u"])
 
     def select(self, chosen: NDArray[Any] | Sequence[int] | slice) -> Instants:
-        """Choose instants by a mask, by indices or by a slice."""
+        """Choose instants by a mask, by indices or by a slice; DataError for anything else."""
+        chosen = _places(chosen, len(self))
 
         def last(values: Mapping[str, Array] | None) -> dict[str, Array] | None:
             return None if values is None else {name: array[..., chosen] for name, array in values.items()}
@@ -132,7 +134,8 @@ class Windows:
         return {str(name): (float(a), float(b)) for name, a, b in zip(names, first, last, strict=True)}
 
     def select(self, chosen: NDArray[Any] | Sequence[int] | slice) -> Windows:
-        """Choose windows by a mask, by indices or by a slice."""
+        """Choose windows by a mask, by indices or by a slice; DataError for anything else."""
+        chosen = _places(chosen, len(self))
         return Windows(
             run=self.run[chosen],
             t=self.t[chosen],
@@ -152,6 +155,23 @@ class Windows:
         for start, end in intervals:
             touched |= (self.begin <= end) & (self.end >= start)
         return touched
+
+
+def _places(chosen: Any, count: int) -> NDArray[Any] | slice:
+    """A mask, indices (n,) or a slice of so many entries; DataError for what chooses no row of them."""
+    if isinstance(chosen, slice):
+        return chosen
+    places = np.asarray(chosen)
+    if places.shape == (0,):
+        places = places.astype(np.intp)
+    if places.ndim != 1 or places.dtype.kind not in "biu":
+        raise DataError(f"give a mask, indices or a slice to select by, not {chosen!r}")
+    if places.dtype.kind == "b" and len(places) != count:
+        raise DataError(f"a mask of {len(places)} values does not fit {count} entries")
+    if places.dtype.kind != "b" and len(places) and not -count <= places.min() <= places.max() < count:
+        odd = places[(places < -count) | (places >= count)][0]
+        raise DataError(f"there are {count} entries, so no index {odd}")
+    return places
 
 
 def to_frame(north: Any, east: Any, north0: Any, east0: Any, psi0: Any) -> tuple[Any, Any]:
@@ -195,10 +215,12 @@ def cut_windows(
 
     Raises
     ------
-    DataError : a number that is not positive and finite, or no run is as long as past and horizon together.
+    DataError : a horizon or past that is no whole number, a time that is not positive and finite, an unknown path, or
+        no run is as long as past and horizon together.
     """
-    if not (1 <= horizon < np.inf and 0 < step < np.inf and 0 < interval < np.inf):
-        raise DataError(f"horizon {horizon}, step {step:g} s and interval {interval:g} s must be positive and finite")
+    horizon, past = whole("horizon", horizon, 1, DataError), whole("past", past, 0, DataError)
+    step, interval = positive("step", step, DataError), positive("interval", interval, DataError)
+    one_of("path", path, ("position", "velocity"), DataError)
     shared = shares_clock(dataset)
     parts = []
     for run, rows in pieces(dataset):

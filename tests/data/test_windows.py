@@ -1,7 +1,7 @@
 """Windows against motion known in closed form, and splits against the law that no moment is seen twice."""
 
 from itertools import combinations, pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -173,7 +173,7 @@ def test_touching_is_closed_and_counts_the_future() -> None:
 
 @pytest.mark.parametrize("options", [{"horizon": 200}, {"horizon": 0}, {"horizon": 5, "step": 0.0}])
 def test_impossible_windows(options: dict[str, float]) -> None:
-    with pytest.raises(DataError, match="horizon"):
+    with pytest.raises(DataError, match="horizon|step must be"):
         cut_windows(as_dataset(turning(T)), **options)  # type: ignore[arg-type]
 
 
@@ -448,10 +448,68 @@ def test_numbers_that_are_not_finite_are_refused() -> None:
     dataset = as_dataset(turning(np.arange(0.0, 60.0, 0.5)))
     for name in ("step", "interval"):
         for value in (np.nan, np.inf, 0.0, -1.0):
-            with pytest.raises(DataError, match="must be positive and finite"):
+            with pytest.raises(DataError, match=f"{name} must be a number above 0 and finite, not {value}"):
                 cut_windows(dataset, **{"horizon": 5, "step": 1.0, "interval": 2.0, name: value})
-    with pytest.raises(DataError, match="horizon inf, step 1 s and interval 2 s must be positive and finite"):
+    with pytest.raises(DataError, match="horizon must be a whole number, 1 or more, not inf"):
         cut_windows(dataset, horizon=np.inf, step=1.0, interval=2.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"horizon": 5.5}, "horizon must be a whole number"),
+        ({"horizon": "5"}, "horizon must be a whole number"),
+        ({"past": 2.5}, "past must be a whole number, 0 or more, not 2.5"),
+        ({"past": -3}, "past must be a whole number, 0 or more, not -3"),
+        ({"path": "speed"}, "path 'speed' is not known: valid: position, velocity"),
+        ({"step": "1"}, "step must be a number above 0"),
+    ],
+)
+def test_windows_of_a_wrong_argument_are_refused(wrong: dict[str, Any], message: str) -> None:
+    """Before, half a step of the past was cut off at the begin of a run, and an unknown path was the position."""
+    with pytest.raises(DataError, match=message):
+        cut_windows(as_dataset(turning(T)), **{"horizon": 5, **wrong})
+
+
+def test_numbers_of_other_types_cut_the_same_windows() -> None:
+    dataset = as_dataset(turning(T))
+    windows = cut_windows(dataset, horizon=5, step=0.5, interval=2.0, past=3)
+    other: Any = {"horizon": 5.0, "step": np.float32(0.5), "interval": np.int64(2), "past": np.uint8(3)}
+    again = cut_windows(dataset, **other)
+    assert (type(again.horizon), type(again.step)) == (int, float)
+    np.testing.assert_array_equal(again.future, windows.future)
+    np.testing.assert_array_equal(again.past["u"], windows.past["u"])
+
+
+def test_windows_are_chosen_by_masks_indices_and_slices() -> None:
+    windows = cut_windows(as_dataset(turning(T)), horizon=5, past=2)
+    some = windows.select(slice(1, 3))
+    every: tuple[Any, ...] = ((1, 2), range(1, 3), np.array([1, 2], dtype=np.uint8), windows.t == windows.t[1:3, None])
+    for chosen in (*every[:3], every[3].any(axis=0), pd.Series(every[3].any(axis=0))):
+        np.testing.assert_array_equal(windows.select(chosen).future, some.future)
+        np.testing.assert_array_equal(windows.instants().select(chosen).past["x"], some.past["x"])
+    assert len(windows.select(np.array([]))) == 0
+
+
+@pytest.mark.parametrize(
+    ("chosen", "message"),
+    [
+        (None, "give a mask, indices or a slice to select by, not None"),
+        (0, "give a mask, indices or a slice to select by, not 0"),
+        ([[0, 1]], "give a mask, indices or a slice"),
+        ([0.0], "give a mask, indices or a slice"),
+        ("a", "give a mask, indices or a slice"),
+        ([True, False], "a mask of 2 values does not fit"),
+        ([99], "so no index 99"),
+        ([-99], "so no index -99"),
+    ],
+)
+def test_what_chooses_no_windows_is_refused(chosen: Any, message: str) -> None:
+    """Before, None gave one window with all the others in it."""
+    windows = cut_windows(as_dataset(turning(T)), horizon=5)
+    for part in (windows, windows.instants()):
+        with pytest.raises(DataError, match=message):
+            part.select(chosen)
 
 
 @pytest.mark.parametrize("step", [1e4, 1e24, 1e300])
