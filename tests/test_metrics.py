@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+import torch
 
 from shipid import metrics
+from shipid.errors import ShipidError
 from shipid.metrics import BINS, tally, tally_quantile
 
 
@@ -27,6 +29,23 @@ def test_lengths_are_those_of_hypot_in_every_layout_and_size() -> None:
 def test_position_error_by_hand():
     predicted = np.array([[[3.0, 4.0], [1.0, 1.0]]])
     assert metrics.position_error(predicted, np.zeros((1, 2, 2))) == pytest.approx(np.array([[5.0, 2**0.5]]))
+
+
+@pytest.mark.parametrize("look", [list, np.uint8, np.int8, np.float32, torch.tensor, lambda a: a.tolist()])
+def test_paths_of_any_type_have_the_same_error(look):
+    """Before, a difference of bytes wrapped around: 0 less 3 was 253."""
+    near, far = np.array([[[0, 0], [100, 0]]]), np.array([[[3, 4], [-100, 0]]])
+    expected = [[5.0, 200.0]] if look is not np.uint8 else [[5.0, 100.0]]
+    assert (
+        metrics.position_error(look(near), look(np.maximum(far, 0) if look is np.uint8 else far)).tolist() == expected
+    )
+
+
+def test_what_is_no_path_is_refused():
+    with pytest.raises(ShipidError, match="true must be an array of numbers"):
+        metrics.position_error(np.zeros((1, 1, 2)), [["a", "b"]])
+    with pytest.raises(ValueError, match="paths must both be"):
+        metrics.position_error([[0.0, 0.0]], [[0.0, 0.0, 0.0]])
 
 
 def test_the_error_knows_no_frame(paths):
