@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,9 @@ class Dataset:
 
     def __post_init__(self) -> None:
         check_schema(self.frame, self.metadata)
+        # what passed the check stays: later changes of the caller's table are not seen (pandas copies on write)
+        object.__setattr__(self, "frame", self.frame.copy(deep=False))
+        object.__setattr__(self, "metadata", deepcopy(self.metadata))
 
     @property
     def commands(self) -> list[str]:
@@ -67,8 +71,17 @@ class Dataset:
         return [str(name) for name in self.frame["run"].unique()]
 
     def select(self, runs: Iterable[str]) -> Dataset:
-        """Return the dataset with these runs alone, in the order of the table; DataError where none is left."""
-        return replace(self, frame=self.frame[self.frame["run"].isin(list(runs))].reset_index(drop=True))
+        """Return the dataset with these runs alone, in the order of the table; DataError where none is left.
+
+        Names that no run has are passed over.
+        """
+        names = [runs] if isinstance(runs, str) else list(runs)
+        chosen = self.frame["run"].isin(names)
+        if not chosen.any():
+            raise DataError(
+                f"no run is named {', '.join(map(str, names))}: there are {', '.join(self.runs)}", path="run"
+            )
+        return replace(self, frame=self.frame[chosen].reset_index(drop=True))
 
     @property
     def digest(self) -> str:
@@ -207,6 +220,8 @@ def wraps(name: str) -> bool:
 def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
     """Raise DataError unless the table holds what `Dataset` promises."""
     check_metadata(metadata)
+    if not isinstance(frame, pd.DataFrame):
+        raise DataError(f"the table must be a pandas DataFrame, not {type(frame).__name__}")
     if len(frame) == 0:
         raise DataError("the dataset has no rows: it needs at least one run")
     other = next((name for name in frame.columns if not isinstance(name, str)), None)

@@ -3,6 +3,7 @@
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -162,8 +163,29 @@ def test_some_runs_keep_their_rows_and_their_order() -> None:
         rows = (each.frame[each.frame["run"] == name].reset_index(drop=True) for each in (whole, part))
         pd.testing.assert_frame_equal(*rows)
     assert part.metadata == whole.metadata
-    with pytest.raises(DataError, match="at least one run"):
-        whole.select("x")
+    assert whole.select("c").runs == ["c"]
+    for none in ("x", ["x"], np.array(["x"])):
+        with pytest.raises(DataError, match="no run is named x: there are a, b, c"):
+            whole.select(none)
+
+
+def test_a_table_that_changes_later_does_not_change_the_dataset() -> None:
+    frame, metadata = as_dataset(turning(T)).frame.copy(), {"flags": ["break"]}
+    dataset = Dataset(frame, metadata)
+    digest, u = dataset.digest, frame["u"].iloc[0]
+    frame.loc[0, "u"] = np.nan
+    frame["v"] = 7.0
+    metadata["flags"].clear()
+    metadata["clock"] = "none"
+    assert dataset.digest == digest
+    assert dataset.frame["u"].iloc[0] == u
+    assert dataset.metadata == {"flags": ["break"]}
+
+
+def test_a_table_is_a_frame() -> None:
+    columns: Any = as_dataset(turning(T)).frame.to_dict("list")
+    with pytest.raises(DataError, match="the table must be a pandas DataFrame, not dict"):
+        Dataset(columns, {"flags": ["break"]})
 
 
 def test_pieces_start_at_breaks() -> None:
