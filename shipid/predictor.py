@@ -8,11 +8,12 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self, overload
+from typing import Annotated, Any, Literal, NamedTuple, Self, get_args, overload
 
 import numpy as np
 from pydantic import BaseModel, Field
 
+from shipid.arguments import numbers, one_of, whole
 from shipid.data.windows import Commands, Instants, Windows, fold_masks, run_folds
 from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
@@ -117,7 +118,7 @@ class Predictor:
         Parameters
         ----------
         instants : what is known at the instants of prediction.
-        paths : those of the physics alone, if they are known already.
+        paths : (T, S, 2) [m] of the physics alone, if they are known already; they are not changed.
         level : share of the true paths that the band is to hold whole, such as 0.9.
         pointwise : the band holds that share of the positions at each step alone: it is narrower, and a whole path
             leaves it more often.
@@ -125,16 +126,21 @@ class Predictor:
 
         Raises
         ------
-        DataError : planned commands, a column or a part of the past is missing; there were too few runs for the level.
+        DataError : planned commands, a column or a part of the past is missing, or has another shape; there were too
+            few runs for the level.
         """
         if level is not None:
             self.check_level(level, kind)
         instants = self._known(instants)
-        alone = self.physics.paths(instants) if paths is None else paths
+        alone = self.physics.paths(instants) if paths is None else numbers("paths", paths, DataError)
+        if alone.shape != (self.physics.horizon, len(instants), 2):
+            raise DataError(f"paths must be {(self.physics.horizon, len(instants), 2)}, not {alone.shape}")
         try:
             predicted = self.corrector.predict(self.physics, instants, alone)
         except (ValueError, TypeError, IndexError) as error:
             raise DataError(f"the arrays of the instants and of the predictor do not fit together ({error})") from error
+        if predicted is paths:  # the prediction is the caller's to change, too
+            predicted = predicted.copy()
         if level is None:
             return predicted
         return Banded(
@@ -160,6 +166,8 @@ class Predictor:
 
     def _known(self, instants: Instants) -> Instants:
         """The instants with planned commands where the predictor takes them, and without them where it does not."""
+        if not isinstance(instants, Instants):
+            raise DataError(f"give Instants, such as `windows.instants()`, not {type(instants).__name__}")
         missing = next((name for name in ("u", "v", "r") if name not in instants.columns), None)
         if missing is not None:
             raise DataError("the instants lack this column", path=missing)
@@ -167,6 +175,7 @@ class Predictor:
         if instants.step is not None and abs(instants.step - step) > 1e-9 * step:
             message = f"instants of windows with steps of {instants.step:g} s, the predictor has {step:g} s"
             raise DataError(f"{message}: cut windows with its step")
+        instants = _as_numbers(instants)
         if self.commands == "held":
             return replace(instants, planned=None)
         if instants.planned is None:
@@ -174,19 +183,23 @@ class Predictor:
         return instants
 
     def outside(self, columns: Mapping[str, Array]) -> Array:
-        """Whether each instant (S,) lies outside what training has seen, in any column; all do without any limits.
+        """Return whether each instant (S,) is outside what training has seen, in any column; all are without limits.
 
         columns : name -> (S,), measured and, with an observer, its estimates: `observer.age` is compared with `run_up`,
             and where it is missing nobody knows that the observer has settled. Columns without limits, and limits
             without a column, are passed over.
         """
+        if any(np.ndim(values) != 1 for values in columns.values()):
+            odd = next(name for name, values in columns.items() if np.ndim(values) != 1)
+            raise DataError(f"must be (S,), a value for each instant, not {np.shape(columns[odd])}", path=odd)
         outside = np.full(len(next(iter(columns.values()), ())), not self.limits)
         for name, (low, high) in self.limits.items():
             if name in columns:
-                slack = 1e-9 * max(1.0, abs(low), abs(high))
-                outside |= ~((columns[name] >= low - slack) & (columns[name] <= high + slack))
+                slack, values = 1e-9 * max(1.0, abs(low), abs(high)), numbers(name, columns[name], DataError)
+                outside |= ~((values >= low - slack) & (values <= high + slack))
         if self.run_up > 0:
-            outside |= ~(columns.get(AGE, np.zeros(len(outside))) >= self.run_up - 1e-3 * self.physics.step)
+            age = numbers(AGE, columns.get(AGE, np.zeros(len(outside))), DataError)
+            outside |= ~(age >= self.run_up - 1e-3 * self.physics.step)
         return outside
 
     def save(self, file: str | os.PathLike[str]) -> Path:
@@ -273,6 +286,30 @@ class Predictor:
             raise ResultError("damaged: run the study again", file=file) from None
 
 
+def _as_numbers(instants: Instants) -> Instants:
+    """The instants with arrays of floats, whatever they were; DataError for a column that is not (S,)."""
+    count = np.shape(instants.columns["u"])
+    if len(count) != 1:
+        raise DataError(f"must be (S,), a value for each instant, not {count}", path="u")
+    columns = {}
+    for name in (str(name) for name in instants.columns if name != "run"):  # the name of the run, as of a table
+        columns[name] = numbers(f"column {name!r}", instants.columns[name], DataError)
+        if columns[name].shape != count:
+            raise DataError(f"must be {count} as 'u', not {columns[name].shape}", path=name)
+
+    def floats(what: str, given: Mapping[str, Array]) -> dict[str, Array]:
+        return {name: numbers(f"{what} {name!r}", values, DataError) for name, values in given.items()}
+
+    return replace(
+        instants,
+        columns=columns,
+        past=floats("past", instants.past),
+        planned=None if instants.planned is None else floats("planned", instants.planned),
+        hidden=None if instants.hidden is None else floats("hidden", instants.hidden),
+        estimates=floats("estimate", instants.estimates),
+    )
+
+
 class _Header(BaseModel):
     """Further fields of the header of a predictor (besides vessel, observer and method), with their types."""
 
@@ -329,9 +366,16 @@ def fit(
 
     Raises
     ------
-    DataError : physics and windows differ in horizon or step; the windows hold too short a past, lack a command of the
-        vessel or are too few to be split; the physics has an observer; the physics or the training diverges.
+    DataError : an argument of another type; physics and windows differ in horizon or step; the windows hold too short
+        a past, lack a command of the vessel or are too few to be split; the physics has an observer; the physics or the
+        training diverges.
     """
+    for name, given, kind in (("method", method, Method), ("physics", physics, Physics), ("windows", windows, Windows)):
+        if not isinstance(given, kind):
+            shown = given.__name__ if isinstance(given, type) else type(given).__name__
+            raise DataError(f"{name} must be an object of the class {kind.__name__}, not {shown}")
+    one_of("commands", commands, get_args(Commands), DataError)
+    seed, refits = whole("seed", seed, 0, DataError), whole("refits", refits, 0, DataError)
     if (physics.horizon, physics.step) != (windows.horizon, windows.step):
         message = f"the physics has {physics.horizon} steps of {physics.step:g} s"
         raise DataError(f"{message}, the windows have {windows.horizon} steps of {windows.step:g} s: make them equal")
@@ -430,9 +474,10 @@ def _folds(
     """(Training, validation) indices of windows, split by run: as the method wants, or with the named runs."""
     if validation_runs is None:
         return run_folds(windows, method.validation, seed)
-    names, runs = tuple(validation_runs), list(windows.spans)
+    names = (validation_runs,) if isinstance(validation_runs, str) else tuple(validation_runs)
+    runs = list(windows.spans)
     unknown = next((run for run in names if run not in runs), None)
     if unknown is not None:
-        raise DataError(f"no run with windows: {choices(unknown, runs)}", path="validation_runs")
+        raise DataError(f"no run with windows: {choices(str(unknown), runs)}", path="validation_runs")
     training, judged = fold_masks(windows, names)
     return [(np.flatnonzero(training), np.flatnonzero(judged))]

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+import torch
 
 from shipid.data.dataset import Dataset
-from shipid.data.windows import Windows, cut_windows
+from shipid.data.windows import Instants, Windows, cut_windows
 from shipid.errors import DataError
 from shipid.hybrid.alone import Alone, Unchanged
 from shipid.hybrid.features import Memory
@@ -146,3 +149,103 @@ def test_diverging_physics_is_refused() -> None:
     wild = load_vessel("gunnerus-28.9").with_values({"hull.derivatives.X_u|u|": 1e23})
     with pytest.raises(DataError, match=r"diverges on .*% of the windows"):
         fit(SMALL, Physics(wild, HORIZON, 1.0), WINDOWS)
+
+
+LOOKS: dict[str, Callable[[np.ndarray], Any]] = {
+    "list": list,
+    "series with another index": lambda values: pd.Series(values, index=range(len(values))[::-1]),
+    "tensor": torch.tensor,
+    "objects": lambda values: values.astype(object),
+}
+
+
+@pytest.mark.parametrize("look", LOOKS.values(), ids=LOOKS)
+def test_columns_of_any_type_give_the_same_prediction(predictor: Predictor, look: Callable[[np.ndarray], Any]) -> None:
+    instants = WINDOWS.instants()
+    looking = Instants({name: look(values) for name, values in instants.columns.items()})
+    for known in (predictor, fit(SMALL, Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0), WINDOWS)):
+        banded = known.predict(instants, level=0.5)
+        again = known.predict(looking, level=0.5)
+        np.testing.assert_array_equal(again.paths, banded.paths)
+        np.testing.assert_array_equal(again.region.along, banded.region.along)
+        np.testing.assert_array_equal(known.outside(looking.columns), known.outside(instants.columns))
+        table: Any = pd.DataFrame(instants.columns).assign(run=WINDOWS.run)
+        np.testing.assert_array_equal(known.predict(Instants(table)), banded.paths)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"psi": np.zeros(1)}, "psi: must be .* as 'u', not"),
+        ({"u": np.array(2.0)}, r"u: must be \(S,\), a value for each instant, not \(\)"),
+        ({"port.n": np.array(["2"] * len(WINDOWS))}, r"column 'port\.n' must be an array of numbers"),
+    ],
+)
+def test_a_column_of_another_shape_is_named(predictor: Predictor, change: dict[str, Any], message: str) -> None:
+    """Before, one value was taken for all instants."""
+    with pytest.raises(DataError, match=message):
+        predictor.predict(Instants({**WINDOWS.columns, **change}))
+
+
+def test_only_instants_are_predicted_from(predictor: Predictor) -> None:
+    given: Any = WINDOWS
+    for call in (predictor.predict, predictor.alone):
+        with pytest.raises(DataError, match=r"give Instants, such as `windows\.instants\(\)`, not Windows"):
+            call(given)
+
+
+def test_paths_of_another_shape_are_refused(predictor: Predictor) -> None:
+    """Before, the path of one instant was taken for all, and without a method whatever was given came back."""
+    instants = WINDOWS.instants()
+    alone = fit(Alone(), Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0), WINDOWS)
+    for known in (predictor, alone):
+        paths = known.alone(instants)
+        np.testing.assert_array_equal(known.predict(instants, paths.tolist()), known.predict(instants))
+        for wrong in (paths[:, :1], paths[:2], paths[..., 0], paths.transpose(1, 0, 2)):
+            with pytest.raises(DataError, match="paths must be"):
+                known.predict(instants, wrong)
+
+
+def test_a_prediction_is_no_view_of_what_was_passed_in() -> None:
+    instants = WINDOWS.instants()
+    known = fit(Alone(), Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0), WINDOWS)
+    paths = known.alone(instants)
+    predicted = known.predict(instants, paths)
+    predicted[:] = 0.0
+    np.testing.assert_array_equal(paths, known.alone(instants))
+
+
+@pytest.mark.parametrize("level", ["0.9", [0.5, 0.9], np.array([0.5]), 90, np.nan])
+def test_what_is_no_level_is_refused(predictor: Predictor, level: Any) -> None:
+    with pytest.raises(DataError, match="is no level of a band"):
+        predictor.predict(WINDOWS.instants(), level=level)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"commands": "Known"}, r"commands 'Known' is not known: did you mean 'known'\?"),
+        ({"seed": "0"}, "seed must be a whole number, 0 or more, not '0'"),
+        ({"seed": -1}, "seed must be a whole number"),
+        ({"seed": np.random.default_rng(0)}, "seed must be a whole number"),
+        ({"refits": 1.5}, "refits must be a whole number"),
+        ({"method": PathDrawn}, "method must be an object of the class Method, not PathDrawn"),
+        ({"method": "path-drawn"}, "method must be an object of the class Method, not str"),
+        ({"physics": load_vessel("gunnerus-28.9")}, "physics must be an object of the class Physics, not Vessel"),
+        ({"windows": WINDOWS.instants()}, "windows must be an object of the class Windows, not Instants"),
+        ({"validation_runs": [1]}, "validation_runs: no run with windows"),
+    ],
+)
+def test_a_wrong_argument_is_one_line(wrong: dict[str, Any], message: str) -> None:
+    """Before, commands that were neither held nor known were one in the fit and the other in the prediction."""
+    with pytest.raises(DataError, match=message):
+        fit(**{"method": SMALL, "physics": NONE, "windows": WINDOWS, **wrong})
+
+
+def test_numbers_of_numpy_are_saved(predictor: Predictor, tmp_path: Path) -> None:
+    physics = Physics(None, np.int64(HORIZON), np.float32(1.0))  # type: ignore[arg-type]
+    again = fit(SMALL, physics, WINDOWS, seed=np.int64(0), validation_runs=None)  # type: ignore[arg-type]
+    loaded = Predictor.load(again.save(tmp_path / "numpy.npz"))
+    np.testing.assert_array_equal(loaded.predict(WINDOWS.instants()), predictor.predict(WINDOWS.instants()))
+    one = fit(SMALL, NONE, WINDOWS, validation_runs="M1").predict(WINDOWS.instants())
+    np.testing.assert_array_equal(one, fit(SMALL, NONE, WINDOWS, validation_runs=["M1"]).predict(WINDOWS.instants()))

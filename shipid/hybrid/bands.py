@@ -156,8 +156,10 @@ class Bands:
 
     def check(self, level: float, kind: str | None = None) -> None:
         """Raise DataError, one sentence, where no band of this level can be promised."""
-        if not 0 < level <= LEVELS[-1]:
-            raise DataError(f"{level:g} is no level of a band: give a share above 0 and up to 0.99, such as 0.9")
+        number = isinstance(level, int | float | np.floating)
+        if not number or not 0 < level <= LEVELS[-1]:
+            shown = f"{level:g}" if number else repr(level)
+            raise DataError(f"{shown} is no level of a band: give a share above 0 and up to 0.99, such as 0.9")
         if kind is not None and kind not in self.kinds:
             raise DataError(f"no run of the kind {kind!r} calibrated this band: {choices(kind, self.kinds)}")
         if not self.promises(level, kind):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+from shipid.arguments import one_of, positive, whole
 from shipid.data.windows import Instants, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance
@@ -34,6 +35,8 @@ class Physics:
     observer : with one, the physics starts from the filtered state in moving water, under the slow force as it fades;
         instants must then hold its `estimates`.
     path : where true positions come from, see `cut_windows`.
+
+    Raises ShipidError for a vessel that is none, numbers that are not positive, and an unknown integrator or path.
     """
 
     vessel: Vessel | None
@@ -44,9 +47,12 @@ class Physics:
     path: Literal["position", "velocity"] = "position"
 
     def __post_init__(self) -> None:
-        """Numbers of NumPy's become plain ones: a saved or exported predictor writes them out."""
-        object.__setattr__(self, "horizon", int(self.horizon))
-        object.__setattr__(self, "step", float(self.step))
+        if not isinstance(self.vessel, Vessel | None):
+            raise ShipidError(f"physics takes a vessel, such as of `load_vessel`, or None, not {self.vessel!r}")
+        object.__setattr__(self, "horizon", whole("horizon", self.horizon, 1))
+        object.__setattr__(self, "step", positive("step", self.step))
+        one_of("integrator", self.integrator, get_args(Integrator))
+        one_of("path", self.path, ("position", "velocity"))
 
     def with_values(self, values: Mapping[str, Any]) -> Physics:
         """Return the same physics with other numbers, dotted path -> value."""

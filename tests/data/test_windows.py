@@ -173,7 +173,7 @@ def test_touching_is_closed_and_counts_the_future() -> None:
 
 @pytest.mark.parametrize("options", [{"horizon": 200}, {"horizon": 0}, {"horizon": 5, "step": 0.0}])
 def test_impossible_windows(options: dict[str, float]) -> None:
-    with pytest.raises(DataError, match="horizon|step must be"):
+    with pytest.raises(DataError, match=r"horizon|step must be"):
         cut_windows(as_dataset(turning(T)), **options)  # type: ignore[arg-type]
 
 

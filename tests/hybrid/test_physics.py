@@ -186,3 +186,19 @@ def test_many_steps_at_once_run_as_c(count: int, engine: str, monkeypatch: pytes
     physics.paths(Instants(dict.fromkeys(names, zero)))
     physics.states(Instants(dict.fromkeys(names, zero)), engine="casadi")
     assert taken == [engine, "casadi"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"integrator": "Euler"}, r"integrator 'Euler' is not known: did you mean 'euler'\?"),
+        ({"path": "speed"}, "path 'speed' is not known: valid: position, velocity"),
+        ({"horizon": 2.5}, "horizon must be a whole number, 1 or more, not 2.5"),
+        ({"step": 0.0}, "step must be a number above 0"),
+        ({"vessel": "mariner"}, "physics takes a vessel, such as of `load_vessel`, or None, not 'mariner'"),
+    ],
+)
+def test_physics_of_a_wrong_argument_is_refused(wrong: dict[str, Any], message: str) -> None:
+    """Before, every integrator but `euler` was rk4, `Euler` too."""
+    with pytest.raises(ShipidError, match=message):
+        Physics(**{"vessel": SHIP, "horizon": 5, "step": 1.0, **wrong})
