@@ -77,34 +77,52 @@ class Vessel:
         """Dotted path of every block that the equations use -> what binds its numbers to a physics function."""
         return bindings(self.document)
 
-    @cached_property
+    @property
     def units(self) -> dict[str, str]:
-        """Dotted path -> unit of every parameter, in document order of use."""
+        """Dotted path -> unit of every parameter, in document order of use; a copy, free to be changed."""
+        return dict(self._units)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Dotted path -> value of every number that the equations use; a copy, free to be changed."""
+        return dict(self._parameters)
+
+    @cached_property
+    def _units(self) -> dict[str, str]:
         return units(self.document)
 
     @cached_property
-    def parameters(self) -> dict[str, float]:
-        """Dotted path -> value of every number that the equations use."""
-        return {path: float(documents.get(self.document, path)) for path in self.units}
+    def _parameters(self) -> dict[str, float]:
+        return {path: float(documents.get(self.document, path)) for path in self._units}
+
+    @property
+    def mass(self) -> NDArray[np.float64]:
+        """Mass plus added mass (n, n) [kg, kg m, kg m^2] in the degrees of freedom of the vessel; a copy."""
+        return self._mass.copy()
 
     @cached_property
-    def mass(self) -> NDArray[np.float64]:
-        """Mass plus added mass (n, n) [kg, kg m, kg m^2] in the degrees of freedom of the vessel."""
+    def _mass(self) -> NDArray[np.float64]:
         blocks, numbers = [self.bound[name] for name in ("inertia", "added_mass")], []
         for target in (target for block in blocks for target in block.values()):
             assert isinstance(target, str | int | float)  # neither function takes a list or a table
-            numbers.append(self.parameters[target] if isinstance(target, str) else target)
+            numbers.append(self._parameters[target] if isinstance(target, str) else target)
         M = np.asarray(mass(*(tuple(block) for block in blocks))(numbers))
         return M[np.ix_(self.axes, self.axes)]
 
     @cached_property
     def structure(self) -> str:
         """Digest of the document without its parameters' values: vessels of one structure compile once."""
-        without_values = documents.replace(_without_words(self.document), dict.fromkeys(self.parameters, 0))
-        return documents.digest([without_values, list(self.parameters)])  # the order is that of the input vector
+        without_values = documents.replace(_without_words(self.document), dict.fromkeys(self._parameters, 0))
+        return documents.digest([without_values, list(self._parameters)])  # the order is that of the input vector
 
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
-        """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document."""
+        """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document.
+
+        Raises DocumentError for values that are no mapping by path, and for what the vessel's checks refuse.
+        """
+        if not hasattr(values, "items") or not all(isinstance(path, str) for path in values.keys()):  # noqa: SIM118
+            message = f"values must be a mapping of dotted paths, such as {{'inertia.m': 4e5}}, not {values!r}"
+            raise DocumentError(message, file=self.file)
         values = {path: documents.plain(value) for path, value in values.items()}
         least, most = documents.LEAST_NUMBER, documents.MOST_NUMBER
         odd = {
@@ -114,25 +132,27 @@ class Vessel:
         }
         documents.check_values(odd, self.file)
         document = documents.replace(self.document, values)
-        if values.keys() <= self.units.keys():  # numbers alone: terms, names and units are as they were
+        if values.keys() <= self._units.keys():  # numbers alone: terms, names and units are as they were
             try:
                 documents.parse(model_for(document), document, self.file)
             except DocumentError:
                 return check_vessel(document, self.file)
             vessel = Vessel(document, self.file)
-            vessel.__dict__.update(bound=self.bound, units=self.units, structure=self.structure)
-            vessel.__dict__["parameters"] = self.parameters | {path: float(value) for path, value in values.items()}
+            vessel.__dict__.update(bound=self.bound, _units=self._units, structure=self.structure)
+            vessel.__dict__["_parameters"] = self._parameters | {path: float(value) for path, value in values.items()}
             _check_numbers(vessel)
             return vessel
         return check_vessel(document, self.file)
 
 
-def load_vessel(name: str | Path, relative_to: Path | None = None) -> Vessel:
-    """Read a bundled vessel by name, or a vessel or patch document by path.
+def load_vessel(name: str | Path, relative_to: str | Path | None = None) -> Vessel:
+    """Read a bundled vessel by name, or a vessel or patch document by path; DocumentError where it is not valid.
+
+    relative_to : folder that a relative path is tried from first, before the working folder.
 
     A patch has `base` (a vessel), optionally `base_digest`, and `[set]` with dotted paths; see `shipid.vessel.perturb`.
     """
-    vessel = _load(documents.find(name, "models", relative_to), ())
+    vessel = _load(documents.find(name, "models", None if relative_to is None else Path(relative_to)), ())
     fault = contradiction(vessel.document, vessel.parameters)
     if fault is not None:
         raise DocumentError(fault[1], file=vessel.file, path=fault[0])

@@ -3,6 +3,7 @@ from __future__ import annotations
 import copy
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -209,3 +210,30 @@ def test_arrays_are_lists_of_numbers() -> None:
     learned = ship.with_values({"hull.learned": block})
     assert learned.document["hull"]["learned"]["w_u"] == [1.0, 1.0, 1.0]
     assert learned.with_values({"hull.learned.w_u.1": np.float64(2.0)}).parameters["hull.learned.w_u.1"] == 2.0
+
+
+def test_what_a_vessel_returns_is_free_to_be_changed() -> None:
+    """Before, a change of the parameters changed the ship and its rollouts, but not its digest."""
+    base = load_vessel("gunnerus-28.9")
+    light = base.with_values({"inertia.m": 4e5})
+    for ship in (base, light):
+        parameters, units, mass = ship.parameters, ship.units, ship.mass
+        before = dict(parameters), dict(units), mass.copy()
+        parameters["inertia.m"] *= 2
+        units["inertia.m"] = "t"
+        mass *= 2
+        assert (ship.parameters, ship.units) == before[:2]
+        np.testing.assert_array_equal(ship.mass, before[2])
+    assert base.with_values({"inertia.m": 4e5}) == light
+
+
+@pytest.mark.parametrize("values", [None, [("inertia.m", 4e5)], {5: 1.0}, "inertia.m"])
+def test_values_are_a_mapping_by_path(values: Any) -> None:
+    with pytest.raises(DocumentError, match="values must be a mapping of dotted paths"):
+        load_vessel("mariner").with_values(values)
+
+
+def test_a_folder_may_be_a_text(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text('base = "mariner"\nname = "mine"\n', encoding="utf-8")
+    for folder in (tmp_path, str(tmp_path)):
+        assert load_vessel("mine.toml", relative_to=folder).name == "mine"
