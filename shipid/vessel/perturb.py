@@ -28,6 +28,7 @@ from pydantic import (
 )
 
 from shipid import document as documents
+from shipid.arguments import whole
 from shipid.errors import DocumentError, choices
 from shipid.physics.grammar import derivative, deviation
 from shipid.vessel.load import Vessel
@@ -286,8 +287,11 @@ def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str 
     """Draw one member of a resolved family; bit for bit the same on every machine.
 
     Range factors are uniform; a path drawn by several blocks is drawn anew in each and the factors multiply.
+
+    member : from 0. counter : how often it was redrawn. Raises ShipidError where one of them is no whole number, and
+    DocumentError for a path that the base lacks or a member that is no valid vessel.
     """
-    return _draw(family, _changes(family, base, file), member, base, counter, file)
+    return _draw(family, _changes(family, base, file), member, base, base.parameters, counter, file)
 
 
 def members(
@@ -296,7 +300,8 @@ def members(
     """Members of a resolved family, all or those of the given numbers from 0, none redrawn."""
     changes = _changes(family, base, file)
     wanted = range(family.members) if numbers is None else numbers
-    return [_draw(family, changes, number, base, 0, file) for number in wanted]
+    original = base.parameters  # one for all members: a family may have many
+    return [_draw(family, changes, number, base, original, 0, file) for number in wanted]
 
 
 @dataclass(frozen=True)
@@ -331,9 +336,15 @@ def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Cha
 
 
 def _draw(
-    family: Family, changes: Sequence[_Change], member: int, base: Vessel, counter: int, file: str | Path | None
+    family: Family,
+    changes: Sequence[_Change],
+    member: int,
+    base: Vessel,
+    original: dict[str, float],
+    counter: int,
+    file: str | Path | None,
 ) -> Variant:
-    original = base.parameters
+    member, counter = whole("member", member), whole("counter", counter)  # the draw is a hash: 1.0 would be another
     values: dict[str, float] = {}
     for change in changes:
         for path, argument in change.arguments.items():

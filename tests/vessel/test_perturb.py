@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from shipid.errors import DocumentError
+from shipid.errors import DocumentError, ShipidError
 from shipid.physics.grammar import derivative
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Perturbation, Variant, draw, members, resolve, uniform
@@ -282,3 +282,27 @@ def test_families_that_cannot_be_written_out(families: list[dict[str, Any]], rem
 def test_names_of_members(base: Vessel) -> None:
     assert [variant.name for variant in members(family(MASS, members=2), base)] == ["high-1", "high-2"]
     assert [variant.name for variant in members(family(MASS, members=1), base)] == ["high"]
+
+
+def test_a_member_is_a_whole_number() -> None:
+    """A draw is a hash of its number: before, member 1.0 was another ship than member 1 and had the same name."""
+    base = load_vessel("gunnerus-28.9")
+    family = Family(name="f", members=3, perturb=[{"parameters": ["hull.*"], "factor": (0.6, 1.4)}])
+    first = draw(family, 1, base)
+    for one in (np.int64(1), 1.0, np.float64(1)):
+        assert draw(family, one, base) == first  # type: ignore[arg-type]
+    assert members(family, base, numbers=np.arange(3.0))[1] == first  # type: ignore[arg-type]
+    for odd in (-1, 1.5, "1", None, True):
+        with pytest.raises(ShipidError, match="member must be a whole number, 0 or more, not"):
+            draw(family, odd, base)  # type: ignore[arg-type]
+    with pytest.raises(ShipidError, match="counter must be a whole number"):
+        draw(family, 1, base, counter=0.5)  # type: ignore[arg-type]
+
+
+def test_members_do_not_share_numbers_with_their_base() -> None:
+    base = load_vessel("gunnerus-28.9")
+    mass = base.parameters["inertia.m"]
+    family = Family(name="f", members=2, perturb=[{"parameters": ["hull.*"], "factor": (0.6, 1.4)}])
+    for variant in members(family, base):
+        variant.base_parameters["inertia.m"] = 0.0  # type: ignore[index]
+    assert base.parameters["inertia.m"] == mass
