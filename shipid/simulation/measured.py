@@ -53,7 +53,7 @@ class Measured:
 def measure_standard(
     vessel: Vessel,
     name: str,
-    angles: Sequence[float] = (),
+    angles: Sequence[float] | float = (),
     *,
     speed: float | None = None,
     side: str = "starboard",
@@ -73,7 +73,7 @@ def measure_standard(
 
 def measure_all(
     vessel: Vessel,
-    wanted: Sequence[tuple[str, Sequence[float], str]],
+    wanted: Sequence[tuple[str, Sequence[float] | float, str]],
     *,
     speed: float | None = None,
     duration: float | None = None,

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.arguments import numbers, one_of, positive
 from shipid.engine.casadi import orders_of, outputs_of
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
@@ -28,7 +29,7 @@ Array = NDArray[np.float64]
 
 def perform(
     vessel: Vessel,
-    manoeuvres: Sequence[Manoeuvre],
+    manoeuvres: Iterable[Manoeuvre] | Manoeuvre,
     *,
     step: float,
     interval: float | None = None,
@@ -62,11 +63,21 @@ def perform(
     Raises
     ------
     DocumentError : a manoeuvre that this vessel cannot perform.
-    ShipidError : an approach that does not settle, a run that diverges, an interval that is no multiple of the step.
+    ShipidError : an approach that does not settle, a run that diverges, an interval that is no multiple of the step, a
+        time that is not positive, an unknown method or output.
     """
+    given: Any = [manoeuvres] if isinstance(manoeuvres, Manoeuvre | str) else manoeuvres
+    manoeuvres = list[Manoeuvre](given)
+    odd: list[Any] = [one for one in manoeuvres if not isinstance(one, Manoeuvre)]
+    if odd:
+        remedy = "give some of `shipid.simulation.manoeuvre`, such as Zigzag(...)"
+        raise ShipidError(f"{odd[0]!r} is no manoeuvre: {remedy}")
     if not manoeuvres:
         raise ShipidError("no manoeuvre is given: give at least one")
-    between = step if interval is None else interval
+    step = positive("step", step)
+    between = step if interval is None else positive("interval", interval)
+    if duration is not None:
+        duration = positive("duration", duration)
     every = round(between / step)
     if every < 1 or abs(every * step - between) > 1e-9 * step * every:
         raise ShipidError(f"interval {between:g} s must be a multiple of step {step:g} s")
@@ -76,6 +87,9 @@ def perform(
         raise DocumentError(f"two runs are named {twice!r}", path="manoeuvre.name")
     rows = [_rows(one.length if duration is None else duration, step * every) for one in manoeuvres]
     weather = _weather(vessel, environment or {}, len(manoeuvres), every * (max(rows) - 1) + 1)
+    one_of("method", method, get_args(Method))
+    for name in outputs:
+        one_of("outputs", name, dynamics(vessel).outputs)
     seas = {path: np.asarray(drawn) for path, drawn in (components or {}).items()}
     short = next((path for path, drawn in seas.items() if len(drawn) != len(manoeuvres)), None)
     if short is not None:
@@ -192,7 +206,7 @@ def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: in
             file=vessel.file,
             path="environment",
         )
-    given = {name: np.asarray(environment.get(name, 0.0), dtype=float) for name in names}
+    given = {name: numbers(f"environment {name!r}", environment.get(name, 0.0)) for name in names}
     for name, values in given.items():
         if values.shape not in ((), (count,), (instants, count)):
             wanted = f"one value or {count}, one a manoeuvre, or a series ({instants}, {count})"

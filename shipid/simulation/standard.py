@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from shipid.arguments import numbers
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import ShipidError, choices
 from shipid.simulation.approach import Controls, acceleration
@@ -57,7 +58,7 @@ class Standard:
 def standard(
     vessel: Vessel,
     name: str,
-    angles: Sequence[float] = (),
+    angles: Sequence[float] | float = (),
     *,
     speed: float | None = None,
     side: str = "starboard",
@@ -71,7 +72,8 @@ def standard(
     Parameters
     ----------
     name : `zigzag`, `turning`, `pull-out`, `spiral`, `reverse-spiral`, `stop`.
-    angles : [deg] of helm and, of a zigzag, the execute heading; of a reverse spiral the greatest rate [deg/s].
+    angles : one or several [deg], of helm and, of a zigzag, the execute heading; of a reverse spiral the greatest rate
+        [deg/s].
     speed : approach speed [m/s]; default: the document's U_0, else Froude number 0.2.
     side : first turn, `starboard` or `port`.
     duration : [s]; of a spiral, the time of each level. Default: the time for 60 ship lengths at the approach speed, 30
@@ -88,6 +90,7 @@ def standard(
     if name not in KINDS:
         raise ShipidError(f"no manoeuvre is called {name!r}: {choices(name, KINDS)}", path="NAME")
     build, most = KINDS[name]
+    angles = numbers("angles", angles).ravel().tolist()
     if len(angles) > most:
         raise ShipidError(f"{name} takes {most or 'no'} {'angle' if most == 1 else 'angles'}", path="ANGLES")
     if any(angle <= 0 for angle in angles):

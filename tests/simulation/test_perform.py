@@ -231,9 +231,25 @@ def test_a_zigzag_in_waves_still_turns_at_the_execute_heading() -> None:
     [
         ({"environment": {"V_w": [3.0, 4.0, 5.0]}}, "environment 'V_w' must be one value or 2"),
         ({"components": {"waves.drift": np.zeros((1, 1, 41))}}, "for 1 ships, and there are 2 manoeuvres"),
-        ({"interval": 0.0}, "interval 0 s must be a multiple"),
+        ({"interval": 0.0}, "interval must be a number above 0 and finite, not 0"),
+        ({"step": 0}, "step must be a number above 0 and finite, not 0"),
+        ({"step": np.nan}, "step must be a number above 0 and finite, not nan"),
+        ({"duration": -5.0}, "duration must be a number above 0 and finite, not -5"),
+        ({"method": "RK4"}, "method 'RK4' is not known: valid: euler, rk4"),
+        ({"outputs": ["port.thrus"]}, r"outputs 'port\.thrus' is not known: did you mean 'port\.thrust'\?"),
+        ({"environment": {"V_w": "3"}}, "environment 'V_w' must be an array of numbers, not str"),
     ],
 )
 def test_what_does_not_fit_the_manoeuvres_is_refused(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ShipidError, match=message):
-        perform(SHIP, [CIRCLE, CIRCLE.model_copy(update={"name": "other"})], step=0.1, **given)
+        perform(SHIP, [CIRCLE, CIRCLE.model_copy(update={"name": "other"})], **{"step": 0.1, **given})
+
+
+def test_manoeuvres_come_one_by_one_or_from_anywhere() -> None:
+    one = perform(SHIP, [CIRCLE], step=0.1)
+    given: Any
+    for given in (CIRCLE, (CIRCLE,), iter([CIRCLE])):
+        pd.testing.assert_frame_equal(perform(SHIP, given, step=np.float64(0.1)), one)
+    for given in ("zigzag", ["zigzag"], [None]):
+        with pytest.raises(ShipidError, match=r"is no manoeuvre: give some of `shipid\.simulation\.manoeuvre`"):
+            perform(SHIP, given, step=0.1)

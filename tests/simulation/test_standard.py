@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -111,3 +112,12 @@ def test_a_ship_without_a_length_is_refused() -> None:
     document = {key: value for key, value in SHIP.document.items() if key != "particulars"}
     with pytest.raises(ShipidError, match=r"particulars\.L_pp is missing"):
         standard(replace(SHIP, document=document), "turning")
+
+
+def test_angles_are_one_or_several() -> None:
+    one: Any
+    for one in (35, np.int64(35), [35], np.array([35.0])):
+        assert standard(SHIP, "turning", one) == standard(SHIP, "turning", (35.0,))
+    assert standard(SHIP, "zigzag", np.array([20, 10])) == standard(SHIP, "zigzag", (20, 10))  # type: ignore[arg-type]
+    with pytest.raises(ShipidError, match="angles must be an array of numbers"):
+        standard(SHIP, "zigzag", ("10", "10"))  # type: ignore[arg-type]
