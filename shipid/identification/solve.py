@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -86,7 +86,7 @@ class Solution:
 def identify(
     vessel: Vessel,
     dataset: Dataset,
-    runs: Sequence[str],
+    runs: Iterable[str] | str,
     settings: Identify,
     start: Mapping[str, float] | Solution | None = None,
     progress: Progress | None = None,
@@ -99,7 +99,7 @@ def identify(
 
     Parameters
     ----------
-    runs : names of the runs to fit. settings : unknowns, weights, horizon and solver.
+    runs : names of the runs to fit, or the name of one. settings : unknowns, weights, horizon and solver.
     start : path -> initial factor, or an earlier solution; default: the setting `start`.
     progress : called with the iteration number and the objective after each iteration; a true return value stops.
 
@@ -107,6 +107,7 @@ def identify(
     ------
     DocumentError, DataError : the settings, the vessel and the data do not fit together.
     """
+    runs = (runs,) if isinstance(runs, str) else tuple(str(run) for run in (() if runs is None else runs))
     plain = settings.model_copy(update={"discount": False})
     solution = _identified(vessel, dataset, runs, plain, start, progress)
     if not settings.discount:

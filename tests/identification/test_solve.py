@@ -6,6 +6,7 @@ import signal
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
@@ -360,6 +361,11 @@ def test_a_start_that_diverges_is_reported() -> None:
         ({"runs_wanted": ["M07"]}, "there is no run 'M07'"),
         ({"runs_wanted": []}, "no run to fit"),
         ({"runs_wanted": ["M01", "M01"]}, "named twice"),
+        ({"runs_wanted": "M07"}, "there is no run 'M07'"),
+        ({"runs_wanted": np.array(["M01", "M07"])}, "there is no run 'M07'"),
+        ({"runs_wanted": pd.Series(["M07"])}, "there is no run 'M07'"),
+        ({"runs_wanted": iter(["M07"])}, "there is no run 'M07'"),
+        ({"runs_wanted": None}, "no run to fit"),
         ({"horizon": 100.0}, "no unbroken stretch of 50 s"),
         ({"parameters": ["hull.derivatives.Y_u"]}, "selects nothing"),
         ({"fixed": ["hull.*"]}, "is also fixed"),
