@@ -204,11 +204,18 @@ def content_of(source: Source) -> ReportContent:
     if isinstance(source, ReportContent):
         return source
     if isinstance(source, pd.DataFrame):
+        if source.empty:
+            raise ShipidError("the table has no rows", path="cells")
         return content_of({"cells": source})
     if isinstance(source, Mapping):
         return _from_frames(dict(source))
     from shipid.study.contents import report_content
+    from shipid.study.results import Results
 
+    given: Any = source
+    if not isinstance(given, Results):
+        remedy = "give Results, as of `read_results`, or a table of cells, as of `read_cells`"
+        raise ShipidError(f"{type(source).__name__} holds nothing to draw: {remedy}", path="figures")
     return report_content(source)
 
 
@@ -231,6 +238,9 @@ def _completed(cells: pd.DataFrame) -> pd.DataFrame:
     """Give a table of cells the columns that it lacks."""
     if lacking := [name for name in ("model", "N_D", "H") if name not in cells]:
         raise ShipidError(f"lacks the columns {', '.join(lacking)}", path="cells")
+    for name in ("N_D", "H", "A"):
+        if name in cells and not pd.api.types.is_numeric_dtype(cells[name]) and len(cells):
+            raise ShipidError(f"the column {name} must hold numbers, not {cells[name].dtype}", path="cells")
     unknown = dict.fromkeys(("A", "A_90", "A_rms", "H_90", "rms"), np.nan)
     plain = {"family": "given", "seed": 0, "sentence": "", "hyperparameters": "", "seconds": 0.0}
     ok = pd.Series(np.where(cells["H"].notna(), "ok", "failed"), index=cells.index)

@@ -76,6 +76,16 @@ def test_frames_that_do_not_fit_are_one_sentence() -> None:
         figures.gain({"cell": pd.DataFrame()})
 
 
+def test_what_holds_nothing_to_draw_is_one_sentence() -> None:
+    cells = pd.DataFrame({"model": ["a", "a"], "N_D": [10, 30], "H": [2.0, 1.0]})
+    with pytest.raises(ShipidError, match="figures: str holds nothing to draw: give Results, as of `read_results`"):
+        figures.gain("results/quick")  # type: ignore[arg-type]
+    with pytest.raises(ShipidError, match="cells: the table has no rows"):
+        figures.gain(cells[:0])
+    with pytest.raises(ShipidError, match="cells: the column H must hold numbers, not str"):
+        figures.gain(cells.astype({"H": "str"}))
+
+
 def test_the_path_of_a_prediction_is_the_recorded_one(content: ReportContent) -> None:
     window = content.snapshots[0]
     made = figures.prediction(content, run=window.run, t=window.t)

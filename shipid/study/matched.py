@@ -66,7 +66,7 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
 
     Raises ResultError for a folder without a result, ShipidError where no cell matches.
     """
-    if len(folders) < 2:
+    if isinstance(folders, str | os.PathLike) or len(folders) < 2:
         raise ShipidError("name two folders or more")
     places = [Path(folder) for folder in folders]
     real = [os.path.realpath(place) for place in places]

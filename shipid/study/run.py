@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from shipid.arguments import whole
 from shipid.capacity import processor
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
@@ -98,8 +99,11 @@ def run_study(
     scheduler : address of a Dask scheduler to use instead, such as `tcp://host:8786`.
     device : PyTorch device of rollouts and training.
     leave : end when other processes work on all that is left; the one that ends last writes the tables.
+
+    Raises ShipidError for a number of workers below 1, before any work.
     """
     begun = time.perf_counter()
+    workers = None if workers is None else whole("workers", workers, 1)
     check_device(device)
     store.open_folder(folder, plan)
     if plan.parts:

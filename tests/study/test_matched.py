@@ -174,6 +174,9 @@ def test_nothing_in_common_is_one_line(made: Made, tiny_run: Path) -> None:
     assert _remedy(one, other, named=False).startswith("name counterparts by --pair FIRST=OTHER; they have no N_D in")
     with pytest.raises(ShipidError, match="two folders or more"):
         compare([tiny_run])
+    for one in (tiny_run, str(tiny_run)):
+        with pytest.raises(ShipidError, match="two folders or more"):
+            compare(one)  # type: ignore[arg-type]
     with pytest.raises(ShipidError, match=f"{tiny_run}: is named twice"):
         compare([tiny_run, tiny_run])
 

@@ -496,3 +496,10 @@ def test_methods_are_fitted_with_the_seed_of_their_batch(tmp_path: Path, monkeyp
         run_batch(plan, prepared, batch, "cpu")
     assert seen == [batch.seed for batch in plan.batches]
     assert sorted(seen) == [3, 8]
+
+
+@pytest.mark.parametrize("workers", [0, -1, 1.5, "2"])
+def test_a_number_of_workers_that_is_none_is_refused_before_any_work(tmp_path: Path, workers: Any) -> None:
+    with pytest.raises(ShipidError, match="workers must be a whole number, 1 or more, not"):
+        next(run_study(tiny_plan(tmp_path), tmp_path / "run", workers=workers))
+    assert not (tmp_path / "run").exists()
