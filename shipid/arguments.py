@@ -40,6 +40,13 @@ def one_of(name: str, value: Any, valid: Iterable[str], error: Kind = ShipidErro
         raise error(f"{name} {value!r} is not known: {choices(str(value), names)}")
 
 
+def of_class(name: str, value: Any, kind: type, remedy: str, error: Kind = ShipidError) -> None:
+    """Raise `error` for a value of another class; the remedy says where such a value comes from."""
+    if not isinstance(value, kind):
+        shown = repr(value) if isinstance(value, str) else type(value).__name__
+        raise error(f"{name} must be a {kind.__name__}, {remedy}, not {shown}")
+
+
 def numbers(name: str, values: Any, error: Kind = ShipidError) -> NDArray[np.float64]:
     """Return an array of floats, of a list, a series, a tensor or an array of any real type; masked values are NaN.
 

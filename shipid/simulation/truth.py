@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from shipid.arguments import of_class
 from shipid.document import Checked
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.signals import is_output, measurable
@@ -161,9 +162,15 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
 
     Mean wind, current and wave direction are constant in a run. Every run starts upright, so the first ten seconds of
     roll are a transient. Position and velocities are those of the origin, the centre of gravity projected on the calm
-    waterline: u and v horizontal, along and across the heading, and r = d(psi)/dt. Raises DocumentError if a manoeuvre
-    diverges.
+    waterline: u and v horizontal, along and across the heading, and r = d(psi)/dt.
+
+    vessel : the ship, on which the values of `truth.set` are set. Its name may be another than `truth.vessel`, which a
+    study looks up.
+
+    Raises ShipidError for a truth that is none, DocumentError if it does not fit the vessel or a manoeuvre diverges.
     """
+    of_class("truth", truth, Truth, "such as Truth.model_validate(...)")
+    vessel = vessel.with_values(truth.set) if truth.set else vessel
     check_truth(truth, vessel)
     environment, chi = _weather(truth, vessel)
     keys = [(truth.seed, "manoeuvre", number) for number in range(truth.manoeuvres)]

@@ -294,3 +294,11 @@ def test_a_sensor_of_an_output_logs_it() -> None:
     assert 20 < np.std(noisy - exact) < 80
     with pytest.raises(DocumentError, match=r"truth.sensors.port.torque: no logged column"):
         simulate(truth(duration=10.0, sensors={"port.torque": {}}), SHIP)
+
+
+def test_values_of_the_block_are_set_on_the_ship() -> None:
+    """Before, a caller from Python had the ship as she was, without a word."""
+    heavy = {"inertia.m": 8e5}
+    of_block = simulate(truth(set=heavy), SHIP)
+    pd.testing.assert_frame_equal(of_block, simulate(truth(), SHIP.with_values(heavy)))
+    assert not of_block.equals(simulate(truth(), SHIP))
