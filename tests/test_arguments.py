@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,8 @@ import pandas as pd
 import pytest
 import torch
 
-from shipid.arguments import numbers, one_of, positive, whole
+import shipid
+from shipid.arguments import numbers, of_class, one_of, positive, whole
 from shipid.errors import DataError, ShipidError
 
 
@@ -70,3 +72,32 @@ def test_a_masked_value_is_none() -> None:
 def test_what_holds_no_numbers_is_refused(values: Any) -> None:
     with pytest.raises(ShipidError, match="u must be an array of numbers, not"):
         numbers("u", values)
+
+
+def test_an_object_of_another_class_comes_with_the_way_to_the_right_one() -> None:
+    of_class("step", 1, int, "such as 1")
+    with pytest.raises(DataError, match=r"vessel must be a int, such as 1, not 'mariner'"):
+        of_class("vessel", "mariner", int, "such as 1", DataError)
+    with pytest.raises(ShipidError, match=r"vessel must be a int, such as 1, not list"):
+        of_class("vessel", [1], int, "such as 1")
+
+
+ANY: Any = object()
+CALLS: dict[str, tuple[Callable[[], Any], str]] = {
+    "rollout": (lambda: shipid.rollout(ANY, {}, {}, step=1.0, num_steps=1), "vessel must be a Vessel, as of"),
+    "members": (lambda: shipid.members(shipid.Family(name="f"), ANY), "base must be a Vessel, as of"),
+    "simulate": (lambda: shipid.simulate(ANY, ANY), "truth must be a Truth, such as"),
+    "cut_windows": (lambda: shipid.cut_windows(ANY, horizon=1), "dataset must be a Dataset, as of"),
+    "write_dataset": (lambda: shipid.write_dataset(ANY, "x.parquet"), "dataset must be a Dataset, such as"),
+    "check_dataset": (lambda: shipid.check_dataset(ANY), "dataset must be a Dataset, as of"),
+    "import_log": (lambda: shipid.import_log(ANY, "log.csv"), "mapping must be a Mapping, as of"),
+    "identify": (lambda: shipid.identify(ANY, ANY, [], ANY), "dataset must be a Dataset, as of"),
+    "run_study": (lambda: next(shipid.run_study(ANY, "run")), "plan must be a Plan, as of"),
+}
+
+
+@pytest.mark.parametrize(("call", "message"), CALLS.values(), ids=CALLS)
+def test_public_functions_refuse_what_they_do_not_take(call: Callable[[], Any], message: str) -> None:
+    """Before, an AttributeError from deep inside."""
+    with pytest.raises(ShipidError, match=message):
+        call()

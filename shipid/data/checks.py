@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid.arguments import of_class
 from shipid.data.dataset import Array, Dataset, cumulative_integral, pieces, shares_clock, unit_of
+from shipid.errors import DataError
 from shipid.physics.signals import row_of
 
 Plane = np.ndarray[Any, np.dtype[np.complex128]]
@@ -31,7 +33,9 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
 
     Returns a table with columns `check`, `run`, `value`, `unit`, `limit`, `ok`, `sentence`. A check reports what is
     suspicious; it changes nothing. Limits are engineering judgement, and widened by what the noise of the log makes.
+    Raises DataError for what is no dataset.
     """
+    of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     by_run: dict[str, list[pd.DataFrame]] = {}
     for run, rows in pieces(dataset):
         by_run.setdefault(run, []).append(rows)

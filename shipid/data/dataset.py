@@ -17,6 +17,7 @@ import pyarrow
 import pyarrow.parquet
 from numpy.typing import NDArray
 
+from shipid.arguments import of_class
 from shipid.errors import DataError, choices
 from shipid.files import open_file, whole
 from shipid.physics.signals import SIGNALS, is_command, is_output, named, signal_of
@@ -302,14 +303,20 @@ def _check_column(name: str, column: pd.Series[Any]) -> None:
 def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
     """Write a dataset as Parquet (zstd), metadata as JSON in its schema; the file appears whole or not at all.
 
-    Raises DataError for a name that does not end in .parquet, or where the file cannot be written.
+    Raises DataError for a name that does not end in .parquet, for metadata that JSON cannot hold, or where the file
+    cannot be written.
     """
+    of_class("dataset", dataset, Dataset, "such as Dataset(frame, metadata)", DataError)
     target = Path(file)
     if target.suffix != ".parquet":
         raise DataError("a dataset is a Parquet file: let the name end in .parquet", file=target)
     metadata = {"units": units_of(map(str, dataset.frame.columns)), **dataset.metadata}
+    try:
+        text = json.dumps(metadata)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"the metadata must be plain data, as JSON holds it ({error})", file=target) from None
     table = pyarrow.Table.from_pandas(dataset.frame, preserve_index=False)
-    table = table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: json.dumps(metadata).encode()})
+    table = table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: text.encode()})
     try:
         with whole(target) as part, part.open("wb") as stream:  # Arrow takes no name that is not UTF-8
             pyarrow.parquet.write_table(table, stream, compression="zstd")

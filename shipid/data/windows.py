@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.arguments import one_of, positive, whole
+from shipid.arguments import of_class, one_of, positive, whole
 from shipid.data.dataset import Array, Dataset, clock_slack, cumulative_integral, pieces, sample, shares_clock
 from shipid.errors import DataError
 
@@ -218,6 +218,7 @@ def cut_windows(
     DataError : a horizon or past that is no whole number, a time that is not positive and finite, an unknown path, or
         no run is as long as past and horizon together.
     """
+    of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     horizon, past = whole("horizon", horizon, 1, DataError), whole("past", past, 0, DataError)
     step, interval = positive("step", step, DataError), positive("interval", interval, DataError)
     one_of("path", path, ("position", "velocity"), DataError)

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.arguments import of_class
 from shipid.data.dataset import Dataset
-from shipid.errors import DocumentError, choices
+from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
 from shipid.identification.residuals import Problem, build
@@ -107,6 +108,8 @@ def identify(
     ------
     DocumentError, DataError : the settings, the vessel and the data do not fit together.
     """
+    of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
+    of_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
     runs = (runs,) if isinstance(runs, str) else tuple(str(run) for run in (() if runs is None else runs))
     plain = settings.model_copy(update={"discount": False})
     solution = _identified(vessel, dataset, runs, plain, start, progress)

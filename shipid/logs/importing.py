@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.arguments import of_class
 from shipid.data.dataset import (
     BREAK,
     STANDARD_DEVIATIONS,
@@ -107,6 +108,7 @@ def import_log(
     ------
     DataError : with the log, the row or the key of the mapping, and what would be right.
     """
+    of_class("mapping", mapping, Mapping, "as of `read_mapping`", DataError)
     source, off = Path(file), tuple(without)
     for kind in off:
         if kind not in REPAIRS:

@@ -79,7 +79,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
     )
 
 
-def write_pages(folder: Path, say: Say | None = None) -> Path:
+def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
     """Write report.html, summary.md, answer.txt and the tables from what a run's folder holds; returns the report.
 
     A study of several parts has these in the folder of each part, and a page that compares its methods over all parts,
@@ -87,6 +87,7 @@ def write_pages(folder: Path, say: Say | None = None) -> Path:
 
     Raises ResultError if the folder holds no run or cannot be written.
     """
+    folder = Path(folder)
     store.stored_plan(folder)
     with Claims(folder) as claims, claims.alone(PAGES):
         return _write(folder, say)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.arguments import whole
+from shipid.arguments import of_class, whole
 from shipid.capacity import processor
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
@@ -81,7 +81,7 @@ class Event:
 
 def run_study(
     plan: Plan,
-    folder: Path,
+    folder: str | os.PathLike[str],
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -100,8 +100,10 @@ def run_study(
     device : PyTorch device of rollouts and training.
     leave : end when other processes work on all that is left; the one that ends last writes the tables.
 
-    Raises ShipidError for a number of workers below 1, before any work.
+    Raises ShipidError for a plan that is none and for a number of workers below 1, before any work.
     """
+    of_class("plan", plan, Plan, "as of `read_plan`")
+    folder = Path(folder)
     begun = time.perf_counter()
     workers = None if workers is None else whole("workers", workers, 1)
     check_device(device)

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
+from shipid.arguments import of_class
 from shipid.errors import DocumentError, choices
 from shipid.physics import ACTUATORS, GIVEN, TERMS, Term
 from shipid.physics.frames import current, heave_rate, kinematics, vector
@@ -96,7 +97,9 @@ def dynamics(vessel: Vessel, helmsman: Helmsman | None = None) -> Dynamics:
     """Equations of a vessel; vessels of one structure (all members of a family) share one object.
 
     With a helmsman, its inputs take the place of the commands; DocumentError if its orders do not fit the vessel.
+    ShipidError for what is no vessel.
     """
+    of_class("vessel", vessel, Vessel, "as of `load_vessel`")  # here all that simulate, fit or identify come by
     key = (vessel.structure, helmsman)
     if key not in _compiled:
         _compiled[key] = _assemble(vessel, helmsman)

@@ -28,7 +28,7 @@ from pydantic import (
 )
 
 from shipid import document as documents
-from shipid.arguments import whole
+from shipid.arguments import of_class, whole
 from shipid.errors import DocumentError, choices
 from shipid.physics.grammar import derivative, deviation
 from shipid.vessel.load import Vessel
@@ -318,6 +318,7 @@ class _Change:
 
 def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Change]:
     """Perturbations of a family on its base; DocumentError for a path that the base does not have."""
+    of_class("base", base, Vessel, "as of `load_vessel`")
     original, times, result = base.parameters, dict[str, int](), []
     for index, block in enumerate(family.perturb, start=-family._inherited):
         place = f"perturb.{index}" if index >= 0 else f"extends.perturb.{index + family._inherited}"

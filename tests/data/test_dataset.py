@@ -80,7 +80,7 @@ def test_file_is_compressed_parquet_with_json_metadata(tmp_path: Path) -> None:
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     file = write_dataset(as_dataset(turning(T)), tmp_path / "trial.parquet")
     before = file.read_bytes()
-    with pytest.raises(TypeError):
+    with pytest.raises(DataError, match="the metadata must be plain data"):
         write_dataset(as_dataset(turning(T), bad=object()), file)
     assert file.read_bytes() == before
 
@@ -250,3 +250,10 @@ def test_a_pipe_is_no_dataset(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.parquet")
     with pytest.raises(DataError, match="a device or a pipe"):
         read_dataset(tmp_path / "pipe.parquet")
+
+
+def test_metadata_that_no_file_can_hold_are_refused(tmp_path: Path) -> None:
+    frame = as_dataset(turning(T)).frame
+    with pytest.raises(DataError, match=r"the metadata must be plain data, as JSON holds it \(.*int64"):
+        write_dataset(Dataset(frame, {"flags": ["break"], "rows": np.int64(3)}), tmp_path / "x.parquet")
+    assert list(tmp_path.iterdir()) == []

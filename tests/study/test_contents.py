@@ -35,7 +35,7 @@ def test_a_further_frame_is_one_line(tiny_run: Path, monkeypatch: pytest.MonkeyP
 
 def test_pages_are_written_anew_from_the_folder(tiny_run: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(tiny_run, tmp_path / "run")
-    report = write_pages(folder)
+    report = write_pages(str(folder))
     assert report == folder / "report.html"
     answer = (folder / "answer.txt").read_text().splitlines()
     assert answer == [sentence.text for sentence in report_content(read_results(folder)).answer]
