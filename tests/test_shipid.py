@@ -167,6 +167,12 @@ def test_results_of_the_how_to_become_a_table_and_a_figure(
     assert Path("gain.html").is_file()
 
 
+@pytest.mark.parametrize("page", ["python.md", "howto.md", "reference-commands.md"])
+def test_a_block_that_is_copied_alone_knows_its_names(page: str) -> None:
+    for block in blocks(page):
+        assert "shipid." not in block or "import shipid" in block or "from shipid" in block, block
+
+
 def test_frames_of_the_documentation_are_drawn() -> None:
     space: dict[str, Any] = {}
     exec(blocks("python.md")[3], space)
