@@ -24,6 +24,7 @@ from shipid.hybrid.methods import METHODS, kind_of
 from shipid.hybrid.physics import Physics, check_columns
 from shipid.observer import AGE, Observer
 from shipid.physics.signals import SIGNALS, measurable
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
@@ -137,6 +138,10 @@ class Predictor:
             raise DataError(f"paths must be {(self.physics.horizon, len(instants), 2)}, not {alone.shape}")
         try:
             predicted = self.corrector.predict(self.physics, instants, alone)
+        except KeyError as error:
+            raise DataError(
+                "the method was trained with this input, and the instants lack it", path=error.args[0]
+            ) from error
         except (ValueError, TypeError, IndexError) as error:
             raise DataError(f"the arrays of the instants and of the predictor do not fit together ({error})") from error
         if predicted is paths:  # the prediction is the caller's to change, too
@@ -180,6 +185,14 @@ class Predictor:
             return replace(instants, planned=None)
         if instants.planned is None:
             raise DataError("this predictor was made for known commands: it needs those planned over the horizon")
+        wanted = (self.physics.horizon, len(instants))
+        for name, values in instants.planned.items():
+            if values.shape != wanted:
+                raise DataError(f"a planned command must be {wanted}, not {values.shape}", path=name)
+        needed = () if self.vessel is None else dynamics(self.vessel).commands
+        missing = next((name for name in needed if name not in instants.planned), None)
+        if missing is not None:
+            raise DataError("this command of the vessel is not among those planned", path=missing)
         return instants
 
     def outside(self, columns: Mapping[str, Array]) -> Array:

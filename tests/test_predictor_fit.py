@@ -249,3 +249,21 @@ def test_numbers_of_numpy_are_saved(predictor: Predictor, tmp_path: Path) -> Non
     np.testing.assert_array_equal(loaded.predict(WINDOWS.instants()), predictor.predict(WINDOWS.instants()))
     one = fit(SMALL, NONE, WINDOWS, validation_runs="M1").predict(WINDOWS.instants())
     np.testing.assert_array_equal(one, fit(SMALL, NONE, WINDOWS, validation_runs=["M1"]).predict(WINDOWS.instants()))
+
+
+def test_planned_commands_are_all_there_and_of_the_horizon() -> None:
+    """Before, an order that was not planned was held without a word, and so was one of a single step."""
+    physics = Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0)
+    for known in (fit(Alone(), physics, WINDOWS, commands="known"), fit(SMALL, NONE, WINDOWS, commands="known")):
+        planned = WINDOWS.planned
+        plain = {name: values.tolist() for name, values in planned.items()}
+        given: Any = Instants(WINDOWS.columns, planned=plain)
+        np.testing.assert_array_equal(known.predict(given), known.predict(WINDOWS.instants(known=True)))
+        for wrong, message in (
+            ({}, "port.n: "),
+            ({name: values for name, values in planned.items() if name != "port.n"}, "port.n: "),
+            (planned | {"port.n": planned["port.n"][0]}, "port.n: a planned command must be"),
+            (planned | {"port.n": planned["port.n"][:2]}, "port.n: a planned command must be"),
+        ):
+            with pytest.raises(DataError, match=message):
+                known.predict(Instants(WINDOWS.columns, planned=wrong))
