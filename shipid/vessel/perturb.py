@@ -319,6 +319,9 @@ class _Change:
 def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Change]:
     """Perturbations of a family on its base; DocumentError for a path that the base does not have."""
     of_class("base", base, Vessel, "as of `load_vessel`")
+    if family.extends is not None:
+        message = f"extends {family.extends!r}, whose perturbations come first: write them out, or use `resolve`"
+        raise DocumentError(message, file=file, path=f"family.{family.name}.extends")
     original, times, result = base.parameters, dict[str, int](), []
     for index, block in enumerate(family.perturb, start=-family._inherited):
         place = f"perturb.{index}" if index >= 0 else f"extends.perturb.{index + family._inherited}"

@@ -306,3 +306,14 @@ def test_members_do_not_share_numbers_with_their_base() -> None:
     for variant in members(family, base):
         variant.base_parameters["inertia.m"] = 0.0  # type: ignore[index]
     assert base.parameters["inertia.m"] == mass
+
+
+def test_a_family_that_extends_another_is_not_drawn_without_it() -> None:
+    """Before, the perturbations of the other were left out without a word."""
+    base = load_vessel("gunnerus-28.9")
+    first = Family(name="a", base="gunnerus-28.9", perturb=[{"parameters": ["hull.*"], "factor": 0.9}])
+    other = Family(name="b", extends="a", perturb=[{"parameters": ["inertia.m"], "factor": 1.1}])
+    for call in (lambda: members(other, base), lambda: draw(other, 0, base)):
+        with pytest.raises(DocumentError, match="extends 'a', whose perturbations come first"):
+            call()
+    assert len(members(resolve([first, other])[1], base)[0].values) > 1
