@@ -76,7 +76,8 @@ def error_map(content: ReportContent) -> Figure | None:
     lined += "result; pieces shorter than the distance of two N_D are left out."
     if bounds:
         lined += " Dotted: the same lines through the ends of the 95 % interval of H over test manoeuvres. Between the "
-        lined += "two dotted lines of a level the data do not say on which side of the level H lies."
+        lined += "two dotted lines of a level the data do not say on which side of the level H lies; one that is "
+        lined += "missing lies beyond the cells."
     return Figure(
         id="map",
         title="Physics and data: the map",
@@ -207,11 +208,13 @@ def _pieces(
         every = [(height, piece) for height in levels for piece in contour(x, y, heights, height)]
         return [(height, piece) for height, piece in every if np.ptp(piece[:, 0]) >= np.diff(x).min()]
 
+    drawn = lines(mean)
     if intervals is None:
-        return lines(mean), []
+        return drawn, []
     keys = [(str(model), int(size)) for model, size in zip(intervals.model, intervals.N_D, strict=True)]
     ends = [over(dict(zip(keys, intervals[side], strict=True))) for side in ("low", "high")]
-    return lines(mean), [*lines(ends[0]), *lines(ends[1])]
+    named = {height for height, _ in drawn}  # a dotted line without its line is taken for that of another
+    return drawn, [piece for end in ends for piece in lines(end) if piece[0] in named]
 
 
 def _flat(

@@ -172,6 +172,18 @@ def test_bands_of_lines_of_equal_error_hold_the_lines(simulation):
     assert len(same) == 2 * len(lines) // 2
 
 
+def test_a_dotted_line_is_of_a_level_that_has_a_line(simulation):
+    """Else a reader takes the dotted line of 1.5 m for the end of the interval of the line of 1 m."""
+    means = simulation.cells.groupby(["model", "N_D"], as_index=False).H.mean()
+    corner = simulation.cells.model.eq("high-1") & simulation.cells.N_D.eq(10)
+    one_cell = simulation.cells.assign(H=np.where(corner, 8.0, 1.0))  # the lines around it are too short to be drawn
+    ends = means.assign(low=means.H / means.H.median(), high=means.H / means.H.median() * 1.4)
+    drawn = flat(replace(simulation, cells=one_cell, frames={"intervals": ends})).data
+    names = {kind: {trace.name for trace in drawn if trace.meta == (kind,)} for kind in ("iso", "bounds")}
+    assert not names["iso"]
+    assert not names["bounds"]
+
+
 def test_too_few_test_manoeuvres_give_no_band(simulation):
     means = simulation.cells.groupby(["model", "N_D"], as_index=False).H.mean()
     blank = replace(simulation, frames={"intervals": means.assign(low=np.nan, high=np.nan)})
