@@ -388,6 +388,8 @@ def _unread(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path, p
     text = " ".join(str(cell).strip() for cell in reversed(cells.values()))
     if clock.unit != "date":
         return f"{text} is no time of day, hours, minutes and seconds as in 123005.5: correct it, or write another unit"
+    if np.isfinite(seconds(pd.Series([text]))[0]):
+        return f"{text!r} has no time zone, while other rows have one: write it in every row, or in none"
     return (
         f"{text!r} is no date or time of day that can be read: write dates as 2024-05-14 08:00:00; "
         'for a number of seconds write [clock] unit = "s"'

@@ -38,6 +38,8 @@ DAY_OF = (
     r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)|\d\d?(?P<gap>[- ])[A-Za-z]{3}(?P=gap)\d{4}"
 )
 """A date without a time."""
+ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
+"""The end of a date in ISO 8601 that says its zone."""
 DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y")
 DAYS += ("%d-%m-%Y", "%m-%d-%Y", "%y/%m/%d", "%d-%b-%Y", "%d %b %Y")
 HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
@@ -149,22 +151,25 @@ def seconds(dates: pd.Series[Any]) -> Array:
     """Return dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
 
     Read are ISO 8601, dates and durations of pandas, and `DAYS` with `HOURS`; of those that every row can be, that with
-    which the log is shorter, else day/month. A time of day goes on after midnight. NaN
-    where there is none.
+    which the log is shorter, else day/month. A time of day goes on after midnight. NaN where there is none, and where a
+    date has no zone while others have one.
     """
     if isinstance(dates.dtype, pd.CategoricalDtype):
         dates = dates.astype(object)
     if pd.api.types.is_timedelta64_dtype(dates.dtype):
         return np.array(dates.dt.total_seconds(), dtype=np.float64)
     if pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object:
-        texts = dates.dropna().astype(str).str.strip().str.replace(r",\s+", " ", regex=True).str.replace(",", ".")
+        texts = dates.dropna().astype(str).str.strip()
+        if texts.str.contains(",", regex=False).any():
+            texts = texts.str.replace(r",\s+", " ", regex=True).str.replace(",", ".")
         if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
             return _since_midnight(dates)
         written = ways_of(texts)
         if written:
             moments = min((_moments(texts, one) for one in written), key=_unlikely)
             return _since_1970(moments.reindex(dates.index))
-        dates = texts.reindex(dates.index)
+        zoned = texts.str.contains(ZONE)
+        dates = (texts[zoned] if zoned.any() else texts).reindex(dates.index)
     return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))
 
 
@@ -651,6 +656,13 @@ def _speed(sentence: Any) -> Any:
     return None if factor is None else float(sentence.wind_speed) * factor
 
 
+def _true_wind(sentence: Any) -> Any:
+    """Return the true wind speed [m/s], which a sentence has in m/s, in knots or in both."""
+    if sentence.wind_speed_meters in (None, "") and sentence.wind_speed_knots:
+        return float(sentence.wind_speed_knots) * KNOT
+    return sentence.wind_speed_meters
+
+
 SENTENCES: dict[str, dict[str, Callable[[Any], Any]]] = {
     "GGA": {"latitude": _position("latitude"), "longitude": _position("longitude")},
     "GLL": {"latitude": _position("latitude"), "longitude": _position("longitude")},
@@ -671,7 +683,7 @@ SENTENCES: dict[str, dict[str, Callable[[Any], Any]]] = {
         "engine_rpm_2": _revolutions("E", "2"),
     },
     "MWV": {"apparent_angle": _apparent("wind_angle"), "apparent_speed": _speed},
-    "MWD": {"wind_from": lambda s: s.direction_true, "wind_speed": lambda s: s.wind_speed_meters},
+    "MWD": {"wind_from": lambda s: s.direction_true, "wind_speed": _true_wind},
 }
 """Sentence -> column -> how it is read: deg; rot deg/min; sog kn; rpm; wind speeds m/s."""
 NMEA_COLUMNS = tuple(dict.fromkeys(name for columns in SENTENCES.values() for name in columns))

@@ -162,6 +162,23 @@ def test_what_is_no_date_is_not_a_number() -> None:
     np.testing.assert_array_equal(times, [1666857600.0, np.nan, 1666857601.0])
 
 
+@pytest.mark.parametrize("zone", ["Z", "+02:00", "-0330", "+02"])
+def test_a_date_without_a_zone_beside_others_with_one_is_refused(zone: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    """As UTC it would be hours off; with no zone anywhere every row is UTC."""
+    moments = (pd.Timestamp("2024-05-14T08:00:00") + pd.to_timedelta(log["time"], "s")).dt.strftime(
+        "%Y-%m-%dT%H:%M:%S.%f"
+    )
+    zoned = moments + zone
+    assert np.isfinite(seconds(zoned)).all()
+    assert np.isfinite(seconds(moments)).all()
+    zoned[3] = moments[3]
+    log.assign(time=zoned).to_csv(tmp_path / "log", index=False)
+    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
+    with pytest.raises(DataError, match=f"{moments[3]}' has no time zone, while other rows have one") as caught:
+        import_log(read_mapping(mapping), tmp_path / "log")
+    assert caught.value.path == "row 4"
+
+
 @pytest.mark.parametrize("text", ["14.05.2024 08:00:00 +02:00", "1715731140.5", "080000"])
 def test_a_time_that_cannot_be_read_is_shown(text: str, log: pd.DataFrame, tmp_path: Path) -> None:
     log.assign(time=text).to_csv(tmp_path / "log", index=False)
@@ -397,6 +414,15 @@ def test_values_that_a_sentence_calls_invalid_are_not_taken(tmp_path: Path) -> N
     assert table["rudder_port"].isna().all()
     assert table["sog"].tolist() == pytest.approx([5.0, np.nan], nan_ok=True)
     assert table.attrs["unreadable"] == 0
+
+
+@pytest.mark.parametrize("speed", ["10.0,N,,M", ",N,5.1444,M", "10.0,N,5.1444,M"])
+def test_the_true_wind_is_read_in_knots_too(speed: str, tmp_path: Path) -> None:
+    fixes = [f"GPRMC,12000{k},A,4807.0,N,01131.0,E,5.0,84.0,271022,,,A" for k in (0, 1)]
+    lines = [line for fix in fixes for line in (fix, f"WIMWD,120.0,T,118.0,M,{speed}")]
+    (tmp_path / "log").write_text("\n".join(map(sentence, lines)))
+    table = readers.read_table(tmp_path / "log", readers.NmeaFormat(kind="nmea"), "time")
+    assert table["wind_speed"].tolist() == pytest.approx([5.1444, 5.1444], abs=1e-4)
 
 
 def test_times_of_day_that_go_back_are_of_the_next_day() -> None:
