@@ -73,14 +73,12 @@ def open_folder(folder: Path, plan: Plan) -> None:
     if _provenance(folder)["digest"] != plan.digest:
         raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
     _mend(folder, plan)
-    for place in (
-        folder,
-        folder / "cells",
-        folder / "predictions",
-        folder / "batches",
-        folder / seals.FOLDER,
-        folder / JOURNALS,
-    ):
+    sweep_run(folder)
+
+
+def sweep_run(folder: Path) -> None:
+    """Remove what processes that are gone were writing into the folder of a run."""
+    for place in (folder, *(folder / name for name in ("cells", "predictions", "batches", seals.FOLDER, JOURNALS))):
         sweep(place)
 
 
@@ -300,6 +298,7 @@ def write_results(folder: Path, rows: pd.DataFrame, whole: bool = True) -> Path:
         from shipid.hybrid.journal import merge  # with Optuna, which a study is read without
 
         merge(journals, folder / TRIALS)
+    sweep_run(folder)  # again: a worker of a killed run may outlive it by a moment, and be gone only by now
     if whole:
         seals.write_seal(folder, RESULTS, [folder / "results.parquet", folder / "trials.parquet"])
     return folder / "results.parquet"

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +13,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import ResultError
-from shipid.files import read_json
+from shipid.files import TEMPORARY, read_json, temporary_folder
 from shipid.study import seals, store
 from shipid.study.plan import Batch, Unit
 from tests.study.tiny import tiny_plan
@@ -117,6 +120,19 @@ def test_results_are_a_row_for_each_metric_and_each_trial(tiny_run: Path, tmp_pa
     wide = table[table["metric"] == "H"].set_index("cell")["value"]
     np.testing.assert_array_equal(wide.loc[rows["cell"]], rows["H"])
     assert set(table.loc[table["metric"] == "seconds", "unit"]) == {"s"}
+
+
+def test_results_end_what_a_process_that_is_gone_was_writing(tiny_run: Path, tmp_path: Path) -> None:
+    """A worker of a killed run outlives it by a moment: it may begin a file after others joined the folder."""
+    rows, cells = store.read_rows(tiny_run), tmp_path / "cells"
+    cells.mkdir()
+    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True)
+    left = cells / f"{TEMPORARY}{socket.gethostname()}-{gone.stdout.strip()}-abc"
+    left.mkdir()
+    with temporary_folder(cells) as mine:
+        store.write_results(tmp_path, rows)
+        assert mine.exists()
+    assert not left.exists()
 
 
 def test_tables_lose_their_seal_when_a_unit_is_stored_after_them(tmp_path: Path) -> None:
