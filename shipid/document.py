@@ -337,6 +337,17 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
         raise DocumentError(message, file=file, path=path) from None
 
 
+def suits(model: Any, data: Any) -> bool:
+    """Whether a pydantic model takes data that have a number, not true or "5", wherever the model asks for one."""
+    from pydantic import ValidationError
+
+    try:
+        model.__pydantic_validator__.validate_python(data)
+    except ValidationError:
+        return False
+    return True
+
+
 def taken_for_numbers(data: Any, parsed: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """Path and value of truth values and texts that pydantic has taken for numbers: true for 1, "5" for 5."""
     if isinstance(data, bool | str):

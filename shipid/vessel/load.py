@@ -132,12 +132,9 @@ class Vessel:
         }
         documents.check_values(odd, self.file)
         document = documents.replace(self.document, values)
-        if values.keys() <= self._units.keys():  # numbers alone: terms, names and units are as they were
-            try:
-                documents.parse(model_for(document), document, self.file)
-            except DocumentError:
-                return check_vessel(document, self.file)
-            vessel = Vessel(document, self.file)
+        numbers = all(type(value) in (float, int) for value in values.values())
+        if numbers and values.keys() <= self._units.keys() and documents.suits(model_for(document), document):
+            vessel = Vessel(document, self.file)  # terms, names and units are as they were
             vessel.__dict__.update(bound=self.bound, _units=self._units, structure=self.structure)
             vessel.__dict__["_parameters"] = self._parameters | {path: float(value) for path, value in values.items()}
             _check_numbers(vessel)
