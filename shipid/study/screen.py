@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import reduce
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -109,14 +110,15 @@ def _rows(
         p90[same] = tally_quantile(reduce(np.add, (one.tally for one in measured)), 0.9)
         diverged[same] = sum(one.diverged.sum(axis=1) for one in measured) / num_windows
     whole = diverged == 0
-    rows = {
+    rows: dict[str, Any] = {
         "family": [variant.family for variant in variants],
         "member": [variant.name for variant in variants],
         "A": np.where(whole, mean, np.nan),
         "A_90": np.where(whole, p90, np.nan),
         "diverged": diverged,
     }
-    return pd.concat([pd.DataFrame(rows), pd.DataFrame([dict(variant.factors) for variant in variants])], axis=1)
+    factors = {path: [variant.factors[path] for variant in variants] for path in variants[0].factors}  # all draw alike
+    return pd.DataFrame(rows | factors)
 
 
 def _equal_lags(base: Vessel, values: Array) -> list[Array]:
