@@ -523,6 +523,8 @@ def _column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Series[
     names = [str(name) for name in log.columns]
     if names.count(source) > 1:
         raise DataError(f"column {source!r} appears twice in the log: rename one of them", file=file, path=path)
+    if source in log.attrs.get("other", {}):
+        raise DataError(f"{source!r} is {log.attrs['other'][source]}", file=file, path=path)
     if source not in names:
         alone = f"the header is one column, {names[0]!r}: is the separator right?" if names else "there is none"
         remedy = alone if len(names) <= 1 else choices(source, names)

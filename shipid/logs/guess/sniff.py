@@ -139,6 +139,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
             raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)
     else:
         table = read_table(file, model, "time")
+        notes = tuple(f"{name!r} is {what}" for name, what in table.attrs.get("other", {}).items() if "save" in what)
     columns, words = _numbers(table, form.get("decimal", "."))
     if isinstance(model, TextFormat):
         missing = _sentinels(table, columns)

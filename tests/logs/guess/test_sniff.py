@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 
 from shipid.errors import DataError
 from shipid.logs.guess.sniff import _is_time_of_day, cells, plain, sniff
@@ -43,6 +44,18 @@ def test_a_text_log_is_recognised(content: str, form: dict[str, object], tmp_pat
     np.testing.assert_allclose(sniffed.t, T)
     assert [plain(name) for name in sniffed.columns] == ["n", "psi"]
     np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
+
+
+def test_cells_of_a_matlab_file_are_left_out_with_a_note(tmp_path: Path) -> None:
+    file = tmp_path / "log.mat"
+    savemat(
+        file, {**{name: TABLE[name].to_numpy() for name in TABLE}, "rpm": TABLE["N"].to_numpy(dtype=object), "m": 3}
+    )
+    sniffed = sniff(file)
+    assert list(sniffed.columns) == ["N", "psi"]
+    assert sniffed.notes == (
+        "'rpm' is an array of 20 cells, not a vector of numbers: save rpm = cell2mat(rpm), or datenum(rpm) of dates",
+    )
 
 
 def test_a_log_without_a_header_has_numbers_or_the_names_that_are_given(tmp_path: Path) -> None:
