@@ -38,6 +38,7 @@ from shipid.logs.mapping import (
     Segment,
     Source,
     clock_seconds,
+    is_dated,
     read_mapping,
     to_si,
 )
@@ -46,6 +47,7 @@ from shipid.logs.readers import (
     Progress,
     TextFormat,
     dated,
+    hour_twice,
     moment_of,
     read_table,
     require_file,
@@ -362,6 +364,9 @@ def _times(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path
 def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
     """Return the time of every row [s]; raises DataError where it is missing or does not rise."""
     t = _times(log, clock, form, file, path)
+    twice = hour_twice(t) if np.isfinite(t).all() and (is_dated(clock.unit) or clock.unit == "hhmmss") else None
+    if twice is not None:
+        raise DataError(twice[1], file=file, path=f"row {twice[0] + 1}")
     if isinstance(clock, Clock) and clock.every is not None and np.isfinite(t).all():
         return evenly(t, clock.every, file)
     wrong = np.flatnonzero(~(np.diff(t) > 0)) if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1

@@ -13,7 +13,7 @@ from pydantic import Field, SerializeAsAny
 from shipid import document
 from shipid.data.dataset import DATED, STANDARD_DEVIATIONS, optional, required, unit_of
 from shipid.errors import DocumentError, choices
-from shipid.logs.readers import DAY, LAST_DATE, NEXT_DAY, READERS, Format, TextFormat
+from shipid.logs.readers import DAY, LAST_DATE, READERS, Format, TextFormat, over_midnights
 from shipid.logs.repairs import (
     INPUTS,
     REPAIRS,
@@ -262,7 +262,7 @@ def since_midnight(values: NDArray[np.float64]) -> NDArray[np.float64]:
     since = 3600.0 * hour + 60.0 * minute + second
     since[~((values >= 0) & (hour < 24) & (minute < 60) & (second < 61))] = np.nan  # 60: a leap second
     known = np.flatnonzero(np.isfinite(since))
-    since[known] += DAY * np.cumsum(np.diff(since[known], prepend=since[known][:1]) < -NEXT_DAY)
+    since[known] = over_midnights(since[known])
     return since
 
 

@@ -29,7 +29,8 @@ from shipid.logs.repairs import Strict
 from shipid.units import KNOT
 
 DAY, HALF_DAY = 86400.0, 43200.0  # s
-NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day
+NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, but for those that go back by an hour
+HOUR = 3600.0  # s: by which local time goes back at the end of daylight saving
 LOOKED_AT = 300  # lines that a guess at the format looks at
 WIDEST, LONGEST_LINE = 10_000, 8_000_000  # cells and bytes of a line: more is no log
 LARGE = 32_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
@@ -234,7 +235,35 @@ def _since_midnight(times: pd.Series[Any]) -> Array:
     afternoon = half.eq("pm").to_numpy(dtype=bool, na_value=False)
     since[of_twelve] = since[of_twelve] % HALF_DAY + HALF_DAY * afternoon[of_twelve]  # 12:30 AM is half past midnight
     since[np.isnan(numbers[:, 0])] = np.nan
-    return np.asarray(since + DAY * np.cumsum(np.diff(since, prepend=since[:1]) < -NEXT_DAY), dtype=np.float64)
+    return over_midnights(since)
+
+
+def over_midnights(since: Array) -> Array:
+    """Times of day (N,) [s] as seconds since the first midnight: after one that goes back, the next day has begun.
+
+    Where it goes back by an hour it is not the next day: see `hour_twice`.
+    """
+    steps = np.diff(since, prepend=since[:1])
+    return np.asarray(since + DAY * np.cumsum((steps < -NEXT_DAY) & ~_hour_back(steps)), dtype=np.float64)
+
+
+def hour_twice(t: Array) -> tuple[int, str] | None:
+    """Row (from 0) of a log at t (N,) [s] that begins an hour anew, and what to do; None if no row does.
+
+    So local time does at the end of daylight saving. A pause of up to ten minutes may lie between the rows.
+    """
+    steps = np.diff(t)
+    row = int(np.argmax(steps < 0)) + 1 if np.any(steps < 0) else 0
+    if row == 0 or not _hour_back(steps[row - 1]):
+        return None
+    last, first = (date_of(one) if DATED < one < LAST_DATE else date_of(one % DAY)[11:] for one in t[row - 1 : row + 1])
+    remedy = "write UTC, or in every row the zone that holds there; else sort or split the log"
+    return row, f"time goes back by an hour, from {last} to {first}: is it local time as daylight saving ends? {remedy}"
+
+
+def _hour_back(steps: Any) -> Any:
+    """Whether steps (N,) [s] of a clock go back by an hour, less a pause of up to ten minutes."""
+    return (steps >= -HOUR) & (steps <= NEXT_DAY - HOUR)
 
 
 def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:

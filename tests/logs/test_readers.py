@@ -14,6 +14,7 @@ from scipy.io import savemat
 
 from shipid.errors import DataError, DocumentError
 from shipid.logs import readers
+from shipid.logs.guess.sniff import sniff
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.readers import (
     READERS,
@@ -188,6 +189,41 @@ def test_dates_as_they_are_written(style: str, unix: bool) -> None:
     moments = pd.Timestamp("2022-10-26T23:59:30.5") + pd.to_timedelta(T, "s")
     times = seconds(pd.Series(moments.strftime(style)))
     np.testing.assert_allclose(times, T + (1666828770.5 if unix else 86370.5), atol=1e-5)
+
+
+TWICE = {
+    "date": ("%Y-%m-%d %H:%M:%S.%f", "2024-10-27 02:59:59 to 2024-10-27 02:00:00"),
+    "time of day": ("%H:%M:%S.%f", "02:59:59 to 02:00:00"),
+    "time of day, of twelve hours": ("%I:%M:%S.%f %p", "02:59:59 to 02:00:00"),
+    "hhmmss": ("%H%M%S.%f", "02:59:59 to 02:00:00"),
+    "whole minutes": ("%H:%M", "02:59:00 to 02:00:00"),
+}
+
+
+@pytest.mark.parametrize("every", ["", "\nevery = 0.5"])
+@pytest.mark.parametrize("name", TWICE)
+def test_an_hour_that_occurs_twice_is_refused(name: str, every: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    """Half a minute before the clocks of Berlin were set back to half a minute after."""
+    style, span = TWICE[name]
+    moments = pd.Timestamp("2024-10-27T00:59:30Z").tz_convert("Europe/Berlin") + pd.to_timedelta(T, "s")
+    log.assign(time=moments.strftime(style)).to_csv(tmp_path / "log.csv", index=False)
+    unit = "hhmmss" if name == "hhmmss" else "date"
+    mapping = mapping_with(tmp_path, "", ('from = "time"', f'from = "time"\nunit = "{unit}"{every}'))
+    message = f"time goes back by an hour, from {span}: is it local time as daylight saving ends"
+    with pytest.raises(DataError, match=message) as caught:
+        import_log(read_mapping(mapping), tmp_path / "log.csv")
+    assert caught.value.path == "row 61"
+    if name != "hhmmss":  # numbers that go back may be anything
+        with pytest.raises(DataError, match=message) as caught:
+            sniff(tmp_path / "log.csv")
+        assert caught.value.path == "row 61"
+
+
+@pytest.mark.parametrize("style", ["%Y-%m-%dT%H:%M:%S.%f%z", "%H:%M:%S.%f"])
+def test_the_end_of_daylight_saving_in_times_that_say_their_zone_or_are_utc(style: str) -> None:
+    zone = "Europe/Berlin" if "z" in style else "UTC"
+    moments = pd.Timestamp("2024-10-27T00:59:30Z").tz_convert(zone) + pd.to_timedelta(T, "s")
+    np.testing.assert_allclose(np.diff(seconds(pd.Series(moments.strftime(style)))), 0.5, atol=1e-6)
 
 
 @pytest.mark.parametrize("style", ["%d/%m/%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S"])

@@ -28,6 +28,7 @@ from shipid.logs.readers import (
     TIME_OF_DAY,
     TextFormat,
     dated,
+    hour_twice,
     parse_text,
     read_table,
     require_file,
@@ -386,6 +387,7 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     rising = [name for name, values in finite.items() if np.all(np.diff(values) > 0)]
     called = [name for name in columns if _is_clock(name)]
     texts = [name for name in map(str, table.columns) if name not in columns and name]
+    twice = None
     for name in sorted(texts, key=lambda name: not _is_clock(name)):
         column = _called(table, name)
         of_day = column.dropna().astype(str).str.fullmatch(TIME_OF_DAY)
@@ -404,6 +406,9 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         if rate is not None:
             return {"from": name, "unit": "date", "every": rate[0]}, rate[1]
         called.append(name)
+        twice = twice or hour_twice(since)
+    if twice is not None and not any(name in called for name in rising):
+        raise DataError(twice[1], file=file, path=f"row {twice[0] + 1}")
     candidates = [name for name in rising if name in called] or [name for name in rising if not _counts(columns[name])]
     unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
     rounded = [name for name in called or unnamed if name in finite and name not in rising]
