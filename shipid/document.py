@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from datetime import date, time
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Self, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from shipid.errors import DocumentError, choices
 
@@ -297,16 +297,6 @@ def match(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
     return [path for path in paths if expression.fullmatch(path)]
 
 
-class Checked:
-    """For pydantic models of documents: `model_validate` raises DocumentError, as for a file, not pydantic's error."""
-
-    @classmethod
-    def model_validate(cls, obj: Any, **_: Any) -> Self:
-        """Return a checked model of plain data; DocumentError with dotted path, value and remedy."""
-        result: Self = parse(cls, obj, None, cls.__name__.lower())
-        return result
-
-
 def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
     """Validate data by a pydantic model; DocumentError with path, value and remedy for the first problem.
 
@@ -315,7 +305,7 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
     from pydantic import ValidationError
 
     try:
-        parsed = model.__pydantic_validator__.validate_python(data)  # what `model_validate` does, see `Checked`
+        parsed = model.__pydantic_validator__.validate_python(data)  # what `model_validate` does, see `checked.Checked`
         for path, value in taken_for_numbers(data, parsed):
             where = ".".join(filter(None, (prefix, path)))
             raise DocumentError(f"{value!r}: must be a number", file=file, path=where)
@@ -354,7 +344,7 @@ def taken_for_numbers(data: Any, parsed: Any, path: str = "") -> Iterator[tuple[
         taken = parsed if isinstance(parsed, list | tuple) else [parsed]  # a key may take one value for a list of it
         if any(isinstance(one, int | float) and not isinstance(one, bool) for one in taken):
             yield path, data
-    elif isinstance(data, list) and isinstance(parsed, list | tuple):
+    elif isinstance(data, list | tuple) and isinstance(parsed, list | tuple):
         for number, pair in enumerate(zip(data, parsed, strict=False)):
             yield from taken_for_numbers(*pair, f"{path}.{number}".removeprefix("."))
     elif isinstance(data, Mapping):
@@ -396,7 +386,7 @@ def _place(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
     """The parts of a pydantic location that are keys or indices of the data, without the names of union members."""
     location = problem["loc"]
     for position, part in enumerate(location):
-        listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
+        listed = isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)
         if listed or (isinstance(data, Mapping) and part in data):
             data = data[part]
         elif problem["type"] != "missing" or position < len(location) - 1:
@@ -414,7 +404,11 @@ def _note(model: Any, location: tuple[int | str, ...]) -> str:
 def _fields(model: Any, location: tuple[int | str, ...]) -> list[str]:
     """Keys that a pydantic model allows at a place inside it, over all members of a union."""
     models = _models(model, location)
-    return [name for kind in models for name in (kind.keys() if hasattr(kind, "keys") else kind.model_fields)]
+    return [
+        name
+        for kind in models
+        for name in (kind.keys() if callable(getattr(kind, "keys", None)) else kind.model_fields)
+    ]
 
 
 def _models(model: Any, location: tuple[int | str, ...]) -> list[Any]:

@@ -31,6 +31,7 @@ import numpy as np
 from casadi import SX
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from shipid.checked import Checked
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, clock_slack, stretches
 from shipid.data.windows import Windows, to_frame
 from shipid.engine.casadi import summed_rates
@@ -67,7 +68,7 @@ NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 
 
-class Observer(BaseModel):
+class Observer(Checked, BaseModel):
     """The `[observer]` block of a study. Without a unit: by the ship's size, in units of L, g, sqrt(g L), sqrt(L / g).
 
     With L = 28.9 m these are 28.9 m, 9.81 m/s^2, 16.8 m/s, 1.72 s; for yaw g / L = 0.339 rad/s^2, sqrt(g / L) = 0.583

@@ -362,7 +362,7 @@ def test_a_compass_counts_from_zero_again() -> None:
     ],
 )
 def test_measurements_that_cannot_serve_are_refused(block: dict[str, Any], remedy: str) -> None:
-    with pytest.raises(ValueError, match=remedy):
+    with pytest.raises(DocumentError, match=remedy):
         Observer(**block)
 
 

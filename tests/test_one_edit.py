@@ -270,7 +270,7 @@ def test_a_truth_says_what_its_environment_lacks_or_nobody_takes(depth: Vessel) 
         check(V_w=4.0, depth=4.0)
     with pytest.raises(DocumentError, match=r"truth.environment.depth: no term .* remove it"):
         check(load_vessel("gunnerus-28.9"), depth=4.0)
-    with pytest.raises(ValueError, match=r"environment.depth has low > high"):
+    with pytest.raises(DocumentError, match=r"environment.depth has low > high"):
         check(depth=(5.0, 4.0))
 
 

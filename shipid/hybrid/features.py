@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat, field_validator
 
+from shipid.checked import Checked
 from shipid.data.windows import Instants, to_frame
 from shipid.errors import DataError
 from shipid.hybrid.physics import Physics
@@ -73,7 +74,7 @@ def rows_of(table: Mapping[str, Array], names: Sequence[str]) -> Array:
 OneOrMore = NonNegativeFloat | tuple[PositiveFloat, ...]
 
 
-class Memory(BaseModel):
+class Memory(Checked, BaseModel):
     """What a method takes from the past: all in seconds before the instant; nothing by default.
 
     Parameters

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from shipid.checked import Checked
 from shipid.data.windows import Instants, Windows
 from shipid.errors import DataError
 from shipid.hybrid.features import Inputs
@@ -148,7 +149,7 @@ class Fitted:
     left_out: Array | None = None
 
 
-class Method(BaseModel, ABC):
+class Method(Checked, BaseModel, ABC):
     """A way to improve physics by data: its fields are its settings, `fit` returns correctors.
 
     validation : `runs` leaves out every run in turn to judge a trial; `share` holds out a fifth of the runs.

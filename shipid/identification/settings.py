@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
 
 from shipid import document as documents
+from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
 from shipid.identification.plausible import within
 from shipid.physics.signals import is_output, named
@@ -50,7 +51,7 @@ WIDE = {"initial_state": 1.0, "current": 0.3, "thrust_scale": 0.1, "latency": 1.
 }
 
 
-class Identify(documents.Checked, BaseModel):
+class Identify(Checked, BaseModel):
     """The `[identify]` table. The unknowns are factors on the base values of the vessel's parameters (dotted paths).
 
     weights : standard deviations of the signals [m/s, rad/s, rad, m], and of measured outputs by the names of their

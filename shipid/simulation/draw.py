@@ -8,6 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
+from shipid.checked import Checked
 from shipid.document import required, taken_for_numbers
 from shipid.errors import choices
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre
@@ -21,7 +22,7 @@ SEEDS = 2**31  # number of different seeds that may be drawn
 COURSE = "course_deg"
 
 
-class Draw(BaseModel):
+class Draw(Checked, BaseModel):
     """`[[truth.manoeuvre]]`: a kind of manoeuvre, its share of the runs, and the keys of the kind.
 
     A number is a fixed value. A pair [low, high] in place of a number is a range; each run draws from it uniformly.
@@ -75,7 +76,7 @@ class Draw(BaseModel):
             given["duration"] = duration
         given.setdefault(COURSE, _between(0.0, 360.0, at("psi")))
         try:
-            manoeuvre = kind.model_validate(given)
+            manoeuvre: Manoeuvre = kind.__pydantic_validator__.validate_python(given)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             key = ".".join(str(part) for part in first["loc"] if part != "orders")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from shipid.checked import Checked
 from shipid.errors import DocumentError
 from shipid.vessel.perturb import uniform
 
@@ -21,7 +22,7 @@ Positive = Annotated[FiniteFloat, Field(gt=0)]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
-class Gusts(BaseModel):
+class Gusts(Checked, BaseModel):
     """A `gusts` block: spectrum, height [m] and frequency band [Hz].
 
     `npd` depends only on wind speed and height. `kaimal` needs a turbulence intensity (sigma / mean speed) and takes

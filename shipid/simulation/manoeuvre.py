@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman
@@ -51,7 +52,7 @@ class Start:
     held: bool = False
 
 
-class Manoeuvre(BaseModel, ABC):
+class Manoeuvre(Checked, BaseModel, ABC):
     """Base class of all kinds of manoeuvre: name, initial heading, initial state and orders."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveFloat, PositiveInt
 
+from shipid.checked import Checked
 from shipid.units import GRAVITY
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import uniform
@@ -18,7 +19,7 @@ LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.2 % of the energy of a J
 SIDE = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}  # symmetry in the relative heading: 1 even, -1 odd
 
 
-class Sea(BaseModel):
+class Sea(Checked, BaseModel):
     """`[truth.waves]`: an irregular sea with a JONSWAP spectrum, long-crested unless `spreading` is given.
 
     Its components hold 99 % of the energy: those from half to 3.2 times the peak frequency.

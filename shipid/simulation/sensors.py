@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
 from shipid.vessel.perturb import uniform
 
@@ -23,7 +24,7 @@ WRAPPING = ("psi", "beta_w")
 SAME = 1e-6  # of a step of the record: two instants closer than this are equal
 
 
-class Sensor(BaseModel):
+class Sensor(Checked, BaseModel):
     """One sensor of a `sensors` table: column -> block, in the SI unit of the column."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

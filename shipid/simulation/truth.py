@@ -10,7 +10,7 @@ import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.arguments import of_class
-from shipid.document import Checked
+from shipid.checked import Checked
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.signals import is_output, measurable
 from shipid.simulation import gusts

@@ -29,6 +29,7 @@ from pydantic import (
 
 from shipid import document as documents
 from shipid.arguments import of_class, whole
+from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
 from shipid.physics.grammar import derivative, deviation
 from shipid.vessel.load import Vessel
@@ -113,7 +114,7 @@ RULES: dict[str, Rule] = {
 """Key -> rule; a block with several applies them in this order. To add one, write its change and name it here."""
 
 
-class Perturbation(BaseModel):
+class Perturbation(Checked, BaseModel):
     """One `[[family.perturb]]` block: keys of `RULES`, and which numbers they change.
 
     `given` holds what the block says for each rule, by its key.
@@ -179,7 +180,7 @@ def _block_model(rules: tuple[tuple[str, Rule], ...]) -> type[BaseModel]:
     return create_model("perturbation", __config__=ConfigDict(extra="forbid"), **shared, **fields)
 
 
-class Family(documents.Checked, BaseModel):
+class Family(Checked, BaseModel):
     """A `[[family]]` block of a study: so many members of one base, perturbed by the same rules."""
 
     model_config = ConfigDict(extra="forbid")

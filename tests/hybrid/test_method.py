@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.data.windows import cut_windows
-from shipid.errors import DataError
+from shipid.errors import DataError, DocumentError
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Case, Fitted, Method, Task, same_table, shared_tables
 from shipid.hybrid.methods import METHODS
@@ -88,7 +88,7 @@ def test_a_method_is_a_fit_and_its_settings() -> None:
     assert {name: one.trials for name, one in Toy(weight=3.0).fit(task()).items()} == {
         name: [{"value": 3.0}] for name in ("right", "wrong", "none")
     }
-    with pytest.raises(ValueError, match="extra"):
+    with pytest.raises(DocumentError, match=r"Toy\.wieght: unknown key: did you mean 'weight'"):
         Toy(wieght=3.0)  # type: ignore[call-arg]
 
 

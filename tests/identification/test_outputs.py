@@ -199,5 +199,5 @@ def test_what_is_fitted_must_be_predicted_and_measured() -> None:
     less = Dataset(pd.DataFrame(data.frame.drop(columns="propeller.thrust")), data.metadata)
     with pytest.raises(DataError, match=r"propeller.thrust: was not measured; .* propeller.torque"):
         build(tanker(), less, less.runs, SPEED.model_copy(update={"weights": {"propeller.thrust": 1.0}}))
-    with pytest.raises(ValueError, match=r"weights.thrust is no valid name: .*<component>.<signal>"):
+    with pytest.raises(DocumentError, match=r"weights.thrust is no valid name: .*<component>.<signal>"):
         Identify(parameters=["hull.mmg.R_0"], weights={"thrust": 1.0})

@@ -33,7 +33,7 @@ MASS, YAW = "inertia.m", "hull.derivatives.N_ur"
     ],
 )
 def test_wrong_settings_are_refused(given: dict[str, object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(DocumentError, match=message):
         Identify(parameters=[MASS], **given)
 
 

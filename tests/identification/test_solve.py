@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.errors import ShipidError
+from shipid.errors import DocumentError, ShipidError
 from shipid.identification.fit import origin, search
 from shipid.identification.residuals import build, predict
 from shipid.identification.settings import POSITIVE, Identify, unknowns
@@ -413,7 +413,7 @@ def test_mistakes_are_one_line(more: dict[str, object], words: str) -> None:
     ],
 )
 def test_a_wrong_block_is_reported(more: dict[str, object], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(DocumentError, match=words):
         settings(**more)
 
 

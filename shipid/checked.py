@@ -1,0 +1,43 @@
+"""Base of the pydantic models that callers from Python make: a wrong argument is one line, not pydantic's report."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Self
+
+from pydantic import BaseModel, ValidationError
+
+from shipid.document import parse
+from shipid.errors import DocumentError
+
+if TYPE_CHECKING:
+    OneLine = type
+else:
+
+    class OneLine(type(BaseModel)):
+        """Class of the models whose constructor raises DocumentError: with class, argument, value and remedy.
+
+        Models that are inside others are made by pydantic, not by this call, so a document names the place as before.
+        """
+
+        def __call__(cls, *values: Any, **given: Any) -> Any:
+            """Return a checked model of arguments that are given by name."""
+            if values:
+                names = ", ".join(cls.model_fields)
+                remedy = f"write the name of each argument: {names}" if names else "it takes no arguments"
+                raise DocumentError(remedy, path=f"{cls.__name__}({values[0]!r})")
+            try:
+                return super().__call__(**given)
+            except ValidationError as error:
+                refused = error
+            parse(cls, given, None, cls.__name__)
+            raise refused  # what a constructor alone refuses
+
+
+class Checked(BaseModel, metaclass=OneLine):
+    """A pydantic model of which constructor and `model_validate` raise DocumentError, as for a file."""
+
+    @classmethod
+    def model_validate(cls, obj: Any, **_: Any) -> Self:
+        """Return a checked model of plain data; DocumentError with dotted path, value and remedy."""
+        result: Self = parse(cls, obj, None, cls.__name__.lower())
+        return result

@@ -1,0 +1,66 @@
+"""Classes that callers from Python make: a wrong argument is one line with class, argument and remedy."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+import shipid
+from shipid.errors import DocumentError
+from shipid.hybrid.features import Memory
+from shipid.hybrid.methods import METHODS
+from shipid.identification.settings import Identify
+from shipid.observer import Observer
+from shipid.simulation.manoeuvre import KINDS
+from shipid.simulation.truth import Truth
+from shipid.vessel.perturb import Family, Perturbation
+
+MADE: list[type[BaseModel]] = [
+    Memory,
+    Observer,
+    Identify,
+    Family,
+    Perturbation,
+    Truth,
+    *METHODS.values(),
+    *KINDS.values(),
+]
+
+
+@pytest.mark.parametrize("kind", MADE, ids=lambda kind: kind.__name__)
+def test_an_unknown_argument_and_one_without_a_name_are_one_line(kind: Any) -> None:
+    with pytest.raises(DocumentError, match=rf"^{kind.__name__}\.typo: unknown key: [^\n]+$"):
+        kind(typo=1)
+    with pytest.raises(DocumentError, match=rf"^{kind.__name__}\(-1\): (write the name of each|it takes no)[^\n]+$"):
+        kind(-1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "line"),
+    [
+        (shipid.PathDrawn, {"trials": 0}, "PathDrawn.trials: 0: must be above 0"),
+        (Memory, {"history": (2.0, -1.0)}, "Memory.history.1: -1.0: must be above 0"),
+        (Identify, {"parameters": "hull.*"}, "Identify.parameters: 'hull.*': must be a list"),
+        (Family, {"name": "a", "perturb": [{"parameters": ["hull.*"]}]}, "Family.perturb.0: `parameters` and"),
+        (
+            Perturbation,
+            {"parameters": ["hull.*"], "factor": "x"},
+            "Perturbation.factor: 'x': must be a number or a list",
+        ),
+        (Observer, {"measured": ("u",)}, "Observer: measured lacks 'psi'"),
+    ],
+)
+def test_a_wrong_value_is_named(kind: Any, given: dict[str, Any], line: str) -> None:
+    with pytest.raises(DocumentError) as caught:
+        kind(**given)
+    assert str(caught.value).startswith(line)
+    assert "\n" not in str(caught.value)
+
+
+def test_models_are_made_copied_and_pickled_as_before() -> None:
+    memory = Memory(history=(2.0, 4.0))
+    assert pickle.loads(pickle.dumps(memory)) == memory == memory.model_copy() == Memory(**memory.model_dump())
+    assert shipid.PathDrawn(memory=memory).memory is memory
