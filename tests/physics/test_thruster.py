@@ -207,3 +207,12 @@ def test_coefficients_by_hand(J: float, J_y: float, sense: int) -> None:
     wrench = numbers(azimuth()(water, n, 0.0))
     reduction = 1.0 if sense > 0 else -0.65
     np.testing.assert_allclose(wrench[:2], [reduction * scale * K_x, scale * K_y], rtol=1e-12)
+
+
+@pytest.mark.parametrize("u", [5.0, -5.0])
+def test_the_over_running_drag_of_an_azimuth_unit_has_a_step_at_zero_revolutions(u: float) -> None:
+    """As its description says: k_T rho D_p^2 k_over2 u^2 for water from ahead, k_astern times as large from astern."""
+    unit = load_vessel("gunnerus-28.9").document["thruster"]["port"]
+    above, below = (numbers(azimuth()([u, 0, 0, 0, 0, 0], n, 0.0))[0] for n in (1e-7, -1e-7))
+    drag = unit["k_T"] * 1025.0 * unit["D_p"] ** 2 * unit["k_over2"] * u**2
+    assert above - below == pytest.approx(-drag if u > 0 else -unit["k_astern"] * drag, rel=1e-3)
