@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -44,7 +46,21 @@ def of_class(name: str, value: Any, kind: type, remedy: str, error: Kind = Shipi
     """Raise `error` for a value of another class; the remedy says where such a value comes from."""
     if not isinstance(value, kind):
         shown = repr(value) if isinstance(value, str) else type(value).__name__
-        raise error(f"{name} must be a {kind.__name__}, {remedy}, not {shown}")
+        article = "an" if kind.__name__[0] in "AEIOaeio" else "a"
+        raise error(f"{name} must be {article} {kind.__name__}, {remedy}, not {shown}")
+
+
+def by_name(name: str, value: Any, what: str, error: Kind = ShipidError) -> None:
+    """Raise `error` for a value that is no mapping; `what` says of what to what, such as `a name to an array`."""
+    if not isinstance(value, Mapping) and not hasattr(value, "keys"):  # a table has keys, too
+        raise error(f"{name} must be a dict, of {what}, not {type(value).__name__}")
+
+
+def path_of(name: str, value: Any, error: Kind = ShipidError) -> Path:
+    """Return the path of a file or folder, given as a text or a Path; raise `error` for anything else."""
+    if not isinstance(value, str | os.PathLike):
+        raise error(f"{name} must be a path, a text or a Path, not {value!r}")
+    return Path(value)
 
 
 def numbers(name: str, values: Any, error: Kind = ShipidError) -> NDArray[np.float64]:

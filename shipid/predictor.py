@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self, get_args, overload
 import numpy as np
 from pydantic import BaseModel, Field
 
-from shipid.arguments import numbers, one_of, whole
+from shipid.arguments import by_name, numbers, one_of, path_of, whole
 from shipid.data.windows import Commands, Instants, Windows, fold_masks, run_folds
 from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
@@ -173,6 +173,10 @@ class Predictor:
         """The instants with planned commands where the predictor takes them, and without them where it does not."""
         if not isinstance(instants, Instants):
             raise DataError(f"give Instants, such as `windows.instants()`, not {type(instants).__name__}")
+        parts = {name: getattr(instants, name) for name in ("columns", "past", "planned", "hidden", "estimates")}
+        for part, given in parts.items():
+            if part not in ("planned", "hidden") or given is not None:
+                by_name(f"{part} of the instants", given, "a name to an array", DataError)
         missing = next((name for name in ("u", "v", "r") if name not in instants.columns), None)
         if missing is not None:
             raise DataError("the instants lack this column", path=missing)
@@ -202,6 +206,7 @@ class Predictor:
             and where it is missing nobody knows that the observer has settled. Columns without limits, and limits
             without a column, are passed over.
         """
+        by_name("columns", columns, "a name to an array", DataError)
         if any(np.ndim(values) != 1 for values in columns.values()):
             odd = next(name for name, values in columns.items() if np.ndim(values) != 1)
             raise DataError(f"must be (S,), a value for each instant, not {np.shape(columns[odd])}", path=odd)
@@ -217,6 +222,7 @@ class Predictor:
 
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Write one `.npz` of arrays and a JSON header; it appears whole or not at all."""
+        target = path_of("file", file, ResultError)
         header = {
             "format": FORMAT,
             "vessel": None if self.vessel is None else {"document": self.vessel.document, "file": self.vessel.file},
@@ -234,7 +240,6 @@ class Predictor:
             "corrector": self.corrector.header(),
             "bands": None if self.bands is None else self.bands.header(),
         }
-        target = Path(file)
         if target.is_dir():
             raise ResultError("is a folder: name a file to write", file=target)
         arrays = {"header": np.array(json.dumps(header)), **self.corrector.arrays()}
@@ -388,6 +393,7 @@ def fit(
             shown = given.__name__ if isinstance(given, type) else type(given).__name__
             raise DataError(f"{name} must be an object of the class {kind.__name__}, not {shown}")
     one_of("commands", commands, get_args(Commands), DataError)
+    by_name("kinds", kinds or {}, "the name of a run to a kind of manoeuvre", DataError)
     seed, refits = whole("seed", seed, 0, DataError), whole("refits", refits, 0, DataError)
     if (physics.horizon, physics.step) != (windows.horizon, windows.step):
         message = f"the physics has {physics.horizon} steps of {physics.step:g} s"

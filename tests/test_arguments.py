@@ -13,6 +13,7 @@ import torch
 import shipid
 from shipid.arguments import numbers, of_class, one_of, positive, whole
 from shipid.errors import DataError, ShipidError
+from shipid.export.write import export_predictor, export_vessel
 
 
 @pytest.mark.parametrize("value", [3, 3.0, np.int32(3), np.uint8(3), np.float32(3), np.array(3)])
@@ -76,9 +77,9 @@ def test_what_holds_no_numbers_is_refused(values: Any) -> None:
 
 def test_an_object_of_another_class_comes_with_the_way_to_the_right_one() -> None:
     of_class("step", 1, int, "such as 1")
-    with pytest.raises(DataError, match=r"vessel must be a int, such as 1, not 'mariner'"):
+    with pytest.raises(DataError, match=r"vessel must be an int, such as 1, not 'mariner'"):
         of_class("vessel", "mariner", int, "such as 1", DataError)
-    with pytest.raises(ShipidError, match=r"vessel must be a int, such as 1, not list"):
+    with pytest.raises(ShipidError, match=r"vessel must be an int, such as 1, not list"):
         of_class("vessel", [1], int, "such as 1")
 
 
@@ -92,6 +93,26 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "check_dataset": (lambda: shipid.check_dataset(ANY), "dataset must be a Dataset, as of"),
     "import_log": (lambda: shipid.import_log(ANY, "log.csv"), "mapping must be a Mapping, as of"),
     "identify": (lambda: shipid.identify(ANY, ANY, [], ANY), "dataset must be a Dataset, as of"),
+    "rollout commands": (
+        lambda: shipid.rollout(shipid.load_vessel("mariner"), {}, ANY, step=1.0, num_steps=1),
+        "commands must be a dict, of a name to an array, not object",
+    ),
+    "Vessel": (lambda: shipid.Vessel({}, "x"), "no document of a vessel: read one with `load_vessel`"),
+    "standard": (lambda: shipid.standard(ANY, "zigzag"), "vessel must be a Vessel, as of"),
+    "Physics": (lambda: shipid.Physics(None, 2, 1.0, observer=ANY), "observer must be an Observer, such as"),
+    "draw": (lambda: shipid.draw(ANY, 0, ANY), "family must be a Family, such as"),
+    "numbers": (lambda: shipid.members(shipid.Family(name="f"), ANY, numbers=ANY), "base must be a Vessel"),
+    "run_identification": (lambda: shipid.run_identification(ANY, ANY, ANY), "settings must be an Identify, such as"),
+    "screen": (lambda: next(shipid.screen(ANY, ANY, [], 1)), "plan must be a Plan, as of"),
+    "compare": (lambda: shipid.compare(ANY), "name two folders or more"),
+    "compare_methods": (lambda: shipid.compare_methods(ANY), "results must be a Results, as of"),
+    "read_dataset": (lambda: shipid.read_dataset(ANY), "file must be a path, a text or a Path, not <object"),
+    "read_results": (lambda: shipid.read_results(ANY), "folder must be a path"),
+    "read_cells": (lambda: shipid.read_cells(ANY), "folder must be a path"),
+    "write_pages": (lambda: shipid.write_pages(ANY), "folder must be a path"),
+    "guess": (lambda: shipid.guess(ANY), "path must be a path"),
+    "export_predictor": (lambda: export_predictor(ANY, "c", "x"), "give a Predictor, as of `fit` or `Predictor.load`"),
+    "export_vessel": (lambda: export_vessel(ANY, "c", ANY), "out must be a path"),
     "run_study": (lambda: next(shipid.run_study(ANY, "run")), "plan must be a Plan, as of"),
 }
 

@@ -17,7 +17,7 @@ import pyarrow
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from shipid.arguments import of_class
+from shipid.arguments import of_class, path_of
 from shipid.errors import DataError, choices
 from shipid.files import open_file, whole
 from shipid.physics.signals import SIGNALS, is_command, is_output, named, signal_of
@@ -76,6 +76,8 @@ class Dataset:
 
         Names that no run has are passed over.
         """
+        if not isinstance(runs, Iterable):
+            raise DataError(f"runs must be the name of a run, or several names, not {runs!r}")
         names = [runs] if isinstance(runs, str) else list(runs)
         chosen = self.frame["run"].isin(names)
         if not chosen.any():
@@ -307,7 +309,7 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
     cannot be written.
     """
     of_class("dataset", dataset, Dataset, "such as Dataset(frame, metadata)", DataError)
-    target = Path(file)
+    target = path_of("file", file, DataError)
     if target.suffix != ".parquet":
         raise DataError("a dataset is a Parquet file: let the name end in .parquet", file=target)
     metadata = {"units": units_of(map(str, dataset.frame.columns)), **dataset.metadata}
@@ -327,6 +329,7 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
 
 def read_dataset(file: str | os.PathLike[str]) -> Dataset:
     """Read a dataset that `write_dataset` wrote; raises DataError for anything else, naming file and column."""
+    file = path_of("file", file, DataError)
     if os.path.isdir(file):
         raise DataError("is a folder: name one dataset; `shipid data join` makes one of several", file=file)
     try:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.arguments import numbers, whole
+from shipid.arguments import by_name, numbers, of_class, whole
 from shipid.engine.engines import REPEATED, Engine, chosen, done_by, named
 from shipid.engine.integrate import Array, Batch, Job, Method
 from shipid.errors import DataError, ShipidError, choices
@@ -193,8 +193,13 @@ def prepared(
     helmsman: Helmsman | None,
 ) -> tuple[Dynamics, Batch]:
     """Equations, and inputs as a `Batch`; DataError or ShipidError for a missing input or a wrong shape."""
+    given = {"start": start, "commands": commands, "environment": environment, "components": components}
+    for name, value in (given if memory is None else {**given, "memory": memory}).items():
+        by_name(name, value, "a name to an array")
+    if helmsman is not None:
+        of_class("helmsman", helmsman, Helmsman, "as of `Manoeuvre.helmsman`")
     model = dynamics(vessel, helmsman)
-    first = None if start is None else next((name for name in model.state if name in start), None)
+    first = next((name for name in model.state if name in start), None)
     if first is None:
         raise DataError(f"start holds no state; {vessel.name} needs {', '.join(model.state)}")
     shape = np.shape(start[first])

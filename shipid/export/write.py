@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Literal, get_args
 
+from shipid.arguments import path_of
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.export.blocks import Precision
@@ -40,6 +41,8 @@ def export_predictor(
     ------
     ShipidError : the target does not exist, cannot take the method, or the compiler fails.
     """
+    if not hasattr(predictor, "corrector"):
+        raise DocumentError(f"give a Predictor, as of `fit` or `Predictor.load`, not {type(predictor).__name__}")
     target, file = _checked(to, out, single)
     kept = model(predictor)
     title = c_name(name or file.stem)
@@ -80,10 +83,10 @@ def export_vessel(
 
 def _checked(to: str, out: str | os.PathLike[str], single: bool) -> tuple[str, Path]:
     if to not in TARGETS:
-        raise DocumentError(f"no such target: {choices(to, TARGETS)}", path="--to")
+        raise DocumentError(f"no such target: {choices(str(to), TARGETS)}", path="--to")
     if single and to not in ("c", "onnx"):
         raise DocumentError(f"{to} is always in double precision: leave --single out", path="--single")
-    file = Path(out)
+    file = path_of("out", out)
     if to == "c" and file.exists() and not file.is_dir():
         raise DocumentError("is a file: the target c takes a folder", file=file, path="--out")
     if to != "c" and file.is_dir():

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from shipid.arguments import one_of, positive, whole
+from shipid.arguments import of_class, one_of, positive, whole
 from shipid.data.windows import Instants, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance
@@ -52,6 +52,8 @@ class Physics:
         object.__setattr__(self, "horizon", whole("horizon", self.horizon, 1))
         object.__setattr__(self, "step", positive("step", self.step))
         one_of("integrator", self.integrator, get_args(Integrator))
+        if self.observer is not None:
+            of_class("observer", self.observer, Observer, "such as Observer(), or None")
         one_of("path", self.path, ("position", "velocity"))
 
     def with_values(self, values: Mapping[str, Any]) -> Physics:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from shipid import document as documents
+from shipid.arguments import of_class
 from shipid.data.dataset import Dataset, apart_from
 from shipid.data.outputs import common_outputs, compare_outputs
 from shipid.document import short_names
@@ -241,6 +242,7 @@ def run_identification(
     DocumentError, DataError : vessel, dataset, settings and runs do not fit together.
     ShipidError : the fit did not converge; the message says why.
     """
+    of_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
     check_level(band)
     fitted, tested = check(vessel, dataset, settings, runs, held_out, ahead=ahead, profiles=profiles)
     digest = dataset.digest

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.arguments import of_class
+from shipid.arguments import by_name, numbers, of_class
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.covariance import inverted
@@ -110,6 +110,8 @@ def identify(
     """
     of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     of_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
+    if start is not None and not isinstance(start, Solution):
+        by_name("start", start, "a path to a factor, or a Solution", DocumentError)
     runs = (runs,) if isinstance(runs, str) else tuple(str(run) for run in (() if runs is None else runs))
     plain = settings.model_copy(update={"discount": False})
     solution = _identified(vessel, dataset, runs, plain, start, progress)
@@ -213,7 +215,7 @@ def _factors(problem: Problem, start: Mapping[str, float]) -> Array:
         if path not in unknown.paths:
             message = f"{path!r} is not free in the fit: {choices(path, unknown.paths)}"
             raise DocumentError(message, file=problem.vessel.file, path=f"{BLOCK}.start")
-        factors[unknown.paths.index(path)] = factor
+        factors[unknown.paths.index(path)] = float(numbers(f"start of {path}", factor, DocumentError))
     return np.asarray(np.clip(factors, unknown.low, unknown.high))
 
 

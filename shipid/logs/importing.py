@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.arguments import of_class
+from shipid.arguments import of_class, path_of
 from shipid.data.dataset import (
     BREAK,
     STANDARD_DEVIATIONS,
@@ -111,7 +111,7 @@ def import_log(
     DataError : with the log, the row or the key of the mapping, and what would be right.
     """
     of_class("mapping", mapping, Mapping, "as of `read_mapping`", DataError)
-    source, off = Path(file), tuple(without)
+    source, off = path_of("file", file, DataError), tuple(without)
     for kind in off:
         if kind not in REPAIRS:
             raise DataError(f"no repair of this kind: {choices(kind, REPAIRS)}", path=kind)

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.arguments import numbers, one_of, positive
+from shipid.arguments import by_name, numbers, one_of, positive
 from shipid.engine.casadi import orders_of, outputs_of
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
@@ -86,6 +86,7 @@ def perform(
     if twice is not None:
         raise DocumentError(f"two runs are named {twice!r}", path="manoeuvre.name")
     rows = [_rows(one.length if duration is None else duration, step * every) for one in manoeuvres]
+    by_name("environment", environment or {}, "a name to a number or an array")
     weather = _weather(vessel, environment or {}, len(manoeuvres), every * (max(rows) - 1) + 1)
     one_of("method", method, get_args(Method))
     for name in outputs:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.arguments import numbers
+from shipid.arguments import numbers, of_class
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import ShipidError, choices
 from shipid.simulation.approach import Controls, acceleration
@@ -87,6 +87,7 @@ def standard(
     ShipidError : an unknown name, side or approach, angles that do not fit, no length, a speed that no shaft speed
         gives, a time that is not positive.
     """
+    of_class("vessel", vessel, Vessel, "as of `load_vessel`")
     if name not in KINDS:
         raise ShipidError(f"no manoeuvre is called {name!r}: {choices(name, KINDS)}", path="NAME")
     build, most = KINDS[name]
@@ -107,7 +108,7 @@ def standard(
     length = length_of(vessel)
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
-    asked = service_speed(vessel) if speed is None else speed
+    asked = service_speed(vessel) if speed is None else float(numbers("speed", speed))
     n_rpm = (shaft_speed(Controls.of(vessel), asked) if n is None else n) / RPM
     passing = length / asked  # s for one length
     interval = _round(passing / ROWS) if step is None else step * STEPS

@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
+from shipid.arguments import path_of
 from shipid.errors import ResultError
 from shipid.files import temporary_folder, write_table, write_text
 from shipid.report import Finding, ReportContent, Sentence, Snapshot, write_report, write_summary
@@ -87,7 +88,7 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
 
     Raises ResultError if the folder holds no run or cannot be written.
     """
-    folder = Path(folder)
+    folder = path_of("folder", folder)
     store.stored_plan(folder)
     with Claims(folder) as claims, claims.alone(PAGES):
         return _write(folder, say)

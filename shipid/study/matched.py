@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.arguments import path_of
 from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError, ShipidError, choices
 from shipid.metrics import over_time, position_error
@@ -66,9 +67,9 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
 
     Raises ResultError for a folder without a result, ShipidError where no cell matches.
     """
-    if isinstance(folders, str | os.PathLike) or len(folders) < 2:
+    if isinstance(folders, str | os.PathLike) or not isinstance(folders, Sequence) or len(folders) < 2:
         raise ShipidError("name two folders or more")
-    places = [Path(folder) for folder in folders]
+    places = [path_of("folder", folder) for folder in folders]
     real = [os.path.realpath(place) for place in places]
     twice = next((place for place, one in zip(places, real, strict=True) if real.count(one) > 1), None)
     if twice is not None:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtrit
 
+from shipid.arguments import of_class
 from shipid.metrics import over_time, position_error
 from shipid.study.evidence import mean_errors
 from shipid.study.memory import paired_interval
@@ -32,6 +33,7 @@ def compare_methods(results: Results) -> pd.DataFrame:
     The family `with physics` is the mean over all families but `none`. The difference is that to the method by which
     the study judges. To choose the lowest H of a test chooses by the test: the interval does not count that.
     """
+    of_class("results", results, Results, "as of `read_results`")
     return compared(method_cells(results), results.plan.judged)
 
 

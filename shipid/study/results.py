@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid.arguments import path_of
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
 from shipid.errors import DataError, ResultError, ShipidError
@@ -140,7 +141,7 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
     trials (a list of dicts), and, of a study of several parts, condition and part. Raises ResultError for a folder
     without a finished cell.
     """
-    folder = Path(folder)
+    folder = path_of("folder", folder)
     plan = store.stored_plan(folder)
     if not plan.parts:
         return _labelled(store.read_rows(folder), plan)
@@ -164,7 +165,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
 
     say : called with a few words on how far it is.
     """
-    folder = Path(folder)
+    folder = path_of("folder", folder)
     plan = store.stored_plan(folder)
     if plan.parts:
         named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.arguments import of_class, whole
+from shipid.arguments import of_class, path_of, whole
 from shipid.capacity import processor
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
@@ -103,7 +103,7 @@ def run_study(
     Raises ShipidError for a plan that is none and for a number of workers below 1, before any work.
     """
     of_class("plan", plan, Plan, "as of `read_plan`")
-    folder = Path(folder)
+    folder = path_of("folder", folder)
     begun = time.perf_counter()
     workers = None if workers is None else whole("workers", workers, 1)
     check_device(device)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid.arguments import of_class
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.engine.engines import REPEATED
@@ -69,6 +70,8 @@ def screen(
 
     engine : as of `rollout`; "single" takes half the time and gives A to about six digits.
     """
+    of_class("plan", plan, Plan, "as of `read_plan`")
+    of_class("dataset", dataset, Dataset, "as of `read_dataset`")
     pool, test, _ = partition(plan, dataset)
     size = min(MEMBERS, max(1, NUMBERS // (len(pool) + len(test) + BINS)))
     for family in wanted:

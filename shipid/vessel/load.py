@@ -52,6 +52,10 @@ class Vessel:
     document: Document
     file: str
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.document, Mapping) or "inertia" not in self.document:
+            raise DocumentError("no document of a vessel: read one with `load_vessel`, change it with `with_values`")
+
     @cached_property
     def digest(self) -> str:
         """Digest of the document, so that a patch knows its base."""

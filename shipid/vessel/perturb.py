@@ -300,6 +300,8 @@ def members(
 ) -> list[Variant]:
     """Members of a resolved family, all or those of the given numbers from 0, none redrawn."""
     changes = _changes(family, base, file)
+    if not isinstance(numbers, Iterable | None):
+        raise DocumentError(f"numbers must be several whole numbers, such as [0, 1], not {numbers!r}")
     wanted = range(family.members) if numbers is None else numbers
     original = base.parameters  # one for all members: a family may have many
     return [_draw(family, changes, number, base, original, 0, file) for number in wanted]
@@ -319,6 +321,7 @@ class _Change:
 
 def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Change]:
     """Perturbations of a family on its base; DocumentError for a path that the base does not have."""
+    of_class("family", family, Family, "such as Family(name=..., perturb=[...])")
     of_class("base", base, Vessel, "as of `load_vessel`")
     if family.extends is not None:
         message = f"extends {family.extends!r}, whose perturbations come first: write them out, or use `resolve`"

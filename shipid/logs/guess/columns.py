@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from shipid.arguments import path_of
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
@@ -81,7 +82,7 @@ def guess(
     ------
     DataError : if the log cannot be read, has no clock, no heading or no position, or does not move as in that frame.
     """
-    source = read_source(Path(path), names)
+    source = read_source(path_of("path", path, DataError), names)
     sniffed = source.sniffed
     columns = evidence.filled(sniffed.t, sniffed.columns.items())
     spiky = take_spikes(sniffed.t, columns)
