@@ -248,8 +248,9 @@ def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], 
 
     log, fitted, _ = without_shared(log, *pick_runs(log, runs, test))
     try:
-        ahead, step = proposed_horizon(ship, log)
-        look = first_look(ship, log, fitted, ahead=ahead, step=step)
+        with steps("comparing the vessel as she is with the runs, before the fit"):
+            ahead, step = proposed_horizon(ship, log)
+            look = first_look(ship, log, fitted, ahead=ahead, step=step)
     except DataError:
         return  # the fit says what is missing
     if look.wrong:
