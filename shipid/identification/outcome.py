@@ -274,7 +274,7 @@ def run_identification(
         _go_on(held)
         warnings = (
             *shared,
-            *_blurred(dataset, fitted, settings),
+            *solution.warnings,
             *_warnings(solution, judged, pairs),
             *_left(solution, curves),
         )
@@ -569,18 +569,6 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
         ratio=variance_ratio(judged, path),
         bounds=(float(unknown.low[index]), float(unknown.high[index])),
     )
-
-
-def _blurred(dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
-    """A warning if the step of the fit is longer than the interval of the log."""
-    rows = dataset.frame[dataset.frame["run"].isin(runs)]
-    between = float(rows.groupby("run", sort=False)["t"].diff().median())
-    if settings.step <= 1.5 * between:
-        return []
-    return [
-        f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: faster "
-        f"changes of the commands are lost; compare with step {between:.3g}"
-    ]
 
 
 def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:

@@ -49,6 +49,7 @@ class Solution:
     at_bound : (n,) whether the estimate is at a bound. held : (n,) factors that are not free: dropped, or given
         bounds that are equal. dropped : paths of the former.
     effective : signal -> independent residuals that its residuals were counted as, where `discount` is on.
+    warnings : what the fit cannot see, one sentence each: a step that is longer than the interval of the log.
     """
 
     vessel: Vessel
@@ -77,6 +78,7 @@ class Solution:
     point: Point = field(repr=False)
     dropped: tuple[str, ...] = ()
     effective: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
     @property
     def identified(self) -> Vessel:
@@ -173,7 +175,8 @@ def _identified(
         factors = np.where(np.arange(len(targets)) == weakest, targets, solution.factors)
         result = search(problem, factors, _point(result), progress, before=result.iterations)
         solution = replace(_solution(problem, result, objective_start, time.perf_counter() - begun), dropped=dropped)
-    return solution
+    warning = _blurred(dataset, runs, settings)
+    return replace(solution, warnings=(warning,) if warning else ())
 
 
 def _searched(
@@ -205,6 +208,18 @@ def _searched(
             break
     assert result is not None
     return result, objective_start
+
+
+def _blurred(dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
+    """A warning if the step of the fit is longer than the interval of the log, else no text."""
+    rows = dataset.frame[dataset.frame["run"].isin(runs)]
+    between = float(rows.groupby("run", sort=False)["t"].diff().median())
+    if settings.step <= 1.5 * between:
+        return ""
+    return (
+        f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: faster "
+        f"changes of the commands are lost; compare with step {between:.3g}"
+    )
 
 
 def _factors(problem: Problem, start: Mapping[str, float]) -> Array:

@@ -72,6 +72,14 @@ def test_it_converges_from_where_whole_runs_diverge(seed: int) -> None:
     assert np.allclose(solution.factors, 1, atol=1e-4)
 
 
+def test_a_step_longer_than_the_interval_of_the_log_is_a_warning_of_the_solution() -> None:
+    """As the command says it; before, who called from Python did not learn of it."""
+    dataset = trials(SHIP, runs=2, steps=30)
+    assert identify(SHIP, dataset, dataset.runs, settings()).warnings == ()
+    (warning,) = identify(SHIP, dataset, dataset.runs, settings(step=2.0)).warnings
+    assert warning.startswith("rows of the log are 1 s apart and commands are held over steps of 2 s: faster")
+
+
 def test_ties_share_a_factor_and_what_is_fixed_stays() -> None:
     truth = SHIP.with_values({path: 1.2 * SHIP.parameters[path] for path in FEW[:2]})
     dataset = trials(truth, runs=4)
