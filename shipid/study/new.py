@@ -42,6 +42,7 @@ MOST_AMOUNTS, MOST_WINDOWS = 6, 20000
 LENGTHS_AHEAD = (
     2.5  # ship lengths: the paper's experiments look 2.3 (15 s at full scale) and 2.4 (30 s, simulated) ahead
 )
+WIND, WIND_LENGTH = 6.0, 28.9  # m/s, m: up to a moderate breeze on R/V Gunnerus, as in the bundled studies
 HORIZONS = (1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 450, 600)  # s
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
 STEPS, LOGGED_STEPS, LONGEST_STEP = 15, 30, 2.0  # steps ahead at least, of constant and of recorded orders; s
@@ -541,8 +542,20 @@ def _truth(
     yield Choice("truth.interval", step, "s between logged rows")
     weather = dynamics(vessel).environment
     if "V_w" in weather:
-        yield Choice("truth.wind_speed", [0.0, 6.0], "m/s, from anywhere: up to a moderate breeze")
+        yield wind_for(length)
     yield _turning(controls, service, rpm)
+
+
+def wind_for(length: float) -> Choice:
+    """Wind for a ship of a length [m]: WIND, on a ship shorter than WIND_LENGTH by Froude's rule, and why.
+
+    V = WIND sqrt(L / WIND_LENGTH): as hard for her as the wind of the bundled studies is for their ship.
+    """
+    if length >= WIND_LENGTH:
+        return Choice("truth.wind_speed", [0.0, WIND], "m/s, from anywhere: up to a moderate breeze")
+    speed = float(f"{WIND * (length / WIND_LENGTH) ** 0.5:.2g}")
+    why = f"{WIND:g} m/s on a ship of {WIND_LENGTH:g} m (R/V Gunnerus in the bundled studies), by Froude's rule"
+    return Choice("truth.wind_speed", [0.0, speed], f"m/s, from anywhere: {why} (sqrt of length) on {length:.3g} m")
 
 
 def _turning(controls: Controls, service: float, rpm: float) -> Choice:

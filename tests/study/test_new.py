@@ -22,7 +22,17 @@ from shipid.logs.mapping import read_mapping
 from shipid.simulation.approach import Controls
 from shipid.study import new
 from shipid.study.first_look import GROUPS, Change, Look
-from shipid.study.new import LEAST_RUNS, SHARE_OF_RUN, _ahead, _turning, draft_study, horizon_of, ladder, step_of
+from shipid.study.new import (
+    LEAST_RUNS,
+    SHARE_OF_RUN,
+    _ahead,
+    _turning,
+    draft_study,
+    horizon_of,
+    ladder,
+    step_of,
+    wind_for,
+)
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.survey import helm_sense, separation, survey, typical_runs
@@ -296,6 +306,16 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
     assert truth is not None
     assert truth.duration >= plan.study.prediction.horizon * plan.study.prediction.step
     assert max(plan.study.grid.N_D) == truth.manoeuvres - plan.study.split.test  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("length", "wind"),
+    [(300.0, 6.0), (28.9, 6.0), (4.0, 2.2), (2.91, 1.9), (0.69, 0.93)],  # 6 sqrt(L / 28.9)
+)
+def test_wind_is_that_of_a_small_ship_by_froudes_rule(length: float, wind: float) -> None:
+    choice = wind_for(length)
+    assert choice.value == [0.0, wind]
+    assert (f"by Froude's rule (sqrt of length) on {length:g} m" in choice.why) == (length < 28.9)
 
 
 def test_a_ship_without_helm_gets_an_order_for_each_screw() -> None:
