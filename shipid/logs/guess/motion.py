@@ -26,6 +26,7 @@ FASTEST, HARDEST, SLOWEST = 100.0, 20.0, 0.02  # m/s, m/s^2, m/s: no ship goes o
 FROUDE = 4.0  # U / sqrt(g L): nothing that is steered in trials is faster for its length
 OFF_UNIT = 0.15  # relative distance of a fitted scale from a unit
 PLAIN, OFF_RARE = ("m/s", "kn", "km/h"), 0.03  # units that logs have, and the same distance for a unit that few have
+ALONG = 0.1  # share of the track that a speed along the heading may leave unexplained
 
 
 @dataclass(frozen=True)
@@ -362,11 +363,34 @@ def check_clock(state: State, length: float = np.inf) -> None:
 
     length : of the ship [m], where it is known. A slow model whose clock is in minutes goes as a fast ship does.
     """
-    if is_possible(state, length) or any("t" in question.about for question in state.questions):
+    if any("t" in question.about for question in state.questions) or _asked_by_speed(state):
+        return
+    if is_possible(state, length):
         return
     speed, across = pace(state)
     goes = f"by the drafted clock, in {state.clock_unit}, the ship goes {speed:.3g} m/s and turns at {across:.3g} m/s^2"
     state.ask(("t", "north", "east"), f"{goes}: are the units of the clock and of the positions right?")
+
+
+def _asked_by_speed(state: State) -> bool:
+    """Ask where a recorded speed along the heading gives the track only with a clock in another unit, as in minutes."""
+    assert state.psi is not None
+    assert state.position is not None
+    seen, way = state.chosen.change(state.position), np.exp(1j * state.psi)
+    for name in state.called("speed"):
+        written = unit_in_name(name, "m/s")
+        fit = evidence.fit(seen, state.chosen.change(evidence.integral(state.t, state.columns[name] * way)))
+        if fit.left > ALONG:
+            continue
+        for unit in (written,) if written is not None else PLAIN:
+            ratio = fit.scale / to_si(unit, "u")
+            other = _clock_unit(state, ratio)
+            if other is not None:
+                begins = f"the track is {ratio:.4g} times the integral of {name!r} in {unit}"
+                why = f"is the clock in {other}? The draft says {state.clock_unit}, with which {begins}"
+                state.ask(("t", "north", "east"), why)
+                return True
+    return False
 
 
 def choose_yaw_rate(state: State, most: float = 0.3) -> None:

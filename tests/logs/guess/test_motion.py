@@ -167,6 +167,19 @@ def test_a_slow_model_that_goes_as_none_of_its_length_does_is_asked(wrong: float
     assert len(state.questions) == asked
 
 
+@pytest.mark.parametrize(("name", "factor"), [("speed [m/s]", 1.0), ("sog_kn", 1852 / 3600), ("speed", 1.0)])
+@pytest.mark.parametrize(("wrong", "asked"), [(1.0, 0), (60.0, 1), (3600.0, 1)])
+def test_a_recorded_speed_says_that_the_clock_is_in_another_unit(
+    wrong: float, asked: int, name: str, factor: float
+) -> None:
+    """Also of a slow model, whose pace alone is possible: no course is logged, so that no velocity says it."""
+    state = state_with_pose({name: np.hypot(U, V) / factor}, 1.0 / wrong)
+    check_clock(state, np.inf)
+    assert len(state.questions) == asked
+    if asked:
+        assert f"is the clock in {'min' if wrong == 60 else 'h'}?" in state.questions[0].sentence
+
+
 def test_a_factor_that_no_sensor_has_is_asked_and_not_repaired() -> None:
     state = state_with_pose({"u [m/s]": U / 7.0, "v [m/s]": V / 7.0})
     choose_velocities(state)
