@@ -386,7 +386,7 @@ def _place(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
     """The parts of a pydantic location that are keys or indices of the data, without the names of union members."""
     location = problem["loc"]
     for position, part in enumerate(location):
-        listed = isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)
+        listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
         if listed or (isinstance(data, Mapping) and part in data):
             data = data[part]
         elif problem["type"] != "missing" or position < len(location) - 1:
