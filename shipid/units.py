@@ -21,3 +21,8 @@ def decimals_of(length: float) -> int:
     """
     size = abs(length)
     return 4 if 0.00005 <= size < 0.00995 else 3 if 0.00995 <= size < 0.0995 else 2
+
+
+def length_text(length: float) -> str:
+    """A length [m] as text, with the decimals of `decimals_of`."""
+    return f"{length:.{decimals_of(length)}f}"

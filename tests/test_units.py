@@ -7,7 +7,7 @@ import math
 import pytest
 
 from shipid.logs.mapping import UNITS
-from shipid.units import DEGREE, KNOT, MINUTE, RPM
+from shipid.units import DEGREE, KNOT, MINUTE, RPM, length_text
 
 
 @pytest.mark.parametrize(
@@ -25,3 +25,10 @@ def test_logs_use_the_same_factors() -> None:
     assert UNITS["m/s"]["kn"] == KNOT
     assert UNITS["s"]["min"] == MINUTE
     assert UNITS["rev/s"]["rad/s"] == pytest.approx(1 / (2 * math.pi))
+
+
+@pytest.mark.parametrize(
+    ("length", "text"), [(14.018, "14.02"), (0.1, "0.10"), (0.0344, "0.034"), (-0.00052, "-0.0005"), (0.0, "0.00")]
+)
+def test_lengths_of_a_small_model_are_no_zeros(length: float, text: str) -> None:
+    assert length_text(length) == text

@@ -14,8 +14,9 @@ from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import bundled_or_file, files
 from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyName, Workers, parsed, stem
 from shipid.cli.outputs import check_output
-from shipid.cli.terminal import counted, digits, draw, length, short, show_reasons, steps, table
+from shipid.cli.terminal import counted, digits, draw, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
+from shipid.units import length_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -154,7 +155,7 @@ def _factors(row: dict[str, Any]) -> list[str]:
     words += [f"{value:g} in place of 0" for value in row["from_zero"].values()]
     names = short_names([*row["factors"], *row["from_zero"]])
     shown = ", ".join(f"{name} {word}" for name, word in zip(names, words, strict=True))
-    accuracy = "-" if row["A"] is None else length(row["A"])
+    accuracy = "-" if row["A"] is None else length_text(row["A"])
     note = "observer chosen from the runs of each cell, so A differs by cell" if row["observer_chosen"] else ""
     return [row["foundation"], accuracy, str(len(names)), ", ".join(filter(None, (shown, note)))]
 
@@ -193,7 +194,7 @@ def study_screen(
     write_table(file, frame)
     spread = screen.spread(frame)
     shares = [f"{share:.0%}" for share in screen.SHARES]
-    rows = [[*map(str, row[:3]), *(length(value) for value in row[3:])] for row in spread.itertuples(index=False)]
+    rows = [[*map(str, row[:3]), *map(length_text, row[3:])] for row in spread.itertuples(index=False)]
     correlations = screen.drivers(frame)
     pairs = [
         (str(row.family), str(row.paths), f"{row.factor:+.2f}", f"{row.away:+.2f}") for row in correlations.itertuples()
@@ -419,7 +420,7 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in findings.itertuples()]
     shown = table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True))
     answer.rows("findings", findings, shown if len(findings) else None)
-    means, lows, highs = ([length(value) for value in errors[name]] for name in ("mean", "low", "high"))
+    means, lows, highs = (errors[name].map(length_text) for name in ("mean", "low", "high"))
     texts = [f"{mean} [{low}, {high}]" for mean, low, high in zip(means, lows, highs, strict=True)]
     several = bool(errors.duplicated(["family", "N_D"]).any())
     names = errors["family"] + (" + " + errors["method"]).where((errors["N_D"] > 0) & several, "")
@@ -435,7 +436,8 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     rows = [
         [
             *(str(row[name]) for name in ("family", "method", "N_D")),
-            *(f"{row[n]:.2f} [{row[f'{n}_low']:.2f}, {row[f'{n}_high']:.2f}]" for n in ("coverage", "width")),
+            "{:.2f} [{:.2f}, {:.2f}]".format(*(row[f"coverage{end}"] for end in ("", "_low", "_high"))),
+            "{} [{}, {}]".format(*(length_text(row[f"width{end}"]) for end in ("", "_low", "_high"))),
             str(row["worlds"]),
         ]
         for row in bands.to_dict("records")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from shipid.errors import visible
-from shipid.units import decimals_of
+from shipid.units import length_text
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -24,11 +24,6 @@ if TYPE_CHECKING:
 SILENCE, LOOK = 15.0, 2.0  # s without a line before there is one; between looks at the searches on a terminal
 HANDLER = "command line"
 """Name of the handler that writes log messages to standard error."""
-
-
-def length(value: float) -> str:
-    """Write a length [m] with two decimals, and below 0.1 m with two digits."""
-    return f"{value:.{decimals_of(value)}f}"
 
 
 def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> Table:
@@ -308,7 +303,7 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
                     best = min((best or row, row), key=lambda r: r["H"])
                     worst = max((worst or row, row), key=lambda r: r["H"])
                 label = (
-                    f"best {best['cell']} {length(best['H'])} m, worst {worst['cell']} {length(worst['H'])} m"
+                    f"best {best['cell']} {length_text(best['H'])} m, worst {worst['cell']} {length_text(worst['H'])} m"
                     if best
                     else "cells"
                 )

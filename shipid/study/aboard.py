@@ -25,6 +25,7 @@ from shipid.predictor import Predictor
 from shipid.study.apply import Band, along_run
 from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
+from shipid.units import length_text
 
 Array = np.ndarray
 TRACK = ["run", "t", "north", "east"]
@@ -249,11 +250,9 @@ def summary(played: Played) -> list[str]:
         here = merged[(merged["ahead"] == moment) & merged["error"].notna()]
         if len(here):
             error, alarm = here["error"].to_numpy(), here["outside"].to_numpy(dtype=bool)
-            inside = f"{np.median(error[alarm]):.2f}" if alarm.any() else "-"
-            lines.append(
-                f"{moment:>36g} s {np.median(error):>8.2f} {np.quantile(error, 0.9):>6.2f} {error.max():>7.2f} "
-                f"{inside:>10}"
-            )
+            median, most, worst = map(length_text, (np.median(error), np.quantile(error, 0.9), error.max()))
+            inside = length_text(np.median(error[alarm])) if alarm.any() else "-"
+            lines.append(f"{moment:>36g} s {median:>8} {most:>6} {worst:>7} {inside:>10}")
     return lines
 
 
@@ -298,10 +297,8 @@ def _promise(played: Played) -> list[str]:
     points = played.points
     for moment in _moments(points):
         here = points[points["ahead"] == moment]
-        along, across = here["band_along"].to_numpy(), here["band_across"].to_numpy()
-        lines.append(
-            f"  {moment:g} s ahead: {np.median(along):.2f} m along the track, {np.median(across):.2f} m across (median)"
-        )
+        along, across = (length_text(np.median(here[name])) for name in ("band_along", "band_across"))
+        lines.append(f"  {moment:g} s ahead: {along} m along the track, {across} m across (median)")
     return lines
 
 

@@ -25,18 +25,6 @@ def test_digits() -> None:
     assert [digits(value) for value in (1.23456, -0.00001, float("nan"), 1.6e9)] == ["1.235", "0", "-", "1600000000.0"]
 
 
-def test_lengths_of_a_small_model_are_no_zeros() -> None:
-    from shipid.cli.terminal import length
-
-    assert [length(value) for value in (14.018, 0.1, 0.0344, 0.00052, 0.0)] == [
-        "14.02",
-        "0.10",
-        "0.034",
-        "0.0005",
-        "0.00",
-    ]
-
-
 class Still:
     """A watch that sees two searches of which one moves."""
 

@@ -144,6 +144,19 @@ def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tm
     )
 
 
+def test_lengths_of_a_small_model_are_no_zeros_in_a_summary(banded, tmp_path):
+    _, file = banded
+    played = play(file, saved(log(), tmp_path), level=0.9)
+    small = played.points.copy()
+    small[["error", "band_along", "band_across"]] /= 3e3
+    lines = summary(replace(played, points=small))
+    heads = [line.startswith("error where the log goes on") for line in lines]
+    table = lines[heads.index(True) + 1 :]
+    assert table
+    said = [*table, *(line for line in lines if "across (median)" in line)]
+    assert not any(" 0.00 " in line for line in said), said
+
+
 def test_a_summary_says_when_bands_hold_less_than_promised_by_more_than_chance(banded, tmp_path):
     """Eight runs like those of training; then of a ship that is far faster than her log says."""
     fitted, _ = banded
