@@ -140,14 +140,15 @@ def table(content: ReportContent) -> Table | None:
     frame = _frame(content, "coverage")
     if frame.empty:
         return None
+    width, end = length_places(frame["width"]), length_places(frame["end"])
     rows = [
         [
             text(row["model"]),
             figure(row["N_D"], 0),
             Cell(_percent(row["level"]), row["level"]),
             _share(row),
-            figure(row["width"], length_places(frame["width"])),
-            figure(row["end"], length_places(frame["end"])),
+            figure(row["width"], width),
+            figure(row["end"], end),
             figure(row["lengths"], 3),
         ]
         for row in frame.to_dict("records")
@@ -185,13 +186,14 @@ def groups(content: ReportContent) -> Table | None:
     if frame.empty:
         return None
     frame = frame[frame.model.isin(exemplars(content))]
+    width = length_places(frame["width"])
     rows = [
         [
             text(row["model"]),
             text(BY[row["by"]]),
             text(row["group"]),
             _share(row),
-            figure(row["width"], length_places(frame["width"])),
+            figure(row["width"], width),
             figure(row["runs"], 0),
             text(row["note"] or None),
         ]

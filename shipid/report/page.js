@@ -236,12 +236,12 @@
     }));
   }
 
-  const browser = document.getElementById("browser");
-  // as `number` of the pages: two digits at least, for a model of a metre too
-  function lengthOf(value) {
+  // as `length_text` in Python
+  function lengthText(value) {
     return value.toFixed(value >= 0.0995 || value < 0.00005 ? 2 : value >= 0.00995 ? 3 : 4);
   }
 
+  const browser = document.getElementById("browser");
   if (browser) {
     const slider = browser.querySelector("input[type=range]");
     const list = browser.querySelector(".errors");
@@ -265,7 +265,7 @@
         item.firstChild.style.setProperty("--line", line.color);
         const error = document.createElement("span");
         error.className = "value";
-        error.textContent = path[4] === null ? "diverged" : `${lengthOf(path[4])} m`;
+        error.textContent = path[4] === null ? "diverged" : `${lengthText(path[4])} m`;
         item.append(name, error);
         return item;
       }));

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from shipid.report.content import PUBLISHED, ReportContent
+from shipid.report.content import PUBLISHED, Floats, ReportContent
 from shipid.report.wording import counted, fixed, listed, number
 
 
@@ -66,12 +66,21 @@ def figure(value: object, decimals: int) -> Cell:
 
 def decimals(values: pd.DataFrame | pd.Series[float]) -> int:
     """Decimals, three at most, that leave three digits to the median of some values."""
-    sizes = np.abs(np.asarray(values, dtype=float))
+    return _places(np.asarray(values, dtype=float), 3, 0, 3)
+
+
+def length_places(lengths: pd.Series[float]) -> int:
+    """Decimals of a column of lengths [m], from two to four, that leave two digits to the median."""
+    return _places(pd.to_numeric(lengths, errors="coerce").to_numpy(dtype=float), 2, 2, 4)
+
+
+def _places(values: Floats, digits: int, least: int, most: int) -> int:
+    """Decimals, from least to most, that leave so many digits to the median; two where all are 0 or missing."""
+    sizes = np.abs(values)
     sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
-    return int(np.clip(2 - np.floor(np.log10(np.median(sizes))), 0, 3)) if len(sizes) else 2
+    return int(np.clip(digits - 1 - np.floor(np.log10(np.median(sizes))), least, most)) if len(sizes) else 2
 
 
-MOST_PLACES = 4  # decimals of a length [m]
 MISSING = 1e300  # sorts after every number (page.js knows it)
 # Column of the frame -> heading and, of numbers, the decimals.
 CELLS = {
@@ -206,33 +215,19 @@ def _range(mine: pd.DataFrame, quantity: str) -> Cell:
 def _table(
     id_: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, tuple[str, int | None]]
 ) -> Table:
-    present = {
-        name: (
-            heading,
-            length_places(frame[name], places) if heading.endswith("[m]") and places is not None else places,
-        )
-        for name, (heading, places) in columns.items()
-        if name in frame.columns
+    headings = {name: heading for name, (heading, _) in columns.items() if name in frame.columns}
+    places = {
+        name: length_places(frame[name]) if heading.endswith("[m]") else columns[name][1]
+        for name, heading in headings.items()
     }
     rows = []
     for record in frame.to_dict("records"):
-        row = [
-            text(record[name]) if decimals is None else figure(record[name], decimals)
-            for name, (_, decimals) in present.items()
-        ]
-        if "status" in present and record["status"] != "ok":
+        row = [text(record[name]) if count is None else figure(record[name], count) for name, count in places.items()]
+        if "status" in places and record["status"] != "ok":
             status = f"{record['status']}: {record['sentence']}" if record.get("sentence") else str(record["status"])
-            row[list(present).index("status")] = Cell(status, status.lower(), bad=True)
+            row[list(places).index("status")] = Cell(status, status.lower(), bad=True)
         rows.append(row)
-    headings = [heading for heading, _ in present.values()]
-    return Table(id_, title, takeaway, headings, [decimals is not None for _, decimals in present.values()], rows)
-
-
-def length_places(lengths: pd.Series[float], usual: int = 2) -> int:
-    """Decimals of a column of lengths [m]: as many as usual, more where its middle one would have one digit or none."""
-    sizes = np.abs(pd.to_numeric(lengths, errors="coerce").to_numpy(dtype=float))
-    sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
-    return int(np.clip(1 - np.floor(np.log10(np.median(sizes))), usual, MOST_PLACES)) if len(sizes) else usual
+    return Table(id_, title, takeaway, [*headings.values()], [count is not None for count in places.values()], rows)
 
 
 def duration(seconds: float) -> str:

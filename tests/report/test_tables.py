@@ -50,7 +50,7 @@ def test_cells_count_their_trials(simulation):
 
 
 def test_errors_of_a_small_model_are_no_zeros(simulation):
-    """A hundredth of the errors, as of a model of a metre: no column of 0.00."""
+    """A 300th of the errors, as of a model of a metre: no column of 0.00."""
     small = simulation.cells.assign(H=simulation.cells.H / 300, A=simulation.cells.A / 300)
     table = cells(replace(simulation, cells=small))
     for name in ("H [m]", "A [m]"):
