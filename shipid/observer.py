@@ -33,7 +33,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.checked import Checked
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, clock_slack, stretches
-from shipid.data.windows import Windows, to_frame
+from shipid.data.windows import Commands, PathSource, Windows, to_frame
 from shipid.engine.casadi import summed_rates
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.integrate import Method
@@ -510,7 +510,7 @@ def observed_start(
     columns: Mapping[str, Array],
     horizon: int,
     step: float,
-    path: Literal["position", "velocity"] = "position",
+    path: PathSource = "position",
 ) -> ObservedStart:
     """The filtered state, the wind and the slow force that a rollout in moving water takes.
 
@@ -544,7 +544,7 @@ def observed_paths(
     *,
     planned: Mapping[str, Array] | None = None,
     memory: Mapping[str, Array] | None = None,
-    path: Literal["position", "velocity"] = "position",
+    path: PathSource = "position",
     engine: str = AUTO,
 ) -> tuple[Array, Array]:
     """Paths (T, S, 2) [m] of the physics with the observer, in the frame (11), and which diverged (S,).
@@ -595,8 +595,8 @@ def tune_observer(
     settings: Observer | None = None,
     *,
     method: Method = "euler",
-    commands: Literal["held", "known"] = "held",
-    path: Literal["position", "velocity"] = "position",
+    commands: Commands = "held",
+    path: PathSource = "position",
     memory: Mapping[str, Array] | None = None,
 ) -> tuple[Observer, dict[str, float]]:
     """Settings with the least mean error of prediction on training runs: coordinate search over a small grid.

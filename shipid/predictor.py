@@ -8,13 +8,14 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self, get_args, overload
+from typing import Annotated, Any, NamedTuple, Self, get_args, overload
 
 import numpy as np
 from pydantic import BaseModel, Field
 
 from shipid.arguments import by_name, numbers, one_of, path_of, whole
-from shipid.data.windows import Commands, Instants, Windows, fold_masks, run_folds
+from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, run_folds
+from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
@@ -333,10 +334,10 @@ class _Header(BaseModel):
 
     horizon: Annotated[int, Field(ge=1, le=MOST_STEPS)]
     step: Annotated[float, Field(gt=0, le=1e4)]
-    integrator: Literal["euler", "rk4"]
+    integrator: Integrator
     commands: Commands
     causal: list[str]
-    path: Literal["position", "velocity"]
+    path: PathSource
     limits: dict[str, tuple[float, float]]
     provenance: dict[str, Any]
     run_up: Annotated[float, Field(ge=0, le=1e9)] = 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,8 @@ from shipid.errors import DataError
 
 Mask = NDArray[np.bool_]
 Commands = Literal["held", "known"]
+PathSource = Literal["position", "velocity"]
+"""Columns that give the true path: logged positions, or velocities that are integrated."""
 NESTED, HELD_OUT, FOLDS = 1, 2, 3
 """Purposes of a draw of runs: one seed gives each a separate order."""
 VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
@@ -195,7 +197,7 @@ def cut_windows(
     horizon: int,
     step: float = 1.0,
     interval: float = 1.0,
-    path: Literal["position", "velocity"] = "position",
+    path: PathSource = "position",
     past: int = 0,
 ) -> Windows:
     """Cut a window every `interval` [s], its whole past and future inside one unbroken stretch of one run.
@@ -221,7 +223,7 @@ def cut_windows(
     of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     horizon, past = whole("horizon", horizon, 1, DataError), whole("past", past, 0, DataError)
     step, interval = positive("step", step, DataError), positive("interval", interval, DataError)
-    one_of("path", path, ("position", "velocity"), DataError)
+    one_of("path", path, get_args(PathSource), DataError)
     shared = shares_clock(dataset)
     parts = []
     for run, rows in pieces(dataset):
@@ -264,9 +266,7 @@ def _instants(t: Array, past: float, ahead: float, interval: float) -> Array:
     return np.asarray(t[rows[t[rows] >= first - slack]])
 
 
-def past_of(
-    rows: pd.DataFrame, instants: Array, past: int, step: float, path: Literal["position", "velocity"]
-) -> dict[str, Array]:
+def past_of(rows: pd.DataFrame, instants: Array, past: int, step: float, path: PathSource) -> dict[str, Array]:
     """Columns of one unbroken stretch at P, ..., 1 steps before the instants (S,) [s], name -> (P, S); none for P = 0.
 
     x, y [m] are the positions then in the frame (11) of the instant, by the same true path as the future; the columns
@@ -284,9 +284,7 @@ def past_of(
     return {**kept, "x": x, "y": y}
 
 
-def future_of(
-    rows: pd.DataFrame, instants: Array, horizon: int, step: float, path: Literal["position", "velocity"]
-) -> Array:
+def future_of(rows: pd.DataFrame, instants: Array, horizon: int, step: float, path: PathSource) -> Array:
     """True paths (T, S, 2) [m] in the frame (11) after instants (S,) [s] of one unbroken stretch that holds them."""
     grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], rows["t"].to_numpy()[-1])
     values = sample(rows, grid)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from shipid.arguments import of_class, one_of, positive, whole
-from shipid.data.windows import Instants, from_frame, to_frame
+from shipid.data.windows import Instants, PathSource, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance
 from shipid.engine.integrate import Method as Integrator
@@ -44,7 +44,7 @@ class Physics:
     step: float
     integrator: Integrator = "euler"
     observer: Observer | None = None
-    path: Literal["position", "velocity"] = "position"
+    path: PathSource = "position"
 
     def __post_init__(self) -> None:
         if not isinstance(self.vessel, Vessel | None):
@@ -54,7 +54,7 @@ class Physics:
         one_of("integrator", self.integrator, get_args(Integrator))
         if self.observer is not None:
             of_class("observer", self.observer, Observer, "such as Observer(), or None")
-        one_of("path", self.path, ("position", "velocity"))
+        one_of("path", self.path, get_args(PathSource))
 
     def with_values(self, values: Mapping[str, Any]) -> Physics:
         """Return the same physics with other numbers, dotted path -> value."""

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator,
 
 from shipid import document as documents
 from shipid.checked import Checked
+from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, choices
 from shipid.identification.plausible import within
 from shipid.physics.signals import is_output, named
@@ -75,7 +76,7 @@ class Identify(Checked, BaseModel):
         default=30.0, description="s of each prediction; 0: every run as a whole"
     )
     step: Positive = Field(default=1.0, description="s")
-    method: Literal["euler", "rk4"] = "rk4"
+    method: Method = "rk4"
     weights: Annotated[dict[str, Positive], Field(min_length=1)] = {"u": 0.1, "v": 0.1, "r": math.radians(0.2)}
     loss: Literal["squared", "huber"] = "squared"
     threshold: Positive = Field(default=2.0, description="standard deviations beyond which huber counts linearly")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.arguments import of_class
 from shipid.checked import Checked
+from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.signals import is_output, measurable
 from shipid.simulation import gusts
@@ -48,7 +49,7 @@ class Truth(Checked, BaseModel):
     duration: Annotated[FiniteFloat, Field(gt=0, description="s of a run from the first instant of prediction on")]
     run_up: Annotated[FiniteFloat, Field(ge=0, description="s of a run, logged, before that instant")] = 0.0
     step: Annotated[FiniteFloat, Field(gt=0, description="s")] = 0.05
-    method: Literal["euler", "rk4"] = "rk4"
+    method: Method = "rk4"
     interval: Annotated[FiniteFloat, Field(gt=0, description="s between logged rows")] = 1.0
     seed: int = 0
     wind_speed: NotNegative = (0.0, 6.0)

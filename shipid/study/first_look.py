@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 import tomlkit
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 from tomlkit.items import KeyType, SingleKey
 
 from shipid.data.dataset import Dataset
-from shipid.data.windows import Instants, Windows, cut_windows
+from shipid.data.windows import Instants, PathSource, Windows, cut_windows
 from shipid.errors import DocumentError
 from shipid.hybrid.physics import Physics, check_columns
 from shipid.identification.plausible import outside
@@ -171,7 +170,7 @@ def first_look(
     *,
     ahead: float,
     step: float,
-    path: Literal["position", "velocity"] = "position",
+    path: PathSource = "position",
 ) -> Look:
     """Compare a vessel with the runs of a log.
 
@@ -198,7 +197,7 @@ def first_look(
     return Look(vessel, windows.horizon * step, alone, constant, facts, tuple(changes))
 
 
-def _some(dataset: Dataset, horizon: int, step: float, path: Literal["position", "velocity"]) -> Windows:
+def _some(dataset: Dataset, horizon: int, step: float, path: PathSource) -> Windows:
     """At most so many windows, evenly over all runs."""
     windows = cut_windows(dataset, horizon=horizon, step=step, interval=max(step, horizon * step / 4), path=path)
     if len(windows) <= MOST_WINDOWS:

@@ -11,14 +11,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tomlkit
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
 
 from shipid import document as documents
-from shipid.data.windows import Commands
+from shipid.data.windows import Commands, PathSource
 from shipid.document import Document
+from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DocumentError, choices
 from shipid.files import as_argument
 from shipid.hybrid.method import Method
@@ -74,7 +75,7 @@ class Data(Strict):
     causal: list[str] = Field(
         default=[], description="columns interpolated between fixes: inputs hold the last fix, such as u and v"
     )
-    path: Literal["position", "velocity"] = Field(
+    path: PathSource = Field(
         default="position", description="true path: logged positions, or the integral of u, v, psi"
     )
 
@@ -102,7 +103,7 @@ class Prediction(Strict):
 
     ahead: Annotated[FiniteFloat, Field(gt=0, description="s, a multiple of the step")]
     step: Annotated[FiniteFloat, Field(gt=0, description="s")] = 1.0
-    integrator: Literal["euler", "rk4"] = "euler"
+    integrator: Integrator = "euler"
     interval: Annotated[FiniteFloat, Field(gt=0, description="s between instants of prediction")] = 1.0
     past: Annotated[
         FiniteFloat, Field(ge=0, description="s of a run before its first instant; more if a method needs")

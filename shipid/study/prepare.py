@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,7 @@ from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, kept_rows, outside_spans, pieces, read_dataset
 from shipid.data.windows import (
     Instants,
+    PathSource,
     Windows,
     cut_windows,
     holes,
@@ -338,7 +339,7 @@ def known_by_then(plan: Plan, dataset: Dataset) -> Dataset:
         raise DocumentError(error.message, file=plan.file, path="data.causal") from None
 
 
-def path_of(plan: Plan) -> Literal["position", "velocity"]:
+def path_of(plan: Plan) -> PathSource:
     """Where the true path of a study comes from."""
     return plan.study.data.path if plan.study.data else "position"
 
