@@ -16,7 +16,8 @@ from shipid.physics.signals import row_of
 
 Plane = np.ndarray[Any, np.dtype[np.complex128]]
 
-GAP, JITTER, FROZEN, OVERLAP = 3.0, 0.05, 0.02, 0.5
+GAP = 3.0  # usual steps: a longer one is a time without rows
+JITTER, FROZEN, OVERLAP = 0.05, 0.02, 0.5
 CORRELATION, SCALE_ERROR, HEADING_ERROR, PATH_ERROR = 0.8, 0.1, 0.25, 0.05
 TURNING = np.radians(0.2)  # rms of r under which a run is too straight to compare headings
 FEW_ROWS, FAR, BRIEF, CALM = 30, np.radians(240.0), 600.0, 1.0  # rows; turn of the ship; s; m/s

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.arguments import of_class, one_of, positive, whole
+from shipid.data.checks import GAP
 from shipid.data.dataset import Array, Dataset, clock_slack, cumulative_integral, pieces, sample, shares_clock
 from shipid.errors import DataError
 
@@ -21,7 +22,6 @@ PathSource = Literal["position", "velocity"]
 NESTED, HELD_OUT, FOLDS = 1, 2, 3
 """Purposes of a draw of runs: one seed gives each a separate order."""
 VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
-HOLE = 3.0  # a step longer than so many usual ones is a time without rows, as for the check `gap`
 MANY = 100  # instants asked for each row, from which on every row is one
 STATES = ("u", "v", "r", "psi")
 """True states that a window holds over its horizon, beside the path."""
@@ -328,30 +328,31 @@ def concatenate(parts: Sequence[Windows]) -> Windows:
     )
 
 
-def holes(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]:
+def gaps(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]:
     """Times (start, end) [s] without rows, inside the unbroken stretches of each run; runs that have none are left out.
 
-    They are longer than `least` [s] and than three usual steps of the stretch. A window that reaches over one is
-    interpolated there.
+    They are longer than `least` [s] and than three usual steps of the stretch, as in the check `gap`. A window that
+    reaches over one is interpolated there.
     """
-    found: dict[str, list[tuple[float, float]]] = {}
+    spans: dict[str, list[tuple[float, float]]] = {}
     for run, rows in pieces(dataset):
         t = rows["t"].to_numpy()
         steps = np.diff(t)
         if not len(steps):
             continue
-        limit = max(least, HOLE * float(np.median(steps))) + clock_slack(t)
-        found.setdefault(run, []).extend((float(t[k]), float(t[k + 1])) for k in np.flatnonzero(steps > limit))
-    return {run: spans for run, spans in found.items() if spans}
+        limit = max(least, GAP * float(np.median(steps))) + clock_slack(t)
+        for k in np.flatnonzero(steps > limit):
+            spans.setdefault(run, []).append((float(t[k]), float(t[k + 1])))
+    return spans
 
 
 def reach_over(windows: Windows, spans: Mapping[str, Iterable[tuple[float, float]]]) -> Mask:
     """Windows (S,) that see a part of the spans (start, end) [s] of their run, pasts and futures included."""
     seen = np.zeros(len(windows), dtype=bool)
     for run, times in spans.items():
-        own = windows.run == run
+        of_run = windows.run == run
         for start, end in times:
-            seen |= own & (windows.begin < end) & (windows.end > start)
+            seen |= of_run & (windows.begin < end) & (windows.end > start)
     return seen
 
 

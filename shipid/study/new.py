@@ -29,7 +29,7 @@ from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import length_of, service_speed, shaft_speed
 from shipid.study.first_look import Look, first_look
 from shipid.study.plan import NO_MODEL, Plan, build_plan
-from shipid.study.prepare import all_windows, obtain, over_holes, partition, prepare
+from shipid.study.prepare import all_windows, obtain, over_gaps, partition, prepare
 from shipid.study.survey import Survey, helm_sense, separation, survey, typical_runs
 from shipid.units import GRAVITY, RPM
 from shipid.vessel.dynamics import dynamics
@@ -197,7 +197,7 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     fixed += [_folds(amounts[-1])]
     tail = [*rest, *_grid(amounts), method]
     failing = [_failing(seen, data)] if seen.faults else []
-    failing += over_holes(dataset, all_windows(least, dataset))
+    failing += over_gaps(dataset, all_windows(least, dataset))
     warnings = [*failing, *_wrong_velocities(seen), *_wrong_helm(first, dataset), *_knowing(vessels, tests)]
     warnings += [look.sentence for look in looks.values() if look.wrong]
     try:

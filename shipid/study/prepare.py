@@ -19,7 +19,7 @@ from shipid.data.windows import (
     PathSource,
     Windows,
     cut_windows,
-    holes,
+    gaps,
     nested_runs,
     part_folds,
     reach_over,
@@ -135,7 +135,7 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
     test_runs = _test_runs(plan, windows)
     test = windows.select(np.isin(windows.run, test_runs))
     rest = windows.select(~np.isin(windows.run, test_runs))
-    notes = over_holes(dataset, windows)
+    notes = over_gaps(dataset, windows)
     if windows.shared_clock:
         touching = rest.touching(test.spans.values())
         if touching.any():
@@ -154,18 +154,16 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
     return rest, test, notes
 
 
-def over_holes(dataset: Dataset, windows: Windows) -> list[str]:
+def over_gaps(dataset: Dataset, windows: Windows) -> list[str]:
     """A sentence on windows that reach over times without rows, longer than a step; none where there are none."""
-    found = holes(dataset, windows.step)
-    over = reach_over(windows, found)
+    spans = gaps(dataset, windows.step)
+    over = reach_over(windows, spans)
     if not over.any():
         return []
-    named = {run: spans for run, spans in found.items() if (over & (windows.run == run)).any()}
-    run, (start, end) = max(
-        ((run, span) for run, spans in named.items() for span in spans), key=lambda one: one[1][1] - one[1][0]
-    )
+    seen = [(end - start, start, run) for run in np.unique(windows.run[over]).tolist() for start, end in spans[run]]
+    length, start, run = max(seen, key=lambda gap: gap[0])
     return [
-        f"{int(over.sum())} of {len(windows)} windows hold a time without rows, the longest {end - start:.3g} s after "
+        f"{int(over.sum())} of {len(windows)} windows hold a time without rows, the longest {length:.3g} s after "
         f"t = {start:g} s of {run!r}: path and motion are only interpolated there; set max_gap in [clock] of the "
         "mapping and import again"
     ]

@@ -16,7 +16,7 @@ from shipid.data.windows import (
     cut_windows,
     fold_masks,
     from_frame,
-    holes,
+    gaps,
     nested_runs,
     part_folds,
     reach_over,
@@ -530,10 +530,10 @@ def test_windows_over_a_time_without_rows_are_found() -> None:
     """A recorder that paused from 20 to 30 s; windows of 10 s that end at 20 s, or begin at 30 s, see nothing of it."""
     paused = turning(T[(T <= 20) | (T >= 30)])
     dataset = as_dataset(paused, turning(T))
-    found = holes(dataset, 1.0)
-    assert found == {"a": [(20.0, 30.0)]}
+    spans = gaps(dataset, 1.0)
+    assert spans == {"a": [(20.0, 30.0)]}
     windows = cut_windows(dataset, horizon=10)
-    over = reach_over(windows, found)
+    over = reach_over(windows, spans)
     np.testing.assert_array_equal(over, (windows.run == "a") & (windows.t > 10) & (windows.t < 30))
-    assert holes(dataset, 10.0) == {}  # a step of the prediction as long
-    assert holes(as_dataset(turning(T[::2]), turning(T)), 0.1) == {}  # rows of another interval are no hole
+    assert gaps(dataset, 10.0) == {}  # a step of the prediction as long
+    assert gaps(as_dataset(turning(T[::2]), turning(T)), 0.1) == {}  # rows of another interval are no hole

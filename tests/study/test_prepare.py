@@ -29,7 +29,7 @@ from shipid.study.prepare import (
     estimates_of,
     instants_of,
     obtain,
-    over_holes,
+    over_gaps,
     prepare,
     runs_by_amount,
     window_memory,
@@ -423,14 +423,14 @@ def test_the_sea_trials_test_is_untouched(shared_data: Path, monkeypatch: pytest
     assert prepared.accuracy("accurate")["mean"] < prepared.accuracy("inaccurate")["mean"]
 
 
-def test_windows_over_a_hole_of_the_log_are_told(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+def test_a_note_counts_the_windows_over_a_time_without_rows(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     """Without max_gap the import leaves a pause of the recorder whole: the study says which windows hold it."""
     plan, dataset, prepared = tiny
     assert not prepared.notes
     run, t = dataset.runs[0], dataset.frame["t"]
     paused = (dataset.frame["run"] == run) & (t > 5) & (t < 12)
     holed = replace(dataset, frame=dataset.frame[~paused].reset_index(drop=True))
-    (note,) = over_holes(holed, all_windows(plan, holed))
+    (note,) = over_gaps(holed, all_windows(plan, holed))
     assert f"the longest 7 s after t = 5 s of {run!r}" in note
     assert "set max_gap in [clock]" in note
     assert prepare(plan, holed).notes == (note,)
