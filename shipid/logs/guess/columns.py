@@ -24,7 +24,7 @@ from shipid.logs.guess.defects import defects_of_motion, defects_of_rows, defect
 from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import Frame, choose_pose
-from shipid.logs.guess.sniff import Sniffed
+from shipid.logs.guess.sniff import Sniffed, is_clock
 from shipid.logs.guess.sources import Source, read_source
 from shipid.logs.guess.unused import reasons
 from shipid.logs.guess.words import parts_of, wind_kind
@@ -101,6 +101,8 @@ def guess(
         choose_yaw_rate(state, 0.05)
     choose_velocities(state)
     check_clock(state, np.inf if vessel is None else vessel.document.get("particulars", {}).get("L_pp", np.inf))
+    if sniffed.clock["unit"] != "date":
+        _ask_for_clock(state, str(sniffed.clock["from"]))
     if state.r is None:
         choose_yaw_rate(state)
     choose_commands(state)
@@ -113,6 +115,12 @@ def guess(
     defects_of_motion(state)
     left = reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)
+
+
+def _ask_for_clock(state: State, name: str) -> None:
+    """Ask whether a column is the clock that only rises, and has another name."""
+    if not (is_clock(name) or state.numbered):
+        state.ask(("clock",), f"no column is called a clock: {name!r} rises from row to row. Is it the time?")
 
 
 def _runs(state: State, source: Source) -> None:

@@ -29,6 +29,7 @@ from shipid.logs.readers import (
     TextFormat,
     dated,
     hour_twice,
+    moment_of,
     parse_text,
     read_table,
     require_file,
@@ -372,7 +373,7 @@ def _clock_once(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> t
 def _once(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | None:
     """Return the rows that do not say the time of the row before once more; None where no clock has a few of these."""
     for name in map(str, table.columns):
-        if not _is_clock(name):
+        if not is_clock(name):
             continue
         times = columns[name] if name in columns else seconds(_called(table, name))
         steps = np.diff(times, prepend=-np.inf)
@@ -385,10 +386,10 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     """Return the clock: a column that rises, by its name if several do; dates; or a rounded one, by its rate."""
     finite = {name: values for name, values in columns.items() if np.isfinite(values).all() and len(values)}
     rising = [name for name, values in finite.items() if np.all(np.diff(values) > 0)]
-    called = [name for name in columns if _is_clock(name)]
+    called = [name for name in columns if is_clock(name)]
     texts = [name for name in map(str, table.columns) if name not in columns and name]
-    twice = None
-    for name in sorted(texts, key=lambda name: not _is_clock(name)):
+    times: dict[str, Array] = {}
+    for name in sorted(texts, key=lambda name: not is_clock(name)):
         column = _called(table, name)
         of_day = column.dropna().astype(str).str.fullmatch(TIME_OF_DAY)
         dates = _dates(table, texts) if len(of_day) and of_day.all() else None
@@ -396,9 +397,10 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
             with_date = seconds(dated(_called(table, dates), column))
             if np.isfinite(with_date).all() and np.all(np.diff(with_date) > 0):
                 return {"from": name, "unit": "date", "date": dates}, with_date
-        since = seconds(column) if _is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
+        since = seconds(column) if is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
+        times[name] = since
         if not np.isfinite(since).all():
-            called += [name] if _is_clock(name) else []
+            called += [name] if is_clock(name) else []
             continue
         if np.all(np.diff(since) > 0):
             return {"from": name, "unit": "date"}, since
@@ -406,9 +408,13 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         if rate is not None:
             return {"from": name, "unit": "date", "every": rate[0]}, rate[1]
         called.append(name)
-        twice = twice or hour_twice(since)
-    if twice is not None and not any(name in called for name in rising):
-        raise DataError(twice[1], file=file, path=f"row {twice[0] + 1}")
+    if not any(name in called for name in rising):  # another column that happens to rise is no clock then
+        for name, since in times.items():
+            if np.isfinite(since).all() and np.any(np.diff(since) < 0):
+                twice = hour_twice(since)
+                if twice is not None:
+                    raise DataError(twice[1], file=file, path=f"row {twice[0] + 1}")
+                raise DataError(f"no column can be the clock: {name!r} {_fault(since)}", file=file)
     candidates = [name for name in rising if name in called] or [name for name in rising if not _counts(columns[name])]
     unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
     rounded = [name for name in called or unnamed if name in finite and name not in rising]
@@ -423,7 +429,8 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     if rising:
         unit = _unit_of_clock(rising[0], finite[rising[0]])
         return {"from": rising[0], "unit": unit}, clock_seconds(finite[rising[0]], unit)
-    fault = f"{called[0]!r} {_fault(columns.get(called[0], np.empty(0)))}" if called else "none rises from row to row"
+    first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
+    fault = f"{called[0]!r} {_fault(first)}" if called else "none rises from row to row"
     raise DataError(f"no column can be the clock: {fault}", file=file)
 
 
@@ -441,7 +448,8 @@ def _dates(table: pd.DataFrame, names: list[str]) -> str | None:
     return None
 
 
-def _is_clock(name: str) -> bool:
+def is_clock(name: str) -> bool:
+    """Whether a column has the name of a clock."""
     parts = set(parts_of(name)) | {plain(name)}
     return bool(parts & CLOCK_WORDS) and not parts & NO_CLOCK_WORDS
 
@@ -544,12 +552,17 @@ def _counts(values: Array) -> bool:
 
 
 def _fault(values: Array) -> str:
-    if not len(values):
+    if not np.isfinite(values).any():
         return "holds no numbers and no dates"
     if not np.isfinite(values).all():
         return f"has no value in row {int(np.argmax(~np.isfinite(values))) + 1}"
-    row = int(np.argmax(np.diff(values) <= 0)) + 1
-    return f"{'repeats' if values[row] == values[row - 1] else 'goes back'} in row {row + 1}"
+    row = int(np.argmax(np.diff(values) < 0)) + 1
+    if values[row] < values[row - 1]:  # rows of one time alone may be a rounded clock
+        before, after = moment_of(values[row - 1]), moment_of(values[row])
+        return (
+            f"goes back from {before} to {after} in row {row + 1}: sort the log, or split it there, and join the parts"
+        )
+    return f"repeats in row {int(np.argmax(np.diff(values) == 0)) + 2}"
 
 
 def plain(name: str) -> str:

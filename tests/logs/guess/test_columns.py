@@ -43,6 +43,13 @@ def test_a_clean_log_has_no_defect(seed: int, every: int, tmp_path: Path) -> Non
     assert all(column.confidence > 0.8 and column.evidence for column in proposal.columns)
 
 
+@pytest.mark.parametrize(("name", "asked"), [("time", 0), ("Elapsed [s]", 0), ("distance", 1)])
+def test_a_column_that_only_rises_is_asked_for(name: str, asked: int, tmp_path: Path) -> None:
+    proposal = guessed(as_bridge(si_log(0, 5)).round(4).rename(columns={"time": name}), tmp_path)
+    said = [question.sentence for question in proposal.questions if "clock" in question.about]
+    assert said == ["no column is called a clock: 'distance' rises from row to row. Is it the time?"] * asked
+
+
 def spread(log: pd.DataFrame) -> pd.DataFrame:
     """As from a slower log of 2 s, interpolated linearly, the heading across 360, too."""
     slow = log.iloc[::4]

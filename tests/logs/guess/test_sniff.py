@@ -14,6 +14,7 @@ from shipid.logs.guess.sniff import _is_time_of_day, cells, plain, sniff
 
 T = np.arange(0.0, 10.0, 0.5)
 TABLE = pd.DataFrame({"time": T, "N": 1.5 * T, "psi": 30.0 + T})
+SUMMER_TIME_ENDS = [f"26.10.2025 02:{59 * (i < 10):02}:{(50 + i) % 60:02}" for i in range(len(T))]
 
 
 def text(
@@ -230,7 +231,14 @@ def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> Non
         (b"\x00\x01\x02 binary", "a binary file of unknown format"),
         (b"a letter\nto the captain\nwith no numbers\n", "no table of numbers with any separator"),
         (text(table=TABLE.assign(time=np.minimum(T, 8.0), N=1.0, psi=1.0)).encode(), "'time' repeats in row 18"),
-        (text(table=TABLE.assign(time=np.abs(T - 2.0), N=1.0, psi=1.0)).encode(), "'time' goes back in row 2"),
+        (
+            text(table=TABLE.assign(time=np.abs(T - 2.0), N=1.0, psi=1.0)).encode(),
+            "'time' goes back from 2 s to 1.5 s in row 2",
+        ),
+        (
+            text(table=TABLE.assign(time=SUMMER_TIME_ENDS)).encode(),
+            "'time' goes back from 2025-10-26 02:59:59 UTC to 2025-10-26 02:00:00 UTC in row 11: sort the log",
+        ),
         (
             text(table=TABLE.assign(time=TABLE["time"].where(T != 1.0), N=1.0, psi=1.0)).encode(),
             "'time' has no value in row 3",
@@ -242,6 +250,15 @@ def test_what_is_no_log_is_one_sentence(content: bytes, message: str, tmp_path: 
     (tmp_path / "log.csv").write_bytes(content)
     with pytest.raises(DataError, match=rf"log\.csv.*{message}"):
         sniff(tmp_path / "log.csv")
+
+
+def test_dates_that_rise_are_the_clock_beside_dates_that_go_back(tmp_path: Path) -> None:
+    """A receiver's clock set back is no reason to refuse the logger's own."""
+    table = TABLE.assign(
+        time=SUMMER_TIME_ENDS, utc=pd.date_range("2025-10-26", periods=len(T), freq="500ms").astype(str)
+    )
+    (tmp_path / "log.csv").write_text(text(table=table))
+    assert sniff(tmp_path / "log.csv").clock["from"] == "utc"
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
