@@ -31,7 +31,7 @@ def replay(
 
     from shipid.data.dataset import read_dataset
     from shipid.files import check_table, write_table
-    from shipid.identification.free_run import free_runs
+    from shipid.identification.free_run import free_runs, unfelt
     from shipid.identification.outcome import pick_runs
     from shipid.identification.settings import Identify
     from shipid.report.replay import REPLAYED, ReplayContent, write_replay
@@ -49,6 +49,7 @@ def replay(
     chosen, _ = pick_runs(log, runs or ())
     settings = Identify(parameters=[next(iter(ship.parameters))], step=step, horizon=0.0)
     replayed = free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
+    zero = unfelt(ship, log, settings, chosen)
     rows = [
         [row["run"], *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"]))]
         if row["position"] == row["position"]
@@ -64,7 +65,7 @@ def replay(
         provenance={
             "Vessel": f"{ship.name}, digest {ship.digest}",
             "Dataset": f"{dataset}, digest {log.digest}",
-            "Simulation": f"rk4, steps of {step:g} s",
+            "Simulation": f"rk4, steps of {step:g} s" + (f"; {', '.join(zero)} taken as 0" if zero else ""),
             "shipid": __version__,
         },
         command=command_line(),
@@ -72,6 +73,9 @@ def replay(
     with answering(as_json) as answer:
         answer.say(f"{ship.name}: root mean square errors, {f'{ahead:g} s' if ahead else 'whole runs'}")
         heads = ["run", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
+        answer.say(assumed=zero)
+        if zero:
+            answer.say(f"not in the log, taken as 0: {', '.join(zero)}")
         answer.rows("errors", replayed.errors.drop(columns="model"), table(heads, rows))
         if csv is not None:
             write_table(csv, replayed.series)

@@ -17,7 +17,7 @@ from shipid.errors import DataError
 from shipid.identification.residuals import build
 from shipid.identification.segments import LEAST_STEPS, ShootingSegment
 from shipid.identification.sensitivities import COLUMNS
-from shipid.identification.settings import Identify
+from shipid.identification.settings import ENVIRONMENT, Identify, overrides
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -40,6 +40,16 @@ class FreeRuns:
 
     series: pd.DataFrame
     errors: pd.DataFrame
+
+
+def unfelt(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[str]) -> list[str]:
+    """States and weather that the vessel has and neither dataset, settings nor nuisances give: they are 0."""
+    model = dynamics(vessel)
+    given = {*map(str, dataset.frame), *(("V_c", "beta_c") if "current" in settings.widths else ())}
+    lacking = [name for name in (*model.state, *model.environment) if name not in given]
+    own = overrides(settings, runs, vessel, model.environment, dataset.runs) if lacking and settings.runs else {}
+    everywhere = {name for name in lacking if own and all(f"{ENVIRONMENT}.{name}" in own[run] for run in runs)}
+    return [name for name in lacking if name not in everywhere]
 
 
 def check_length(settings: Identify, length: float) -> None:

@@ -24,7 +24,7 @@ from shipid.identification import design
 from shipid.identification.bands import LONG, Measure, bands, check_level, refusal
 from shipid.identification.collinearity import digits, listed
 from shipid.identification.fit import Progress
-from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
+from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs, unfelt
 from shipid.identification.plausible import verdict
 from shipid.identification.profile import Profile, profile, variance_ratio
 from shipid.identification.reach import beyond, of_log, reach_of
@@ -275,6 +275,7 @@ def run_identification(
         warnings = (
             *shared,
             *solution.warnings,
+            *unmeasured(vessel, dataset, fitted, settings),
             *_warnings(solution, judged, pairs),
             *_left(solution, curves),
         )
@@ -569,6 +570,15 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
         ratio=variance_ratio(judged, path),
         bounds=(float(unknown.low[index]), float(unknown.high[index])),
     )
+
+
+def unmeasured(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
+    """A warning if the vessel feels what nobody measured: the numbers make up for it."""
+    lacking = unfelt(vessel, dataset, settings, runs)
+    if not lacking:
+        return []
+    current = "; --nuisance current=0.2 gives each run a current" if "V_c" in lacking else ""
+    return [f"not in the log, taken as 0: {', '.join(lacking)}: the estimates make up for what they do{current}"]
 
 
 def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import tomlkit
@@ -47,6 +47,8 @@ STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading and of the speed over the
 TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from which the turning is judged
 FEW = 3  # windows
 MODEST = 5.0  # factor
+NEWTON = 3  # steps of the search for a current
+STRONG = 0.7  # of the median speed: a stronger current is none
 UNITS = (60.0, 1 / 60.0)  # rev/s read as rpm, and rpm as rev/s
 ALIKE = 1.5  # factor within which a speed is explained by a unit
 OFF = 1.15  # a factor by which speed or turning may differ before it is reported
@@ -101,11 +103,21 @@ class Change:
 
 
 @dataclass(frozen=True)
+class Current:
+    """A steady current of all runs, V_c [m/s] towards beta_c [rad]. error : mean error [m] with it."""
+
+    V_c: float
+    beta_c: float
+    error: float
+
+
+@dataclass(frozen=True)
 class Look:
     """How a vessel and a log agree.
 
     ahead : [s]. alone, constant : mean position error [m] over it of the vessel, with the recorded commands, and of
         constant u, v, r. facts : what differs, in words. changes : those that explain it, in the order of their worth.
+    current : that explains more than all changes alone; the changes are then beside it.
     """
 
     vessel: Vessel
@@ -114,16 +126,18 @@ class Look:
     constant: float
     facts: tuple[str, ...]
     changes: tuple[Change, ...] = field(default=())
+    current: Current | None = None
 
     @property
     def corrected(self) -> float:
-        """Mean error [m] with all changes."""
-        return self.changes[-1].error if self.changes else self.alone
+        """Mean error [m] with the current and all changes."""
+        before = self.alone if self.current is None else self.current.error
+        return self.changes[-1].error if self.changes else before
 
     @property
     def wrong(self) -> bool:
         """Whether the vessel should not be used as it is."""
-        return bool(self.changes) or self.alone >= self.constant
+        return bool(self.changes) or self.current is not None or self.alone >= self.constant
 
     @property
     def values(self) -> dict[str, float]:
@@ -135,6 +149,13 @@ class Look:
         """One line: what is off, and which number would explain it."""
         errors = f"mean error over {self.ahead:g} s {self.alone:.3g} m, of constant u, v, r {self.constant:.3g} m"
         seen = f"{'; '.join(self.facts)}; {errors}" if self.facts else errors
+        if self.current is not None:
+            V_c, beta_c = self.current.V_c, np.degrees(self.current.beta_c) % 360.0
+            stream = f"a steady current of {V_c:.2g} m/s towards {beta_c:.0f} deg, which is not in the log,"
+            more = f", then {', '.join(_shown(self.vessel, one) for one in self.changes)}" if self.changes else ""
+            left = f" ({self.corrected:.3g} m)" if self.changes else ""
+            explained = f"{stream} would explain most of it ({self.current.error:.3g} m)"
+            return f"{self.vessel.name}: {seen}: {explained}{more}{left}"
         if not self.changes:
             if self.alone < self.constant:
                 return f"{self.vessel.name} and the log agree, and no single number would explain the rest: {seen}"
@@ -191,10 +212,13 @@ def first_look(
     share = _turning(vessel, windows, trial.instants())
     facts = tuple(_facts(vessel, windows, share))
     mistaken = share is not None and share < 0  # a sign, which no factor mends
-    changes = [] if mistaken else _explained(trial, alone)
-    if changes and changes[-1].error > (1 - SAVING) * alone:
-        changes = []
-    return Look(vessel, windows.horizon * step, alone, constant, facts, tuple(changes))
+    changes = [] if mistaken else _worthwhile(trial, alone)
+    current = None if mistaken else _current(trial)
+    least = min(changes[-1].error if changes else alone, (1 - SAVING) * alone)
+    if current is None or current.error > least:
+        return Look(vessel, windows.horizon * step, alone, constant, facts, tuple(changes))
+    changes = _worthwhile(_in_current(trial, current.V_c, current.beta_c), current.error)
+    return Look(vessel, windows.horizon * step, alone, constant, facts, tuple(changes), current)
 
 
 def _some(dataset: Dataset, horizon: int, step: float, path: PathSource) -> Windows:
@@ -244,6 +268,47 @@ class _Trial:
             for number, place in enumerate(places):
                 result[place] = float(capped[number].mean())
         return result
+
+
+def _in_current(trial: _Trial, V_c: float, beta_c: float) -> _Trial:
+    """The same trial in a steady current [m/s, rad]."""
+    vessel, windows = trial.vessel, trial.windows
+    if "current" not in vessel.document:
+        vessel = vessel.with_values({"current.kind": "uniform"})
+    columns = {**windows.columns, "V_c": np.full(len(windows), V_c), "beta_c": np.full(len(windows), beta_c)}
+    return replace(trial, vessel=vessel, windows=replace(windows, columns=columns), known={})
+
+
+def _current(trial: _Trial) -> Current | None:
+    """The steady current of all runs with which the paths fit best, which no log has; None where none is found.
+
+    Runs of one heading cannot tell it from a thrust that is wrong: their error is then explained by both alike.
+    """
+
+    def away(current: Array) -> Array:  # (N,) [m], of all points
+        one = _in_current(trial, float(np.hypot(*current)), float(np.arctan2(current[1], current[0])))
+        paths = Physics(one.vessel, one.windows.horizon, one.windows.step, "rk4").paths(one.instants())
+        return np.asarray((paths - one.windows.future).ravel())
+
+    speed = float(np.median(np.hypot(trial.windows.columns["u"], trial.windows.columns["v"])))
+    current, step = np.zeros(2), 0.02 * speed
+    for _ in range(NEWTON):
+        base = away(current)
+        slopes = np.stack([(away(current + step * axis) - base) / step for axis in np.eye(2)], axis=1)
+        sound = np.isfinite(base) & np.isfinite(slopes).all(axis=1)
+        if not sound.any():
+            return None
+        current = current - np.linalg.lstsq(slopes[sound], base[sound])[0]
+        if not 0 < float(np.hypot(*current)) < STRONG * speed:
+            return None
+    V_c, beta_c = float(np.hypot(*current)), float(np.arctan2(current[1], current[0]))
+    return Current(V_c, beta_c, _in_current(trial, V_c, beta_c).errors([{}])[0])
+
+
+def _worthwhile(trial: _Trial, alone: float) -> list[Change]:
+    """The changes that explain the error; none where all together save too little."""
+    changes = _explained(trial, alone)
+    return [] if changes and changes[-1].error > (1 - SAVING) * alone else changes
 
 
 def _explained(trial: _Trial, alone: float) -> list[Change]:

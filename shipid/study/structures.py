@@ -26,7 +26,15 @@ from shipid.files import write_new
 from shipid.identification.bands import Measure, bands, check_level, refusal
 from shipid.identification.design import Candidate, Limits, candidates, performed, steps_between
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
-from shipid.identification.outcome import SIGNALS, TRIED, pick_runs, residual_level, residual_spacing, without_shared
+from shipid.identification.outcome import (
+    SIGNALS,
+    TRIED,
+    pick_runs,
+    residual_level,
+    residual_spacing,
+    unmeasured,
+    without_shared,
+)
 from shipid.identification.reach import Reach, beyond, of_log, reach_of
 from shipid.identification.settings import Identify
 from shipid.identification.sides import by_group, uneven
@@ -237,7 +245,7 @@ def compare_structures(
         runs=fitted,
         test=tested,
         digest=digest,
-        shared=shared,
+        shared=(*shared, *unmeasured(vessel, dataset, fitted, settings)),
         ahead=length,
         level=level,
         errors=every,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.identification.free_run import ALL, MEASURED, free_runs
+from shipid.identification.free_run import ALL, MEASURED, free_runs, unfelt
 from shipid.identification.settings import Identify
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
@@ -61,3 +62,18 @@ def test_every_piece_begins_at_the_measured_state() -> None:
 def test_a_piece_shorter_than_two_steps_is_refused() -> None:
     with pytest.raises(DataError, match="must hold two steps of 1 s"):
         free_runs({"true": SHIP}, DATA, DATA.runs, SETTINGS, length=1.0)
+
+
+def test_what_nobody_measured_is_named_unless_it_is_estimated_or_set() -> None:
+    """A current or wind that is taken as 0 goes into the errors, and into the numbers of a fit."""
+    ship = SHIP.with_values({"current.kind": "uniform"})
+    calm = Dataset(DATA.frame.drop(columns=["V_w", "beta_w"], errors="ignore"), DATA.metadata)
+    assert unfelt(ship, calm, SETTINGS, DATA.runs) == ["V_w", "beta_w", "V_c", "beta_c"]
+    estimated = SETTINGS.model_copy(update={"nuisance": {"current": 0.2}})
+    assert unfelt(ship, calm, estimated, DATA.runs) == ["V_w", "beta_w"]
+    wind = {"environment": {"V_w": 3.0, "beta_w": 0.5}}
+    one, both = (SETTINGS.model_copy(update={"runs": dict.fromkeys(runs, wind)}) for runs in (DATA.runs[:1], DATA.runs))
+    assert unfelt(ship, calm, one, DATA.runs) == ["V_w", "beta_w", "V_c", "beta_c"]
+    assert unfelt(ship, calm, both, DATA.runs) == ["V_c", "beta_c"]
+    measured = Dataset(calm.frame.assign(V_w=3.0, beta_w=0.5), DATA.metadata)
+    assert unfelt(SHIP, measured, SETTINGS, DATA.runs) == []

@@ -74,6 +74,26 @@ def test_a_rudder_of_the_other_sign_is_reported(log: Dataset) -> None:
     assert view.wrong
 
 
+def test_a_current_that_nobody_measured_is_found_and_no_number_is_blamed() -> None:
+    truth = load_vessel(SHIP).with_values({"current.kind": "uniform"})
+    kinds: list[Zigzag | TurningCircle] = [
+        TurningCircle(n_rpm=RPM, angle_deg=25, duration=90.0, execute_at=20.0, course_deg=60),
+        *(Zigzag(n_rpm=RPM, angle_deg=20, duration=90.0, execute_at=20.0, course_deg=one) for one in (0, 110, 200)),
+    ]
+    stream = {"V_c": 0.12, "beta_c": np.radians(250.0)}
+    frame = perform(truth, kinds, step=0.1, interval=1.0, environment=stream)
+    kept = [str(name) for name in frame if not str(name).startswith("actual.") and name not in stream]
+    drifting = Dataset(frame[kept].astype({"run": "str"}), {"clock": "run", "flags": []})
+    view = look(load_vessel(SHIP), drifting)
+    assert view.current is not None
+    assert view.current.V_c == pytest.approx(0.12, rel=0.1)
+    assert np.degrees(view.current.beta_c) % 360.0 == pytest.approx(250.0, abs=5.0)
+    assert not view.changes
+    assert view.corrected < 0.2 * view.alone
+    assert view.wrong
+    assert "a steady current of 0.12 m/s towards 250 deg, which is not in the log, would explain" in view.sentence
+
+
 @pytest.mark.parametrize(("factor", "read", "right"), [(60.0, "rev/s", "rpm"), (1 / 60, "rpm", "rev/s")])
 def test_a_shaft_in_another_unit_is_asked_for(log: Dataset, factor: float, read: str, right: str) -> None:
     wrong = Dataset(log.frame.assign(**{"propeller.n": factor * log.frame["propeller.n"]}), log.metadata)
