@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
-from shipid.logs.guess.words import parts_of, side_of
+from shipid.logs.guess.words import parts_of, side_of, words_of_side
 from shipid.physics.signals import is_command, is_shaft, row_of, signal_of
 from shipid.simulation.approach import Controls
 from shipid.vessel.load import Vessel
@@ -35,7 +35,7 @@ def name_commands(state: State, vessel: Vessel) -> None:
     for signal in dict.fromkeys(map(signal_of, controls.commands)):
         wanted = [name for name in controls.commands if signal_of(name) == signal]
         drafted = [one for one in state.suggestions if is_command(one.name) and signal_of(one.name) == signal]
-        for name, one in _pairs(state, wanted, drafted, idle):
+        for name, one in _pairs(state, wanted, drafted, idle, vessel):
             components.setdefault(one.name.partition(".")[0], name.partition(".")[0])
             named.append(replace(one, name=name))
         missing = [name for name in wanted if name not in {one.name for one in named}]
@@ -61,12 +61,12 @@ def _drop_guesses(state: State, signals: set[str]) -> None:
 
 
 def _pairs(
-    state: State, wanted: Sequence[str], drafted: Sequence[Suggestion], idle: set[str]
+    state: State, wanted: Sequence[str], drafted: Sequence[Suggestion], idle: set[str], vessel: Vessel
 ) -> Iterator[tuple[str, Suggestion]]:
     """Yield each command of the vessel with the column for it: that of its side, or the only one."""
     main = [one for one in drafted if _place(one.name) not in ("bow", "stern")]
     for name in wanted:
-        place = _place(name)
+        place = _place(name) or _side(name, vessel)
         if name in idle or place in ("bow", "stern"):
             alike = [one for one in drafted if _place(one.name) == place and one not in main]
         else:
@@ -74,7 +74,7 @@ def _pairs(
             if not alike and place in OPPOSITE and main:
                 alike = [one for one in main if _place(one.name) == OPPOSITE[place]]
                 state.ask((signal_of(name),), f"is {name} as {alike[0].source!r}? The log has no column of that side")
-            if not alike and not place:
+            if not alike and not place and (len(wanted) == 1 or len(main) == 1):
                 alike = main
         if alike:
             if len(alike) > 1 and len(wanted) < len(alike):
@@ -121,10 +121,14 @@ def _renamed(one: Suggestion, components: dict[str, str]) -> Suggestion:
 def _place(name: str) -> str:
     """Side or end in the name of a command; empty where there is none."""
     component = name.partition(".")[0]
-    if component in PLACES:
-        return component
-    place = side_of(component)
+    place = next((one for one in PLACES if component.lower() in words_of_side(one)), None) or side_of(component)
     return place if place in PLACES else ""
+
+
+def _side(name: str, vessel: Vessel) -> str:
+    """Side on which the vessel has the component of a command; empty on the centre line."""
+    y = vessel.parameters.get(f"thruster.{name.partition('.')[0]}.y", 0.0)
+    return "port" if y < 0 else "starboard" if y > 0 else ""
 
 
 def _shown(name: str) -> str:

@@ -84,3 +84,34 @@ def test_a_command_that_the_ship_needs_is_asked() -> None:
     state, names = drafted({"rudder": RUDDER}, vessel())
     assert set(names) == {"rudder.delta"}
     assert "which column is propeller.n?" in state.questions[-1].sentence
+
+
+@pytest.mark.parametrize(
+    ("components", "y", "bound"),
+    [
+        (("left", "right"), 1.0, True),  # a side is the whole name
+        (("m1", "m2"), 1.0, True),  # the document says where they are
+        (("m1", "m2"), 0.0, False),  # one behind the other
+    ],
+)
+def test_two_screws_under_any_names_take_their_own_columns(components: tuple[str, str], y: float, bound: bool) -> None:
+    """Before, both took the column of port."""
+    known = {"shafts": 2, "propulsor": "differential"}
+    document = vessel(**known).document
+    thrusters = document["thruster"]
+    renamed = {
+        name: {**thrusters[side], "y": sign * y}
+        for name, side, sign in zip(components, ("port", "starboard"), (-1, 1), strict=True)
+    }
+    if not bound:
+        renamed["rudder"] = {**vessel().document["thruster"]["rudder"], "behind": "m1"}
+    ship = Vessel({**document, "thruster": renamed}, "made.toml")
+    columns = {"rpm port": RPM, "rpm stbd": RPM + 10.0 * R} | ({} if bound else {"rudder": RUDDER})
+    state, names = drafted(columns, ship)
+    if bound:
+        assert names == {f"{components[0]}.n": "rpm port", f"{components[1]}.n": "rpm stbd"}
+    else:
+        assert not {f"{name}.n" for name in components} & set(names)
+        assert [question.sentence for question in state.questions] == [
+            f"which column is {name}.n? {ship.name} needs it" for name in components
+        ]
