@@ -12,6 +12,7 @@ from shipid.units import DEGREE
 
 SHORTEST = 100.0  # m: length from which the standards apply
 SAME = 0.5 * DEGREE  # tolerance of the angle of a test
+CARRIED = 0.1  # of the steady speed: a current from which a turning circle is not judged
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,10 @@ def criteria(kind: str, measures: Measures, length: float | None) -> list[Criter
 def _turning(measures: Measures, length: float | None) -> Iterator[Criterion]:
     over = _wrong(measures, {"helm": 35.0})
     note = f"{over}; the test asks for that, or for the greatest helm allowed at the test speed" if over else ""
+    current, steady = measures["current_speed"].value, measures["steady_speed"].value
+    if current > CARRIED * steady:
+        carried = f"current or wind carried the ship at {current:.2g} m/s: correct the track for it (MSC/Circ.1053)"
+        note = "; ".join(filter(None, [note, carried]))
     for name, limit in (("advance", 4.5), ("tactical_diameter", 5.0)):
         label = f"turning ability: {name.replace('_', ' ')} (5.3.1)"
         missing = measures[name].why

@@ -37,7 +37,8 @@ def turning(record: Record) -> Measures:
         heading has changed by 90 deg, `tactical_diameter` by 180 deg, `greatest_advance`, `greatest_transfer` [m];
         `time_to_90`, `time_to_180`, `time_to_360` [s]; of the steady turn, means over the last 180 deg of heading:
         `steady_diameter` (2 V / r) [m], `steady_speed` [m/s], `steady_rate` [rad/s], `steady_drift` (> 0: the bow
-        points inwards) [rad], and `speed_loss` (share of the approach speed).
+        points inwards) [rad], `speed_loss` (share of the approach speed), and `current_speed` [m/s]: the velocity over
+        ground that does not turn with the ship, by current or wind. Nothing else is corrected for it.
     """
     over, measures = helm_over(record), Measures()
     start, helm, side = over.start, over.angle, over.side
@@ -89,6 +90,16 @@ def _steady(record: Record, side: float, turned: Array, beyond: float, before: f
     measures.add("steady_rate", rate, "rad/s", why)
     measures.add("steady_drift", mean(t, drift, first, end) if np.isfinite(rate) else NAN, "rad", why)
     measures.add("speed_loss", 1 - speed / before if before else NAN, "-", why)
+    measures.add("current_speed", _carried(record, first, end) if np.isfinite(rate) else NAN, "m/s", why)
+
+
+def _carried(record: Record, first: float, end: float) -> float:
+    """Speed [m/s] of the water in a steady turn: u + i v is a constant through the water and c exp(-i psi) of it."""
+    within = (record.t >= first) & (record.t <= end)
+    turning = np.exp(-1j * record.psi[within])
+    parts = np.stack([np.ones_like(turning), turning], axis=1)
+    found = np.linalg.lstsq(parts, record.u[within] + 1j * record.v[within])[0]
+    return float(abs(found[1]))
 
 
 def pull_out(record: Record) -> Measures:

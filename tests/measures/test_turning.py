@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.measures import pull_out, turning
+from shipid.measures.criteria import criteria
 from shipid.units import DEGREE
 from tests.measures.made_records import DRIFT, GAIN, RATE, SPEED, START, circle, every, perfect_circle, released, rows
 
@@ -32,10 +33,31 @@ def test_a_perfect_circle_has_exact_measures() -> None:
         "steady_rate": RATE,
         "steady_drift": DRIFT,
         "speed_loss": 0.0,
+        "current_speed": 0.0,
     }
     assert set(measures) == set(exact)
     for name, value in exact.items():
         assert measures[name].value == pytest.approx(value, abs=2e-3), name
+
+
+@pytest.mark.parametrize("towards", [0.0, 1.0, 4.0])
+def test_a_current_shows_in_a_whole_circle_and_its_track_is_not_judged(towards: float) -> None:
+    """The tactical diameter over ground is then anything: the current carries the ship by 0.2 V in half a turn."""
+    calm = every(perfect_circle(), 0.1)
+    stream = 0.2 * SPEED
+    carried = replace(
+        calm,
+        north=calm.north + stream * np.cos(towards) * calm.t,
+        east=calm.east + stream * np.sin(towards) * calm.t,
+        u=calm.u + stream * np.cos(towards - calm.psi),
+        v=calm.v + stream * np.sin(towards - calm.psi),
+    )
+    measures = turning(carried)
+    assert measures["current_speed"].value == pytest.approx(stream, rel=0.01)
+    rows_of = criteria("turning", measures, 200.0)
+    assert [row.met for row in rows_of] == [None, None]
+    assert all(f"carried the ship at {stream:.2g} m/s" in row.note for row in rows_of)
+    assert all("carried" not in row.note for row in criteria("turning", turning(calm), 200.0))
 
 
 def test_an_unsteady_turn_has_no_steady_diameter() -> None:
