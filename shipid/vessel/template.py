@@ -212,8 +212,13 @@ def _check(given: Particulars) -> None:
     for what, value, low, high in _ranges(given):
         if not low <= value <= high:
             raise ShipidError(f"{what} = {value:.3g}: the formulae hold for {low:g} to {high:.3g}")
-    if _yaw_inertia(given) < LEAST_YAW:
-        raise ShipidError("so short and deep a hull has no added yaw inertia by Clarke's formula")
+    if _yaw_inertia(given) < LEAST_YAW:  # linear in beam / length
+        least = 0.33 / (0.33 * given.beam / given.length + _yaw_inertia(given) - LEAST_YAW)
+        raise ShipidError(
+            f"length / beam = {given.length / given.beam:.3g}: with this block coefficient and beam / draught Clarke's "
+            f"formula gives an added yaw inertia from {math.ceil(100 * least) / 100:g} on: take a similar vessel "
+            "and change it (`shipid vessel list`)"
+        )
 
 
 def _ranges(given: Particulars) -> Iterator[tuple[str, float, float, float]]:

@@ -211,6 +211,11 @@ def test_given_areas_and_type_are_taken() -> None:
         ({"propulsor": "azimuth", "rudder_area": 20.0}, "--rudder-area: there is none with azimuth: leave it out"),
         ({"propulsor": "differential", "rudder_rate": 5.0}, "--rudder-rate: there is none with differential"),
         ({"length": 70.0, "block": 0.41, "draught": 12.0}, "Clarke's formula"),
+        (
+            {"length": 32.0, "beam": 10.5, "draught": 4.2, "block": 0.5, "speed": 3.5},
+            "length / beam = 3.05: with this block coefficient and beam / draught Clarke's "
+            "formula gives an added yaw inertia from 3.32 on",
+        ),
     ],
 )
 def test_what_the_formulae_do_not_know_is_refused(change: dict[str, object], complaint: str) -> None:
