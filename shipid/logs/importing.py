@@ -64,7 +64,7 @@ from shipid.logs.repairs import (
     apply_repairs,
     interpolate_at,
 )
-from shipid.physics.signals import is_command, is_output
+from shipid.physics.signals import is_command, is_output, row_of
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 
@@ -598,8 +598,13 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column], file: Path) -> pd
 
 
 def _check_wraps(t: Array, values: Array, name: str, column: Column, file: Path) -> None:
-    """Raise DataError where an angle jumps by a whole turn from row to row: the mean of 359 and 1 deg is 180."""
-    if column.wrap or not (wraps(name) or name == "course"):
+    """Raise DataError where an angle jumps by a whole turn from row to row: the mean of 359 and 1 deg is 180.
+
+    An order is not interpolated, but a gear that follows it would go the whole turn back.
+    """
+    row = row_of(name)
+    ordered = row is not None and row.angle and is_command(name)
+    if column.wrap or not (wraps(name) or name == "course" or ordered):
         return
     known = np.isfinite(values)
     times = t[known]

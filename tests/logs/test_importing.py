@@ -141,6 +141,23 @@ def test_a_heading_that_counts_from_0_again_is_refused_without_wrap(plain_mappin
     np.testing.assert_allclose(imported(straight, plain, tmp_path).frame["psi"], straight["psi"], atol=1e-9)
 
 
+def test_an_order_that_counts_from_0_again_is_refused_without_wrap(plain_mapping: Write, tmp_path: Path) -> None:
+    """The unit of the vessel would turn by 358 deg, the unit of the ship by 2."""
+    alpha = 0.02 * (T - 20.0)
+    column = '[columns."unit.alpha"]\nfrom = "azimuth"\nunit = "rad"\n'
+    wraps_not, wraps_too = (read_mapping(plain_mapping(f"{column}wrap = {on}\n")) for on in ("false", "true"))
+    file = as_log(turning(T), tmp_path / "log.csv")
+    plain = pd.read_csv(file)
+    plain.assign(azimuth=alpha % (2 * np.pi)).to_csv(file, index=False)
+    with pytest.raises(
+        DataError, match=r"columns.unit.alpha: .* jumps by a whole turn, once at 20 s: write wrap = true"
+    ):
+        import_log(wraps_not, file)
+    np.testing.assert_allclose(import_log(wraps_too, file).frame["unit.alpha"], alpha, atol=1e-9)
+    plain.assign(azimuth=np.where(T < 20.0, 2.0, -2.0)).to_csv(file, index=False)  # 229 deg: an order
+    assert import_log(wraps_not, file).frame["unit.alpha"].min() == -2.0
+
+
 def test_segments_may_overlap(plain_mapping: Write, tmp_path: Path) -> None:
     more = '\n[[segment]]\nrun = "a"\nstart = 10\nend = 20\n[[segment]]\nrun = "b"\nstart = 15\nend = 30\n'
     frame = imported(turning(T), plain_mapping(more), tmp_path).frame
