@@ -499,7 +499,8 @@ typedef struct {{
 void {name}_init({name} *self);
 
 /* Keep a row that was measured at t [s], entries as in {name}_row_names. Rows come in order; after a pause of more than
- * {GAP * physics.step:g} s the past begins anew. Angles may wrap. Rows closer than {
+ * {GAP * physics.step:g} s the past begins anew. The heading may wrap. Orders are taken as they are:
+ * an azimuth about 0 goes on to -10 deg, not to 350, as in the imported log. Rows closer than {
             physics.step / ROWS_A_STEP:g} s replace each other in the past. */
 int {name}_record({name} *self, double t, const {name}_real *row);
 

@@ -289,6 +289,30 @@ def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
     np.testing.assert_allclose(np.stack(predicted, axis=1), expected, rtol=0, atol=1e-10)
 
 
+def test_the_heading_may_wrap_and_an_order_is_taken_as_it_is_as_the_header_says(tmp_path):
+    vessel = variety()["gunnerus-28.9"]
+    rows = log_of(vessel, 8, np.random.default_rng(3), 1.0).frame
+    corrector = drawn("learned-force", 1, vessel="gunnerus-28.9").predictor.corrector
+    exported = model(Predictor(Physics(vessel, 5, 1.0, "euler"), "learned-force", corrector, {"u": (-9.0, 9.0)}))
+    files = predictor_files(exported, "odd", Precision())
+    assert "The heading may wrap. Orders are taken as they are" in files.texts["odd.h"]
+    size, loaded = _size_of_struct(files, tmp_path) + 64, library(files, tmp_path)
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    ends = []
+    for turned in ({}, {"psi": 2 * np.pi}, {"port.alpha": 2 * np.pi}):
+        kept, path = np.zeros(size, dtype=np.uint8), np.zeros((5, 2))
+        loaded.odd_init(pointer(kept))
+        late = rows["t"] > rows["t"].median()
+        log = rows.assign(**{name: rows[name] + by * late for name, by in turned.items()})
+        for t, row in zip(log["t"], log[list(order)].to_numpy(dtype=float), strict=True):
+            assert loaded.odd_record(pointer(kept), t, pointer(np.ascontiguousarray(row))) == 0
+        loaded.odd_predict(pointer(kept), None, pointer(path))
+        ends.append(path)
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=1e-9)
+    assert np.isfinite(ends[2]).all()
+
+
 def test_a_ship_without_orders_compiles_without_a_warning(tmp_path):
     strange = drawn("one-step", 6, count=3, vessel="mariner")
     vessel = variety()["mariner"]
