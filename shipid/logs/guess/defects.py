@@ -22,6 +22,7 @@ OF_POSITIONS = {"kind": "despike", "columns": ["north", "east"], "window": 10.0,
 FEW = 4  # times that a sentence names
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
+STREAM = 0.5  # of the misfit of positions and velocities: less is no current
 
 
 def defects_of_rows(state: State, sniffed: Sniffed) -> None:
@@ -113,10 +114,37 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
         return np.asarray(path + off * np.exp(1j * state.psi))
     if float(np.sqrt(evidence.fit(seen[keep], ran[keep]).left)) > JITTER:
         far = float(np.sqrt(np.mean(np.abs(seen[keep] - scale * ran[keep]) ** 2)))
+        current, share = _stream(seen[keep], ran[keep])
+        if share > STREAM:
+            towards = np.degrees(np.angle(current)) % 360.0
+            flow = f"a current of {abs(current):.2g} m/s towards {towards:.0f} deg ({100 * share:.0f} % of the misfit)"
+            sentence = f"positions and velocities part as in {flow}: is the speed one through the water? Then take "
+            sentence += "[estimate] in its place"
+            state.find("speed through water", (), float(np.clip(share, 0.5, 0.95)), sentence)
+            return path
         sentence = f"over {evidence.WINDOW:g} s positions leave integrated velocities by {far:.2g} m (RMS)"
         sentence += ": take the path of the velocities"
         state.find("position jitter", (), 0.8, sentence)
     return path
+
+
+def _stream(seen: Complex, ran: Complex) -> tuple[complex, float]:
+    """The steady current [m/s], north + i east, that velocities lack, and its share of the misfit.
+
+    seen, ran : changes (W,) [m] of position and of integrated velocities over each window. Velocities lack it whole, or
+    a speed along the course over ground lacks what of it is along the course.
+    """
+    course = ran / np.maximum(np.abs(ran), 1e-9)
+    before = float(np.sum(np.abs(seen - evidence.fit(seen, ran).scale * ran) ** 2))
+    best = 0j, 0.0
+    for along in (np.ones_like(ran), 1j * np.ones_like(ran)), (course.real * course, course.imag * course):
+        columns = np.stack([ran, *(evidence.WINDOW * one for one in along)], axis=1)
+        both = np.concatenate([seen.real, seen.imag])
+        design = np.concatenate([columns.real, columns.imag])
+        found = np.linalg.lstsq(design, both, rcond=None)[0]
+        share = 1.0 - float(np.sum((both - design @ found) ** 2)) / max(before, 1e-12)
+        best = max(best, (complex(found[1], found[2]), share), key=lambda one: one[1])
+    return best
 
 
 def _delay(state: State, seen: Array | Complex, integrated: Complex) -> tuple[float, float]:

@@ -50,6 +50,23 @@ def test_a_column_that_only_rises_is_asked_for(name: str, asked: int, tmp_path: 
     assert said == ["no column is called a clock: 'distance' rises from row to row. Is it the time?"] * asked
 
 
+@pytest.mark.parametrize("along", [False, True])
+def test_velocities_through_the_water_are_no_jitter_of_the_positions(along: bool, tmp_path: Path) -> None:
+    """u and v of a Doppler log, or its speed beside the course of the receiver, in a current."""
+    log = as_bridge(si_log(0, 5))
+    stream = 0.3 * float(np.median(log["u"])) * np.exp(1j * np.radians(200.0))
+    drifted = log.assign(N=log["N"] + stream.real * log["time"], E=log["E"] + stream.imag * log["time"])
+    if along:
+        ground = (log["u"] + 1j * log["v"]) * np.exp(1j * np.radians(log["psi"])) + stream
+        course = np.degrees(np.angle(ground)) % 360.0
+        drifted = drifted.drop(columns=["u", "v"]).assign(speed=np.hypot(log["u"], log["v"]), cog=course)
+    proposal = guessed(drifted.round(4), tmp_path)
+    (found,) = [finding for finding in proposal.findings if finding.kind == "speed through water"]
+    assert f"a current of {abs(stream):.2g} m/s towards" in found.sentence
+    assert 190.0 < float(found.sentence.split("towards ")[1].split(" deg")[0]) < 210.0
+    assert "position jitter" not in proposal.kinds
+
+
 def spread(log: pd.DataFrame) -> pd.DataFrame:
     """As from a slower log of 2 s, interpolated linearly, the heading across 360, too."""
     slow = log.iloc[::4]
