@@ -417,7 +417,7 @@ def test_mistakes_are_one_line(more: dict[str, object], words: str) -> None:
         ({"nuisance": ["currant"]}, "did you mean 'current'"),
         ({"bounds": {FEW[0]: (2.0, 1.0)}}, "low above high"),
         ({"horizon": 1.5}, "must hold two steps"),
-        ({"weights": {"u": 0.0}}, "greater than 0"),
+        ({"weights": {"u": 0.0}}, "must be above 0"),
     ],
 )
 def test_a_wrong_block_is_reported(more: dict[str, object], words: str) -> None:
