@@ -38,7 +38,7 @@ def positive(name: str, value: Any, error: Kind = ShipidError) -> float:
 def one_of(name: str, value: Any, valid: Iterable[str], error: Kind = ShipidError) -> None:
     """Raise `error` for a value that is none of the valid names."""
     names = list(valid)
-    if value not in names:
+    if not isinstance(value, str) or value not in names:
         raise error(f"{name} {value!r} is not known: {choices(str(value), names)}")
 
 

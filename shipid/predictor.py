@@ -208,8 +208,8 @@ class Predictor:
             without a column, are passed over.
         """
         by_name("columns", columns, "a name to an array", DataError)
-        if any(np.ndim(values) != 1 for values in columns.values()):
-            odd = next(name for name, values in columns.items() if np.ndim(values) != 1)
+        odd = next((name for name, values in columns.items() if np.ndim(values) != 1), None)
+        if odd is not None:
             raise DataError(f"must be (S,), a value for each instant, not {np.shape(columns[odd])}", path=odd)
         outside = np.full(len(next(iter(columns.values()), ())), not self.limits)
         for name, (low, high) in self.limits.items():

@@ -46,6 +46,8 @@ def test_an_unknown_name_comes_with_those_that_are_valid() -> None:
         one_of("method", "Euler", ("euler", "rk4"))
     with pytest.raises(ShipidError, match="method None is not known: valid: euler, rk4"):
         one_of("method", None, ("euler", "rk4"))
+    with pytest.raises(ShipidError, match="is not known: valid: euler, rk4"):
+        one_of("method", np.array(["euler", "rk4"]), ("euler", "rk4"))
 
 
 @pytest.mark.parametrize(

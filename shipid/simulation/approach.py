@@ -32,7 +32,7 @@ NOTHING = 1e-12  # m/s^2, rad/s^2
 CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach of a small ship
 PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose speed settles over some 20
 SETTLED = 1e-3  # m/s, rad/s: greatest change of a velocity over the last chunk, and greatest yaw rate
-SLOW = 0.02  # the same times U^2 / L, for a large and slow ship: her speed is then right to about 1 %
+SLOW = 0.02  # s: the same in U^2 / L, for a large and slow ship: her speed is then right to about 1 %
 CREEPING = 0.02  # Froude number: a ship that is slower, or at rest, is taken for one of it
 KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
 LENGTH, FASTEST = 100.0, 100.0  # m, of a ship whose document does not say; m/s
@@ -168,12 +168,12 @@ def steady(controls: Controls, n: Array, *, step: float, method: Method, engine:
     """Steady straight motion in calm water at shaft speeds n (S,) [rev/s].
 
     Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s (large and slow ships: by
-    0.02 U^2 / L), with the helm amidships, or held on course by a helmsman. Position and heading are then set to 0.
+    0.02 s U^2 / L), with the helm amidships, or held on course by a helmsman. Position and heading are then set to 0.
 
     Raises
     ------
-    ShipidError : it diverges, is not steady after an hour and 200 ship lengths, or turns with the helm amidships
-        (`NotStraight`).
+    ShipidError : it diverges, is steady neither after an hour nor after 200 ship lengths, or turns with the helm
+        amidships (`NotStraight`).
     """
     asked = _Asked(dynamics(controls.vessel), tuple(controls.vessel.parameters.values()), _length(controls), controls)
     known = _steady(asked, tuple(map(float, n)), step, method, engine, held)

@@ -18,7 +18,7 @@ from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.words import fits, is_magnetic, is_order, parts_of
 from shipid.logs.mapping import to_si
 
-GOOD, POOR = 0.05, 0.2  # misfit of a course and a heading: 1 - agreement
+POOR = 0.2  # misfit of a course and a heading: 1 - agreement
 MIRROR = 2.0  # times smaller a misfit must be, to decide between a heading and its mirror
 STRAIGHT = 0.01  # 1 - |mean exp(i psi)| of a ship that hardly turns
 COMPASS = frozenset(("heading hdg hdt head compass kompass gyro kreisel kurs course baug psi steuer rumbo cap").split())
