@@ -154,17 +154,21 @@ class Look:
             stream = f"a steady current of {V_c:.2g} m/s towards {beta_c:.0f} deg, which is not in the log,"
             more = f", then {', '.join(_shown(self.vessel, one) for one in self.changes)}" if self.changes else ""
             left = f" ({self.corrected:.3g} m)" if self.changes else ""
-            explained = f"{stream} would explain most of it ({self.current.error:.3g} m)"
+            explained = f"{stream} would explain {self._part(self.current.error)} of it ({self.current.error:.3g} m)"
             return f"{self.vessel.name}: {seen}: {explained}{more}{left}"
         if not self.changes:
             if self.alone < self.constant:
                 return f"{self.vessel.name} and the log agree, and no single number would explain the rest: {seen}"
             return f"{self.vessel.name} is worse than constant u, v, r, and no single number explains it: {seen}"
         first, *others = self.changes
-        explained = f"{_shown(self.vessel, first)} would explain most of it ({first.error:.3g} m)"
+        explained = f"{_shown(self.vessel, first)} would explain {self._part(first.error)} of it ({first.error:.3g} m)"
         more = f", then {', '.join(_shown(self.vessel, one) for one in others)}" if others else ""
         left = f" ({self.corrected:.3g} m)" if others else ""
         return f"{self.vessel.name}: {seen}: {explained}{more}{left}"
+
+    def _part(self, error: float) -> str:
+        """How much of the error is explained where so much [m] is left."""
+        return "most" if error <= self.alone / 2 else "a part"
 
     def patch(self, base: str) -> str:
         """The changes as a patch document (TOML) on a vessel that is called `base` there; empty without changes."""

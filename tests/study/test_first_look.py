@@ -63,6 +63,7 @@ def test_a_screw_too_large_is_reported_and_explained(log: Dataset) -> None:
     assert view.values.get(D_P, 0.0) == pytest.approx(truth.parameters[D_P], rel=0.1)
     assert view.corrected < 0.3 * view.alone
     assert "would explain most of it" in view.sentence
+    assert "would explain a part of it" in replace(view, alone=1.5 * view.changes[0].error).sentence
     assert "\n" not in view.sentence
 
 
