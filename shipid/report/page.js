@@ -216,6 +216,10 @@
   function showWind(place, wind) {
     place.hidden = !wind;
     if (!wind) return;
+    if (wind[0] < 0.05) {
+      place.textContent = "no wind"; // 0.0 m/s, from no direction
+      return;
+    }
     const degrees = ((Math.round((wind[1] * 180) / Math.PI) % 360) + 360) % 360; // psi counts on over whole turns
     place.innerHTML = `<svg viewBox="0 0 20 20" width="20" height="20" aria-hidden="true">
       <path transform="rotate(${degrees} 10 10)" d="M10 18V3M5 8l5-5 5 5"/></svg>`;
