@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat
 from shipid import document as documents
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
+from shipid.files import open_file
 from shipid.physics import TERMS
 from shipid.physics.grammar import AXES
 from shipid.physics.inertia import mass
@@ -224,9 +225,12 @@ def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dic
     import pandas as pd  # most vessels have no table, and it takes its time
 
     try:
-        frame = pd.read_csv(source, comment="#")
-    except OSError:
+        with open_file(source) as stream:
+            frame = pd.read_csv(stream, comment="#")
+    except FileNotFoundError:
         raise DocumentError(f"{source}: no such file in the folder of the vessel", file=file, path=path) from None
+    except OSError as error:
+        raise DocumentError(f"{source}: cannot be read: {error.strerror}", file=file, path=path) from None
     except ValueError:
         raise DocumentError(f"{source}: not a CSV table with a header", file=file, path=path) from None
     missing = next((name for name in columns if name not in frame), None)

@@ -71,6 +71,7 @@ BROKEN = {
     "extends-and-base": ("extends", "valid: base, base_digest"),
     "waves-without-table": ("waves.first_order.table", "missing"),
     "waves-table-missing": ("waves.first_order.table", "gone.csv: no such file in the folder of the vessel"),
+    "waves-table-of-a-device": ("waves.first_order.table", "/dev/zero: cannot be read: a device or a pipe, not a file"),
     "waves-table-empty": ("waves.first_order.table", "words.csv: not a CSV table with a header"),
     "waves-table-without-a-column": ("waves.first_order.table", "has no column 'K_imag'"),
     "waves-with-columns-missing": ("waves.drift.table", "has no column 'X_drift'"),
