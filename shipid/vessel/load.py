@@ -215,7 +215,7 @@ def _with_tables(document: Document, file: Path) -> Document:
     """The document with the CSV files of tables replaced by their columns, so that its digest covers their content."""
     tables = {}
     for path, key, block in (*term_blocks(document), *term_blocks(document, off=True)):
-        if key in TERMS and isinstance(block.get(TABLE), str):
+        if key in TABLES and isinstance(block.get(TABLE), str):
             tables[f"{path}.{TABLE}"] = _table(file.parent / block[TABLE], TABLES[key], file, f"{path}.{TABLE}")
     return documents.replace(document, tables) if tables else dict(document)
 
@@ -303,7 +303,7 @@ def check_vessel(document: Document, file: str) -> Vessel:
             raise DocumentError(message, file=file, path=path)
         paths[name] = path
         _check_lengths(path, block, file)
-        if TABLE in block:
+        if key in TABLES:
             _check_wave_table(f"{path}.{TABLE}", block[TABLE], TABLES[key], file)
     _check_behind(vessel)
     _check_units(vessel)

@@ -72,6 +72,8 @@ BROKEN = {
     "waves-without-table": ("waves.first_order.table", "missing"),
     "waves-table-missing": ("waves.first_order.table", "gone.csv: no such file in the folder of the vessel"),
     "waves-table-of-a-device": ("waves.first_order.table", "/dev/zero: cannot be read: a device or a pipe, not a file"),
+    "table-of-another-term": ("hull.derivatives.table", "'tables/waves.csv': must be a number"),
+    "table-in-the-wind": ("wind.table", "unknown key: valid: A_FW"),
     "waves-table-empty": ("waves.first_order.table", "words.csv: not a CSV table with a header"),
     "waves-table-without-a-column": ("waves.first_order.table", "has no column 'K_imag'"),
     "waves-with-columns-missing": ("waves.drift.table", "has no column 'X_drift'"),
