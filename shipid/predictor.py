@@ -33,6 +33,7 @@ FORMAT = 4
 DIVISORS = ("std", "spread", "deviation")  # last words of the names of arrays by which inputs or traits are divided
 BANDS = "bands."  # before the names of arrays of a band in a saved predictor
 MOST_STEPS = 100_000  # of a horizon
+NAMES = ("commands", "names", "modules")  # keys of lists of names in the headers of correctors and bands
 
 
 class Banded(NamedTuple):
@@ -277,6 +278,8 @@ class Predictor:
                 f"written in format {header.get('format')}, this shipid reads {FORMAT}: run the study again", file=file
             )
         _check_arrays(arrays, file)
+        if not _named([header.get("corrector"), header.get("bands")]):
+            raise ResultError("damaged: run the study again", file=file)
         band = {name.removeprefix(BANDS): arrays.pop(name) for name in [*arrays] if name.startswith(BANDS)}
         try:
             known = _Header.model_validate(header)
@@ -341,6 +344,17 @@ class _Header(BaseModel):
     limits: dict[str, tuple[float, float]]
     provenance: dict[str, Any]
     run_up: Annotated[float, Field(ge=0, le=1e9)] = 0.0
+
+
+def _named(header: Any) -> bool:
+    """Whether all lists of names in a part of the header of a predictor hold texts, at any depth."""
+    if isinstance(header, list):
+        return all(map(_named, header))
+    if not isinstance(header, dict):
+        return True
+    lists = [header[key] for key in NAMES if key in header]
+    texts = all(isinstance(one, list) and all(isinstance(name, str) for name in one) for one in lists)
+    return texts and all(_named(value) for key, value in header.items() if key not in NAMES)
 
 
 def _check_arrays(arrays: Mapping[str, Array], file: str | os.PathLike[str]) -> None:
