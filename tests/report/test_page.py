@@ -83,12 +83,15 @@ def test_one_plotly_and_a_file_that_fits_a_mail(page):
     assert not parsed.open, "every element is closed"
 
 
-def test_the_vendored_plotly_is_the_one_that_is_recorded():
+def test_the_vendored_plotly_is_the_one_that_is_recorded_and_draws_the_figures_of_the_package():
     folder = files("shipid.report").joinpath("vendor")
     script = folder.joinpath("plotly-cartesian.min.js").read_bytes()
     record = folder.joinpath("README.md").read_text(encoding="utf-8")
     assert hashlib.sha256(script).hexdigest() in record
-    assert b"plotly.js (cartesian - minified) v" + get_plotlyjs_version().encode() in script[:200]
+    version = re.search(rb"plotly.js \(cartesian - minified\) v([0-9.]+)", script[:200])
+    assert version is not None
+    assert f"plotly.js {version[1].decode()}" in record
+    assert version[1].decode().partition(".")[0] == get_plotlyjs_version().partition(".")[0], "figures are made for it"
     assert b"</script" not in script
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.study.workers import LONGEST, METHOD, ONE_THREAD, PRELOADED, QUICK_END, import_for_workers, on_workers
+from shipid.study.workers import LONGEST, METHOD, ONE_THREAD, PRELOADED, import_for_workers, on_workers
 
 forked = pytest.mark.skipif(METHOD != "forkserver", reason="workers are forked on Linux only")
 
@@ -48,26 +48,6 @@ process.join()
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
     )
     assert process.stdout.split() == ["1"] * (1 + len(ONE_THREAD) + 1), process.stderr
-
-
-@forked
-def test_the_source_of_workers_ends_at_once_and_no_other_process_does() -> None:
-    """It calls nothing that was registered before."""
-    program = f"""
-import multiprocessing, sys
-from shipid.study.workers import import_for_workers
-import_for_workers()
-ask = "import sys; print('{QUICK_END}' in sys.modules, flush=True)"
-process = multiprocessing.get_context("forkserver").Process(target=exec, args=(ask,))
-process.start()
-process.join()
-print("{QUICK_END}" in sys.modules)
-"""
-    process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert process.stdout.split() == ["True", "False"], process.stderr
-    late = f"import atexit; atexit.register(print, 'slowly'); import {QUICK_END}"
-    process = subprocess.run([sys.executable, "-c", late], capture_output=True, text=True, check=True)
-    assert process.stdout == ""
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
