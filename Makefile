@@ -6,6 +6,8 @@ STAMP  := $(VENV)/.installed
 
 export OMP_NUM_THREADS ?= 2
 
+OLD := import sys; sys.exit("shipid needs Python 3.11 or newer: make study PYTHON=python3.12" if sys.version_info < (3, 11) else 0)
+
 .PHONY: study test slow check docs format faults bench clean
 
 study: $(STAMP)          ## the main job: the embedded default study, and the path of its report
@@ -52,6 +54,7 @@ clean:
 	rm -rf $(VENV) results docs/_build docs/generated .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 $(STAMP): pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -c '$(OLD)'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch==2.13.0
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
