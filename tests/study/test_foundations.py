@@ -273,7 +273,7 @@ def test_what_cannot_be_identified_fails_in_its_cells(tmp_path: Path, recorded: 
 
     The bounds keep the search where they diverge: elsewhere it depends on the solver's version whether they do.
     """
-    far = dict.fromkeys(PATHS, [50.0, 60.0])
+    far = {path: [50.0, 60.0] for path in PATHS}
     bad = {**FITTED, "name": "bad", "identify": {**IDENTIFY, "step": 20.0, "horizon": 40.0, "bounds": far}}
     plan, _ = study(recorded, [WRONG, bad])
     run_here(plan, tmp_path / "run")

@@ -104,28 +104,32 @@ def test_closing_ends_busy_workers() -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="processes of Windows have no groups to interrupt")
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
-def test_workers_end_with_their_parent_and_without_noise(sent: signal.Signals) -> None:
+def test_workers_end_with_their_parent_without_noise_and_leave_nothing(sent: signal.Signals) -> None:
     """Ctrl-C goes to all processes of a terminal, a kill to one; what all inherited is closed when all have ended."""
     program = """
 import signal, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background of a shell ignore it
-from shipid.study.workers import on_workers
+from shipid.study.workers import import_for_workers, on_workers
+import_for_workers()
 try:
     for task, _ in on_workers(time.sleep, [0, 3600, 3600], 2):
         print("begun", flush=True)
 except KeyboardInterrupt:
     print("interrupted", flush=True)
 """
-    command = [sys.executable, "-c", program]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == b"begun\n"
-        if sent == signal.SIGINT:
-            os.killpg(process.pid, sent)
-        else:
-            process.kill()
-        out, err = process.communicate(timeout=60)
+    command, pipe = [sys.executable, "-c", program], subprocess.PIPE
+    with tempfile.TemporaryDirectory(dir="/tmp") as short:  # that of a test may be too long for a socket
+        environment = os.environ | {"TMPDIR": short}
+        with subprocess.Popen(command, env=environment, stdout=pipe, stderr=pipe, start_new_session=True) as process:
+            assert process.stdout is not None
+            assert process.stdout.readline() == b"begun\n"
+            if sent == signal.SIGINT:
+                os.killpg(process.pid, sent)
+            else:
+                process.kill()
+            out, err = process.communicate(timeout=60)
         assert (out, err) == (b"interrupted\n" if sent == signal.SIGINT else b"", b"")
+        assert not os.listdir(short)
 
 
 def test_what_workers_need_is_imported_before_they_are_forked() -> None:
