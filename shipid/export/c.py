@@ -20,13 +20,23 @@ from shipid.export.equations import Equations
 from shipid.export.model import Model
 from shipid.hybrid.bands import FEWEST, LEVELS, Bands
 from shipid.observer import DIVERGED, LOW, MEASURED, STATES, Bank, bank, filter_function, sizes
-from shipid.physics.signals import SIGNALS, signal_of
+from shipid.physics.signals import SIGNALS, is_command, signal_of
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 ROWS_A_STEP = 8  # rows of a recorder that are kept for each step of the past
 GAP = 3.0  # steps: after a longer pause a recorder begins anew
+_SAME_TURN = """/* An angle of a thruster or rudder by the turn that training had: of all that differ by whole turns, the one within its
+ * limits. Where these hold more than a turn, or none is within: the nearest to the last one. */
+static real same_turn(real angle, real last, int place)
+{{
+    const double turn = 6.283185307179586476925, low = {name}_limits[2 * place], high = {name}_limits[2 * place + 1];
+    const double within = (double)angle + turn * ceil((low - (double)angle) / turn);
+    if (high - low <= turn && within <= high) return (real)within;
+    return angle + (real)(turn * floor(0.5 + ((double)last - (double)angle) / turn));
+}}
+"""
 SPEED_LIMIT = 100.0  # m/s and rad/s: a faster state has diverged
 WORDS = frozenset(
     """
@@ -499,8 +509,9 @@ typedef struct {{
 void {name}_init({name} *self);
 
 /* Keep a row that was measured at t [s], entries as in {name}_row_names. Rows come in order; after a pause of more than
- * {GAP * physics.step:g} s the past begins anew. The heading may wrap. Orders are taken as they are:
- * an azimuth about 0 goes on to -10 deg, not to 350, as in the imported log. Rows closer than {
+ * {GAP * physics.step:g} s the past begins anew. The heading may wrap, and so may angles of
+ * thrusters and rudders: 350 deg is -10 deg where training had -50 to 50. Where training had more than a turn, an angle
+ * goes on by the shortest way. The first row says by which turn. Rows closer than {
             physics.step / ROWS_A_STEP:g} s replace each other in the past. */
 int {name}_record({name} *self, double t, const {name}_real *row);
 
@@ -702,6 +713,7 @@ double {name}_factor(double miss, double level, int kind)
         n, cap, step = len(row), self.capacity, model.physics.step
         angles = [i for i, key in enumerate(row) if "." not in key and key in SIGNALS and SIGNALS[key].angle]
         orders = [i for i, key in enumerate(row) if "." in key]
+        turned = [key for key in row if is_command(key) and SIGNALS[signal_of(key)].angle and key in model.limits]
         u, v, psi = (row.index(key) for key in ("u", "v", "psi"))
         reached = [row.index(key) for key in names.reached]
         velocity = model.physics.path == "velocity"
@@ -712,7 +724,12 @@ double {name}_factor(double miss, double level, int kind)
             f"        kept[{i}] += (real)(6.283185307179586476925 * floor(0.5 + ((double)last[{i}] - (double)kept[{i}]) / 6.283185307179586476925));"
             for i in angles
         )
-        lines = [
+        same_turn = "\n".join(
+            f"    kept[{i}] = same_turn(kept[{i}], self->count ? self->rows[newest][{i}] : kept[{i}], {i});"
+            for i in map(row.index, turned)
+        )
+        lines = [_SAME_TURN.format(name=name)] if turned else []
+        lines += [
             f"""void {name}_init({name} *self)
 {{
     memset(self, 0, sizeof *self);
@@ -748,6 +765,7 @@ double {name}_factor(double miss, double level, int kind)
     if (self->count && !(t > self->t[newest])) return {name}_TIME;
     if (self->count && t - self->t[newest] > {GAP * step!r}) self->count = 0;
     memcpy(kept, row, {n} * sizeof *kept);
+{same_turn}
     if (self->count) {{
         const real *last = self->rows[newest];
         const real half = (real)((t - self->t[newest]) / 2);
@@ -786,21 +804,46 @@ double {name}_factor(double miss, double level, int kind)
             if settled > 0
             else ""
         )
+        plan = f", plan[{sizes_['planned']}]" if any(key in names.planned for key in turned) else ""
         lines.append(f"""int {name}_predict(const {name} *self, const {real} *planned, {real} *path)
 {{
     const int newest = (self->first + self->count - 1) % {cap};
     static const int taken[{len(taken)}] = {{{_whole(taken)}}};
-    real now[{len(taken)}], past[{max(1, sizes_["past"])}];
+    real now[{len(taken)}], past[{max(1, sizes_["past"])}]{plan};
     int i;
     for (i = 0; i < {2 * names.horizon}; ++i) path[i] = NAN;
     if (!self->count) return {name}_NO_PAST;
     for (i = 0; i < {len(taken)}; ++i) now[i] = self->rows[newest][taken[i]];
 {past_lines or "    past[0] = 0;"}
-    i = {name}_path(now, self->reached, past, planned, self->estimates, self->parameters, path);
+{self._plan(turned)}    i = {name}_path(now, self->reached, past, planned, self->estimates, self->parameters, path);
 {young}    return i;
 }}
 """)
         return "\n".join(lines)
+
+    def _plan(self, turned: Sequence[str]) -> str:
+        """Planned angles by the same turn as that of the newest row."""
+        names, row = self.model.layout, self.row
+        width = len(names.planned)
+        lines = [
+            f"            plan[{width} * k + {names.planned.index(key)}] = "
+            f"same_turn(planned[{width} * k + {names.planned.index(key)}], k ? plan[{width} * (k - 1) + "
+            f"{names.planned.index(key)}] : self->rows[newest][{row.index(key)}], {row.index(key)});"
+            for key in turned
+            if key in names.planned
+        ]
+        if not lines:
+            return ""
+        rows = "\n".join(lines)
+        return f"""    if (planned) {{
+        int k;
+        memcpy(plan, planned, sizeof plan);
+        for (k = 0; k < {names.horizon}; ++k) {{
+{rows}
+        }}
+        planned = plan;
+    }}
+"""
 
     def _past(self, orders: Sequence[int], north: int, east: int, velocity: bool) -> str:
         """Rows of the past by interpolation, commands by the last row before."""

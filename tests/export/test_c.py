@@ -20,7 +20,7 @@ from shipid.export.casadi import predictor_function
 from shipid.export.equations import Equations
 from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
-from shipid.hybrid.features import Memory
+from shipid.hybrid.features import MOTIONS, Memory
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer, observe
 from shipid.predictor import Predictor
@@ -289,28 +289,67 @@ def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
     np.testing.assert_allclose(np.stack(predicted, axis=1), expected, rtol=0, atol=1e-10)
 
 
-def test_the_heading_may_wrap_and_an_order_is_taken_as_it_is_as_the_header_says(tmp_path):
+@pytest.mark.parametrize("kind", ["learned-force", "path-drawn"])
+@pytest.mark.parametrize(
+    ("low", "high", "angles", "least"),
+    [
+        (-50, 50, [-40, -10, 20, 10, -30, -50, 49, 0], None),  # any turns: 350 for -10
+        (-170, 170, [-100, 100, -160, 165, 0, -5, 90, -90], None),  # orders of a unit that does not turn all round
+        (-200, 500, [350, 380, 400, 365, 350, 300, 330, 362], 0),  # a unit that turns all round, from 0 to 360
+        (-20, 20, [30, 50, 80, 130, 170, 200, 260, 300], -180),  # beyond the training: an alarm, the shortest way
+    ],
+)
+def test_angles_may_wrap(kind, low, high, angles, least, tmp_path):
+    """Rows whose angles differ by whole turns give the paths of those that go on, and the same alarm."""
+    rng = np.random.default_rng(high)
     vessel = variety()["gunnerus-28.9"]
-    rows = log_of(vessel, 8, np.random.default_rng(3), 1.0).frame
-    corrector = drawn("learned-force", 1, vessel="gunnerus-28.9").predictor.corrector
-    exported = model(Predictor(Physics(vessel, 5, 1.0, "euler"), "learned-force", corrector, {"u": (-9.0, 9.0)}))
+    rows = log_of(vessel, 8, rng, 1.0).frame.iloc[: len(angles)]
+    rows = rows.assign(**{"port.alpha": np.radians(angles)})
+    limits = {"u": (-9.0, 9.0), "port.alpha": tuple(np.radians([low, high]))}
+    strange = drawn(kind, 3, vessel="gunnerus-28.9").predictor
+    if kind == "path-drawn":
+        inputs = type(strange.corrector.inputs)(strange.corrector.inputs.commands, Memory(history=(1.0, 2.0)))
+        size, orders = len(rows), inputs.commands
+        names = (*MOTIONS, "psi", "x", "y", "V_w", "beta_w", *orders)
+        instants = Instants(sample(rows, rows["t"].to_numpy()), {name: np.zeros((2, size)) for name in names})
+        table = inputs.table(Physics(vessel, 5, 1.0), instants)
+        corrector = type(strange.corrector)(inputs, (network_of(rng, list(table), table, 5, 2, False),), {})
+    else:
+        corrector = strange.corrector
+    exported = model(Predictor(Physics(vessel, 5, 1.0, "euler"), kind, corrector, limits, commands="known"))
     files = predictor_files(exported, "odd", Precision())
-    assert "The heading may wrap. Orders are taken as they are" in files.texts["odd.h"]
     size, loaded = _size_of_struct(files, tmp_path) + 64, library(files, tmp_path)
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
     order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
-    ends = []
-    for turned in ({}, {"psi": 2 * np.pi}, {"port.alpha": 2 * np.pi}):
-        kept, path = np.zeros(size, dtype=np.uint8), np.zeros((5, 2))
+    plan = np.tile(rows[list(exported.layout.planned)].to_numpy()[-1], (5, 1))
+    place = exported.layout.planned.index("port.alpha")
+    plan[:, place] += np.radians(0.2 * (high - low) * np.linspace(0, 1, 5)) * (-1 if angles[-1] > 0 else 1)
+
+    def made(turned):
+        """Paths and results, a row at a time, with the angles as they are `turned`."""
+        kept, found, results = np.zeros(size, dtype=np.uint8), [], []
         loaded.odd_init(pointer(kept))
-        late = rows["t"] > rows["t"].median()
-        log = rows.assign(**{name: rows[name] + by * late for name, by in turned.items()})
+        log = rows.assign(**{"port.alpha": turned(rows["port.alpha"].to_numpy())})
+        orders = plan.copy()
+        orders[:, place] = turned(plan[:, place])
         for t, row in zip(log["t"], log[list(order)].to_numpy(dtype=float), strict=True):
             assert loaded.odd_record(pointer(kept), t, pointer(np.ascontiguousarray(row))) == 0
-        loaded.odd_predict(pointer(kept), None, pointer(path))
-        ends.append(path)
-    np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=1e-9)
-    assert np.isfinite(ends[2]).all()
+            for planned in (None, pointer(orders)):
+                path = np.zeros((5, 2))
+                results.append(loaded.odd_predict(pointer(kept), planned, pointer(path)))
+                found.append(path)
+        return np.array(found), results
+
+    def turned(values):
+        if least is None:
+            return values + 2 * np.pi * rng.integers(-2, 3, len(values))
+        return (values - np.radians(least)) % (2 * np.pi) + np.radians(least)
+
+    expected, results = made(lambda values: values)
+    assert OUTSIDE in results if low == -20 else OUTSIDE not in results
+    got, others = made(turned)
+    assert others == results
+    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-9)
 
 
 def test_a_ship_without_orders_compiles_without_a_warning(tmp_path):
