@@ -116,7 +116,7 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
     names = tuple(sorted(scalars, key=lambda name: name not in MOVING))
     lags = math.ceil(MOST_LATE * widths["latency"] / settings.step) if "latency" in widths else 0
     numbers = {run: {path: x for path, x in of.items() if path in vessel.parameters} for run, of in overridden.items()}
-    segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags, numbers)
+    segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags, numbers, settings.commands)
     weather = _weather(segments, overridden, model.environment, [n for n in names if n.startswith("current")])
     free = {path for group in unknown.groups for path in group}
     twice = next(((run, path) for run, values in overridden.items() for path in values if path in free), None)

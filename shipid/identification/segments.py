@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,7 @@ def cut_segments(
     horizon: float,
     lags: int = 0,
     parameters_of_run: Mapping[str, Mapping[str, float]] | None = None,
+    commands: Literal["held", "between"] = "held",
 ) -> list[ShootingSegment]:
     """Cut runs into consecutive segments of `horizon` [s]; 0: one segment for each unbroken stretch.
 
@@ -61,10 +62,12 @@ def cut_segments(
     ----------
     step : of the integrator [s]. lags : number of earlier command values to keep.
     parameters_of_run : run -> path -> value, overrides that the actuator simulation of that run uses.
+    commands : `held` from each row to the next, or changing `between` rows.
 
     Raises
     ------
-    DataError : an unknown run, a command that was not recorded, or a run without a long enough stretch.
+    DataError : an unknown run, a command that was not recorded, a run without a long enough stretch, or a step too long
+        for orders that change between rows.
     """
     unknown = next((run for run in runs if run not in dataset.runs), None)
     if unknown is not None:
@@ -82,7 +85,7 @@ def cut_segments(
     for run, places in stretches(dataset):
         if run in runs:
             rows = {name: values[places] for name, values in table.items()}
-            result += _cut(vessels.get(run, vessel), rows, list(runs).index(run), step, horizon, lags)
+            result += _cut(vessels.get(run, vessel), rows, list(runs).index(run), step, horizon, lags, commands)
     without = next((run for i, run in enumerate(runs) if not any(segment.run == i for segment in result)), None)
     if without is not None:
         wanted = max(LEAST_STEPS * step, horizon / 2)
@@ -93,7 +96,13 @@ def cut_segments(
 
 
 def _cut(
-    vessel: Vessel, rows: Mapping[str, NDArray[Any]], run: int, step: float, horizon: float, lags: int
+    vessel: Vessel,
+    rows: Mapping[str, NDArray[Any]],
+    run: int,
+    step: float,
+    horizon: float,
+    lags: int,
+    between: Literal["held", "between"],
 ) -> list[ShootingSegment]:
     t = rows["t"]
     count = int((t[-1] - t[0]) / step + 1e-6) if len(t) > 1 else 0
@@ -106,6 +115,8 @@ def _cut(
     near = np.abs(t[np.clip(np.searchsorted(t, grid), 0, len(t) - 1)] - grid)
     before = np.abs(t[np.clip(np.searchsorted(t, grid) - 1, 0, len(t) - 1)] - grid)
     measured = np.minimum(near, before) <= step / 2 + clock_slack(t)
+    if between == "between":
+        columns |= _between_rows(vessel, rows, grid, step)
     commands = {name: columns[name] for name in dynamics(vessel).commands}
     memory = memory_along(vessel, commands, grid) or {}
     result = []
@@ -125,4 +136,27 @@ def _cut(
                 measured[here],
             )
         )
+    return result
+
+
+def _between_rows(
+    vessel: Vessel, rows: Mapping[str, NDArray[Any]], grid: NDArray[np.float64], step: float
+) -> dict[str, NDArray[np.float64]]:
+    """Commands (N + 1,) in force in the steps from the instants of a grid, as they are in the middle of each step.
+
+    An order to an actuator changes in the middle between the row that has it and the row before. A command without an
+    actuator is a measured angle or speed, or acts at once: it goes on evenly from row to row.
+    """
+    t, middle = rows["t"], grid + step / 2
+    nearest = np.searchsorted((t[1:] + t[:-1]) / 2, middle, side="right")
+    interval, model = float(np.median(np.diff(t))), dynamics(vessel)
+    result = {}
+    for name in model.commands:
+        if name not in model.memory:
+            result[name] = np.interp(middle, t, rows[name])
+            continue
+        if step > interval / 2 + clock_slack(t) and np.ptp(rows[name]) > 0:
+            message = f"{step:g} s: orders to the actuator of {name} change in the middle between rows, which are"
+            raise DataError(f"{message} {interval:.3g} s apart: give at most {interval / 2:.3g}", path="step")
+        result[name] = rows[name][nearest]
     return result

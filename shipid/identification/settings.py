@@ -77,6 +77,11 @@ class Identify(Checked, BaseModel):
     )
     step: Positive = Field(default=1.0, description="s")
     method: Method = "rk4"
+    commands: Literal["held", "between"] = Field(
+        default="held",
+        description="held: a command counts from its row to the next; between: an order to an actuator changes in the "
+        "middle between two rows, any other command evenly",
+    )
     weights: Annotated[dict[str, Positive], Field(min_length=1)] = {"u": 0.1, "v": 0.1, "r": math.radians(0.2)}
     loss: Literal["squared", "huber"] = "squared"
     threshold: Positive = Field(default=2.0, description="standard deviations beyond which huber counts linearly")
@@ -114,6 +119,9 @@ class Identify(Checked, BaseModel):
         for path, (low, high) in self.bounds.items():
             if not low <= high:
                 raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] has low above high: give [low, high]")
+        if self.commands == "between" and self.outputs:
+            message = "'between' is not for measured outputs, which belong to the command of their row"
+            raise ValueError(f"commands: {message}: leave weights.{self.outputs[0]} out, or write 'held'")
         if self.horizon and self.horizon < 2 * self.step:
             raise ValueError(f"horizon {self.horizon:g} s must hold two steps of {self.step:g} s, or be 0")
         return self

@@ -10,6 +10,7 @@ from shipid.errors import DataError
 from shipid.identification.residuals import Predictions, build, predict
 from shipid.identification.segments import cut_segments
 from shipid.identification.settings import Identify
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
 from tests.identification.trials import changed, trials
@@ -32,6 +33,24 @@ def test_earlier_orders_are_those_before_the_segment_the_latest_first() -> None:
         steps = np.maximum(one.t[0] - [1.0, 2.0, 3.0], 0.0)  # before the first row its order holds
         np.testing.assert_allclose(one.earlier["port.n"], 1.0 + 0.01 * steps, atol=1e-12)
     assert {one.t[0] for one in segments} == {0.0, 20.0, 40.0}
+
+
+def test_commands_between_rows() -> None:
+    """An order to a gear changes in the middle between two rows, a command without one goes on evenly."""
+    ship = variety()["actuators"]
+    rows = trials(ship, runs=1, steps=20)
+    lagging = next(name for name in rows.commands if name in dynamics(ship).memory)
+    frame = rows.frame.assign(**{lagging: np.where(rows.frame["t"] < 10, 1.0, 2.0)})
+    stepped = Dataset(frame, rows.metadata)
+    (one,) = cut_segments(ship, stepped, stepped.runs, 0.25, 0.0, commands="between")
+    np.testing.assert_array_equal(one.columns[lagging], np.where(one.t + 0.125 < 9.5, 1.0, 2.0))
+    (held,) = cut_segments(ship, stepped, stepped.runs, 0.25, 0.0)
+    np.testing.assert_array_equal(held.columns[lagging], np.where(held.t < 10, 1.0, 2.0))
+    with pytest.raises(DataError, match=r"step: 1 s: orders to the actuator of .* 1 s apart: give at most 0\.5"):
+        cut_segments(ship, stepped, stepped.runs, 1.0, 0.0, commands="between")
+    frame = DATA.frame.assign(**{"port.n": 1.0 + 0.01 * DATA.frame["t"]})
+    for one in cut_segments(SHIP, Dataset(frame, DATA.metadata), DATA.runs, 1.0, 20.0, commands="between"):
+        np.testing.assert_allclose(one.columns["port.n"][:-1], 1.0 + 0.01 * (one.t[:-1] + 0.5), atol=1e-12)
 
 
 def test_a_break_parts_a_run() -> None:

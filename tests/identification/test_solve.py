@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from dataclasses import replace
+from fnmatch import fnmatch
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,8 @@ from shipid.identification.residuals import build, predict
 from shipid.identification.settings import POSITIVE, Identify, unknowns
 from shipid.identification.solve import LEAST, Solution, _discounted, _weakest, identify
 from shipid.identification.statistics import LinearFit, statistics
+from shipid.simulation.manoeuvre import Zigzag
+from shipid.simulation.perform import perform
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, orders, trials
 
@@ -75,9 +78,72 @@ def test_it_converges_from_where_whole_runs_diverge(seed: int) -> None:
 def test_a_step_longer_than_the_interval_of_the_log_is_a_warning_of_the_solution() -> None:
     """As the command says it; before, who called from Python did not learn of it."""
     dataset = trials(SHIP, runs=2, steps=30)
-    assert identify(SHIP, dataset, dataset.runs, settings()).warnings == ()
-    (warning,) = identify(SHIP, dataset, dataset.runs, settings(step=2.0)).warnings
-    assert warning.startswith("rows of the log are 1 s apart and commands are held over steps of 2 s: faster")
+    (late,) = identify(SHIP, dataset, dataset.runs, settings()).warnings
+    blurred, again = identify(SHIP, dataset, dataset.runs, settings(step=2.0)).warnings
+    assert late == again
+    assert blurred.startswith("rows of the log are 1 s apart and commands are held over steps of 2 s: faster")
+
+
+def weaves(name: str, n_rpm: float, duration: float, *, measured: bool) -> Dataset:
+    """Zigzags that begin at random times, every 0.1 s, with orders or the angles that the gear has reached."""
+    rng = np.random.default_rng(11)
+    kinds = [
+        Zigzag(
+            name=f"{side} {angle}",
+            n_rpm=n_rpm,
+            side=side,
+            angle_deg=angle,
+            duration=duration,
+            execute_at=20.0 + round(rng.uniform(0, 2), 2),
+        )
+        for side in ("starboard", "port")
+        for angle in (10.3, 15.2, 20.7)
+    ]
+    frame = perform(load_vessel(name), kinds, step=0.02, interval=0.1)
+    if measured:
+        frame = frame.assign(**{key[7:]: frame[key] for key in frame if key.startswith("actual.")})
+    frame = frame.drop(columns=[key for key in frame if key.startswith("actual.")])
+    for column, deviation in (("u", 1e-3), ("v", 1e-3), ("r", 3e-5)):
+        frame[column] += rng.normal(0, deviation, len(frame))
+    return Dataset(frame, {"clock": "run", "flags": []})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "n_rpm", "duration", "gear", "paths"),
+    [
+        ("gunnerus-28.9", 145.0, 120.0, True, "hull.*.N_u?"),  # azimuths that turn at once
+        ("container-175", 100.0, 400.0, True, "hull.*.N_[vr]"),  # a rudder with lag and rate
+        ("container-175", 100.0, 400.0, False, "hull.*.N_[vr]"),  # its measured angle
+    ],
+)
+def test_commands_that_change_between_rows(name: str, n_rpm: float, duration: float, gear: bool, paths: str) -> None:
+    """Held from their rows they make N_v wrong, and a warning says so; between rows more than half of that is gone."""
+    vessel = load_vessel(name)
+    dataset = weaves(name, n_rpm, duration, measured=not gear)
+    if not gear:
+        gears = ("thruster.rudder.actuator.delta", "thruster.propeller.actuator.n")
+        vessel = vessel.with_values({f"{path}.off": True for path in gears})
+    parameters = [key for key in vessel.parameters if fnmatch(key, paths)]
+    late = "commands count from their row"
+    for interval in (0.5, 1.0) if name.startswith("gunnerus") else (1.0, 2.0):
+        rows = dataset.frame.groupby("run", sort=False).nth(slice(3, None, round(interval / 0.1)))
+        sparse = Dataset(rows.reset_index(drop=True), dataset.metadata)
+        chosen = {"parameters": parameters, "step": interval / 2}
+        held = identify(vessel, sparse, sparse.runs, Identify(**chosen))
+        between = identify(vessel, sparse, sparse.runs, Identify(**chosen, commands="between"))
+        assert any(late in warning for warning in held.warnings)
+        assert not any(late in warning for warning in between.warnings)
+        wrong, right = (float(np.abs(one.factors[0] - 1)) for one in (held, between))
+        assert wrong > 0.04
+        assert right < wrong / 2
+    fine = identify(vessel, dataset, dataset.runs, Identify(parameters=parameters, step=0.1))
+    assert any(late in warning for warning in fine.warnings) == (abs(fine.factors[0] - 1) > 0.015)
+
+
+def test_commands_between_rows_are_not_for_measured_outputs() -> None:
+    with pytest.raises(DocumentError, match="commands: 'between' is not for measured outputs"):
+        Identify(parameters=["hull.*"], weights={"u": 0.1, "propeller.thrust": 1e4}, commands="between")
 
 
 def test_ties_share_a_factor_and_what_is_fixed_stays() -> None:
