@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Literal, get_args
 
-from shipid.arguments import path_of
+from shipid.arguments import of_class, one_of, path_of
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.export.blocks import Precision
@@ -69,7 +69,12 @@ def export_vessel(
     single: bool = False,
     name: str | None = None,
 ) -> list[Path]:
-    """Write a vessel alone, its step, for simulation: to `c`, `fmu` or `casadi`; see `export_predictor`."""
+    """Write a vessel alone, its step, for simulation: to `c`, `fmu` or `casadi`; see `export_predictor`.
+
+    Raises ShipidError for what is no vessel, and for an unknown target or integrator.
+    """
+    of_class("vessel", vessel, Vessel, "as of `load_vessel`")
+    one_of("integrator", integrator, get_args(Method))
     target, file = _checked(to, out, single)
     title = c_name(name or file.stem)
     if target == "onnx":

@@ -68,6 +68,21 @@ def test_a_vessel_has_no_networks(tmp_path):
     assert set(TARGETS) == {"c", "fmu", "casadi", "onnx"}
 
 
+@pytest.mark.parametrize(
+    ("vessel", "integrator", "message"),
+    [
+        (None, "rk5", "integrator 'rk5' is not known"),
+        (None, "RK4", "integrator 'RK4' is not known: valid: euler, rk4"),
+        ("mariner", "rk4", "vessel must be a Vessel, as of `load_vessel`, not 'mariner'"),
+    ],
+)
+def test_a_wrong_vessel_or_integrator_is_one_line(vessel, integrator, message, tmp_path):
+    with pytest.raises(ShipidError, match=message) as caught:
+        export_vessel(vessel or load_vessel("mariner"), "c", tmp_path / "mariner", integrator=integrator)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_forest_beyond_the_size_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr("shipid.export.model.MOST_NUMBERS", 10)
     with pytest.raises(ShipidError, match=r"hold .* numbers, an export at most 10: use fewer trees"):
