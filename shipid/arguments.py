@@ -16,7 +16,7 @@ from shipid.errors import ShipidError, choices
 Kind = type[ShipidError]
 
 
-def whole(name: str, value: Any, least: int = 0, error: Kind = ShipidError) -> int:
+def whole_number(name: str, value: Any, least: int = 0, error: Kind = ShipidError) -> int:
     """Return a whole number, also one that NumPy holds or that is written as 10.0; raise `error` for anything else."""
     try:
         number = int(value) if isinstance(value, float | np.floating) and value == int(value) else operator.index(value)

@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple, Self, get_args, overload
 import numpy as np
 from pydantic import BaseModel, Field
 
-from shipid.arguments import by_name, numbers, one_of, path_of, whole
+from shipid.arguments import by_name, numbers, one_of, path_of, whole_number
 from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, run_folds
 from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DataError, ResultError, ShipidError, choices
@@ -409,7 +409,7 @@ def fit(
             raise DataError(f"{name} must be an object of the class {kind.__name__}, not {shown}")
     one_of("commands", commands, get_args(Commands), DataError)
     by_name("kinds", kinds or {}, "the name of a run to a kind of manoeuvre", DataError)
-    seed, refits = whole("seed", seed, 0, DataError), whole("refits", refits, 0, DataError)
+    seed, refits = whole_number("seed", seed, 0, DataError), whole_number("refits", refits, 0, DataError)
     if (physics.horizon, physics.step) != (windows.horizon, windows.step):
         message = f"the physics has {physics.horizon} steps of {physics.step:g} s"
         raise DataError(f"{message}, the windows have {windows.horizon} steps of {windows.step:g} s: make them equal")

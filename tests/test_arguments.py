@@ -11,21 +11,21 @@ import pytest
 import torch
 
 import shipid
-from shipid.arguments import numbers, of_class, one_of, positive, whole
+from shipid.arguments import numbers, of_class, one_of, positive, whole_number
 from shipid.errors import DataError, ShipidError
 from shipid.export.write import export_predictor, export_vessel
 
 
 @pytest.mark.parametrize("value", [3, 3.0, np.int32(3), np.uint8(3), np.float32(3), np.array(3)])
 def test_a_whole_number_of_any_type_is_an_int(value: Any) -> None:
-    assert type(whole("horizon", value, 1)) is int
-    assert whole("horizon", value, 1) == 3
+    assert type(whole_number("horizon", value, 1)) is int
+    assert whole_number("horizon", value, 1) == 3
 
 
 @pytest.mark.parametrize("value", [0, -3, 2.5, "3", None, True, np.bool_(True), np.nan, np.inf, [3], 3 + 0j])
 def test_anything_else_is_no_whole_number(value: Any) -> None:
     with pytest.raises(DataError, match="horizon must be a whole number, 1 or more, not"):
-        whole("horizon", value, 1, DataError)
+        whole_number("horizon", value, 1, DataError)
 
 
 @pytest.mark.parametrize("value", [0.5, np.float64(0.5), np.float32(0.5), np.float16(0.5)])

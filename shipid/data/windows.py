@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.arguments import of_class, one_of, positive, whole
+from shipid.arguments import of_class, one_of, positive, whole_number
 from shipid.data.checks import GAP
 from shipid.data.dataset import Array, Dataset, clock_slack, cumulative_integral, pieces, sample, shares_clock
 from shipid.errors import DataError
@@ -221,7 +221,7 @@ def cut_windows(
         no run is as long as past and horizon together.
     """
     of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
-    horizon, past = whole("horizon", horizon, 1, DataError), whole("past", past, 0, DataError)
+    horizon, past = whole_number("horizon", horizon, 1, DataError), whole_number("past", past, 0, DataError)
     step, interval = positive("step", step, DataError), positive("interval", interval, DataError)
     one_of("path", path, get_args(PathSource), DataError)
     shared = shares_clock(dataset)

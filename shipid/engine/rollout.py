@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.arguments import by_name, numbers, of_class, whole
+from shipid.arguments import by_name, numbers, of_class, whole_number
 from shipid.engine.engines import REPEATED, Engine, chosen, done_by, named
 from shipid.engine.integrate import Array, Batch, Job, Method
 from shipid.errors import DataError, ShipidError, choices
@@ -94,7 +94,7 @@ def rollout(
         unknown method, engine, channel, parameter or component.
     """
     asked = named(engine, device)
-    num_steps, every = whole("num_steps", num_steps, 1), whole("every", every, 1)
+    num_steps, every = whole_number("num_steps", num_steps, 1), whole_number("every", every, 1)
     if num_steps % every:
         raise ShipidError(f"num_steps must be a multiple of every, not {num_steps} and {every}")
     check_steps(num_steps)

@@ -73,9 +73,9 @@ def export_vessel(
 
     Raises ShipidError for what is no vessel, and for an unknown target or integrator.
     """
+    target, file = _checked(to, out, single)
     of_class("vessel", vessel, Vessel, "as of `load_vessel`")
     one_of("integrator", integrator, get_args(Method))
-    target, file = _checked(to, out, single)
     title = c_name(name or file.stem)
     if target == "onnx":
         raise DocumentError("a vessel has no networks for ONNX: export it to c, fmu or casadi", path="--to")

@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from shipid.arguments import of_class, one_of, positive, whole
+from shipid.arguments import of_class, one_of, positive, whole_number
 from shipid.data.windows import Instants, PathSource, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance
@@ -49,7 +49,7 @@ class Physics:
     def __post_init__(self) -> None:
         if not isinstance(self.vessel, Vessel | None):
             raise ShipidError(f"physics takes a vessel, such as of `load_vessel`, or None, not {self.vessel!r}")
-        object.__setattr__(self, "horizon", whole("horizon", self.horizon, 1))
+        object.__setattr__(self, "horizon", whole_number("horizon", self.horizon, 1))
         object.__setattr__(self, "step", positive("step", self.step))
         one_of("integrator", self.integrator, get_args(Integrator))
         if self.observer is not None:

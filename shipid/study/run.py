@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.arguments import of_class, path_of, whole
+from shipid.arguments import of_class, path_of, whole_number
 from shipid.capacity import processor
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
@@ -105,7 +105,7 @@ def run_study(
     of_class("plan", plan, Plan, "as of `read_plan`")
     folder = path_of("folder", folder)
     begun = time.perf_counter()
-    workers = None if workers is None else whole("workers", workers, 1)
+    workers = None if workers is None else whole_number("workers", workers, 1)
     check_device(device)
     store.open_folder(folder, plan)
     if plan.parts:

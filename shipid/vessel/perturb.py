@@ -28,7 +28,7 @@ from pydantic import (
 )
 
 from shipid import document as documents
-from shipid.arguments import of_class, whole
+from shipid.arguments import of_class, whole_number
 from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
 from shipid.physics.grammar import derivative, deviation
@@ -352,7 +352,10 @@ def _draw(
     counter: int,
     file: str | Path | None,
 ) -> Variant:
-    member, counter = whole("member", member), whole("counter", counter)  # the draw is a hash: 1.0 would be another
+    member, counter = (
+        whole_number("member", member),
+        whole_number("counter", counter),
+    )  # the draw is a hash: 1.0 would be another
     values: dict[str, float] = {}
     for change in changes:
         for path, argument in change.arguments.items():
