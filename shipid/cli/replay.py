@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -22,6 +22,10 @@ def replay(
     ] = None,
     ahead: Annotated[float, typer.Option(help="s of each simulation; 0: whole runs")] = 0.0,
     step: Annotated[float, typer.Option(help="s, of the integration")] = 0.1,
+    commands: Annotated[
+        Literal["held", "between"],
+        typer.Option(help="held: a command counts from its row to the next; between: it changes between the rows"),
+    ] = "held",
     out: Annotated[Path | None, typer.Option(help="page to write; default: <vessel>-replay.html")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV or Parquet file of both motions to write")] = None,
     as_json: Json = False,
@@ -32,6 +36,7 @@ def replay(
     from shipid.data.dataset import read_dataset
     from shipid.files import check_table, write_table
     from shipid.identification.free_run import free_runs, unfelt
+    from shipid.identification.late import late_commands
     from shipid.identification.outcome import pick_runs
     from shipid.identification.settings import Identify
     from shipid.report.replay import REPLAYED, ReplayContent, write_replay
@@ -47,15 +52,17 @@ def replay(
         check_table(csv)
     ship, log = load_vessel(vessel), read_dataset(dataset)
     chosen, _ = pick_runs(log, runs or ())
-    settings = Identify(parameters=[next(iter(ship.parameters))], step=step, horizon=0.0)
+    settings = Identify(parameters=[next(iter(ship.parameters))], step=step, horizon=0.0, commands=commands)
     replayed = free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
     zero = unfelt(ship, log, settings, chosen)
+    late = late_commands(ship, log, chosen) if commands == "held" else None
     rows = [
         [row["run"], *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"]))]
         if row["position"] == row["position"]
         else [row["run"], "diverges", "", "", ""]
         for row in replayed.errors.to_dict("records")
     ]
+    timing = "; commands change between rows" if commands == "between" else ""
     content = ReplayContent(
         title=f"{ship.name}: recorded runs, replayed",
         name=ship.key,
@@ -65,7 +72,7 @@ def replay(
         provenance={
             "Vessel": f"{ship.name}, digest {ship.digest}",
             "Dataset": f"{dataset}, digest {log.digest}",
-            "Simulation": f"rk4, steps of {step:g} s" + (f"; {', '.join(zero)} taken as 0" if zero else ""),
+            "Simulation": f"rk4, steps of {step:g} s{timing}" + (f"; {', '.join(zero)} taken as 0" if zero else ""),
             "shipid": __version__,
         },
         command=command_line(),
@@ -73,9 +80,11 @@ def replay(
     with answering(as_json) as answer:
         answer.say(f"{ship.name}: root mean square errors, {f'{ahead:g} s' if ahead else 'whole runs'}")
         heads = ["run", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
-        answer.say(assumed=zero)
+        answer.say(assumed=zero, late=None if late is None else late.words)
         if zero:
             answer.say(f"not in the log, taken as 0: {', '.join(zero)}")
+        if late is not None:
+            answer.say(f"{late.words}: the turns are late; compare with --commands between")
         answer.rows("errors", replayed.errors.drop(columns="model"), table(heads, rows))
         if csv is not None:
             write_table(csv, replayed.series)

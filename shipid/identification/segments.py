@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset, clock_slack, sample, stretches
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, choices
+from shipid.identification.late import between_rows
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -116,7 +117,8 @@ def _cut(
     before = np.abs(t[np.clip(np.searchsorted(t, grid) - 1, 0, len(t) - 1)] - grid)
     measured = np.minimum(near, before) <= step / 2 + clock_slack(t)
     if between == "between":
-        columns |= _between_rows(vessel, rows, grid, step)
+        _check_step(vessel, rows, step)
+        columns |= between_rows(vessel, rows, grid + step / 2)  # as they are in the middle of each step
     commands = {name: columns[name] for name in dynamics(vessel).commands}
     memory = memory_along(vessel, commands, grid) or {}
     result = []
@@ -139,24 +141,14 @@ def _cut(
     return result
 
 
-def _between_rows(
-    vessel: Vessel, rows: Mapping[str, NDArray[Any]], grid: NDArray[np.float64], step: float
-) -> dict[str, NDArray[np.float64]]:
-    """Commands (N + 1,) in force in the steps from the instants of a grid, as they are in the middle of each step.
-
-    An order to an actuator changes in the middle between the row that has it and the row before. A command without an
-    actuator is a measured angle or speed, or acts at once: it goes on evenly from row to row.
-    """
-    t, middle = rows["t"], grid + step / 2
-    nearest = np.searchsorted((t[1:] + t[:-1]) / 2, middle, side="right")
-    interval, model = float(np.median(np.diff(t))), dynamics(vessel)
-    result = {}
-    for name in model.commands:
-        if name not in model.memory:
-            result[name] = np.interp(middle, t, rows[name])
-            continue
-        if step > interval / 2 + clock_slack(t) and np.ptp(rows[name]) > 0:
-            message = f"{step:g} s: orders to the actuator of {name} change in the middle between rows, which are"
-            raise DataError(f"{message} {interval:.3g} s apart: give at most {interval / 2:.3g}", path="step")
-        result[name] = rows[name][nearest]
-    return result
+def _check_step(vessel: Vessel, rows: Mapping[str, NDArray[Any]], step: float) -> None:
+    """Raise DataError for steps too long for orders to actuators that change in the middle between two rows."""
+    interval = float(np.median(np.diff(rows["t"])))
+    if step <= interval / 2 + clock_slack(rows["t"]):
+        return
+    changing = (
+        name for name in dynamics(vessel).commands if name in dynamics(vessel).memory and np.ptp(rows[name]) > 0
+    )
+    for name in changing:
+        message = f"{step:g} s: orders to the actuator of {name} change in the middle between rows, which are"
+        raise DataError(f"{message} {interval:.3g} s apart: give at most {interval / 2:.3g}", path="step")

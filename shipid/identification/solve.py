@@ -14,17 +14,15 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
+from shipid.identification.late import late_commands
 from shipid.identification.residuals import Problem, build
 from shipid.identification.settings import BLOCK, Identify, columns_of
 from shipid.identification.start import by_inverse_dynamics, grown
 from shipid.identification.statistics import LinearFit, whiteness
-from shipid.physics.signals import SIGNALS, signal_of
-from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 DISCOUNTS, LEAST = 2, 1e-3  # fits with discounted residuals; least factor on a deviation
-LATE, CONSIDERABLE = 3.5, 0.02  # change of N_v over lateness U / L_pp, measured; of a number that is worth a warning
 NEAR = 1e-6  # of a factor: so close to a bound it is at the bound
 ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "base": ("straight", "growing")}
 """Setting `start` -> kinds of initial factors, tried in this order until the search converges."""
@@ -227,30 +225,14 @@ def _blurred(dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
 
 
 def _late(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
-    """A warning if commands that steer, held from their rows on, come late for how fast the ship turns; else no text.
-
-    They come half an interval late on average. In zigzags that moved N_v by about `LATE` times the share of this in
-    the time in which the ship goes her length (docs/identification.md, "Commands between rows").
-    """
-    rows = dataset.frame[dataset.frame["run"].isin(runs)]
-    steering = [name for name in dynamics(vessel).commands if SIGNALS[signal_of(name)].turns]
-    steering = [name for name in steering if (rows.groupby("run", sort=False)[name].nunique() > 1).any()]
-    if settings.commands == "between" or not steering:
+    """A warning if commands that steer come late for how fast the ship turns, else no text."""
+    late = late_commands(vessel, dataset, runs) if settings.commands == "held" else None
+    if late is None:
         return ""
-    length = float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
-    speed = float(rows["u"].abs().mean())
-    between = float(rows.groupby("run", sort=False)["t"].diff().median())
-    share = LATE * between / 2 * speed / length if length else 0.0
-    if share < CONSIDERABLE:
-        return ""
-    orders = any(name in dynamics(vessel).memory for name in steering)
-    late = f"{between / 2:.3g} s late on average"
-    remedy = f'commands = "between"{f" and step at most {between / 2:.3g}" if orders else ""}'
+    remedy = f'commands = "between"{f" and step at most {late.delay:.3g}" if late.to_gear else ""}'
     remedy = f"compare with {remedy}" if not settings.outputs else "log faster"
-    return (
-        f"rows are {between:.3g} s apart and commands count from their row, {late}: numbers of the turn such as N_v "
-        f"may be some {share:.0%} off, more than their intervals say; {remedy}"
-    )
+    numbers = f"numbers of the turn such as N_v may be some {late.share:.0%} off, more than their intervals say"
+    return f"{late.words}: {numbers}; {remedy}"
 
 
 def _factors(problem: Problem, start: Mapping[str, float]) -> Array:

@@ -8,6 +8,7 @@ then the next.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,10 +18,11 @@ import tomlkit
 from numpy.typing import NDArray
 from tomlkit.items import KeyType, SingleKey
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Dataset, pieces
 from shipid.data.windows import Instants, PathSource, Windows, cut_windows
 from shipid.errors import DocumentError
 from shipid.hybrid.physics import Physics, check_columns
+from shipid.identification.late import Late, between_rows, late_commands
 from shipid.identification.plausible import outside
 from shipid.metrics import position_error
 from shipid.physics.signals import is_shaft, steers
@@ -117,6 +119,8 @@ class Look:
 
     ahead : [s]. alone, constant : mean position error [m] over it of the vessel, with the recorded commands, and of
         constant u, v, r. facts : what differs, in words. changes : those that explain it, in the order of their worth.
+    late : commands that come late, where the vessel errs less if they change between the rows, and its mean error [m]
+        then; what else explains the error is beside them.
     current : that explains more than all changes alone; the changes are then beside it.
     """
 
@@ -127,17 +131,23 @@ class Look:
     facts: tuple[str, ...]
     changes: tuple[Change, ...] = field(default=())
     current: Current | None = None
+    late: tuple[Late, float] | None = None
+
+    @property
+    def timely(self) -> float:
+        """Mean error [m] of the vessel as it is, with commands that are not late."""
+        return self.alone if self.late is None else self.late[1]
 
     @property
     def corrected(self) -> float:
-        """Mean error [m] with the current and all changes."""
-        before = self.alone if self.current is None else self.current.error
+        """Mean error [m] with all that explains it."""
+        before = self.timely if self.current is None else self.current.error
         return self.changes[-1].error if self.changes else before
 
     @property
     def wrong(self) -> bool:
         """Whether the vessel should not be used as it is."""
-        return bool(self.changes) or self.current is not None or self.alone >= self.constant
+        return bool(self.changes) or self.current is not None or self.timely >= self.constant
 
     @property
     def values(self) -> dict[str, float]:
@@ -149,22 +159,24 @@ class Look:
         """One line: what is off, and which number would explain it."""
         errors = f"mean error over {self.ahead:g} s {self.alone:.3g} m, of constant u, v, r {self.constant:.3g} m"
         seen = f"{'; '.join(self.facts)}; {errors}" if self.facts else errors
+        causes: list[tuple[str, float]] = []
+        if self.late is not None:
+            causes.append((self.late[0].words, self.late[1]))
         if self.current is not None:
             V_c, beta_c = self.current.V_c, np.degrees(self.current.beta_c) % 360.0
             stream = f"a steady current of {V_c:.2g} m/s towards {beta_c:.0f} deg, which is not in the log,"
-            more = f", then {', '.join(_shown(self.vessel, one) for one in self.changes)}" if self.changes else ""
-            left = f" ({self.corrected:.3g} m)" if self.changes else ""
-            explained = f"{stream} would explain {self._part(self.current.error)} of it ({self.current.error:.3g} m)"
-            return f"{self.vessel.name}: {seen}: {explained}{more}{left}"
-        if not self.changes:
+            causes.append((stream, self.current.error))
+        causes += [(_shown(self.vessel, one), one.error) for one in self.changes]
+        if not causes:
             if self.alone < self.constant:
                 return f"{self.vessel.name} and the log agree, and no single number would explain the rest: {seen}"
             return f"{self.vessel.name} is worse than constant u, v, r, and no single number explains it: {seen}"
-        first, *others = self.changes
-        explained = f"{_shown(self.vessel, first)} would explain {self._part(first.error)} of it ({first.error:.3g} m)"
-        more = f", then {', '.join(_shown(self.vessel, one) for one in others)}" if others else ""
-        left = f" ({self.corrected:.3g} m)" if others else ""
-        return f"{self.vessel.name}: {seen}: {explained}{more}{left}"
+        (first, error), *others = causes
+        explained = (
+            f"{first}{', which' * (self.late is not None)} would explain {self._part(error)} of it ({error:.3g} m)"
+        )
+        more = f", then {', '.join(words for words, _ in others)} ({self.corrected:.3g} m)" if others else ""
+        return f"{self.vessel.name}: {seen}: {explained}{more}"
 
     def _part(self, error: float) -> str:
         """How much of the error is explained where so much [m] is left."""
@@ -209,20 +221,30 @@ def first_look(
     """
     check_columns(vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(vessel.file))
     part = dataset.select(runs)
-    windows = _some(part, max(round(ahead / step), 1), step, path)
+    late = late_commands(vessel, part, part.runs)
+    finer = 1 if late is None else max(1, math.ceil(step / late.delay - 1e-9))  # steps in which orders change in time
+    windows = _some(part, max(round(ahead / step), 1) * finer, step / finer, path)
     constant = float(position_error(constant_motion(windows), windows.future).mean())
     trial = _Trial(vessel, part, windows, constant)
     alone = trial.errors([{}])[0]
+    timely = None
+    if late is not None:
+        other = _between(trial)
+        error = other.errors([{}])[0]
+        if error < (1 - WORTH) * alone:
+            trial, timely = other, (late, error)
+    least = alone if timely is None else timely[1]
     share = _turning(vessel, windows, trial.instants())
     facts = tuple(_facts(vessel, windows, share))
     mistaken = share is not None and share < 0  # a sign, which no factor mends
-    changes = [] if mistaken else _worthwhile(trial, alone)
+    changes = [] if mistaken else _worthwhile(trial, least)
     current = None if mistaken else _current(trial)
-    least = min(changes[-1].error if changes else alone, (1 - SAVING) * alone)
-    if current is None or current.error > least:
-        return Look(vessel, windows.horizon * step, alone, constant, facts, tuple(changes))
-    changes = _worthwhile(_in_current(trial, current.V_c, current.beta_c), current.error)
-    return Look(vessel, windows.horizon * step, alone, constant, facts, tuple(changes), current)
+    if current is not None and current.error <= min(changes[-1].error if changes else least, (1 - SAVING) * least):
+        changes = _worthwhile(_in_current(trial, current.V_c, current.beta_c), current.error)
+    else:
+        current = None
+    length = windows.horizon * windows.step
+    return Look(vessel, length, alone, constant, facts, tuple(changes), current, timely)
 
 
 def _some(dataset: Dataset, horizon: int, step: float, path: PathSource) -> Windows:
@@ -274,6 +296,19 @@ class _Trial:
         return result
 
 
+def _between(trial: _Trial) -> _Trial:
+    """The same trial with commands that change between the rows, as they are in the middle of each step."""
+    windows, planned = trial.windows, {name: values.copy() for name, values in trial.windows.planned.items()}
+    middle = windows.t + windows.step * (np.arange(windows.horizon)[:, None] + 0.5)
+    for run, rows in pieces(trial.dataset):
+        t = rows["t"].to_numpy()
+        inside = (windows.run == run) & (windows.t >= t[0] - 1e-9) & (windows.t <= t[-1] + 1e-9)
+        columns = {name: rows[name].to_numpy() for name in ("t", *trial.dataset.commands)}
+        for name, values in between_rows(trial.vessel, columns, middle[:, inside]).items():
+            planned[name][:, inside] = values
+    return replace(trial, windows=replace(windows, planned=planned), known={})
+
+
 def _in_current(trial: _Trial, V_c: float, beta_c: float) -> _Trial:
     """The same trial in a steady current [m/s, rad]."""
     vessel, windows = trial.vessel, trial.windows
@@ -298,7 +333,8 @@ def _current(trial: _Trial) -> Current | None:
     current, step = np.zeros(2), 0.02 * speed
     for _ in range(NEWTON):
         base = away(current)
-        slopes = np.stack([(away(current + step * axis) - base) / step for axis in np.eye(2)], axis=1)
+        with np.errstate(invalid="ignore"):  # paths that diverge
+            slopes = np.stack([(away(current + step * axis) - base) / step for axis in np.eye(2)], axis=1)
         sound = np.isfinite(base) & np.isfinite(slopes).all(axis=1)
         if not sound.any():
             return None

@@ -151,8 +151,12 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
     ),
     "replay": (
         "shipid.identification.free_run:free_runs",
-        f"replay {SHIP} log.parquet --run A* --ahead 9 --step 0.3",
-        {"runs": ("A1", "A2"), "length": 9.0, "settings": lambda settings: settings.step == 0.3},
+        f"replay {SHIP} log.parquet --run A* --ahead 9 --step 0.3 --commands between",
+        {
+            "runs": ("A1", "A2"),
+            "length": 9.0,
+            "settings": lambda settings: (settings.step, settings.commands) == (0.3, "between"),
+        },
     ),
     "identify": (
         "shipid.identification.outcome:run_identification",

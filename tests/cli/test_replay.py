@@ -105,3 +105,28 @@ def test_the_page_draws_runs_in_the_units_of_its_axes() -> None:
     table = replay.errors(content)
     assert table.columns[3] == "r [deg/s]"
     assert [float(cell.text) for cell in table.rows[0][1:]] == pytest.approx([0.1, 0.2, 4.0, 9.0])
+
+
+def test_commands_that_come_late_are_said_and_may_change_between_the_rows(tmp_path: Path) -> None:
+    """Gunnerus, rows of 1 s, orders between them."""
+    kinds = [Zigzag(n_rpm=145, angle_deg=angle, duration=100, execute_at=20.43) for angle in (10, 20)]
+    frame = perform(load_vessel("gunnerus-28.9"), kinds, step=0.05, interval=0.1)
+    frame = frame.groupby("run", sort=False).nth(slice(3, None, 10)).reset_index(drop=True)
+    write_dataset(Dataset(frame.astype({"run": "str"}), {"clock": "run", "flags": []}), tmp_path / "log.parquet")
+    errors = {}
+    for commands in ("held", "between"):
+        words = [
+            "replay",
+            "gunnerus-28.9",
+            str(tmp_path / "log.parquet"),
+            "--out",
+            str(tmp_path / "page.html"),
+            "--json",
+        ]
+        result = CliRunner().invoke(app, [*words, "--commands", commands])
+        assert result.exit_code == 0, result.output
+        said = json.loads(result.stdout)
+        errors[commands] = said["errors"][0]["r"]
+        late = "rows are 1 s apart and commands count from their row, 0.5 s late on average"
+        assert said["late"] == (late if commands == "held" else None)
+    assert errors["between"] < 0.6 * errors["held"]

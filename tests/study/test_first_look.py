@@ -51,7 +51,13 @@ def test_the_vessel_that_made_the_log_is_left_alone(log: Dataset) -> None:
     assert not view.wrong
     assert view.patch(SHIP) == ""
     assert view.alone < 0.05 * view.constant
-    assert "agree" in view.sentence
+    assert view.late is not None  # orders between rows of 1 s
+    assert view.timely < view.alone
+    assert view.corrected == view.timely
+    frame = perform(load_vessel(SHIP), [Zigzag(n_rpm=RPM, angle_deg=10, duration=90.0)], step=0.1, interval=0.1)
+    often = Dataset(frame.astype({"run": "str"}), {"clock": "run", "flags": []})
+    assert look(load_vessel(SHIP), often).late is None
+    assert "the log agree" in look(load_vessel(SHIP), often).sentence
 
 
 def test_a_screw_too_large_is_reported_and_explained(log: Dataset) -> None:
@@ -93,6 +99,29 @@ def test_a_current_that_nobody_measured_is_found_and_no_number_is_blamed() -> No
     assert view.corrected < 0.2 * view.alone
     assert view.wrong
     assert "a steady current of 0.12 m/s towards 250 deg, which is not in the log, would explain" in view.sentence
+
+
+@pytest.mark.parametrize(("name", "n_rpm", "interval"), [("gunnerus-28.9", 145.0, 1.0), ("container-175", 100.0, 2.0)])
+def test_commands_that_come_late_are_named_and_no_number_is_blamed(name: str, n_rpm: float, interval: float) -> None:
+    """The vessel that made the log; Gunnerus got 0.8 times her inertia in yaw."""
+    ship, rng = load_vessel(name), np.random.default_rng(11)
+    kinds = [
+        Zigzag(n_rpm=n_rpm, angle_deg=angle, side=side, duration=200.0, execute_at=20.0 + round(rng.uniform(0, 2), 2))
+        for side in ("starboard", "port")
+        for angle in (10.3, 20.7)
+    ]
+    frame = perform(ship, kinds, step=0.02, interval=0.1)
+    frame = frame.groupby("run", sort=False).nth(slice(3, None, round(interval / 0.1)))
+    kept = frame[[name for name in frame if not str(name).startswith("actual.")]].reset_index(drop=True)
+    dataset = Dataset(kept.astype({"run": "str"}), {"clock": "run", "flags": []})
+    view = first_look(ship, dataset, dataset.runs, ahead=20 * interval, step=interval)
+    assert view.late is not None
+    assert not view.changes
+    assert view.current is None
+    assert not view.wrong
+    assert view.corrected == view.timely < 0.9 * view.alone
+    when = f"commands count from their row, {interval / 2:g} s late on average, which would explain"
+    assert f"rows are {interval:g} s apart and {when}" in view.sentence
 
 
 @pytest.mark.parametrize(("factor", "read", "right"), [(60.0, "rev/s", "rpm"), (1 / 60, "rpm", "rev/s")])

@@ -1,0 +1,77 @@
+"""Commands that come late: held from its row, one that changes between two rows counts half an interval late."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Dataset
+from shipid.physics.signals import SIGNALS, signal_of
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel
+
+LATE = 3.5  # change of N_v over lateness U / L_pp, in zigzags: docs/identification.md, "Commands between rows"
+CONSIDERABLE = 0.02  # of a number of the turn
+
+
+@dataclass(frozen=True)
+class Late:
+    """Commands that steer and change between rows.
+
+    interval : of the rows [s]. share : by which numbers of the turn such as N_v may be wrong, roughly. to_gear :
+        whether one of them is an order to an actuator.
+    """
+
+    interval: float
+    share: float
+    to_gear: bool
+
+    @property
+    def words(self) -> str:
+        """How late, for a sentence."""
+        when = f"commands count from their row, {self.delay:.3g} s late on average"
+        return f"rows are {self.interval:.3g} s apart and {when}"
+
+    @property
+    def delay(self) -> float:
+        """By how much commands are late on average [s]."""
+        return self.interval / 2
+
+
+def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Late | None:
+    """How late the commands of some runs come, where that is considerable for how fast the ship turns; else None.
+
+    A vessel without a length is not judged.
+    """
+    model, rows = dynamics(vessel), dataset.frame[dataset.frame["run"].isin(runs)]
+    by_run = rows.groupby("run", sort=False)
+    steering = [name for name in model.commands if SIGNALS[signal_of(name)].turns and name in rows]
+    steering = [name for name in steering if (by_run[name].nunique() > 1).any()]
+    length = float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
+    if not steering or not length:
+        return None
+    interval = float(by_run["t"].diff().median())
+    share = LATE * interval / 2 * float(rows["u"].abs().mean()) / length
+    if share < CONSIDERABLE:
+        return None
+    return Late(interval, share, any(name in model.memory for name in steering))
+
+
+def between_rows(
+    vessel: Vessel, rows: Mapping[str, NDArray[Any]], instants: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """Commands of one unbroken stretch at instants [s] (any shape), where they change between the rows.
+
+    An order to an actuator changes in the middle between the row that has it and the row before. A command without an
+    actuator is a measured angle or speed, or acts at once: it goes on evenly from row to row.
+    """
+    t, model = np.asarray(rows["t"]), dynamics(vessel)
+    nearest = np.searchsorted((t[1:] + t[:-1]) / 2, instants, side="right")
+    return {
+        name: np.asarray(rows[name])[nearest] if name in model.memory else np.interp(instants, t, rows[name])
+        for name in model.commands
+    }

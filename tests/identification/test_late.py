@@ -1,0 +1,60 @@
+"""Commands that change between rows: where that matters, and what they are meanwhile."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.identification.late import between_rows, late_commands
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import Vessel, load_vessel
+from tests.conftest import variety
+from tests.identification.trials import trials
+
+SHIP = load_vessel("gunnerus-28.9")
+DATA = trials(SHIP, runs=2, steps=40)
+
+
+def at(interval: float) -> Dataset:
+    """The same rows, so far apart."""
+    return Dataset(DATA.frame.assign(t=DATA.frame["t"] * interval), DATA.metadata)
+
+
+def test_lateness_counts_by_how_fast_the_ship_goes_her_length() -> None:
+    late = late_commands(SHIP, at(1.0), DATA.runs)
+    assert late is not None
+    assert (late.interval, late.delay, late.to_gear) == (1.0, 0.5, False)
+    twice = late_commands(SHIP, at(2.0), DATA.runs)
+    assert twice is not None
+    assert twice.share == pytest.approx(2 * late.share)
+    assert late.words == "rows are 1 s apart and commands count from their row, 0.5 s late on average"
+    assert late_commands(SHIP, at(0.02), DATA.runs) is None
+
+
+def test_orders_that_never_change_are_not_late() -> None:
+    steering = [name for name in DATA.commands if name.endswith(".alpha")]
+    held = Dataset(DATA.frame.assign(**dict.fromkeys(steering, 0.1)), DATA.metadata)
+    assert late_commands(SHIP, held, held.runs) is None
+
+
+def test_a_vessel_without_a_length_is_not_judged() -> None:
+    ship = Vessel({key: value for key, value in SHIP.document.items() if key != "particulars"}, SHIP.file)
+    assert late_commands(ship, at(1.0), DATA.runs) is None
+
+
+def test_at_the_rows_and_in_the_middle_between_them() -> None:
+    ship = variety()["actuators"]
+    rng, t = np.random.default_rng(1), np.array([0.0, 1.0, 2.5, 3.0])
+    rows = {name: rng.normal(size=4) for name in dynamics(ship).commands}
+    at_rows, later = (
+        between_rows(ship, {"t": t, **rows}, t),
+        between_rows(ship, {"t": t, **rows}, np.array([[1.74, 1.76]])),
+    )
+    for name, values in rows.items():
+        np.testing.assert_array_equal(at_rows[name], values)
+        if name in dynamics(ship).memory:
+            np.testing.assert_array_equal(later[name], [values[1:3]])
+        else:
+            mean = (values[1] + values[2]) / 2
+            np.testing.assert_allclose(later[name].mean(), mean, atol=1e-12)
