@@ -55,7 +55,8 @@ def test_the_vessel_that_made_the_log_is_left_alone(log: Dataset) -> None:
     assert view.timely < view.alone
     assert view.corrected == view.timely
     frame = perform(load_vessel(SHIP), [Zigzag(n_rpm=RPM, angle_deg=10, duration=90.0)], step=0.1, interval=0.1)
-    often = Dataset(frame.astype({"run": "str"}), {"clock": "run", "flags": []})
+    kept = frame[[name for name in frame if not str(name).startswith("actual.")]]
+    often = Dataset(kept.astype({"run": "str"}), {"clock": "run", "flags": []})
     assert look(load_vessel(SHIP), often).late is None
     assert "the log agree" in look(load_vessel(SHIP), often).sentence
 
