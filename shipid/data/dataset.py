@@ -215,6 +215,26 @@ def sample(rows: pd.DataFrame | Mapping[str, NDArray[Any]], instants: Array) -> 
     return result
 
 
+def in_force(rows: pd.DataFrame | Mapping[str, NDArray[Any]], edges: Array) -> dict[str, Array]:
+    """Commands of one unbroken stretch in force in steps between instants `edges` [s] (T + 1, ...): name -> (T, ...).
+
+    The mean over each step of the commands, which hold from row to row and after the last row; so an order that changes
+    within a step counts for the rest of it.
+    """
+    t, widths = np.asarray(rows["t"]), np.diff(edges, axis=0)
+    at_start, slack = sample(rows, edges[:-1]), clock_slack(t)
+    later = np.maximum(edges - t[-1], 0.0)
+    result: dict[str, Array] = {}
+    for name in filter(is_command, map(str, rows)):
+        values = np.asarray(rows[name], dtype=float)
+        passed = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(t))])
+        mean = np.diff(np.interp(edges, t, passed) + values[-1] * later, axis=0) / widths
+        most = float(np.abs(np.diff(values)).max(initial=0.0))
+        rounding = 2 * slack * most / widths + 1e-9 * np.abs(values).max()  # of the clock, and of the sums
+        result[name] = np.where(np.abs(mean - at_start[name]) > rounding, mean, at_start[name])
+    return result
+
+
 def wraps(name: str) -> bool:
     """Whether a column is an angle of the ship or the weather, unwrapped before it is interpolated."""
     return name in SIGNALS and SIGNALS[name].angle

@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 
 from shipid.arguments import of_class, one_of, positive, whole_number
 from shipid.data.checks import GAP
-from shipid.data.dataset import Array, Dataset, clock_slack, cumulative_integral, pieces, sample, shares_clock
+from shipid.data.dataset import (
+    Array,
+    Dataset,
+    clock_slack,
+    cumulative_integral,
+    in_force,
+    pieces,
+    sample,
+    shares_clock,
+)
 from shipid.errors import DataError
 
 Mask = NDArray[np.bool_]
@@ -80,7 +89,7 @@ class Windows:
     t : instant of prediction on the clock of the recording [s], (S,).
     columns : every dataset column at that instant, name -> (S,); angles unwrapped within the run.
     future : x, y [m] of eq. (11) after 1..T steps, (T, S, 2).
-    planned : command in force from step i-1 to i, i = 1..T, name -> (T, S).
+    planned : command in force from step i-1 to i, i = 1..T, its mean over the step, name -> (T, S).
     horizon, step : T, and its step [s].
     shared_clock : whether all runs lie on one clock; if not, equal times of two runs are different moments.
     past : the columns P, ..., 1 steps before the instant, the oldest first, name -> (P, S); empty for P = 0.
@@ -240,7 +249,7 @@ def cut_windows(
                     t=instants,
                     columns={name: column[0] for name, column in values.items()},
                     future=np.stack([x, y], axis=-1)[1:],
-                    planned={name: values[name][:-1] for name in dataset.commands},
+                    planned=in_force(rows, instants + step * np.arange(horizon + 1)[:, None]),
                     horizon=horizon,
                     step=step,
                     shared_clock=shared,

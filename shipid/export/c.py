@@ -515,8 +515,8 @@ void {name}_init({name} *self);
             physics.step / ROWS_A_STEP:g} s replace each other in the past. */
 int {name}_record({name} *self, double t, const {name}_real *row);
 
-/* Path from the newest row: {name}_HORIZON pairs x, y. planned: {name}_HORIZON rows of commands in force, or a null
- * pointer: commands stay as they are. */
+/* Path from the newest row: {name}_HORIZON pairs x, y. planned: {name}_HORIZON rows of commands in force, each the
+ * mean over its step, or a null pointer: commands stay as they are. */
 int {name}_predict(const {name} *self, const {name}_real *planned, {name}_real *path);
 
 /* The same as a pure function, without a recorder. reached: positions of actuators, or a null pointer: at their orders.

@@ -10,7 +10,7 @@ import pandas as pd
 import pyarrow.parquet
 import pytest
 
-from shipid.data.dataset import Dataset, pieces, read_dataset, sample, unit_of, write_dataset
+from shipid.data.dataset import Dataset, in_force, pieces, read_dataset, sample, unit_of, write_dataset
 from shipid.errors import DataError
 from tests.logs.conftest import as_dataset, turning
 
@@ -257,3 +257,23 @@ def test_metadata_that_no_file_can_hold_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"the metadata must be plain data, as JSON holds it \(.*int64"):
         write_dataset(Dataset(frame, {"flags": ["break"], "rows": np.int64(3)}), tmp_path / "x.parquet")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_commands_in_force_have_the_integral_of_those_that_hold(seed: int) -> None:
+    """Steps of any length, beyond the last row, too; what does not change within a step is the same to the bit."""
+    rng = np.random.default_rng(seed)
+    t = 1.7e9 * (seed % 2) + np.cumsum(rng.uniform(0.05, 0.4, 200))
+    orders = np.repeat(rng.normal(0, 3, 20), 10)
+    rows = {"t": t, "port.n": orders, "port.alpha": np.full(200, 0.1), "u": rng.normal(size=200)}
+    edges = t[0] + rng.uniform(0, 10, 7) + rng.uniform(0.1, 2.0, (40, 7)).cumsum(axis=0)
+    found = in_force(rows, edges)
+    assert list(found) == ["port.n", "port.alpha"]
+    np.testing.assert_array_equal(found["port.alpha"], 0.1)
+    fine = (np.arange(4000) + 0.5) / 4000
+    instants = edges[:-1] + fine[:, None, None] * np.diff(edges, axis=0)
+    held = sample(rows, instants)["port.n"]
+    np.testing.assert_allclose(found["port.n"], held.mean(axis=0), rtol=0, atol=0.01)
+    same = (held == held[0]).all(axis=0)
+    assert 0.2 < same.mean() < 1
+    np.testing.assert_array_equal(found["port.n"][same], held[0][same])

@@ -122,12 +122,14 @@ def test_futures_do_not_depend_on_where_the_log_lies(path: str) -> None:
 
 
 def test_instants_commands_and_columns() -> None:
-    """The command of step i is the order in force from i-1 to i; n changes every 7 s in this log."""
+    """The command of step i is the mean of the orders in force from i-1 to i; n changes every 7 s in this log."""
     windows = cut_windows(as_dataset(turning(T)), horizon=15, step=2.0, interval=3.0)
     assert windows.t.tolist() == list(range(0, 31, 3))
-    expected = np.floor((windows.t + 2.0 * np.arange(15)[:, None]) / 7.0)
-    np.testing.assert_array_equal(windows.planned["port.n"], expected)
-    np.testing.assert_array_equal(windows.columns["port.n"], expected[0])
+    first, second = (np.floor((windows.t + 2.0 * np.arange(15)[:, None] + later) / 7.0) for later in (0.0, 1.0))
+    np.testing.assert_allclose(windows.planned["port.n"], (first + second) / 2, rtol=0, atol=1e-12)
+    whole = first == second
+    np.testing.assert_array_equal(windows.planned["port.n"][whole], first[whole])  # to the bit
+    np.testing.assert_array_equal(windows.columns["port.n"], first[0])
     assert set(windows.columns) == {"north", "east", "psi", "u", "v", "r", "port.n", "flags"}
     assert windows.future.shape == (15, 11, 2)
 
@@ -140,8 +142,9 @@ def test_commands_at_unix_time_are_those_in_force(rate: float) -> None:
     windows = cut_windows(as_dataset(frame), horizon=15, step=0.6, interval=0.7)
     instants = np.floor(rate * 0.7 * np.arange(len(windows)) + 1e-6)  # rows since the start
     np.testing.assert_array_equal(windows.columns["port.n"], instants)
-    later = np.floor(instants + rate * 0.6 * np.arange(15)[:, None] + 1e-6)
-    np.testing.assert_array_equal(windows.planned["port.n"], later)
+    edges = instants / rate + 0.6 * np.arange(16)[:, None]
+    fine = np.floor(rate * (edges[:-1] + 0.6 * (np.arange(600)[:, None, None] + 0.5) / 600) + 1e-6)
+    np.testing.assert_allclose(windows.planned["port.n"], fine.mean(axis=0), rtol=0, atol=0.01)
     assert len(windows) == int((600 / rate - 9.0) / 0.7 + 1e-6) + 1
 
 
