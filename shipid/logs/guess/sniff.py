@@ -141,7 +141,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
             raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)
     else:
         table = read_table(file, model, "time")
-        notes = tuple(f"{name!r} is {what}" for name, what in table.attrs.get("other", {}).items() if "save" in what)
+        notes = tuple(f"{name!r} is {table.attrs['other'][name]}" for name in table.attrs.get("to save anew", ()))
     columns, words = _numbers(table, form.get("decimal", "."))
     if isinstance(model, TextFormat):
         missing = _sentinels(table, columns)

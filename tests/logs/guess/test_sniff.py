@@ -59,6 +59,14 @@ def test_cells_of_a_matlab_file_are_left_out_with_a_note(tmp_path: Path) -> None
     )
 
 
+def test_only_variables_that_must_be_saved_anew_have_a_note(tmp_path: Path) -> None:
+    """Before, a matrix or a number had one, too, where its name held the word "save"."""
+    file = tmp_path / "log.mat"
+    columns = {name: TABLE[name].to_numpy() for name in TABLE}
+    savemat(file, {**columns, "saved": np.ones((len(TABLE), 2)), "save_rate": 3.0})
+    assert sniff(file).notes == ()
+
+
 def test_a_log_without_a_header_has_numbers_or_the_names_that_are_given(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text(text(header=False))
