@@ -26,3 +26,8 @@ def decimals_of(length: float) -> int:
 def length_text(length: float) -> str:
     """A length [m] as text, with the decimals of `decimals_of`."""
     return f"{length:.{decimals_of(length)}f}"
+
+
+def plural(count: int, one: str, many: str | None = None) -> str:
+    """Return the word for so many: `one` for 1, else `many`, which by default is `one` with an s."""
+    return one if count == 1 else f"{one}s" if many is None else many

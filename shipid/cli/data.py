@@ -14,6 +14,7 @@ from shipid.cli.options import MappingName
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import criterion_table, measure_table, reading, table
 from shipid.errors import ShipidError
+from shipid.units import plural
 
 if TYPE_CHECKING:
     from shipid.logs.guess.pose import Frame
@@ -127,7 +128,7 @@ def _draft(
     source = guessed.source
     if source.pattern is not None:
         count = f"{source.held} runs" if source.parts else "as many runs"
-        files = f"{len(source.files)} file{'s' * (len(source.files) > 1)}"
+        files = f"{len(source.files)} {plural(len(source.files), 'file')}"
         sentence = f"{files} {source.pattern!r}: one source of {count}"
         answer.say(sentence, files=len(source.files), pattern=source.pattern)
     left = [{"left out": name, "because": why} for name, why in source.skipped.items()]

@@ -14,6 +14,7 @@ from shipid.cli.completion import files
 from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
 from shipid.cli.terminal import digits, iterations, steps, table
 from shipid.errors import ShipidError
+from shipid.units import plural
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
@@ -137,7 +138,7 @@ def identify(
         _show_identified(outcome, answer)
         write_patch(outcome, file)
         count = len(outcome.solution.values)
-        answer.say(f"{count} number{'s' * (count != 1)} as a patch on {ship.key} -> {file}", file=file)
+        answer.say(f"{count} {plural(count, 'number')} as a patch on {ship.key} -> {file}", file=file)
         if html is not None:
             from shipid.identification.contents import identification_content
             from shipid.report.identification import write_identification

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 
-from shipid.units import decimals_of
+from shipid.units import decimals_of, plural
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -79,4 +79,4 @@ def _power(match: re.Match[str]) -> str:
 
 def counted(count: int, noun: str) -> str:
     """`1 run`, `3 runs`."""
-    return f"{count:,} {noun}" + ("" if count == 1 else "s")
+    return f"{count:,} {plural(count, noun)}"

@@ -25,7 +25,7 @@ from shipid.predictor import Predictor
 from shipid.study.apply import Band, along_run
 from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
-from shipid.units import length_text
+from shipid.units import length_text, plural
 
 Array = np.ndarray
 TRACK = ["run", "t", "north", "east"]
@@ -232,7 +232,7 @@ def summary(played: Played) -> list[str]:
     instants, points = played.instants, played.points
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
     lines = [
-        f"{len(instants)} predictions in {runs} run{'s' if runs > 1 else ''}, "
+        f"{len(instants)} predictions in {runs} {plural(runs, 'run')}, "
         f"{played.horizon * played.step:g} s ahead; {played.skipped} rows before there was a past"
     ]
     if played.assumed:
@@ -257,42 +257,14 @@ def summary(played: Played) -> list[str]:
 
 
 def _promise(played: Played) -> list[str]:
-    """How often the band held whole paths: one sentence, and its size over the horizon."""
-    band, bands, instants = played.band, played.bands, played.instants
-    if band is None or bands is None:
+    """How often the band held whole paths, by how much it adapted, and its size over the horizon; none without one."""
+    if played.band is None or played.bands is None:
         return []
-    reach, outside = instants["reach"].to_numpy(), instants["outside"].to_numpy(dtype=bool)
-    judged, promised = np.isfinite(reach), np.isfinite(reach) & ~outside
-    lines = []
-    if judged.any():
-        held = reach <= instants["factor"].to_numpy()
-        of = "" if band.kind is None else f" of the kind {band.kind!r}"
-        adapts = "" if band.rate is None else f", adapting at {band.rate:g}"
-        inside = f"{held[promised].mean():.0%} of the {promised.sum()}" if promised.any() else "none of the 0"
-        lines.append(
-            f"band of {band.level:.0%}{of}{adapts}: it held {held[judged].mean():.0%} of the {judged.sum()} whole "
-            f"paths that can be judged, {inside} without alarm, where it is promised"
-        )
-        if promised.any():
-            _, most = share_interval(held[promised], instants["run"].to_numpy()[promised])
-            if most < band.level:
-                lines.append(f"  that is fewer than {band.level:.0%} by more than chance: {CHANGED}")
-        usual = at_level(bands.table(band.kind), band.level)
-        shares = []
-        for level in (*STANDARD, band.level) if band.rate is None else ():
-            if bands.promises(level, band.kind) and usual > 0:
-                wider = float(at_level(bands.table(band.kind), level) / usual)
-                shares.append((level, float((reach[promised] <= wider).mean()) if promised.any() else np.nan))
-        if shares and promised.any():
-            levels = ", ".join(f"{level:.0%} held {share:.0%}" for level, share in sorted(dict(shares).items()))
-            lines.append(f"  by level, without alarm: {levels}")
-    else:
-        lines.append(f"band of {band.level:.0%}: no whole path can be judged, the log ends before")
-    if band.rate is not None:
-        factors = instants["factor"].to_numpy()
-        last = ", ".join(
-            f"{run} {value:.2f}" for run, value in instants.groupby("run", sort=False)["factor"].last()[:5].items()
-        )
+    lines = _held(played.instants, played.band, played.bands)
+    if played.band.rate is not None:
+        factors = played.instants["factor"]
+        ends = factors.groupby(played.instants["run"], sort=False).last()[:5]
+        last = ", ".join(f"{run} {value:.2f}" for run, value in ends.items())
         lines.append(f"  times the calibrated one: {factors.min():.2f} to {factors.max():.2f}; at the end: {last}")
     points = played.points
     for moment in _moments(points):
@@ -300,6 +272,40 @@ def _promise(played: Played) -> list[str]:
         along, across = (length_text(np.median(here[name])) for name in ("band_along", "band_across"))
         lines.append(f"  {moment:g} s ahead: {along} m along the track, {across} m across (median)")
     return lines
+
+
+def _held(instants: pd.DataFrame, band: Band, bands: Bands) -> list[str]:
+    """How often the band held the whole paths that can be judged, and whether that is fewer than was promised."""
+    reach, outside = instants["reach"].to_numpy(), instants["outside"].to_numpy(dtype=bool)
+    judged = np.isfinite(reach)
+    promised = judged & ~outside
+    if not judged.any():
+        return [f"band of {band.level:.0%}: no whole path can be judged, the log ends before"]
+    held = reach <= instants["factor"].to_numpy()
+    of = "" if band.kind is None else f" of the kind {band.kind!r}"
+    adapts = "" if band.rate is None else f", adapting at {band.rate:g}"
+    inside = f"{held[promised].mean():.0%} of the {promised.sum()}" if promised.any() else "none of the 0"
+    lines = [
+        f"band of {band.level:.0%}{of}{adapts}: it held {held[judged].mean():.0%} of the {judged.sum()} whole "
+        f"paths that can be judged, {inside} without alarm, where it is promised"
+    ]
+    if promised.any():
+        _, most = share_interval(held[promised], instants["run"].to_numpy()[promised])
+        if most < band.level:
+            lines.append(f"  that is fewer than {band.level:.0%} by more than chance: {CHANGED}")
+        lines += _by_level(reach[promised], band, bands)
+    return lines
+
+
+def _by_level(reach: Array, band: Band, bands: Bands) -> list[str]:
+    """How often bands of other levels held the paths of a reach, without alarm; none of a band that adapts."""
+    table = bands.table(band.kind)
+    usual = at_level(table, band.level)
+    if band.rate is not None or not usual > 0:
+        return []
+    levels = sorted(level for level in {*STANDARD, band.level} if bands.promises(level, band.kind))
+    shares = (f"{level:.0%} held {(reach <= float(at_level(table, level) / usual)).mean():.0%}" for level in levels)
+    return [f"  by level, without alarm: {', '.join(shares)}"] if levels else []
 
 
 def _moments(points: pd.DataFrame) -> Array:

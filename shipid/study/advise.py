@@ -20,6 +20,7 @@ from shipid.study.plan import NO_MODEL, Plan
 from shipid.study.results import Results, judged_cells, naive_summary
 from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, too_few
 from shipid.study.worth import FEWEST_MODELS, Estimate, break_even, runs_without_physics
+from shipid.units import plural
 
 MANY = 3  # methods that learn: their comparison is what the study asks
 SHOWN = 5  # models that a sentence lists
@@ -172,7 +173,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
         share = f"{left.min():.0%}" + (f" to {left.max():.0%}" if len(known) > 1 else "")
         text = (
             f"Compensation with {runs(largest)} leaves {share} of the error of physics "
-            f"alone (over {len(known)} model{'s' * (len(known) > 1)})."
+            f"alone (over {len(known)} {plural(len(known), 'model')})."
         )
         sentences.append((text, "horizon"))
     sentences += [(text, "gain") for text in (*_alone(case), *_trend(case), _floor(case))]
@@ -321,9 +322,7 @@ def _caveats(results: Results) -> list[str]:
     if len(failed):
         by_reason = failed.drop_duplicates("model").groupby("sentence", sort=False)["model"]
         why = "; ".join(f"{named(map(str, models))}: {reason}" for reason, models in by_reason)
-        sentences.append(
-            f"{len(failed)} of {len(cells)} cells {'has' if len(failed) == 1 else 'have'} no result ({why})"
-        )
+        sentences.append(f"{len(failed)} of {len(cells)} cells {plural(len(failed), 'has', 'have')} no result ({why})")
     return sentences
 
 
@@ -344,11 +343,10 @@ def _counted(sides: Sides, rival: str) -> str:
     count = len(sides.better) + len(sides.worse) + len(sides.open)
     if len(sides.better) == count:
         return f"every physics model with a result does better than {rival}"
-    parts = [f"{len(sides.better) or 'none'} of {count} physics models does better than {rival}"]
-    if len(sides.better) > 1:
-        parts = [f"{len(sides.better)} of {count} physics models do better than {rival}"]
+    verb = "do" if len(sides.better) > 1 else "does"  # none does
+    parts = [f"{len(sides.better) or 'none'} of {count} physics models {verb} better than {rival}"]
     if sides.worse:
-        parts.append(f"{named(sides.worse)} {'does' if len(sides.worse) == 1 else 'do'} worse")
+        parts.append(f"{named(sides.worse)} {plural(len(sides.worse), 'does', 'do')} worse")
     if sides.open:
         parts.append(f"for {named(sides.open)} the test cannot tell")
     return "; ".join(parts)
@@ -383,7 +381,7 @@ def _trend(case: Case) -> list[str]:
     sides = case.sides(models, case.table.compare([[(1.0, m, first), (-1.0, m, last)] for m in models]))
     parts = []
     if sides.worse:
-        verb = "is" if len(sides.worse) == 1 else "are"
+        verb = plural(len(sides.worse), "is", "are")
         parts.append(f"With {runs(case.largest)} {named(sides.worse)} {verb} no better than with {case.smallest}.")
     if sides.open:
         parts.append(
@@ -409,9 +407,9 @@ def _floor(case: Case) -> str:
         return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} every model beats it."
     parts = []
     if sides.worse:
-        parts.append(f"{named(sides.worse)} {'is' if len(sides.worse) == 1 else 'are'} worse")
+        parts.append(f"{named(sides.worse)} {plural(len(sides.worse), 'is', 'are')} worse")
     if sides.open:
-        parts.append(f"{named(sides.open)} {'is' if len(sides.open) == 1 else 'are'} not shown to beat it")
+        parts.append(f"{named(sides.open)} {plural(len(sides.open), 'is', 'are')} not shown to beat it")
     return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} {', and '.join(parts)}."
 
 

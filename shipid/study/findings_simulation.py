@@ -54,6 +54,7 @@ from shipid.study.verdict import (
     verdict,
     weakest,
 )
+from shipid.units import plural
 
 Array = NDArray[np.float64]
 CLAIMS = {
@@ -168,8 +169,8 @@ def _S1(grid: Grid) -> Finding:
         over_plain = shown(table.against(PLAIN, grid.moderate, 0).above).sum()
         plain = f" ({over_plain} of {count} beat networks without mirror symmetry, {metres(table.mean(PLAIN, 0))})"
     evidence = (
-        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {_is(won[0])} shown to beat pure "
-        f"data-driven ({grid.value(NO_MODEL, 0)}), whose H less theirs is {_range(leads[0])}{plain}; "
+        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural(won[0], 'is', 'are')} shown to "
+        f"beat pure data-driven ({grid.value(NO_MODEL, 0)}), whose H less theirs is {_range(leads[0])}{plain}; "
         f"that most keep the lead is {keeps}: "
         f"{', '.join(f'{number} at {N}' for number, N in zip(won[1:], amounts[1:], strict=True))}"
     )
@@ -178,11 +179,6 @@ def _S1(grid: Grid) -> Finding:
         for number, N in ((won[0], amounts[0]), (won[-1], amounts[-1]))
     }
     return _finding("S1", weakest((begins, keeps)), evidence, **numbers)
-
-
-def _is(count: int) -> str:
-    """Verb of so many models."""
-    return "is" if count == 1 else "are"
 
 
 def _sides(differences: Sequence[Contrasts]) -> tuple[list[Array], list[Array]]:
@@ -252,9 +248,10 @@ def _S4(grid: Grid) -> Finding:
     worst = [model for model, behind in zip(grid.high, worse, strict=True) if behind]
     orders = table.H[NO_MODEL].shape[1]
     names = ", ".join(f"{model} {grid.value(model, place)}" for model in worst[:3])
+    are = plural(len(worst), "is", "are")
     evidence = (
-        f"at N_D = {last}, {better.sum()} of {len(better)} high models {_is(better.sum())} shown to beat pure "
-        f"data-driven ({grid.value(NO_MODEL, place)}), {len(worst)} {_is(len(worst))} shown to be worse"
+        f"at N_D = {last}, {better.sum()} of {len(better)} high models {plural(better.sum(), 'is', 'are')} shown to "
+        f"beat pure data-driven ({grid.value(NO_MODEL, place)}), {len(worst)} {are} shown to be worse"
         f"{f' ({names})' if names else ''}"
     )
     numbers = {
@@ -262,10 +259,8 @@ def _S4(grid: Grid) -> Finding:
         f"share of high models shown to be worse at N_D = {last}": float(worse.mean()),
     }
     if orders < FEWEST_ORDERS:
-        plural = "s" * (orders > 1)
-        evidence += (
-            f"; fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has {orders} seed{plural}"
-        )
+        seeds = f"{orders} {plural(orders, 'seed')}"
+        evidence += f"; fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has {seeds}"
         return _finding("S4", "undecided", evidence, **numbers)
     if not grid.moderate:
         evidence += "; no moderate model to compare their fluctuation with"

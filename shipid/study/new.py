@@ -31,7 +31,7 @@ from shipid.study.first_look import Look, first_look
 from shipid.study.plan import NO_MODEL, Plan, build_plan
 from shipid.study.prepare import all_windows, obtain, over_gaps, partition, prepare
 from shipid.study.survey import Survey, helm_sense, separation, survey, typical_runs
-from shipid.units import GRAVITY, RPM
+from shipid.units import GRAVITY, RPM, plural
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import order_of
@@ -217,7 +217,7 @@ def _knowing(vessels: Mapping[str, Vessel], tests: Sequence[str]) -> list[str]:
         known = documents.read(vessel.file).get("provenance", {}).get("runs", [])
         seen = [run for run in tests if run in known]
         if seen:
-            words = f"{name} was identified from {', '.join(seen)}, which now test{'s' * (len(seen) == 1)} it"
+            words = f"{name} was identified from {', '.join(seen)}, which now {plural(len(seen), 'tests', 'test')} it"
             blocks.append(f"{words}: choose other test runs, or let the study identify ([family.identify])")
     return blocks
 
@@ -245,7 +245,7 @@ def _usable(dataset: Dataset, steps: int, step: float, data: Path) -> list[str]:
         raise DataError(error.message, file=data) from None
     usable = [run for run in dataset.runs if run in names]
     if len(usable) <= LEAST_RUNS:
-        few = f"{len(usable)} {'run' if len(usable) == 1 else 'runs'} of {steps * step:g} s or more"
+        few = f"{len(usable)} {plural(len(usable), 'run')} of {steps * step:g} s or more"
         remedy = "cut the log into its manoeuvres, [[segment]]s of the mapping (`shipid data segment` proposes them)"
         raise DataError(f"{few}, a study needs {LEAST_RUNS + 1}, one of them for the test: {remedy}", file=data)
     return usable
@@ -300,7 +300,7 @@ def _question(vessels: Mapping[str, Vessel], dataset: Dataset, seen: Survey, hor
     name = next(iter(vessels.values())).name
     yield Choice("question", f"How well can {name} be predicted {horizon:g} s ahead, with how many runs?")
     counts = Counter(seen.runs["kind"])
-    kinds = ", ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in counts.most_common())
+    kinds = ", ".join(f"{count} {plural(count, kind)}" for kind, count in counts.most_common())
     low, high = seen.runs["duration"].min(), seen.runs["duration"].max()
     slow, fast = seen.runs["speed"].min(), seen.runs["speed"].max()
     text = f"{len(seen.runs)} runs ({kinds}) of {low:.0f} to {high:.0f} s at {slow:.2g} to {fast:.2g} m/s"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from shipid.study.evidence import FEWEST_RUNS, LEVEL, Contrasts, holm
 from shipid.study.plan import NO_MODEL
-from shipid.units import decimals_of
+from shipid.units import decimals_of, plural
 
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
 MOST_NAMES = 5  # in one sentence
@@ -81,19 +81,19 @@ def measured(differences: Contrasts, index: int) -> str:
 
 def manoeuvres(count: int) -> str:
     """Return `1 test manoeuvre`, `20 test manoeuvres`, ..."""
-    return f"{count} test manoeuvre{'s' * (count != 1)}"
+    return f"{count} {plural(count, 'test manoeuvre')}"
 
 
 def too_few(count: int) -> str:
     """Say that so many test manoeuvres give no interval; empty if they do."""
     if count >= FEWEST_RUNS:
         return ""
-    return f"{manoeuvres(count)} {'gives' if count == 1 else 'give'} no interval, {FEWEST_RUNS} would"
+    return f"{manoeuvres(count)} {plural(count, 'gives', 'give')} no interval, {FEWEST_RUNS} would"
 
 
 def runs(count: int) -> str:
     """Return `1 run`, `2 runs`, ..."""
-    return f"{count} run{'s' * (count != 1)}"
+    return f"{count} {plural(count, 'run')}"
 
 
 def words(model: str) -> str:
