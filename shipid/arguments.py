@@ -27,6 +27,13 @@ def whole_number(name: str, value: Any, least: int = 0, error: Kind = ShipidErro
     return number
 
 
+def number(name: str, value: Any, error: Kind = ShipidError) -> float:
+    """Return a number as a float, whatever type of number it was; raise `error` for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or np.iscomplexobj(value):
+        raise error(f"{name} must be a number, not {value!r}")
+    return float(value)
+
+
 def positive(name: str, value: Any, error: Kind = ShipidError) -> float:
     """Return a number above 0 as a float, whatever type of number it was; raise `error` for anything else."""
     number = float(value) if isinstance(value, int | float | np.number) and not np.iscomplexobj(value) else np.nan
@@ -42,10 +49,25 @@ def one_of(name: str, value: Any, valid: Iterable[str], error: Kind = ShipidErro
         raise error(f"{name} {value!r} is not known: {choices(str(value), names)}")
 
 
+def names_of(name: str, value: Any, error: Kind = ShipidError) -> tuple[str, ...]:
+    """Return one name or several as a tuple of texts; raise `error` for what is neither."""
+    if isinstance(value, bytes) or not isinstance(value, Iterable):
+        raise error(f"{name} must be a name, or several names, not {value!r}")
+    return (value,) if isinstance(value, str) else tuple(str(one) for one in value)
+
+
+def function_or_none(name: str, value: Any, error: Kind = ShipidError) -> None:
+    """Raise `error` for a value that is neither a function nor None."""
+    if value is not None and not callable(value):
+        raise error(f"{name} must be a function, or None, not {value!r}")
+
+
 def of_class(name: str, value: Any, kind: type, remedy: str, error: Kind = ShipidError) -> None:
     """Raise `error` for a value of another class; the remedy says where such a value comes from."""
     if not isinstance(value, kind):
         shown = repr(value) if isinstance(value, str) else type(value).__name__
+        if isinstance(value, type):
+            shown = f"the class {value.__name__}"
         article = "an" if kind.__name__[0] in "AEIOaeio" else "a"
         raise error(f"{name} must be {article} {kind.__name__}, {remedy}, not {shown}")
 

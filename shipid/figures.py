@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
+from shipid.arguments import of_class
 from shipid.errors import ShipidError, choices
 from shipid.report.checks import CheckContent
 from shipid.report.content import ReportContent
@@ -212,10 +213,7 @@ def content_of(source: Source) -> ReportContent:
     from shipid.study.contents import report_content
     from shipid.study.results import Results
 
-    given: Any = source
-    if not isinstance(given, Results):
-        remedy = "give Results, as of `read_results`, or a table of cells, as of `read_cells`"
-        raise ShipidError(f"{type(source).__name__} holds nothing to draw: {remedy}", path="figures")
+    of_class("source", source, Results, "as of `read_results`, or a table of cells, as of `read_cells`")
     return report_content(source)
 
 
@@ -224,7 +222,7 @@ def _from_frames(frames: dict[str, Any]) -> ReportContent:
     for name in frames:
         if name not in known:
             raise ShipidError(f"a report shows no {name!r}; {choices(name, known)}", path="figures")
-    cells = _completed(frames.pop("cells", pd.DataFrame({"model": [], "N_D": [], "H": []})))
+    cells = _completed(frames.pop("cells", pd.DataFrame({"model": np.array([], dtype=str), "N_D": [], "H": []})))
     models = frames.pop("models", None)
     if models is None:
         models = cells.drop_duplicates("model")[["model", "family", "A", "A_90", "A_rms"]]
@@ -253,15 +251,18 @@ def _identification(source: Identified | IdentificationContent) -> Identificatio
     if isinstance(source, IdentificationContent):
         return source
     from shipid.identification.contents import identification_content
+    from shipid.identification.outcome import Identified
 
+    of_class("source", source, Identified, "as of `run_identification`")
     return identification_content(source, "")
 
 
 def _manoeuvre(source: Measured | ManoeuvreContent) -> ManoeuvreContent:
     if isinstance(source, ManoeuvreContent):
         return source
-    from shipid.simulation.measured import manoeuvre_content
+    from shipid.simulation.measured import Measured, manoeuvre_content
 
+    of_class("source", source, Measured, "as of `measure_standard`")
     return manoeuvre_content(source)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.arguments import numbers
+from shipid.errors import ShipidError
 
 Array = NDArray[np.float64]
 
@@ -43,12 +44,12 @@ def lengths(vectors: Array) -> Array:
 def position_error(predicted: Array, true: Array) -> Array:
     """Return the distance (T, S) [m] between paths (T, S, 2) [m], e_k of (14) and (15); both in one frame.
 
-    Arrays of integers are taken as floats, so that no difference wraps around. Raises ValueError for another shape, and
-    ShipidError for what holds no numbers.
+    Arrays of integers are taken as floats, so that no difference wraps around. Raises ShipidError for another
+    shape, and for what holds no numbers.
     """
     predicted, true = numbers("predicted", predicted), numbers("true", true)
     if predicted.shape != true.shape or predicted.shape[-1:] != (2,):
-        raise ValueError(f"paths must both be (T, S, 2), got {predicted.shape} and {true.shape}")
+        raise ShipidError(f"paths must both be (T, S, 2), got {predicted.shape} and {true.shape}")
     # order C: a sum over errors must not depend on the memory layout of the paths
     return lengths(np.subtract(predicted, true, order="C"))
 

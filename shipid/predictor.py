@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple, Self, get_args, overload
 import numpy as np
 from pydantic import BaseModel, Field
 
-from shipid.arguments import by_name, numbers, one_of, path_of, whole_number
+from shipid.arguments import by_name, names_of, numbers, of_class, one_of, path_of, whole_number
 from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, run_folds
 from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DataError, ResultError, ShipidError, choices
@@ -135,9 +135,7 @@ class Predictor:
         if level is not None:
             self.check_level(level, kind)
         instants = self._known(instants)
-        alone = self.physics.paths(instants) if paths is None else numbers("paths", paths, DataError)
-        if alone.shape != (self.physics.horizon, len(instants), 2):
-            raise DataError(f"paths must be {(self.physics.horizon, len(instants), 2)}, not {alone.shape}")
+        alone = self._paths(self.physics.paths(instants) if paths is None else paths, instants)
         try:
             predicted = self.corrector.predict(self.physics, instants, alone)
         except KeyError as error:
@@ -161,6 +159,8 @@ class Predictor:
     ) -> Region:
         """Return the region around paths (T, S, 2) [m] of `predict` that are known already; DataError as there."""
         bands = self.check_level(level, kind)
+        of_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
+        paths = self._paths(paths, instants)
         return bands.region(paths, instants.columns, self.physics.step, level, pointwise=pointwise, kind=kind)
 
     def check_level(self, level: float, kind: str | None = None) -> Bands:
@@ -171,10 +171,16 @@ class Predictor:
         """Return the paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for pure data-driven."""
         return self.physics.paths(self._known(instants))
 
+    def _paths(self, paths: Array, instants: Instants) -> Array:
+        """The paths as numbers; DataError unless they are (T, S, 2), of this horizon and these instants."""
+        paths, shape = numbers("paths", paths, DataError), (self.physics.horizon, len(instants), 2)
+        if paths.shape != shape:
+            raise DataError(f"paths must be {shape}, not {paths.shape}")
+        return paths
+
     def _known(self, instants: Instants) -> Instants:
         """The instants with planned commands where the predictor takes them, and without them where it does not."""
-        if not isinstance(instants, Instants):
-            raise DataError(f"give Instants, such as `windows.instants()`, not {type(instants).__name__}")
+        of_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
         parts = {name: getattr(instants, name) for name in ("columns", "past", "planned", "hidden", "estimates")}
         for part, given in parts.items():
             if part not in ("planned", "hidden") or given is not None:
@@ -403,10 +409,9 @@ def fit(
         a past, lack a command of the vessel or are too few to be split; the physics has an observer; the physics or the
         training diverges.
     """
-    for name, given, kind in (("method", method, Method), ("physics", physics, Physics), ("windows", windows, Windows)):
-        if not isinstance(given, kind):
-            shown = given.__name__ if isinstance(given, type) else type(given).__name__
-            raise DataError(f"{name} must be an object of the class {kind.__name__}, not {shown}")
+    of_class("method", method, Method, "such as PathDrawn()", DataError)
+    of_class("physics", physics, Physics, "such as Physics(vessel, horizon=60, step=1.0)", DataError)
+    of_class("windows", windows, Windows, "as of `cut_windows`", DataError)
     one_of("commands", commands, get_args(Commands), DataError)
     by_name("kinds", kinds or {}, "the name of a run to a kind of manoeuvre", DataError)
     seed, refits = whole_number("seed", seed, 0, DataError), whole_number("refits", refits, 0, DataError)
@@ -508,7 +513,7 @@ def _folds(
     """(Training, validation) indices of windows, split by run: as the method wants, or with the named runs."""
     if validation_runs is None:
         return run_folds(windows, method.validation, seed)
-    names = (validation_runs,) if isinstance(validation_runs, str) else tuple(validation_runs)
+    names = names_of("validation_runs", validation_runs, DataError)
     runs = list(windows.spans)
     unknown = next((run for run in names if run not in runs), None)
     if unknown is not None:

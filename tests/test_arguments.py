@@ -11,9 +11,10 @@ import pytest
 import torch
 
 import shipid
-from shipid.arguments import numbers, of_class, one_of, positive, whole_number
+from shipid.arguments import names_of, number, numbers, of_class, one_of, positive, whole_number
 from shipid.errors import DataError, ShipidError
 from shipid.export.write import export_predictor, export_vessel
+from shipid.vessel.dynamics import dynamics
 
 
 @pytest.mark.parametrize("value", [3, 3.0, np.int32(3), np.uint8(3), np.float32(3), np.array(3)])
@@ -85,7 +86,57 @@ def test_an_object_of_another_class_comes_with_the_way_to_the_right_one() -> Non
         of_class("vessel", [1], int, "such as 1")
 
 
+@pytest.mark.parametrize("value", ["a", ["a"], ("a",), np.array(["a"]), pd.Series(["a"], index=[3]), iter(["a"])])
+def test_one_name_or_several_are_names(value: Any) -> None:
+    assert names_of("runs", value) == ("a",)
+
+
+@pytest.mark.parametrize("value", [None, 3, np.nan, b"a"])
+def test_anything_else_is_no_name(value: Any) -> None:
+    with pytest.raises(DataError, match="runs must be a name, or several names, not"):
+        names_of("runs", value, DataError)
+
+
+@pytest.mark.parametrize("value", [None, "1", [1.0], True, 1j, pd.NA])
+def test_what_is_no_number_is_refused(value: Any) -> None:
+    assert number("speed", np.float32(0.5)) == 0.5
+    with pytest.raises(ShipidError, match="speed must be a number, not"):
+        number("speed", value)
+
+
 ANY: Any = object()
+SHIP = shipid.load_vessel("mariner")
+NAMES = ("north", "east", "psi", "u", "v", "r")
+START = {name: np.array([7.0 if name == "u" else 0.0]) for name in NAMES}
+ORDERS = {name: np.zeros(1) for name in dynamics(SHIP).commands}
+STRAIGHT = shipid.standard(SHIP, "zigzag").manoeuvre
+LOG = shipid.perform(SHIP, STRAIGHT, step=1.0, duration=60.0)
+DATA = shipid.Dataset(LOG[[name for name in LOG if not str(name).startswith("actual.")]], {})
+WINDOWS = shipid.cut_windows(DATA, horizon=3, step=1.0)
+PHYSICS = shipid.Physics(SHIP, 3, 1.0)
+IDENTIFY = shipid.Identify(parameters=["hull.abkowitz.X_vv"])
+
+
+def roll(start: Any = START, **given: Any) -> Any:
+    return shipid.rollout(SHIP, start, ORDERS, **{"step": 1.0, "num_steps": 1, "engine": "casadi", **given})
+
+
+def identify(**given: Any) -> Any:
+    return shipid.run_identification(SHIP, **{"dataset": DATA, "settings": IDENTIFY, **given})
+
+
+def standard(**given: Any) -> Any:
+    return shipid.standard(SHIP, **{"name": "zigzag", **given})
+
+
+def performed(**given: Any) -> Any:
+    return shipid.perform(SHIP, **{"manoeuvres": STRAIGHT, "step": 1.0, "duration": 2.0, **given})
+
+
+def exported(**given: Any) -> Any:
+    return export_vessel(SHIP, "casadi", "nowhere/v.casadi", **given)
+
+
 CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "rollout": (lambda: shipid.rollout(ANY, {}, {}, step=1.0, num_steps=1), "vessel must be a Vessel, as of"),
     "members": (lambda: shipid.members(shipid.Family(name="f"), ANY), "base must be a Vessel, as of"),
@@ -116,11 +167,47 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "export_predictor": (lambda: export_predictor(ANY, "c", "x"), "give a Predictor, as of `fit` or `Predictor.load`"),
     "export_vessel": (lambda: export_vessel(ANY, "c", ANY), "out must be a path"),
     "run_study": (lambda: next(shipid.run_study(ANY, "run")), "plan must be a Plan, as of"),
+    "relative_to": (lambda: shipid.load_vessel("mariner", 3), "relative_to must be a path"),  # type: ignore[arg-type]
+    "changes": (lambda: shipid.read_plan("quick", ANY), "changes must be a dict, of a dotted path to a value, not"),
+    "changes of no path": (lambda: shipid.read_plan("quick", {3: 4}), "no such block"),  # type: ignore[dict-item]
+    "paths": (lambda: PHYSICS.paths(ANY), "instants must be an Instants, such as"),
+    "position_error": (lambda: shipid.position_error(np.zeros(2), np.zeros(3)), "paths must both be"),
+    "a state": (lambda: roll({**START, "uu": ANY}), "start: Mariner.* has no 'uu': did you mean 'u'?"),
+    "a wind": (lambda: roll(environment={"V_wind": np.zeros(1)}), "environment: .* has no 'V_wind'"),
+    "keep": (lambda: roll(keep=3), "keep must be a name, or several names, not 3"),
+    "keep nothing known": (lambda: roll(keep="uu"), "has no channel 'uu': did you mean 'u'?"),
+    "engine": (lambda: roll(engine=None), "there is no engine None: valid"),
+    "engines": (lambda: roll(engine=["casadi"]), "there is no engine"),
+    "name": (lambda: standard(name=None), "no manoeuvre is called None: valid"),
+    "approach": (lambda: standard(approach=3), "3 is no approach: valid"),
+    "duration": (lambda: standard(duration="long"), "duration must be a number, not 'long'"),
+    "speed": (lambda: standard(speed=[1.0]), "speed must be a number"),
+    "n": (lambda: standard(n="1"), "n must be a number, not '1'"),
+    "manoeuvres": (lambda: performed(manoeuvres=3), "manoeuvres must be a manoeuvre, or several, not 3"),
+    "components": (lambda: performed(components=3), "components must be a dict"),
+    "outputs": (lambda: performed(outputs=3), "outputs must be a name, or several names"),
+    "runs": (lambda: shipid.identify(SHIP, DATA, ANY, IDENTIFY), "runs must be a name, or several names"),
+    "progress": (lambda: shipid.identify(SHIP, DATA, "M001", IDENTIFY, progress=ANY), "progress must be a function"),
+    "dataset": (lambda: identify(dataset=ANY), "dataset must be a Dataset, as of"),
+    "runs to fit": (lambda: identify(runs=3), "runs must be a name, or several names"),
+    "held out": (lambda: identify(held_out=3), "held out must be a name, or several names"),
+    "ahead": (lambda: identify(ahead="long"), "ahead must be a number, not 'long'"),
+    "profiles": (lambda: identify(profiles=3), "profiles must be a name, or several names"),
+    "band": (lambda: identify(band="0.9"), "0.9 is no level of a band"),
+    "validation runs": (
+        lambda: shipid.fit(shipid.PathDrawn(trials=1), PHYSICS, WINDOWS, validation_runs=ANY),
+        "validation_runs must be a name, or several names",
+    ),
+    "integrator": (lambda: exported(integrator="rk5"), "integrator 'rk5' is not known: did you mean 'rk4'?"),
+    "name in C": (lambda: exported(name=3), "name must be a str, such as"),
+    "estimates": (lambda: shipid.figures.estimates(ANY), "source must be an Identified, as of `run_identification`"),
+    "track": (lambda: shipid.figures.track(ANY), "source must be a Measured, as of `measure_standard`"),
+    "no cells": (lambda: shipid.figures.error_map({}), "there is nothing to draw"),
 }
 
 
 @pytest.mark.parametrize(("call", "message"), CALLS.values(), ids=CALLS)
 def test_public_functions_refuse_what_they_do_not_take(call: Callable[[], Any], message: str) -> None:
-    """Before, an AttributeError from deep inside."""
+    """Before, an AttributeError or a TypeError from deep inside, or no word at all."""
     with pytest.raises(ShipidError, match=message):
         call()

@@ -78,7 +78,7 @@ def test_frames_that_do_not_fit_are_one_sentence() -> None:
 
 def test_what_holds_nothing_to_draw_is_one_sentence() -> None:
     cells = pd.DataFrame({"model": ["a", "a"], "N_D": [10, 30], "H": [2.0, 1.0]})
-    with pytest.raises(ShipidError, match="figures: str holds nothing to draw: give Results, as of `read_results`"):
+    with pytest.raises(ShipidError, match="source must be a Results, as of `read_results`, or a table of cells"):
         figures.gain("results/quick")  # type: ignore[arg-type]
     with pytest.raises(ShipidError, match="cells: the table has no rows"):
         figures.gain(cells[:0])

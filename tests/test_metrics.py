@@ -44,7 +44,7 @@ def test_paths_of_any_type_have_the_same_error(look):
 def test_what_is_no_path_is_refused():
     with pytest.raises(ShipidError, match="true must be an array of numbers"):
         metrics.position_error(np.zeros((1, 1, 2)), [["a", "b"]])
-    with pytest.raises(ValueError, match="paths must both be"):
+    with pytest.raises(ShipidError, match="paths must both be"):
         metrics.position_error([[0.0, 0.0]], [[0.0, 0.0, 0.0]])
 
 
@@ -91,7 +91,7 @@ def test_horizon_and_time_are_the_two_margins(paths):
 
 
 def test_shapes_that_cannot_be_meant_are_refused(paths):
-    with pytest.raises(ValueError, match="T, S, 2"):
+    with pytest.raises(ShipidError, match="T, S, 2"):
         metrics.position_error(paths[0][..., 0], paths[1][..., 0])
     with pytest.raises(ValueError, match="no window"):
         metrics.summary(np.empty((30, 0)))

@@ -23,6 +23,7 @@ from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.predictor import Predictor, _folds, fit
 from shipid.vessel.load import load_vessel
+from tests.export.strange import bands_of
 
 HORIZON, SMALL = 5, PathDrawn(trials=1, units=8, terms=2)
 NONE = Physics(None, HORIZON, 1.0)
@@ -190,7 +191,9 @@ def test_a_column_of_another_shape_is_named(predictor: Predictor, change: dict[s
 def test_only_instants_are_predicted_from(predictor: Predictor) -> None:
     given: Any = WINDOWS
     for call in (predictor.predict, predictor.alone):
-        with pytest.raises(DataError, match=r"give Instants, such as `windows\.instants\(\)`, not Windows"):
+        with pytest.raises(
+            DataError, match=r"instants must be an Instants, such as `windows\.instants\(\)`, not Windows"
+        ):
             call(given)
 
 
@@ -204,6 +207,23 @@ def test_paths_of_another_shape_are_refused(predictor: Predictor) -> None:
         for wrong in (paths[:, :1], paths[:2], paths[..., 0], paths.transpose(1, 0, 2)):
             with pytest.raises(DataError, match="paths must be"):
                 known.predict(instants, wrong)
+
+
+def test_a_band_takes_paths_and_instants_alone(predictor: Predictor) -> None:
+    """Before, anything else ended in a TypeError or an AttributeError, and a part of the horizon in a wrong band."""
+    instants, rng = WINDOWS.instants(), np.random.default_rng(3)
+    bands = replace(bands_of(rng, predictor.physics, instants, tuple(predictor.limits), 1.0), runs=60)
+    known = replace(predictor, bands=bands)
+    paths = known.predict(instants)
+    whole, listed = (known.band(given, instants, 0.5) for given in (paths, paths.tolist()))
+    np.testing.assert_array_equal(listed.along, whole.along)
+    wrong: Any
+    for wrong in (None, paths[:, :1], "paths"):
+        with pytest.raises(DataError, match="paths must be"):
+            known.band(wrong, instants, 0.5)
+    wrong = instants.columns
+    with pytest.raises(DataError, match="instants must be an Instants, such as"):
+        known.band(paths, wrong, 0.5)
 
 
 def test_a_prediction_is_no_view_of_what_was_passed_in() -> None:
@@ -229,10 +249,10 @@ def test_what_is_no_level_is_refused(predictor: Predictor, level: Any) -> None:
         ({"seed": -1}, "seed must be a whole number"),
         ({"seed": np.random.default_rng(0)}, "seed must be a whole number"),
         ({"refits": 1.5}, "refits must be a whole number"),
-        ({"method": PathDrawn}, "method must be an object of the class Method, not PathDrawn"),
-        ({"method": "path-drawn"}, "method must be an object of the class Method, not str"),
-        ({"physics": load_vessel("gunnerus-28.9")}, "physics must be an object of the class Physics, not Vessel"),
-        ({"windows": WINDOWS.instants()}, "windows must be an object of the class Windows, not Instants"),
+        ({"method": PathDrawn}, r"method must be a Method, such as PathDrawn\(\), not the class PathDrawn"),
+        ({"method": "path-drawn"}, "method must be a Method, such as PathDrawn\\(\\), not 'path-drawn'"),
+        ({"physics": load_vessel("gunnerus-28.9")}, "physics must be a Physics, such as Physics.*, not Vessel"),
+        ({"windows": WINDOWS.instants()}, "windows must be a Windows, as of `cut_windows`, not Instants"),
         ({"validation_runs": [1]}, "validation_runs: no run with windows"),
     ],
 )

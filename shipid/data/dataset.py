@@ -17,7 +17,7 @@ import pyarrow
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from shipid.arguments import of_class, path_of
+from shipid.arguments import names_of, of_class, path_of
 from shipid.errors import DataError, choices
 from shipid.files import open_file, whole
 from shipid.physics.signals import SIGNALS, is_command, is_output, named, signal_of
@@ -76,14 +76,10 @@ class Dataset:
 
         Names that no run has are passed over.
         """
-        if not isinstance(runs, Iterable):
-            raise DataError(f"runs must be the name of a run, or several names, not {runs!r}")
-        names = [runs] if isinstance(runs, str) else list(runs)
+        names = names_of("runs", runs, DataError)
         chosen = self.frame["run"].isin(names)
         if not chosen.any():
-            raise DataError(
-                f"no run is named {', '.join(map(str, names))}: there are {', '.join(self.runs)}", path="run"
-            )
+            raise DataError(f"no run is named {', '.join(names)}: there are {', '.join(self.runs)}", path="run")
         return replace(self, frame=self.frame[chosen].reset_index(drop=True))
 
     @property

@@ -105,10 +105,10 @@ ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
 
 def named(name: str, device: str) -> Engine | None:
     """The engine with a name; None for `auto`, `repeated`. ShipidError for an unknown name or an unsupported device."""
-    if name in (AUTO, REPEATED):
+    if isinstance(name, str) and name in (AUTO, REPEATED):
         return None
-    if name not in ENGINES:
-        raise ShipidError(f"there is no engine {name!r}: {choices(name, [AUTO, *ENGINES])}")
+    if not isinstance(name, str) or name not in ENGINES:
+        raise ShipidError(f"there is no engine {name!r}: {choices(str(name), [AUTO, *ENGINES])}")
     engine = ENGINES[name]
     if device != "cpu" and not engine.any_device:
         others = " or ".join(repr(other) for other, entry in ENGINES.items() if entry.any_device)

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from shipid.arguments import by_name, numbers, of_class, whole_number
+from shipid.arguments import by_name, names_of, numbers, of_class, whole_number
 from shipid.engine.engines import REPEATED, Engine, chosen, done_by, named
 from shipid.engine.integrate import Array, Batch, Job, Method
 from shipid.errors import DataError, ShipidError, choices
 from shipid.metrics import position_error, tally
 from shipid.physics.helm import Helmsman
+from shipid.physics.signals import row_of
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
@@ -71,7 +72,8 @@ def rollout(
 
     Parameters
     ----------
-    start : state name -> (S,), SI; names that the vessel does not have are ignored, missing ones raise DataError.
+    start : state name -> (S,), SI. In a dict, names of signals that the vessel does not have are passed over here and
+        in `environment`; a name that is no signal at all is an error.
     commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step.
     step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
     parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. A DataFrame, a Series or a dict
@@ -91,7 +93,7 @@ def rollout(
     ------
     DataError : a state, command or signal of the environment that the vessel needs is missing.
     ShipidError : an array of another shape or without numbers, a step or number of steps that is not positive, an
-        unknown method, engine, channel, parameter or component.
+        unknown method, engine, state, channel, parameter or component.
     """
     asked = named(engine, device)
     num_steps, every = whole_number("num_steps", num_steps, 1), whole_number("every", every, 1)
@@ -100,8 +102,10 @@ def rollout(
     check_steps(num_steps)
     given = start, commands, {} if environment is None else environment, components or {}
     model, batch = prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
+    _check_names("start", start, (*model.state, *model.hidden), vessel)
+    _check_names("environment", environment, model.environment, vessel)
     names = channels(model)
-    kept = tuple(names if keep is None else keep)
+    kept = names if keep is None else names_of("keep", keep)
     job = Job(step, num_steps, method, every, places(kept, names, vessel), device)
     with np.errstate(all="ignore"):
         records, worst = done_by(
@@ -114,6 +118,14 @@ def check_steps(num_steps: int) -> None:
     """Raise ShipidError for more steps than any computer does."""
     if num_steps > MOST_STEPS:
         raise ShipidError(f"{num_steps:.2g} steps, at most {MOST_STEPS:.0e}: give a longer step, or a shorter time")
+
+
+def _check_names(what: str, given: object, names: Sequence[str], vessel: Vessel) -> None:
+    """Raise ShipidError for a name in a dict that is neither of the vessel nor of any signal; a table may have more."""
+    odd = [] if not isinstance(given, Mapping) else [name for name in given if name not in names]
+    unknown = next((str(name) for name in odd if row_of(str(name)) is None), None)
+    if unknown is not None:
+        raise ShipidError(f"{what}: {vessel.name} has no {unknown!r}: {choices(unknown, names)}")
 
 
 @dataclass(frozen=True)

@@ -43,9 +43,8 @@ def export_predictor(
     """
     if not hasattr(predictor, "corrector"):
         raise DocumentError(f"give a Predictor, as of `fit` or `Predictor.load`, not {type(predictor).__name__}")
-    target, file = _checked(to, out, single)
+    target, file, title = _checked(to, out, single, name)
     kept = model(predictor)
-    title = c_name(name or file.stem)
     if target == "c":
         return _folder(predictor_files(kept, title, Precision(single)), file)
     if target == "fmu":
@@ -71,12 +70,12 @@ def export_vessel(
 ) -> list[Path]:
     """Write a vessel alone, its step, for simulation: to `c`, `fmu` or `casadi`; see `export_predictor`.
 
-    Raises ShipidError for what is no vessel, and for an unknown target or integrator.
+    integrator : rule of the step, `euler` or `rk4`.
+
+    Raises ShipidError as there, and for an unknown integrator.
     """
-    target, file = _checked(to, out, single)
-    of_class("vessel", vessel, Vessel, "as of `load_vessel`")
+    target, file, title = _checked(to, out, single, name)
     one_of("integrator", integrator, get_args(Method))
-    title = c_name(name or file.stem)
     if target == "onnx":
         raise DocumentError("a vessel has no networks for ONNX: export it to c, fmu or casadi", path="--to")
     if target == "c":
@@ -86,7 +85,10 @@ def export_vessel(
     return write_function(*vessel_function(vessel, title, integrator), file)
 
 
-def _checked(to: str, out: str | os.PathLike[str], single: bool) -> tuple[str, Path]:
+def _checked(to: str, out: str | os.PathLike[str], single: bool, name: str | None) -> tuple[str, Path, str]:
+    """The target, the file or folder, and the name that begins every public name."""
+    if name is not None:
+        of_class("name", name, str, "such as 'gunnerus'", DocumentError)
     if to not in TARGETS:
         raise DocumentError(f"no such target: {choices(str(to), TARGETS)}", path="--to")
     if single and to not in ("c", "onnx"):
@@ -98,7 +100,7 @@ def _checked(to: str, out: str | os.PathLike[str], single: bool) -> tuple[str, P
         raise DocumentError(f"is a folder: the target {to} takes a file", file=file, path="--out")
     if to in ENDINGS and file.suffix != ENDINGS[to]:
         raise DocumentError(f"the target {to} is a file that ends in {ENDINGS[to]}", file=file, path="--out")
-    return to, file
+    return to, file, c_name(name or file.stem)
 
 
 def _folder(files: Files, folder: Path) -> list[Path]:

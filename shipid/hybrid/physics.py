@@ -47,8 +47,8 @@ class Physics:
     path: PathSource = "position"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.vessel, Vessel | None):
-            raise ShipidError(f"physics takes a vessel, such as of `load_vessel`, or None, not {self.vessel!r}")
+        if self.vessel is not None:
+            of_class("vessel", self.vessel, Vessel, "as of `load_vessel`, or None")
         object.__setattr__(self, "horizon", whole_number("horizon", self.horizon, 1))
         object.__setattr__(self, "step", positive("step", self.step))
         one_of("integrator", self.integrator, get_args(Integrator))
@@ -199,6 +199,7 @@ class Physics:
     def _inputs(self, instants: Instants) -> Inputs:
         """Start, commands, environment, slow force and drift of a rollout; what has no column is zero."""
         assert self.vessel is not None
+        of_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
         model = dynamics(self.vessel)
         zero = np.zeros(len(instants))
         columns: Mapping[str, Array] = {"down": instants.columns.get("z", zero), **instants.columns}

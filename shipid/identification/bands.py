@@ -35,8 +35,8 @@ SMALL = 1e-4  # share of the variance of a measure's greatest axis: axes of the 
 
 def check_level(level: float | None) -> None:
     """Raise DataError for a level that is not between 0 and 1."""
-    if level is not None and not 0 < level < 1:
-        raise DataError(f"{level:g} is no level of a band: give a share between 0 and 1, such as 0.9")
+    if level is not None and not (isinstance(level, int | float | np.number) and 0 < level < 1):
+        raise DataError(f"{level} is no level of a band: give a share between 0 and 1, such as 0.9")
 
 
 def short_horizon(solution: Solution, judged: Statistics, spacing: float) -> str:

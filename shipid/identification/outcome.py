@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from shipid import document as documents
-from shipid.arguments import of_class
+from shipid.arguments import function_or_none, names_of, number, of_class
 from shipid.data.dataset import Dataset, apart_from
 from shipid.data.outputs import common_outputs, compare_outputs
 from shipid.document import short_names
@@ -35,6 +35,7 @@ from shipid.identification.statistics import LinearFit, Statistics, autocorrelat
 from shipid.interrupts import uninterrupted
 from shipid.physics.signals import is_shaft
 from shipid.simulation.measured import measure_standard
+from shipid.units import plural
 from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -45,6 +46,7 @@ BEFORE, AFTER = "before", "after"
 BETTER = 0.01  # of the limit of a profile: a point this much below the estimate is a better fit
 SIGNALS = ("u", "v", "r", "position")
 ACCURATE = 0.03  # of a measured thrust or torque: its proposed standard deviation
+EXACT = 1e-3  # of its deviation: what a signal counts with that the vessel repeats exactly
 TRIED: tuple[tuple[str, tuple[float, ...]], ...] = (("zigzag", (10, 10)), ("zigzag", (20, 20)), ("turning", (35,)))
 """Standard manoeuvres [deg] that both vessels perform in calm water."""
 COMPARED = {
@@ -119,7 +121,7 @@ class Identified:
         bundled = documents.bundled("models").get(vessel.key)
         is_bundled = bundled is not None and bundled.resolve() == Path(vessel.file).resolve()
         base = vessel.key if is_bundled else os.path.relpath(vessel.file, file.parent)
-        count = f"{len(self.runs)} {'run' if len(self.runs) == 1 else 'runs'}"
+        count = f"{len(self.runs)} {plural(len(self.runs), 'run')}"
         return patch_text(
             name=f"{vessel.name}, identified",
             base=base,
@@ -175,9 +177,9 @@ def pick_runs(
     runs, held_out : names or patterns in which `*` matches any characters. Raises DataError for an unknown run.
     """
 
-    def chosen(patterns: Sequence[str], option: str) -> list[str]:
+    def chosen(patterns: Sequence[str] | str, option: str) -> list[str]:
         selected: set[str] = set()
-        for pattern in patterns:
+        for pattern in names_of(option, () if patterns is None else patterns, DataError):
             names = documents.match(pattern, dataset.runs)
             if not names:
                 raise DataError(f"{pattern!r} is no run: {choices(pattern, dataset.runs)}", path=option)
@@ -185,7 +187,7 @@ def pick_runs(
         return [run for run in dataset.runs if run in selected]
 
     tested = chosen(held_out, "held out")
-    fitted = [run for run in (chosen(runs, "runs") if runs else dataset.runs) if run not in tested]
+    fitted = [run for run in (chosen(runs, "runs") or dataset.runs) if run not in tested]
     if not fitted:
         raise DataError("every run is held out: leave at least one run for the fit", path="runs")
     return tuple(fitted), tuple(tested)
@@ -243,6 +245,9 @@ def run_identification(
     ShipidError : the fit did not converge; the message says why.
     """
     of_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
+    of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
+    profiles, ahead = names_of("profiles", profiles, DataError), number("ahead", ahead, DataError)
+    function_or_none("progress", progress)
     check_level(band)
     fitted, tested = check(vessel, dataset, settings, runs, held_out, ahead=ahead, profiles=profiles)
     digest = dataset.digest
@@ -525,7 +530,7 @@ def _programme(
     unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
     choice = design.candidates(vessel, (speed / 2, speed), design.Limits(n_rpm=most))
     motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
-    spread = {name: width * residual_level(judged, name) for name, width in motions.items()}
+    spread = {name: width * (residual_level(judged, name) or EXACT) for name, width in motions.items()}
     contributions = design.informed(
         vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
         interval=settings.step,

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.arguments import by_name, numbers, of_class
+from shipid.arguments import by_name, function_or_none, names_of, numbers, of_class
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.covariance import inverted
@@ -116,7 +116,8 @@ def identify(
     of_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
     if start is not None and not isinstance(start, Solution):
         by_name("start", start, "a path to a factor, or a Solution", DocumentError)
-    runs = (runs,) if isinstance(runs, str) else tuple(str(run) for run in (() if runs is None else runs))
+    function_or_none("progress", progress)
+    runs = names_of("runs", () if runs is None else runs, DataError)
     plain = settings.model_copy(update={"discount": False})
     solution = _identified(vessel, dataset, runs, plain, start, progress)
     if not settings.discount:

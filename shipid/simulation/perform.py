@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.arguments import by_name, numbers, one_of, positive
+from shipid.arguments import by_name, names_of, numbers, one_of, positive
 from shipid.engine.casadi import orders_of, outputs_of
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
@@ -67,6 +67,8 @@ def perform(
         time that is not positive, an unknown method or output.
     """
     given: Any = [manoeuvres] if isinstance(manoeuvres, Manoeuvre | str) else manoeuvres
+    if not isinstance(given, Iterable):
+        raise ShipidError(f"manoeuvres must be a manoeuvre, or several, not {given!r}")
     manoeuvres = list[Manoeuvre](given)
     odd: list[Any] = [one for one in manoeuvres if not isinstance(one, Manoeuvre)]
     if odd:
@@ -89,6 +91,8 @@ def perform(
     by_name("environment", environment or {}, "a name to a number or an array")
     weather = _weather(vessel, environment or {}, len(manoeuvres), every * (max(rows) - 1) + 1)
     one_of("method", method, get_args(Method))
+    by_name("components", components or {}, "the path of a term to an array")
+    outputs = names_of("outputs", outputs)
     for name in outputs:
         one_of("outputs", name, dynamics(vessel).outputs)
     seas = {path: np.asarray(drawn) for path, drawn in (components or {}).items()}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.arguments import numbers, of_class
+from shipid.arguments import number, numbers, of_class
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import ShipidError, choices
 from shipid.simulation.approach import Controls, acceleration
@@ -23,7 +23,7 @@ from shipid.simulation.manoeuvre import (
     TurningCircle,
     Zigzag,
 )
-from shipid.units import GRAVITY, RPM
+from shipid.units import GRAVITY, RPM, plural
 from shipid.vessel.load import Vessel
 
 FROUDE = 0.2  # default speed: U = 0.2 sqrt(g L)
@@ -88,28 +88,28 @@ def standard(
         gives, a time that is not positive.
     """
     of_class("vessel", vessel, Vessel, "as of `load_vessel`")
-    if name not in KINDS:
-        raise ShipidError(f"no manoeuvre is called {name!r}: {choices(name, KINDS)}", path="NAME")
+    if not isinstance(name, str) or name not in KINDS:
+        raise ShipidError(f"no manoeuvre is called {name!r}: {choices(str(name), KINDS)}", path="NAME")
     build, most = KINDS[name]
     angles = numbers("angles", angles).ravel().tolist()
     if len(angles) > most:
-        raise ShipidError(f"{name} takes {most or 'no'} {'angle' if most == 1 else 'angles'}", path="ANGLES")
+        raise ShipidError(f"{name} takes {most or 'no'} {plural(most, 'angle')}", path="ANGLES")
     if any(angle <= 0 for angle in angles):
         raise ShipidError("angles are positive: --side gives the direction of the first turn", path="ANGLES")
     for place, angle in enumerate(angles):
         greatest = MOST_HEADING if place else MOST_HELM
         if not angle <= greatest:
             raise ShipidError(f"{angle:g} deg: give at most {greatest:g} deg", path="ANGLES")
-    if approach not in APPROACHES:
-        raise ShipidError(f"{approach!r} is no approach: {choices(approach, APPROACHES)}", path="--approach")
+    if not isinstance(approach, str) or approach not in APPROACHES:
+        raise ShipidError(f"{approach!r} is no approach: {choices(str(approach), APPROACHES)}", path="--approach")
     for option, value in (("--duration", duration), ("--step", step)):
-        if value is not None and not 0 < value < np.inf:
+        if value is not None and not 0 < number(option.strip("-"), value) < np.inf:
             raise ShipidError(f"{value:g} s must be positive and finite", path=option)
     length = length_of(vessel)
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
-    asked = service_speed(vessel) if speed is None else float(numbers("speed", speed))
-    n_rpm = (shaft_speed(Controls.of(vessel), asked) if n is None else n) / RPM
+    asked = service_speed(vessel) if speed is None else number("speed", speed)
+    n_rpm = (shaft_speed(Controls.of(vessel), asked) if n is None else number("n", n)) / RPM
     passing = length / asked  # s for one length
     interval = _round(passing / ROWS) if step is None else step * STEPS
     lead = float(np.ceil(LEAD * passing / interval) * interval)

@@ -158,6 +158,17 @@ def _in_block(path: str | None, place: int) -> str:
     return f"truth.manoeuvre.{place}{inside}"
 
 
+def vessel_of(truth: Truth, vessel: Vessel) -> Vessel:
+    """The vessel with the values and blocks of `truth.set`; DocumentError names the path of an error there."""
+    try:
+        return vessel.with_values(truth.set) if truth.set else vessel
+    except DocumentError as error:
+        raise DocumentError(error.message, path=f"truth.set.{error.path}") from None
+    except (ValueError, IndexError, TypeError, AttributeError):
+        message = f"a path goes below a number of {truth.vessel}: see `shipid vessel show {truth.vessel}`"
+        raise DocumentError(message, path="truth.set") from None
+
+
 def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     """Simulate and log all manoeuvres: a frame with the columns of a dataset, runs `M001`, `M002`, ...
 
@@ -171,7 +182,7 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     Raises ShipidError for a truth that is none, DocumentError if it does not fit the vessel or a manoeuvre diverges.
     """
     of_class("truth", truth, Truth, "such as Truth.model_validate(...)")
-    vessel = vessel.with_values(truth.set) if truth.set else vessel
+    vessel = vessel_of(truth, vessel)
     check_truth(truth, vessel)
     environment, chi = _weather(truth, vessel)
     keys = [(truth.seed, "manoeuvre", number) for number in range(truth.manoeuvres)]

@@ -17,6 +17,7 @@ import tomlkit
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
 
 from shipid import document as documents
+from shipid.arguments import by_name
 from shipid.data.windows import Commands, PathSource
 from shipid.document import Document
 from shipid.engine.integrate import Method as Integrator
@@ -30,8 +31,9 @@ from shipid.logs.mapping import read_mapping
 from shipid.observer import Observer, bank
 from shipid.physics.signals import SIGNALS, named
 from shipid.predictor import MOST_STEPS
-from shipid.simulation.truth import Truth, check_truth, old_keys
+from shipid.simulation.truth import Truth, check_truth, old_keys, vessel_of
 from shipid.study.ranges import LONGEST_NAME, Cut, check_memory, check_ranges, check_seeds
+from shipid.units import plural
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
@@ -628,13 +630,14 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
 
     Raises DocumentError with file, dotted path and remedy.
     """
+    by_name("changes", changes or {}, "a dotted path to a value", DocumentError)
     file = documents.find(str(name), "studies")
     document = documents.read(file)
     known = dict(documents.leaves(document))
     for path in changes or {}:
-        head = path.split(".", 1)[0]
+        head = str(path).split(".", 1)[0]
         if head not in Study.model_fields:
-            raise DocumentError(f"--set: no such block: {choices(head, Study.model_fields)}", file=file, path=path)
+            raise DocumentError(f"--set: no such block: {choices(head, Study.model_fields)}", file=file, path=str(path))
     for path, value in (changes or {}).items():
         try:
             document = documents.replace(document, {path: value})
@@ -654,9 +657,7 @@ def _beyond(document: Document, path: str) -> str:
         if isinstance(value, list) and documents.place_of(value, key) >= len(value):
             name = ".".join(keys[:place])
             last = f", {name}.0 to {name}.{len(value) - 1}" if len(value) > 1 else f", {name}.0" if value else ""
-            return (
-                f"there is no {name}.{key}: {name} has {len(value)} {'entry' if len(value) == 1 else 'entries'}{last}"
-            )
+            return f"there is no {name}.{key}: {name} has {len(value)} {plural(len(value), 'entry', 'entries')}{last}"
         value = value[documents.place_of(value, key)] if isinstance(value, list) else value[key]
     raise KeyError(path)
 
@@ -706,8 +707,9 @@ def _built(
     truth = None
     if study.truth is not None:
         _check_amounts(study, study.truth, file)
-        truth = _truth_vessel(study.truth, file, known)
+        base = _vessel(study.truth.vessel, file, "truth.vessel", known)
         try:
+            truth = vessel_of(study.truth, base)
             check_truth(study.truth, truth)
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=error.path) from None
@@ -823,18 +825,6 @@ def _check_amounts(study: Study, truth: Truth, file: Path) -> None:
     if truth.duration < ahead:
         message = f"{truth.duration:g} s: shorter than the horizon of {ahead:g} s"
         raise DocumentError(message, file=file, path="truth.duration")
-
-
-def _truth_vessel(truth: Truth, file: Path, known: dict[str, Vessel]) -> Vessel:
-    """The vessel that makes the truth, with the blocks that the study adds: an error there names its path."""
-    vessel = _vessel(truth.vessel, file, "truth.vessel", known)
-    try:
-        return vessel.with_values(truth.set) if truth.set else vessel
-    except DocumentError as error:
-        raise DocumentError(error.message, file=file, path=f"truth.set.{error.path}") from None
-    except (ValueError, IndexError, TypeError, AttributeError):
-        message = f"a path goes below a number of {truth.vessel}: see `shipid vessel show {truth.vessel}`"
-        raise DocumentError(message, file=file, path="truth.set") from None
 
 
 def _vessel(name: str, file: Path, path: str, known: dict[str, Vessel]) -> Vessel:

@@ -227,13 +227,15 @@ def _other_session(folder: Path, claims: Claims, device: str) -> Iterator[str]:
 def session_on(device: str) -> dict[str, Any]:
     """What results depend on beside the plan, to the last digit: versions, engine, processor and device."""
     computer = machine()
-    packages = computer["packages"]
-    session = {
-        "shipid": f"{packages.pop('shipid')}, code {code_digest()}",
+    others = {name: version for name, version in computer["packages"].items() if name != "shipid"}
+    return {
+        "shipid": f"{computer['packages']['shipid']}, code {code_digest()}",  # the code may differ and the version not
         "engine": engine(),
         "processor": computer["processor"],
+        "python": computer["python"],
+        "device": device,
+        "packages": others,
     }
-    return {**session, "python": computer["python"], "device": device, "packages": packages}
 
 
 def _shared(

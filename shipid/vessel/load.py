@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FiniteFloat
 
 from shipid import document as documents
+from shipid.arguments import path_of
 from shipid.document import Document
 from shipid.errors import DocumentError, choices
 from shipid.files import open_file
@@ -154,7 +155,8 @@ def load_vessel(name: str | Path, relative_to: str | Path | None = None) -> Vess
 
     A patch has `base` (a vessel), optionally `base_digest`, and `[set]` with dotted paths; see `shipid.vessel.perturb`.
     """
-    vessel = _load(documents.find(name, "models", None if relative_to is None else Path(relative_to)), ())
+    folder = None if relative_to is None else path_of("relative_to", relative_to, DocumentError)
+    vessel = _load(documents.find(name, "models", folder), ())
     fault = contradiction(vessel.document, vessel.parameters)
     if fault is not None:
         raise DocumentError(fault[1], file=vessel.file, path=fault[0])

@@ -292,19 +292,20 @@ def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str 
     member : from 0. counter : how often it was redrawn. Raises ShipidError where one of them is no whole number, and
     DocumentError for a path that the base lacks or a member that is no valid vessel.
     """
-    return _draw(family, _changes(family, base, file), member, base, base.parameters, counter, file)
+    return _Drawn.of(family, base, file).member(member, counter)
 
 
 def members(
     family: Family, base: Vessel, file: str | Path | None = None, numbers: Iterable[int] | None = None
 ) -> list[Variant]:
-    """Members of a resolved family, all or those of the given numbers from 0, none redrawn."""
-    changes = _changes(family, base, file)
+    """Members of a resolved family, all or those of the given numbers from 0, none redrawn.
+
+    Raises ShipidError for a number that is no whole number, and DocumentError as `draw` does.
+    """
+    drawn = _Drawn.of(family, base, file)
     if not isinstance(numbers, Iterable | None):
         raise DocumentError(f"numbers must be several whole numbers, such as [0, 1], not {numbers!r}")
-    wanted = range(family.members) if numbers is None else numbers
-    original = base.parameters  # one for all members: a family may have many
-    return [_draw(family, changes, number, base, original, 0, file) for number in wanted]
+    return [drawn.member(number) for number in (range(family.members) if numbers is None else numbers)]
 
 
 @dataclass(frozen=True)
@@ -343,44 +344,47 @@ def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Cha
     return result
 
 
-def _draw(
-    family: Family,
-    changes: Sequence[_Change],
-    member: int,
-    base: Vessel,
-    original: dict[str, float],
-    counter: int,
-    file: str | Path | None,
-) -> Variant:
-    member, counter = (
-        whole_number("member", member),
-        whole_number("counter", counter),
-    )  # the draw is a hash: 1.0 would be another
-    values: dict[str, float] = {}
-    for change in changes:
-        for path, argument in change.arguments.items():
-            u = 0.0
-            if change.rule.drawn(argument):
-                key, times = change.keys.get(path, (path, 0))
-                u = uniform(family.seed, family.name, member, key, times, counter)
-            values[path] = change.rule.change(values.get(path, original[path]), argument, u)
-    _check(family, member, base, values, file)
-    factors = {path: value / original[path] for path, value in values.items() if original[path] != 0}
-    name = family.name if family.members == 1 else f"{family.name}-{member + 1}"
-    return Variant(
-        name, family.name, member, family.base or base.key, base.digest, values, factors, counter, family.seed, original
-    )
+@dataclass(frozen=True)
+class _Drawn:
+    """A family on its base, from which members are drawn. original : the numbers of the base, one dict for all."""
 
+    family: Family
+    base: Vessel
+    file: str | Path | None
+    changes: Sequence[_Change]
+    original: dict[str, float]
 
-def _check(family: Family, member: int, base: Vessel, values: Mapping[str, float], file: str | Path | None) -> None:
-    """DocumentError for a member that is no valid vessel, such as one of negative mass."""
-    try:
-        base.with_values(values)
-    except DocumentError as error:
-        message = f"member {member + 1} would not be a valid vessel: {error.path}: {error.message}"
-        if values.get(error.path or "") == 0:
-            message = f"{message}: {WITHOUT}"
-        raise DocumentError(message, file=file, path=f"family.{family.name}") from None
+    @classmethod
+    def of(cls, family: Family, base: Vessel, file: str | Path | None) -> _Drawn:
+        changes = _changes(family, base, file)
+        return cls(family, base, file, changes, base.parameters)
+
+    def member(self, number: int, counter: int = 0) -> Variant:
+        """Member of a number from 0, drawn again so often."""
+        number, counter = whole_number("member", number), whole_number("counter", counter)  # of 1.0 is another hash
+        family, base, original, values = self.family, self.base, self.original, dict[str, float]()
+        for change in self.changes:
+            for path, argument in change.arguments.items():
+                u = 0.0
+                if change.rule.drawn(argument):
+                    key, times = change.keys.get(path, (path, 0))
+                    u = uniform(family.seed, family.name, number, key, times, counter)
+                values[path] = change.rule.change(values.get(path, original[path]), argument, u)
+        self._check(number, values)
+        factors = {path: value / original[path] for path, value in values.items() if original[path] != 0}
+        name = family.name if family.members == 1 else f"{family.name}-{number + 1}"
+        of, digest = family.base or base.key, base.digest
+        return Variant(name, family.name, number, of, digest, values, factors, counter, family.seed, original)
+
+    def _check(self, number: int, values: Mapping[str, float]) -> None:
+        """DocumentError for a member that is no valid vessel, such as one of negative mass."""
+        try:
+            self.base.with_values(values)
+        except DocumentError as error:
+            message = f"member {number + 1} would not be a valid vessel: {error.path}: {error.message}"
+            if values.get(error.path or "") == 0:
+                message = f"{message}: {WITHOUT}"
+            raise DocumentError(message, file=self.file, path=f"family.{self.family.name}") from None
 
 
 def uniform(*key: Any) -> float:

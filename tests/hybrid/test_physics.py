@@ -195,7 +195,7 @@ def test_many_steps_at_once_run_as_c(count: int, engine: str, monkeypatch: pytes
         ({"path": "speed"}, "path 'speed' is not known: valid: position, velocity"),
         ({"horizon": 2.5}, "horizon must be a whole number, 1 or more, not 2.5"),
         ({"step": 0.0}, "step must be a number above 0"),
-        ({"vessel": "mariner"}, "physics takes a vessel, such as of `load_vessel`, or None, not 'mariner'"),
+        ({"vessel": "mariner"}, "vessel must be a Vessel, as of `load_vessel`, or None, not 'mariner'"),
     ],
 )
 def test_physics_of_a_wrong_argument_is_refused(wrong: dict[str, Any], message: str) -> None:

@@ -203,6 +203,16 @@ def test_the_profile_agrees_with_the_interval(identified: Identified) -> None:
     assert curve.high == pytest.approx(row["factor_high"], abs=0.3 * row["factor_error"])
 
 
+def test_a_programme_follows_data_without_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before, residuals of exactly 0 ended in `SVD did not converge` of NumPy."""
+    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(outcome, "residual_level", lambda *_: 0.0)
+    exact = trials(SHIP, runs=2, steps=60)
+    table = run_identification(off(), exact, settings(parameters=FEW[:1]), programme=True).programme
+    assert table is not None
+    assert np.isfinite(table.select_dtypes("number")).all(axis=None)
+
+
 def test_the_programme_is_ranked(identified: Identified) -> None:
     table = identified.programme
     assert table is not None

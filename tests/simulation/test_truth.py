@@ -301,3 +301,13 @@ def test_values_of_the_block_are_set_on_the_ship() -> None:
     of_block = simulate(truth(set=heavy), SHIP)
     pd.testing.assert_frame_equal(of_block, simulate(truth(), SHIP.with_values(heavy)))
     assert not of_block.equals(simulate(truth(), SHIP))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [({"inertia.mass": 8e5}, "^truth.set.inertia.mass: "), ({"inertia.m.kg": 1.0}, "^truth.set: a path goes below")],
+)
+def test_a_wrong_value_of_the_block_has_its_path(wrong: dict[str, float], message: str) -> None:
+    """Before, it had the path in the vessel, or none."""
+    with pytest.raises(DocumentError, match=message):
+        simulate(truth(set=wrong), SHIP)
