@@ -215,10 +215,10 @@ class Predictor:
             without a column, are passed over.
         """
         by_name("columns", columns, "a name to an array", DataError)
-        odd = next((name for name, values in columns.items() if np.ndim(values) != 1), None)
+        odd = next((name for name in columns if np.ndim(columns[name]) != 1), None)
         if odd is not None:
             raise DataError(f"must be (S,), a value for each instant, not {np.shape(columns[odd])}", path=odd)
-        outside = np.full(len(next(iter(columns.values()), ())), not self.limits)
+        outside = np.full(len(columns[next(iter(columns))]) if len(columns) else 0, not self.limits)
         for name, (low, high) in self.limits.items():
             if name in columns:
                 slack, values = 1e-9 * max(1.0, abs(low), abs(high)), numbers(name, columns[name], DataError)
@@ -413,7 +413,8 @@ def fit(
     of_class("physics", physics, Physics, "such as Physics(vessel, horizon=60, step=1.0)", DataError)
     of_class("windows", windows, Windows, "as of `cut_windows`", DataError)
     one_of("commands", commands, get_args(Commands), DataError)
-    by_name("kinds", kinds or {}, "the name of a run to a kind of manoeuvre", DataError)
+    kinds = {} if kinds is None else kinds
+    by_name("kinds", kinds, "the name of a run to a kind of manoeuvre", DataError)
     seed, refits = whole_number("seed", seed, 0, DataError), whole_number("refits", refits, 0, DataError)
     if (physics.horizon, physics.step) != (windows.horizon, windows.step):
         message = f"the physics has {physics.horizon} steps of {physics.step:g} s"

@@ -185,6 +185,11 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "n": (lambda: standard(n="1"), "n must be a number, not '1'"),
     "manoeuvres": (lambda: performed(manoeuvres=3), "manoeuvres must be a manoeuvre, or several, not 3"),
     "components": (lambda: performed(components=3), "components must be a dict"),
+    "components of one": (
+        lambda: performed(components={"waves": 1.0}),
+        "there is no|components: the vessel has no term",
+    ),
+    "engine of a list": (lambda: performed(engine=["casadi"]), "there is no engine"),
     "outputs": (lambda: performed(outputs=3), "outputs must be a name, or several names"),
     "runs": (lambda: shipid.identify(SHIP, DATA, ANY, IDENTIFY), "runs must be a name, or several names"),
     "progress": (lambda: shipid.identify(SHIP, DATA, "M001", IDENTIFY, progress=ANY), "progress must be a function"),
@@ -203,7 +208,17 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "estimates": (lambda: shipid.figures.estimates(ANY), "source must be an Identified, as of `run_identification`"),
     "track": (lambda: shipid.figures.track(ANY), "source must be a Measured, as of `measure_standard`"),
     "no cells": (lambda: shipid.figures.error_map({}), "there is nothing to draw"),
+    "no gain": (lambda: shipid.figures.gain({}), "there is nothing to draw"),
 }
+
+
+def test_a_table_is_taken_where_names_with_arrays_are() -> None:
+    """Before, pandas refused to say whether a table is true."""
+    weather = pd.DataFrame({name: np.zeros(1) for name in dynamics(SHIP).environment})
+    pd.testing.assert_frame_equal(performed(environment=weather), performed())
+    known = shipid.fit(shipid.Alone(), PHYSICS, WINDOWS, kinds=pd.Series({"M001": "zigzag"}))
+    columns = {name: values for name, values in WINDOWS.columns.items() if name != "run"}
+    np.testing.assert_array_equal(known.outside(pd.DataFrame(columns)), known.outside(columns))
 
 
 @pytest.mark.parametrize(("call", "message"), CALLS.values(), ids=CALLS)

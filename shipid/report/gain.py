@@ -53,8 +53,10 @@ HOW = (
 )
 
 
-def gain(content: ReportContent) -> Figure:
-    """H over N_D, or the dumbbell A -> H when the study has a single N_D."""
+def gain(content: ReportContent) -> Figure | None:
+    """H over N_D, or the dumbbell A -> H when the study has a single N_D; None without cells."""
+    if content.cells.empty:
+        return None
     means = trained(content).merge(overview(content)[["model"]])
     return _over_size(content, means) if content.cells.N_D.nunique() > 1 else _dumbbell(content, means)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from shipid.arguments import by_name, names_of, numbers, one_of, positive
 from shipid.engine.casadi import orders_of, outputs_of
+from shipid.engine.engines import named
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, choices
@@ -88,14 +89,17 @@ def perform(
     if twice is not None:
         raise DocumentError(f"two runs are named {twice!r}", path="manoeuvre.name")
     rows = [_rows(one.length if duration is None else duration, step * every) for one in manoeuvres]
-    by_name("environment", environment or {}, "a name to a number or an array")
-    weather = _weather(vessel, environment or {}, len(manoeuvres), every * (max(rows) - 1) + 1)
+    environment = {} if environment is None else environment
+    by_name("environment", environment, "a name to a number or an array")
+    weather = _weather(vessel, environment, len(manoeuvres), every * (max(rows) - 1) + 1)
     one_of("method", method, get_args(Method))
-    by_name("components", components or {}, "the path of a term to an array")
+    named(engine, "cpu")
+    components = {} if components is None else components
+    by_name("components", components, "the path of a term to an array")
     outputs = names_of("outputs", outputs)
     for name in outputs:
         one_of("outputs", name, dynamics(vessel).outputs)
-    seas = {path: np.asarray(drawn) for path, drawn in (components or {}).items()}
+    seas = {path: np.atleast_1d(drawn) for path, drawn in components.items()}
     short = next((path for path, drawn in seas.items() if len(drawn) != len(manoeuvres)), None)
     if short is not None:
         counted = f"components of {short} are for {len(seas[short])} ships"
