@@ -325,6 +325,9 @@ def _path(seen: Survey, dataset: Dataset, horizon: float) -> Choice:
     share = float(seen.runs["straying"].mean())
     away = f"positions leave the integral of u, v, psi in {int(seen.runs['straying'].sum())} of {len(seen.runs)} runs"
     size, turn = abs(seen.factor), float(np.degrees(np.angle(seen.factor)))
+    if seen.stream and share > UNTRUE_PATHS:
+        why = f"{away}, by a steady {_flow(seen)}: u and v look like speeds through the water, see above"
+        return Choice("data.path", "velocity", f"{why}; the path of the integral is that through the water")
     half, whole = (separation(dataset, lag) for lag in (horizon / 2, horizon))
     parting = f"{half:.2g} m in {horizon / 2:g} s, {whole:.2g} m in {horizon:g} s"
     apart = f"positions and the integral of u, v, psi part by {parting}"
@@ -339,7 +342,18 @@ def _path(seen: Survey, dataset: Dataset, horizon: float) -> Choice:
     return Choice("data.path", "velocity", f"{away} by more than 5 % of the way; {scatter}")
 
 
+def _flow(seen: Survey) -> str:
+    towards = float(np.degrees(np.angle(seen.stream))) % 360.0
+    return f"{abs(seen.stream):.2g} m/s towards {towards:.0f} deg ({100 * seen.stream_share:.0f} % of the misfit)"
+
+
 def _wrong_velocities(seen: Survey) -> Iterator[str]:
+    if seen.stream and float(seen.runs["straying"].mean()) > UNTRUE_PATHS:
+        yield (
+            f"positions drift from the integral of u, v, psi by a steady {_flow(seen)}: u and v look like speeds "
+            "through the water. For motion over ground take [estimate] in the mapping in their place, and import again"
+        )
+        return
     if abs(seen.factor - 1) > SYSTEMATIC:
         size, turn = abs(seen.factor), float(np.degrees(np.angle(seen.factor)))
         yield (

@@ -15,6 +15,10 @@ from shipid.study.kinds import kinds_of, longest
 GRAVE = ("range", "overlap")  # checks that fail where a unit is wrong, spikes are left, or a run is there twice
 OF_A_KIND = 3  # runs of a kind from which one may be set aside
 
+STREAM_WINDOW = 10.0  # s, over which jitter of the positions is little
+STREAM_SHARE, CLEARER = 0.6, 0.5  # least share of the misfit that a stream explains; what it leaves, of a factor's rest
+SLOW_STREAM = 0.02  # of the speed: a slower stream is not told
+
 
 @dataclass(frozen=True)
 class Survey:
@@ -26,12 +30,16 @@ class Survey:
     step : usual time between rows [s].
     factor : positions over integrated velocities, the best complex factor; its angle is a turn.
     faults : sentences on what no ship does, run by run.
+    stream : steady velocity [m/s], north + i east, that positions have more than u, v, psi say; 0 where there is none.
+    stream_share : share of the misfit of positions and velocities that it explains.
     """
 
     runs: pd.DataFrame
     step: float
     factor: complex
     faults: tuple[str, ...] = ()
+    stream: complex = 0j
+    stream_share: float = 0.0
 
     @property
     def speed(self) -> float:
@@ -68,7 +76,9 @@ def survey(dataset: Dataset) -> Survey:
     step = round(float(np.median(steps)), 6) if len(steps) else 1.0
     grave = failed[failed["check"].astype(str).str.startswith(GRAVE)]
     faults = tuple(f"run {row['run']!r}: {row['sentence']}" for row in grave.to_dict("records"))
-    return Survey(pd.DataFrame(list(runs.values()), index=list(runs)), step, _factor(dataset), faults)
+    return Survey(
+        pd.DataFrame(list(runs.values()), index=list(runs)), step, _factor(dataset), faults, *_stream(dataset)
+    )
 
 
 def _factor(dataset: Dataset) -> complex:
@@ -83,6 +93,33 @@ def _factor(dataset: Dataset) -> complex:
     ran, was = np.concatenate(run), np.concatenate(seen)
     size = float(np.vdot(ran, ran).real)
     return complex(np.vdot(ran, was) / size) if size > 0 else 1.0 + 0.0j
+
+
+def _stream(dataset: Dataset) -> tuple[complex, float]:
+    """The steady velocity [m/s] that u, v, psi lack, and its share of their misfit to the positions.
+
+    0 where a factor explains the misfit as well: a wrong unit, or runs of one heading.
+    """
+    run, seen, span = [], [], []
+    for _, rows in pieces(dataset):
+        t, psi = rows["t"].to_numpy(), rows["psi"].to_numpy()
+        velocity = (rows["u"].to_numpy() + 1j * rows["v"].to_numpy()) * np.exp(1j * psi)
+        way = cumulative_integral(t, velocity.real) + 1j * cumulative_integral(t, velocity.imag)
+        position = rows["north"].to_numpy() + 1j * rows["east"].to_numpy()
+        places = np.unique(np.searchsorted(t, np.arange(t[0], t[-1], STREAM_WINDOW)))
+        for into, values in ((run, way), (seen, position), (span, t)):
+            into.append(np.diff(values[places]))
+    ran, was, lasted = np.concatenate(run), np.concatenate(seen), np.concatenate(span).real
+    misfit = was - ran
+    before, size, time = (float(np.sum(np.abs(one) ** 2)) for one in (misfit, ran, lasted))
+    if not (before > 0 and size > 0):
+        return 0j, 0.0
+    stream = complex(np.sum(misfit * lasted) / time)
+    factor = complex(np.vdot(ran, misfit) / size)
+    left, scaled = (float(np.sum(np.abs(misfit - one) ** 2)) for one in (stream * lasted, factor * ran))
+    speed = float(np.sum(np.abs(ran)) / np.sum(lasted))
+    clear = left < (1 - STREAM_SHARE) * before and left < CLEARER * scaled and abs(stream) > SLOW_STREAM * speed
+    return (stream, 1 - left / before) if clear else (0j, 0.0)
 
 
 def separation(dataset: Dataset, lag: float) -> float:

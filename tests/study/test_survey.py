@@ -75,3 +75,29 @@ def test_the_typical_run_is_the_middle_one_and_neither_broken_nor_the_longest() 
     assert typical_runs(runs) == ["c"]
     runs.loc["c", "whole"] = False
     assert typical_runs(runs)[0] in ("b", "d")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_speeds_through_the_water_lack_a_steady_vector(seed: int) -> None:
+    """Before, `study new` called such positions scattered, or the velocities wrong by a factor."""
+    rng, frame = np.random.default_rng(seed), turning(T)
+    drift = complex(rng.uniform(0.2, 1.0) * np.exp(1j * rng.uniform(-3, 3)))
+    moved = frame.assign(
+        north=frame["north"] + drift.real * T + rng.normal(0, 0.3, len(T)),
+        east=frame["east"] + drift.imag * T + rng.normal(0, 0.3, len(T)),
+    )
+    seen = survey(as_dataset(moved))
+    assert seen.stream == pytest.approx(drift, abs=0.05)
+    assert seen.stream_share > 0.8
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_jitter_and_a_wrong_unit_are_no_stream(seed: int) -> None:
+    rng, frame = np.random.default_rng(seed), turning(T)
+    jitter = frame.assign(
+        north=frame["north"] + rng.normal(0, 2, len(T)), east=frame["east"] + rng.normal(0, 2, len(T))
+    )
+    straight = turning(T, r=1e-7)
+    wrong = [frame.assign(u=1.3 * frame["u"], v=1.3 * frame["v"]), straight.assign(u=1.3 * straight["u"])]
+    for one in (frame, jitter, *wrong):
+        assert survey(as_dataset(one)).stream == 0

@@ -22,6 +22,7 @@ ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a
 TOGETHER = 0.2  # of the range of a column: how far twin rudders are apart
 TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 USUAL = np.radians(20.0)  # rudder angle of a usual turn
+ELECTRICAL = re.compile(r"(?<![A-Za-z])[eE]-?(rpm|RPM)|(?<=[a-z])ERPM|[eE]lec[a-z]*[ _-]*(rpm|RPM|Rpm)")
 NEAR = 15.0  # times from that: a unit further off is doubted
 
 
@@ -174,6 +175,14 @@ def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, An
         ("n",), f"in which unit is {name!r}, up to {top:.4g}? The way of the ship does not say: {unit} is a guess"
     )
     return unit, 0.4, f"{why}; in {unit} as the other shafts" if others else why, {}
+
+
+def ask_for_electrical(state: State) -> None:
+    """Ask for the pole pairs of shafts whose names say electrical turns."""
+    for one in state.suggestions:
+        if one.name.endswith(".n") and ELECTRICAL.search(one.source):
+            turns = f"{one.source!r} looks like electrical rpm of a brushless motor: that is rpm times the pole pairs"
+            state.ask(("n",), f"{turns}. Write factor = 1 / (pole pairs), with a gear also its ratio")
 
 
 def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:

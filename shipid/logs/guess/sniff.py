@@ -51,17 +51,32 @@ CLOCK_WORDS = frozenset(
         "gmt datenum"
     ).split()
 )
+UNPACK, SAVE = "unpack it, or export the log as text or Parquet", "save its sheet as CSV"
+EXPORT = "export it as CSV, Parquet, .mat or NMEA"
 PACKED = {
-    b"\x1f\x8b": "packed by gzip",
-    b"BZh": "packed by bzip2",
-    b"\xfd7zXZ": "packed by xz",
-    b"7z\xbc\xaf": "a 7z archive",
-    b"PK\x03\x04": "a ZIP archive, or a workbook (.xlsx, .ods)",
-    b"\xd0\xcf\x11\xe0": "an old workbook (.xls)",
-    b"SQLite format 3": "a data base of SQLite",
-    b"\x89HDF": "an HDF5 file",
+    b"\x1f\x8b": ("packed by gzip", UNPACK),
+    b"BZh": ("packed by bzip2", UNPACK),
+    b"\xfd7zXZ": ("packed by xz", UNPACK),
+    b"\x28\xb5\x2f\xfd": ("packed by zstd", UNPACK),
+    b"7z\xbc\xaf": ("a 7z archive", UNPACK),
+    b"PK\x03\x04": ("a ZIP archive", UNPACK),
+    b"\xd0\xcf\x11\xe0": ("an old workbook (.xls)", SAVE),
+    b"SQLite format 3": ("a data base of SQLite, such as a bag of ROS 2 (.db3)", EXPORT),
+    b"\x89HDF": ("an HDF5 file", EXPORT),
+    b"#ROSBAG": ("a bag of ROS (.bag)", EXPORT),
+    b"\x89MCAP": ("a bag of ROS 2 (.mcap)", EXPORT),
+    b"ULog": ("a log of PX4 (.ulg)", f"{EXPORT}, as ulog2csv does"),
+    b"\xa3\x95": ("a log of ArduPilot (.bin)", f"{EXPORT}, as mavlogdump.py does"),
+    b"TDSm": ("a file of LabVIEW (.tdms)", EXPORT),
+    b"MDF ": ("a file of measurements (.mf4)", EXPORT),
+    b"CDF": ("a netCDF file", EXPORT),
+    b"ARROW1": ("a Feather file", "export it as Parquet"),
+    b"\x93NUMPY": ("an array of NumPy (.npy)", "export it as CSV or Parquet, with names of columns"),
+    b"%PDF": ("a PDF", "export the log as CSV"),
 }
-"""First bytes of a file that is no log as it is -> what it is."""
+WORKBOOKS = {".xlsx": "a workbook (.xlsx)", ".xlsm": "a workbook (.xlsm)", ".ods": "a workbook (.ods)"}
+"""Ending of a ZIP archive that is a workbook -> what it is."""
+"""First bytes of a file that is no log as it is -> what it is, and what to do."""
 WRITTEN = {
     "ns": "ns nsec nanos nanosec nanoseconds",
     "us": "us usec micros microsec microseconds",
@@ -185,15 +200,22 @@ def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
         if form is not None:
             return form
     encoding = _encoding(head, file)
+    if re.match(r"\s*(\{|\[\s*\{|<[?!a-zA-Z])", head[:400].decode(encoding, "ignore")):
+        kind = "XML or HTML" if head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<") else "JSON"
+        raise DataError(
+            f"{kind}, not a table: export it as CSV, with one line of names and a line for each row", file=file
+        )
     return _text_format(head.decode(encoding, "ignore").splitlines()[:LOOKED_AT], encoding, file, names)
 
 
 def _encoding(head: bytes, file: Path) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    packed = next((name for mark, name in PACKED.items() if head.startswith(mark)), None)
+    packed = next((one for mark, one in PACKED.items() if head.startswith(mark)), None)
+    if packed is not None and head.startswith(b"PK") and file.suffix.lower() in WORKBOOKS:
+        packed = WORKBOOKS[file.suffix.lower()], SAVE
     if packed is not None:
-        raise DataError(f"{packed}: unpack it, or export the log as text or Parquet", file=file)
+        raise DataError(f"{packed[0]}: {packed[1]}", file=file)
     if b"\0" in head:
         raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
     for encoding in ("utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8", "cp1252"):

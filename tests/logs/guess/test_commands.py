@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.commands import choose_commands, likely_unit
+from shipid.logs.guess.commands import ask_for_electrical, choose_commands, likely_unit
 from tests.logs.simulated import si_log, state_with_pose
 
 LOG = si_log()
@@ -124,3 +124,22 @@ def test_a_roll_without_a_unit_has_that_of_the_heading() -> None:
     state = state_with_pose({"roll": 0.5 * np.sin(T)})
     state.suggest("psi", "heading", "deg", 0.9, "")
     assert likely_unit(state, "roll", "phi") == "deg"
+
+
+@pytest.mark.parametrize("name", ["erpm", "motor_erpm", "eRPM port", "leftERPM", "electrical rpm", "esc1-eRPM"])
+def test_electrical_turns_are_asked_for_their_pole_pairs(name: str) -> None:
+    """Before, they were turns of the shaft without a word: 7 times too many with 7 pole pairs."""
+    state = state_with_pose({})
+    state.suggest("propeller.n", name, "rpm", 0.9, "by its name")
+    ask_for_electrical(state)
+    (question,) = state.questions
+    assert question.sentence.startswith(f"{name!r} looks like electrical rpm")
+    assert "pole pairs" in question.sentence
+
+
+@pytest.mark.parametrize("name", ["rpm", "engine_rpm", "engineRPM", "me rpm", "propellerpm", "ME RPM", "MERPM"])
+def test_turns_of_an_engine_are_not_electrical(name: str) -> None:
+    state = state_with_pose({})
+    state.suggest("propeller.n", name, "rpm", 0.9, "by its name")
+    ask_for_electrical(state)
+    assert state.questions == []

@@ -344,6 +344,31 @@ def test_a_packed_log_is_named_as_one(name: str, tmp_path: Path) -> None:
     assert "unpack it" in caught.value.message
 
 
+FOREIGN = {
+    "log.xlsx": (b"PK\x03\x04" + bytes(90), r"a workbook \(.xlsx\): save its sheet as CSV"),
+    "log.ods": (b"PK\x03\x04" + bytes(90), r"a workbook \(.ods\): save its sheet as CSV"),
+    "log.xls": (b"\xd0\xcf\x11\xe0" + bytes(90), r"an old workbook \(.xls\): save its sheet as CSV"),
+    "log.bag": (b"#ROSBAG V2.0\n" + bytes(90), "a bag of ROS"),
+    "log.mcap": (b"\x89MCAP0\r\n" + bytes(90), "a bag of ROS 2"),
+    "log.db3": (b"SQLite format 3\0" + bytes(90), "a data base of SQLite, such as a bag of ROS 2"),
+    "log.ulg": (b"ULog\x01\x12\x35" + bytes(90), "a log of PX4"),
+    "log.bin": (b"\xa3\x95\x80\x80" + bytes(90), "a log of ArduPilot"),
+    "log.tdms": (b"TDSm" + bytes(90), "a file of LabVIEW"),
+    "one.json": (b'[{"time": 0, "rpm": 1},\n{"time": 1, "rpm": 1}]', "JSON, not a table: export it as CSV"),
+    "two.json": (b'{"time": [0, 1, 2],\n "rpm": [1, 2, 3]}', "JSON, not a table: export it as CSV"),
+    "log.gpx": (b'<?xml version="1.0"?>\n<gpx>\n</gpx>\n', "XML or HTML, not a table: export it as CSV"),
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_file_that_is_no_table_is_called_what_it_is(name: str, tmp_path: Path) -> None:
+    """Before, a workbook was to be unpacked, and others had an unknown format or no numbers with any separator."""
+    content, expected = FOREIGN[name]
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(DataError, match=f": {expected}"):
+        sniff(tmp_path / name)
+
+
 def test_a_column_of_yes_and_no_is_no_number(tmp_path: Path) -> None:
     TABLE.assign(rpm=T > 3).to_parquet(tmp_path / "log.parquet")
     sniffed = sniff(tmp_path / "log.parquet")
