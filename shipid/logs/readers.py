@@ -45,6 +45,7 @@ DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/
 DAYS += ("%d-%m-%Y", "%m-%d-%Y", "%y/%m/%d", "%d-%b-%Y", "%d %b %Y")
 HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
+NUMBER = r"[-+]?[\d.,]+(?:[eE][-+]?\d+)?"
 SAMPLES = 60  # texts by which the way of writing is looked for
 _DOTTED = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})")
 _DATED = re.compile(r"\d{4}([-/]?)\d\d\1\d\d")
@@ -366,7 +367,14 @@ def _named_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[l
         names = [*form.names, *[""] * (table.shape[1] - len(form.names))]
         return names, table
     if form.header:
-        return ["" if pd.isna(name) else str(name).strip() for name in table.iloc[0]], table.iloc[1:]
+        header = table.iloc[0].fillna("").str.strip()
+        below = table.iloc[1:]
+        again = np.ones(len(below), dtype=bool)  # a logger that began anew in the same file has written it again
+        for name in table:
+            again &= below[name].fillna("").str.strip().eq(header[name]).to_numpy()
+        if header.str.fullmatch(NUMBER).any():
+            return list(header), below  # numbers are no header: equal rows may be data
+        return list(header), below.loc[~again]
     return [str(number + 1) if number < width else "" for number in range(table.shape[1])], table
 
 

@@ -19,7 +19,7 @@ from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
 from shipid.logs.guess.clues import Finding, Question, State, Suggestion, unit_in_name
-from shipid.logs.guess.commands import ask_for_electrical, choose_commands, likely_unit
+from shipid.logs.guess.commands import ask_for_electrical, ask_for_shares, choose_commands, likely_unit
 from shipid.logs.guess.defects import defects_of_motion, defects_of_rows, defects_of_spikes, take_spikes
 from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
@@ -110,6 +110,7 @@ def guess(
     if vessel is not None:
         name_commands(state, vessel)
     ask_for_electrical(state)
+    ask_for_shares(state)
     _others(state)
     defects_of_rows(state, sniffed)
     defects_of_spikes(state)

@@ -23,6 +23,8 @@ TOGETHER = 0.2  # of the range of a column: how far twin rudders are apart
 TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 USUAL = np.radians(20.0)  # rudder angle of a usual turn
 ELECTRICAL = re.compile(r"(?<![A-Za-z])[eE]-?(rpm|RPM)|(?<=[a-z])ERPM|[eE]lec[a-z]*[ _-]*(rpm|RPM|Rpm)")
+SHARE = re.compile(r"%|‰|percent|per[ _]?mille?|promille|(?<![a-z])(pct|norm(ali[sz]ed)?|pwm)(?![a-z])", re.IGNORECASE)
+WIDEST_RUDDER = 90.0  # deg: no rudder turns farther
 NEAR = 15.0  # times from that: a unit further off is doubted
 
 
@@ -183,6 +185,21 @@ def ask_for_electrical(state: State) -> None:
         if one.name.endswith(".n") and ELECTRICAL.search(one.source):
             turns = f"{one.source!r} looks like electrical rpm of a brushless motor: that is rpm times the pole pairs"
             state.ask(("n",), f"{turns}. Write factor = 1 / (pole pairs), with a gear also its ratio")
+
+
+def ask_for_shares(state: State) -> None:
+    """Ask for the largest angle where a rudder is no angle, by its name or as no rudder turns so far."""
+    for one in state.suggestions:
+        if not one.name.endswith(".delta") or one.source not in state.columns:
+            continue
+        largest = float(np.nanmax(np.abs(state.columns[one.source])))
+        angle = np.degrees(largest * to_si(one.unit, one.name))
+        if SHARE.search(one.source) or angle > WIDEST_RUDDER:
+            state.ask(
+                ("delta",),
+                f"{one.source!r}, up to {largest:.4g}, looks like no angle (in {one.unit} it is {angle:.3g} deg): a "
+                "share of the largest angle? Write factor = (deg at the largest value) / (largest value), unit = 'deg'",
+            )
 
 
 def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:

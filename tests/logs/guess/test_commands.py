@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.commands import ask_for_electrical, choose_commands, likely_unit
+from shipid.logs.guess.commands import ask_for_electrical, ask_for_shares, choose_commands, likely_unit
 from tests.logs.simulated import si_log, state_with_pose
 
 LOG = si_log()
@@ -143,3 +143,27 @@ def test_turns_of_an_engine_are_not_electrical(name: str) -> None:
     state.suggest("propeller.n", name, "rpm", 0.9, "by its name")
     ask_for_electrical(state)
     assert state.questions == []
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [
+        ("rudder", 1000 / 35),
+        ("rudder_pwm", 11.0),
+        ("rudder_pct", 100 / 35),
+        ("rudder [%]", 100 / 35),
+        ("rudder_norm", 1 / 35),
+    ],
+)
+def test_a_rudder_that_is_no_angle_is_asked_for_its_largest_angle(name: str, factor: float) -> None:
+    """Before, per mille, per cent and pulses were degrees without a word: an angle 2.9 or 29 times too large."""
+    state = chosen({name: factor * RUDDER})
+    ask_for_shares(state)
+    assert any("looks like no angle" in question.sentence for question in state.questions)
+
+
+@pytest.mark.parametrize("name", ["rudder", "rudder_deg", "rudder normal", "RudderAngle [deg]"])
+def test_a_rudder_in_degrees_is_not_doubted(name: str) -> None:
+    state = chosen({name: RUDDER})
+    ask_for_shares(state)
+    assert not any("looks like no angle" in question.sentence for question in state.questions)
