@@ -14,7 +14,6 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
-from shipid.identification.late import late_commands
 from shipid.identification.residuals import Problem, build
 from shipid.identification.settings import BLOCK, Identify, columns_of
 from shipid.identification.start import by_inverse_dynamics, grown
@@ -50,8 +49,7 @@ class Solution:
     at_bound : (n,) whether the estimate is at a bound. held : (n,) factors that are not free: dropped, or given
         bounds that are equal. dropped : paths of the former.
     effective : signal -> independent residuals that its residuals were counted as, where `discount` is on.
-    warnings : what the fit cannot see, one sentence each: a step that is longer than the interval of the log, commands
-        that come late.
+    warnings : what the fit cannot see, one sentence each: a step that is longer than the interval of the log.
     """
 
     vessel: Vessel
@@ -178,8 +176,8 @@ def _identified(
         factors = np.where(np.arange(len(targets)) == weakest, targets, solution.factors)
         result = search(problem, factors, _point(result), progress, before=result.iterations)
         solution = replace(_solution(problem, result, objective_start, time.perf_counter() - begun), dropped=dropped)
-    warnings = filter(None, (_blurred(dataset, runs, settings), _late(vessel, dataset, runs, settings)))
-    return replace(solution, warnings=tuple(warnings))
+    warning = _blurred(dataset, runs, settings)
+    return replace(solution, warnings=(warning,) if warning else ())
 
 
 def _searched(
@@ -223,17 +221,6 @@ def _blurred(dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
         f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: faster "
         f"changes of the commands are lost; compare with step {between:.3g}"
     )
-
-
-def _late(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
-    """A warning if commands that steer come late for how fast the ship turns, else no text."""
-    late = late_commands(vessel, dataset, runs) if settings.commands == "held" else None
-    if late is None:
-        return ""
-    remedy = f'commands = "between"{f" and step at most {late.delay:.3g}" if late.to_gear else ""}'
-    remedy = f"compare with {remedy}" if not settings.outputs else "log faster"
-    numbers = f"numbers of the turn such as N_v may be some {late.share:.0%} off, more than their intervals say"
-    return f"{late.words}: {numbers}; {remedy}"
 
 
 def _factors(problem: Problem, start: Mapping[str, float]) -> Array:

@@ -13,6 +13,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, ShipidError
 from shipid.identification.fit import origin, search
+from shipid.identification.late_orders import late_orders
 from shipid.identification.residuals import build, predict
 from shipid.identification.settings import POSITIVE, Identify, unknowns
 from shipid.identification.solve import LEAST, Solution, _discounted, _weakest, identify
@@ -78,10 +79,9 @@ def test_it_converges_from_where_whole_runs_diverge(seed: int) -> None:
 def test_a_step_longer_than_the_interval_of_the_log_is_a_warning_of_the_solution() -> None:
     """As the command says it; before, who called from Python did not learn of it."""
     dataset = trials(SHIP, runs=2, steps=30)
-    (late,) = identify(SHIP, dataset, dataset.runs, settings()).warnings
-    blurred, again = identify(SHIP, dataset, dataset.runs, settings(step=2.0)).warnings
-    assert late == again
-    assert blurred.startswith("rows of the log are 1 s apart and commands are held over steps of 2 s: faster")
+    assert identify(SHIP, dataset, dataset.runs, settings()).warnings == ()
+    (warning,) = identify(SHIP, dataset, dataset.runs, settings(step=2.0)).warnings
+    assert warning.startswith("rows of the log are 1 s apart and commands are held over steps of 2 s: faster")
 
 
 def weaves(name: str, n_rpm: float, duration: float, *, measured: bool) -> Dataset:
@@ -118,27 +118,27 @@ def weaves(name: str, n_rpm: float, duration: float, *, measured: bool) -> Datas
     ],
 )
 def test_commands_that_change_between_rows(name: str, n_rpm: float, duration: float, gear: bool, paths: str) -> None:
-    """Held from their rows they make N_v wrong, and a warning says so; between rows more than half of that is gone."""
+    """Held from their rows they make N_v wrong; between rows more than half of that is gone."""
     vessel = load_vessel(name)
     dataset = weaves(name, n_rpm, duration, measured=not gear)
     if not gear:
         gears = ("thruster.rudder.actuator.delta", "thruster.propeller.actuator.n")
         vessel = vessel.with_values({f"{path}.off": True for path in gears})
     parameters = [key for key in vessel.parameters if fnmatch(key, paths)]
-    late = "commands count from their row"
     for interval in (0.5, 1.0) if name.startswith("gunnerus") else (1.0, 2.0):
         rows = dataset.frame.groupby("run", sort=False).nth(slice(3, None, round(interval / 0.1)))
         sparse = Dataset(rows.reset_index(drop=True), dataset.metadata)
         chosen = {"parameters": parameters, "step": interval / 2}
         held = identify(vessel, sparse, sparse.runs, Identify(**chosen))
         between = identify(vessel, sparse, sparse.runs, Identify(**chosen, commands="between"))
-        assert any(late in warning for warning in held.warnings)
-        assert not any(late in warning for warning in between.warnings)
         wrong, right = (float(np.abs(one.factors[0] - 1)) for one in (held, between))
         assert wrong > 0.04
         assert right < wrong / 2
-    fine = identify(vessel, dataset, dataset.runs, Identify(parameters=parameters, step=0.1))
-    assert any(late in warning for warning in fine.warnings) == (abs(fine.factors[0] - 1) > 0.015)
+        judged = statistics(LinearFit.of(held))
+        found = late_orders(held, sparse, judged)
+        assert found.startswith(f"commands count from their row, on average {interval / 2:g} s late")
+        assert ("--set step=" in found) == (gear and name == "container-175")
+        assert late_orders(between, sparse, judged) == ""
 
 
 def test_commands_between_rows_are_not_for_measured_outputs() -> None:

@@ -1,0 +1,93 @@
+"""Laws of late orders: zigzags whose orders fall between rows are named and mended; sound logs are not blamed."""
+
+from __future__ import annotations
+
+import functools
+import tomllib
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.identification.late_orders import late_orders, lateness
+from shipid.identification.settings import Identify
+from shipid.identification.solve import Solution, identify
+from shipid.identification.statistics import LinearFit, statistics
+from shipid.simulation.manoeuvre import Zigzag
+from shipid.simulation.perform import perform
+from shipid.vessel.load import Vessel
+from shipid.vessel.template import Particulars, first_guess
+
+FERRY = Particulars(length=120, beam=18, draught=5, block=0.6, speed=9)
+FEW = ["hull.mmg.Y_v", "hull.mmg.Y_r", "hull.mmg.N_v", "hull.mmg.N_r"]
+NOISE = {"u": 0.01, "v": 0.01, "r": 2.4e-4}
+
+
+@functools.cache
+def ferry() -> Vessel:
+    text = first_guess(FERRY, "ferry", "ferry.toml").text
+    return Vessel(tomllib.loads(text), "ferry.toml")
+
+
+@functools.cache
+def zigzags(seed: int, step: float) -> pd.DataFrame:
+    """Four zigzags; orders are given at steps of the simulation."""
+    rng = np.random.default_rng(seed)
+    runs = [
+        Zigzag(
+            n_rpm=258,
+            angle_deg=angle,
+            execute_heading_deg=heading * rng.uniform(0.8, 1.2),
+            duration=260,
+            execute_at=round(rng.uniform(13, 26) / step) * step,
+        )
+        for angle, heading in ((10, 10), (20, 20), (15, 10), (10, 5))
+    ]
+    return perform(ferry(), runs, step=step)
+
+
+def log_of(seed: int, step: float, interval: float) -> Dataset:
+    rows = zigzags(seed, step)
+    every = round(interval / step)
+    rows = pd.concat([run.iloc[::every] for _, run in rows.groupby("run", sort=False)], ignore_index=True)
+    rows = rows[[name for name in rows if not name.startswith("actual.")]].copy()
+    rng = np.random.default_rng(seed)
+    for name, deviation in NOISE.items():
+        rows[name] += rng.normal(0, deviation, len(rows))
+    return Dataset(rows, {"vessel": ferry().name, "units": {}, "clock": "run"})
+
+
+def fitted(log: Dataset, step: float, commands: str = "held") -> Solution:
+    how = {"parameters": FEW, "weights": NOISE, "horizon": 66, "step": step, "commands": commands, "start": "base"}
+    solution = identify(ferry(), log, log.runs, Identify(**how))
+    assert solution.status == "ok"
+    return solution
+
+
+def sentence(solution: Solution, log: Dataset) -> str:
+    return late_orders(solution, log, statistics(LinearFit.of(solution)))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_orders_between_slow_rows_are_named_with_the_change_that_the_remedy_makes(seed: int) -> None:
+    """Before, no command said it: the estimates were off by more than their intervals without a word."""
+    log = log_of(seed, 0.05, 1.0)
+    held, mended = fitted(log, 1.0), fitted(log, 0.5, "between")
+    off, left = np.abs(held.factors - 1), np.abs(mended.factors - 1)
+    late = lateness(held, log)
+    assert late is not None
+    place = FEW.index("hull.mmg.N_v")
+    assert left[place] < 0.4 * off[place]
+    assert late.changes[place] == pytest.approx(1 - held.factors[place], abs=0.5 * off[place])
+    assert sentence(held, log).startswith("commands count from their row, on average 0.5 s late")
+    assert "--set commands=between --set step=0.5" in sentence(held, log)
+    assert sentence(mended, log) == ""
+
+
+@pytest.mark.parametrize(("step", "interval"), [(0.05, 0.1), (1.0, 1.0)], ids=["fast rows", "orders on the rows"])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_logs_that_have_their_orders_in_time_are_not_blamed(seed: int, step: float, interval: float) -> None:
+    log = log_of(seed, step, interval)
+    solution = fitted(log, interval)
+    assert sentence(solution, log) == ""
