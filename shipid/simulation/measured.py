@@ -66,6 +66,8 @@ def measure_standard(
 
     engine : of the rollout; `repeated` where many vessels of one structure follow.
     approach : None: with the helm amidships; where the ship then does not go straight, a helmsman holds the course.
+
+    Raises ShipidError as `standard` and `perform` do.
     """
     how: dict[str, Any] = {"speed": speed, "duration": duration, "step": step, "approach": approach}
     return measure_all(vessel, [(name, angles, side)], engine=engine, **how)[0]

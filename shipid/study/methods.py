@@ -32,6 +32,8 @@ def compare_methods(results: Results) -> pd.DataFrame:
 
     The family `with physics` is the mean over all families but `none`. The difference is that to the method by which
     the study judges. To choose the lowest H of a test chooses by the test: the interval does not count that.
+
+    Raises ShipidError for results that are none.
     """
     of_class("results", results, Results, "as of `read_results`")
     return compared(method_cells(results), results.plan.judged)

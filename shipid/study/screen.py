@@ -69,6 +69,8 @@ def screen(
     that the study itself draws, none redrawn. A_90 comes from a tally and is exact to 0.2 %.
 
     engine : as of `rollout`; "single" takes half the time and gives A to about six digits.
+
+    Raises ShipidError for a plan or a dataset that is none, and an engine that does not exist.
     """
     of_class("plan", plan, Plan, "as of `read_plan`")
     of_class("dataset", dataset, Dataset, "as of `read_dataset`")
