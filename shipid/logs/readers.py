@@ -370,8 +370,8 @@ def _named_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[l
         header = table.iloc[0].fillna("").str.strip()
         below = table.iloc[1:]
         again = np.ones(len(below), dtype=bool)  # a logger that began anew in the same file has written it again
-        for name in table:
-            again &= below[name].fillna("").str.strip().eq(header[name]).to_numpy()
+        for place, name in enumerate(header):
+            again &= below.iloc[:, place].fillna("").str.strip().eq(name).to_numpy()
         if header.str.fullmatch(NUMBER).any():
             return list(header), below  # numbers are no header: equal rows may be data
         return list(header), below.loc[~again]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from shipid.data.checks import check_dataset
 from shipid.data.dataset import Dataset, cumulative_integral, pieces
@@ -100,7 +102,9 @@ def _stream(dataset: Dataset) -> tuple[complex, float]:
 
     0 where a factor explains the misfit as well: a wrong unit, or runs of one heading.
     """
-    run, seen, span = [], [], []
+    run: list[NDArray[Any]] = []
+    seen: list[NDArray[Any]] = []
+    span: list[NDArray[Any]] = []
     for _, rows in pieces(dataset):
         t, psi = rows["t"].to_numpy(), rows["psi"].to_numpy()
         velocity = (rows["u"].to_numpy() + 1j * rows["v"].to_numpy()) * np.exp(1j * psi)
@@ -108,7 +112,7 @@ def _stream(dataset: Dataset) -> tuple[complex, float]:
         position = rows["north"].to_numpy() + 1j * rows["east"].to_numpy()
         places = np.unique(np.searchsorted(t, np.arange(t[0], t[-1], STREAM_WINDOW)))
         for into, values in ((run, way), (seen, position), (span, t)):
-            into.append(np.diff(values[places]))
+            into.append(np.diff(np.asarray(values)[places]))
     ran, was, lasted = np.concatenate(run), np.concatenate(seen), np.concatenate(span).real
     misfit = was - ran
     before, size, time = (float(np.sum(np.abs(one) ** 2)) for one in (misfit, ran, lasted))
