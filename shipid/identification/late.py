@@ -14,21 +14,14 @@ from shipid.physics.signals import SIGNALS, signal_of
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
-LATE = 3.5  # change of N_v over lateness U / L_pp, in zigzags: docs/identification.md, "Commands between rows"
-CONSIDERABLE = 0.02  # of a number of the turn
+CONSIDERABLE = 0.006  # of the time in which a ship goes her length: so late, N_v came out 2 % wrong in zigzags
 
 
 @dataclass(frozen=True)
 class Late:
-    """Commands that steer and change between rows.
-
-    interval : of the rows [s]. share : by which numbers of the turn such as N_v may be wrong, roughly. to_gear :
-        whether one of them is an order to an actuator.
-    """
+    """Commands that steer and change between rows. interval : of the rows [s]."""
 
     interval: float
-    share: float
-    to_gear: bool
 
     @property
     def words(self) -> str:
@@ -47,18 +40,16 @@ def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Late
 
     A vessel without a length is not judged.
     """
-    model, rows = dynamics(vessel), dataset.frame[dataset.frame["run"].isin(runs)]
+    rows = dataset.frame[dataset.frame["run"].isin(runs)]
     by_run = rows.groupby("run", sort=False)
-    steering = [name for name in model.commands if SIGNALS[signal_of(name)].turns and name in rows]
+    steering = [name for name in dynamics(vessel).commands if SIGNALS[signal_of(name)].turns and name in rows]
     steering = [name for name in steering if (by_run[name].nunique() > 1).any()]
     length = float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
     if not steering or not length:
         return None
     interval = float(by_run["t"].diff().median())
-    share = LATE * interval / 2 * float(rows["u"].abs().mean()) / length
-    if share < CONSIDERABLE:
-        return None
-    return Late(interval, share, any(name in model.memory for name in steering))
+    late = Late(interval)
+    return late if late.delay * float(rows["u"].abs().mean()) / length >= CONSIDERABLE else None
 
 
 def between_rows(

@@ -117,5 +117,5 @@ def test_short_horizons_with_coloured_residuals_are_refused(fitted: tuple[Soluti
 
 
 def test_a_level_that_is_none_is_refused_before_the_fit() -> None:
-    with pytest.raises(DataError, match="90 is no level of a band"):
+    with pytest.raises(DataError, match="is no level of a band"):
         run_identification(SHIP, trials(SHIP, runs=2, steps=10), settings(), band=90.0)

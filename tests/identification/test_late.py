@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.identification.late import between_rows, late_commands
+from shipid.identification.late import CONSIDERABLE, between_rows, late_commands
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import variety
@@ -24,12 +23,12 @@ def at(interval: float) -> Dataset:
 def test_lateness_counts_by_how_fast_the_ship_goes_her_length() -> None:
     late = late_commands(SHIP, at(1.0), DATA.runs)
     assert late is not None
-    assert (late.interval, late.delay, late.to_gear) == (1.0, 0.5, False)
-    twice = late_commands(SHIP, at(2.0), DATA.runs)
-    assert twice is not None
-    assert twice.share == pytest.approx(2 * late.share)
+    assert (late.interval, late.delay) == (1.0, 0.5)
     assert late.words == "rows are 1 s apart and commands count from their row, 0.5 s late on average"
-    assert late_commands(SHIP, at(0.02), DATA.runs) is None
+    pace = float(DATA.frame["u"].abs().mean()) / SHIP.document["particulars"]["L_pp"]
+    edge = 2 * CONSIDERABLE / pace  # s between rows
+    assert late_commands(SHIP, at(1.01 * edge), DATA.runs) is not None
+    assert late_commands(SHIP, at(0.99 * edge), DATA.runs) is None
 
 
 def test_orders_that_never_change_are_not_late() -> None:
