@@ -369,11 +369,13 @@ def _named_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[l
     if form.header:
         header = table.iloc[0].fillna("").str.strip()
         below = table.iloc[1:]
+        if header.str.fullmatch(NUMBER).any():
+            return list(header), below  # numbers are no header: equal rows may be data
         again = np.ones(len(below), dtype=bool)  # a logger that began anew in the same file has written it again
         for place, name in enumerate(header):
             again &= below.iloc[:, place].fillna("").str.strip().eq(name).to_numpy()
-        if header.str.fullmatch(NUMBER).any():
-            return list(header), below  # numbers are no header: equal rows may be data
+            if not again.any():
+                return list(header), below
         return list(header), below.loc[~again]
     return [str(number + 1) if number < width else "" for number in range(table.shape[1])], table
 
