@@ -20,8 +20,8 @@ from shipid.vessel.dynamics import dynamics
 
 Array = NDArray[np.float64]
 LEAST_ROWS = 0.2  # rows by which the fit wants the orders earlier: below, the log has them in time
-OUTSIDE = 1.0  # of half the interval: a larger change of an estimate is told
-WORTH = 0.02  # of a factor: a smaller change is not told
+OUTSIDE = 1.0  # of half the interval: a larger change of an estimate is reported
+WORTH = 0.02  # of a factor: a smaller change is not
 COARSE = 1.5  # rows: a longer step of the fit has a warning of its own
 
 

@@ -19,7 +19,7 @@ OF_A_KIND = 3  # runs of a kind from which one may be set aside
 
 STREAM_WINDOW = 10.0  # s, over which jitter of the positions is little
 STREAM_SHARE, CLEARER = 0.6, 0.5  # least share of the misfit that a stream explains; what it leaves, of a factor's rest
-SLOW_STREAM = 0.02  # of the speed: a slower stream is not told
+SLOW_STREAM = 0.02  # of the speed: a slower stream is not reported
 
 
 @dataclass(frozen=True)
