@@ -42,7 +42,8 @@ class Instants:
 
     Parameters
     ----------
-    columns : every measured column at the instant, name -> (S,); angles unwrapped within the run.
+    columns : every measured column at the instant, name -> (S,); angles, also of thrusters and rudders, go on within
+        the run as in an imported log: -10 deg after 0, not 350.
     past : the same columns P, ..., 1 steps before the instant, the oldest first, name -> (P, S); empty where no method
         needs them.
     planned : command in force from step i-1 to i of the horizon, i = 1..T, name -> (T, S); None where commands are held

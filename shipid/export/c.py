@@ -18,25 +18,16 @@ from shipid.export.band import COLUMNS
 from shipid.export.blocks import Block, Formula, Precision, c_functions
 from shipid.export.equations import Equations
 from shipid.export.model import Model
+from shipid.export.turns import SAME_TURN, Turned, turned
 from shipid.hybrid.bands import FEWEST, LEVELS, Bands
 from shipid.observer import DIVERGED, LOW, MEASURED, STATES, Bank, bank, filter_function, sizes
-from shipid.physics.signals import SIGNALS, is_command, signal_of
+from shipid.physics.signals import SIGNALS, signal_of
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 ROWS_A_STEP = 8  # rows of a recorder that are kept for each step of the past
 GAP = 3.0  # steps: after a longer pause a recorder begins anew
-_SAME_TURN = """/* An angle of a thruster or rudder by the turn that training had: of all that differ by whole turns, the one within its
- * limits. Where these hold more than a turn, or none is within: the nearest to the last one. */
-static real same_turn(real angle, real last, int place)
-{{
-    const double turn = 6.283185307179586476925, low = {name}_limits[2 * place], high = {name}_limits[2 * place + 1];
-    const double within = (double)angle + turn * ceil((low - (double)angle) / turn);
-    if (high - low <= turn && within <= high) return (real)within;
-    return angle + (real)(turn * floor(0.5 + ((double)last - (double)angle) / turn));
-}}
-"""
 SPEED_LIMIT = 100.0  # m/s and rad/s: a faster state has diverged
 WORDS = frozenset(
     """
@@ -510,9 +501,9 @@ void {name}_init({name} *self);
 
 /* Keep a row that was measured at t [s], entries as in {name}_row_names. Rows come in order; after a pause of more than
  * {GAP * physics.step:g} s the past begins anew. The heading may wrap, and so may angles of
- * thrusters and rudders: 350 deg is -10 deg where training had -50 to 50. Where training had more than a turn, an angle
- * goes on by the shortest way. The first row says by which turn. Rows closer than {
-            physics.step / ROWS_A_STEP:g} s replace each other in the past. */
+ * thrusters and rudders: 350 deg is -10 deg. Between stops that are less than a turn apart the angle within them is
+ * taken, so a jump is real. A unit that turns all round goes on by the shortest way. The first row is taken by the turn
+ * that training had. Rows closer than {physics.step / ROWS_A_STEP:g} s replace each other in the past. */
 int {name}_record({name} *self, double t, const {name}_real *row);
 
 /* Path from the newest row: {name}_HORIZON pairs x, y. planned: {name}_HORIZON rows of commands in force, each the
@@ -713,7 +704,7 @@ double {name}_factor(double miss, double level, int kind)
         n, cap, step = len(row), self.capacity, model.physics.step
         angles = [i for i, key in enumerate(row) if "." not in key and key in SIGNALS and SIGNALS[key].angle]
         orders = [i for i, key in enumerate(row) if "." in key]
-        turned = [key for key in row if is_command(key) and SIGNALS[signal_of(key)].angle and key in model.limits]
+        angled = turned(row, model.vessel, names.parameters)
         u, v, psi = (row.index(key) for key in ("u", "v", "psi"))
         reached = [row.index(key) for key in names.reached]
         velocity = model.physics.path == "velocity"
@@ -724,11 +715,8 @@ double {name}_factor(double miss, double level, int kind)
             f"        kept[{i}] += (real)(6.283185307179586476925 * floor(0.5 + ((double)last[{i}] - (double)kept[{i}]) / 6.283185307179586476925));"
             for i in angles
         )
-        same_turn = "\n".join(
-            f"    kept[{i}] = same_turn(kept[{i}], self->count ? self->rows[newest][{i}] : kept[{i}], {i});"
-            for i in map(row.index, turned)
-        )
-        lines = [_SAME_TURN.format(name=name)] if turned else []
+        same_turn = "\n".join(self._turn(one) for one in angled)
+        lines = [SAME_TURN] if angled else []
         lines += [
             f"""void {name}_init({name} *self)
 {{
@@ -749,8 +737,8 @@ double {name}_factor(double miss, double level, int kind)
             memcpy(self->reached, after, sizeof after);
         }}
 """
-        first_actuators = "\n".join(f"        self->reached[{k}] = row[{i}];" for k, i in enumerate(reached))
-        begin_filters = "        begin_filters(self->filters, row, self->estimates);\n" if filters is not None else ""
+        first_actuators = "\n".join(f"        self->reached[{k}] = kept[{i}];" for k, i in enumerate(reached))
+        begin_filters = "        begin_filters(self->filters, kept, self->estimates);\n" if filters is not None else ""
         go_filters = (
             "        go_filters(self->filters, last, kept, (real)(t - self->t[newest]), self->parameters, self->estimates);\n"
             if filters is not None
@@ -759,14 +747,13 @@ double {name}_factor(double miss, double level, int kind)
         lines.append(f"""int {name}_record({name} *self, double t, const {real} *row)
 {{
     int i, newest = (self->first + self->count - 1) % {cap};
-    real kept[{n + 4}];
+    real kept[{n + 4}]{", moved" if angled else ""};
     if (!isfinite(t)) return {name}_NOT_FINITE;
     for (i = 0; i < {n}; ++i) if (!isfinite(row[i])) return {name}_NOT_FINITE;
     if (self->count && !(t > self->t[newest])) return {name}_TIME;
     if (self->count && t - self->t[newest] > {GAP * step!r}) self->count = 0;
     memcpy(kept, row, {n} * sizeof *kept);
-{same_turn}
-    if (self->count) {{
+{same_turn}    if (self->count) {{
         const real *last = self->rows[newest];
         const real half = (real)((t - self->t[newest]) / 2);
         (void)last;
@@ -804,7 +791,7 @@ double {name}_factor(double miss, double level, int kind)
             if settled > 0
             else ""
         )
-        plan = f", plan[{sizes_['planned']}]" if any(key in names.planned for key in turned) else ""
+        plan = f", plan[{sizes_['planned']}]" if any(one.command in names.planned for one in angled) else ""
         lines.append(f"""int {name}_predict(const {name} *self, const {real} *planned, {real} *path)
 {{
     const int newest = (self->first + self->count - 1) % {cap};
@@ -815,23 +802,46 @@ double {name}_factor(double miss, double level, int kind)
     if (!self->count) return {name}_NO_PAST;
     for (i = 0; i < {len(taken)}; ++i) now[i] = self->rows[newest][taken[i]];
 {past_lines or "    past[0] = 0;"}
-{self._plan(turned)}    i = {name}_path(now, self->reached, past, planned, self->estimates, self->parameters, path);
+{self._plan(angled)}    i = {name}_path(now, self->reached, past, planned, self->estimates, self->parameters, path);
 {young}    return i;
 }}
 """)
         return "\n".join(lines)
 
-    def _plan(self, turned: Sequence[str]) -> str:
-        """Planned angles by the same turn as that of the newest row."""
-        names, row = self.model.layout, self.row
-        width = len(names.planned)
+    def _turn(self, one: Turned) -> str:
+        """The turn of an angle of a new row; where the past must move to it, what is kept of it does."""
+        names, place, cap = self.model.layout, one.place, self.capacity
+        last = f"self->count ? self->rows[newest][{place}] : {one.first(self.name, f'kept[{place}]')}"
+        moves = [f"for (i = 0; i < self->count; ++i) self->rows[(self->first + i) % {cap}][{place}] += moved;"]
+        if one.command in names.reached:
+            moves.append(f"self->reached[{names.reached.index(one.command)}] += moved;")
+        filters = self.filters
+        if filters is not None:
+            places = [*np.cumsum([0, *sizes(filters.model)])]
+            held = ((filters.model.memory, places[2]), (filters.model.commands, places[4]))
+            each = [int(start) + list(group).index(one.command) for group, start in held if one.command in group]
+            moves += [
+                f"for (i = 0; i < {filters.num_filters}; ++i) self->filters[i * {_size(filters)} + {k}] += moved;"
+                for k in each
+            ]
         lines = [
-            f"            plan[{width} * k + {names.planned.index(key)}] = "
-            f"same_turn(planned[{width} * k + {names.planned.index(key)}], k ? plan[{width} * (k - 1) + "
-            f"{names.planned.index(key)}] : self->rows[newest][{row.index(key)}], {row.index(key)});"
-            for key in turned
-            if key in names.planned
+            f"kept[{place}] = {one.call(self.name, f'kept[{place}]', last, '&moved')};",
+            "if (moved < 0 || moved > 0) {",
+            *(f"    {move}" for move in moves),
+            "}",
         ]
+        return "".join(f"    {line}\n" for line in lines)
+
+    def _plan(self, angled: Sequence[Turned]) -> str:
+        """Planned angles by the turn that goes on from the newest row."""
+        names = self.model.layout
+        width, lines = len(names.planned), []
+        for one in angled:
+            if one.command in names.planned:
+                at = names.planned.index(one.command)
+                entry, last = f"plan[{width} * k + {at}]", f"self->rows[newest][{one.place}]"
+                before = f"k ? plan[{width} * (k - 1) + {at}] : {last}"
+                lines.append(f"            {entry} = {one.call(self.name, entry, before, '0')};")
         if not lines:
             return ""
         rows = "\n".join(lines)

@@ -333,6 +333,12 @@ def steers(command: str) -> bool:
     return row is not None and row.turns != 0
 
 
+def turns_round(command: str) -> bool:
+    """Whether a command is an angle of a unit that may turn all round, such as `port.alpha`; a rudder does not."""
+    row = row_of(command)
+    return row is not None and row.angle and row.reach[1] - row.reach[0] >= 2 * math.pi
+
+
 def orders_thrust(name: str) -> bool:
     """Whether the last part of a name is a command that does not steer: a shaft speed or a pitch."""
     row = row_of(name)

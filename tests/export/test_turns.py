@@ -1,0 +1,247 @@
+"""Angles aboard: whatever turn a live angle comes by, the path is that of angles that go on."""
+
+from __future__ import annotations
+
+import copy
+import ctypes
+import subprocess
+
+import numpy as np
+import pytest
+
+from shipid.data.windows import Instants
+from shipid.engine.casadi import memory_along
+from shipid.export.blocks import Precision
+from shipid.export.c import predictor_files
+from shipid.export.model import model
+from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.physics import Physics
+from shipid.observer import Observer
+from shipid.predictor import Predictor
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import check_vessel
+from tests.conftest import variety
+from tests.drawn_ships import drawn_ship, extreme_inputs
+from tests.export.compiled import compile_, compiler, library, pointer, write
+
+OUTSIDE, TURN = 2, 2 * np.pi
+LAG = {"kind": "first_order", "T": 0.5, "rate": 0.20944}
+FREE = {"u": (-1e3, 1e3), "port.alpha": (-1e3, 1e3), "starboard.alpha": (-1e3, 1e3)}  # angles go on without end
+
+
+class Recorder:
+    """An exported predictor that is given rows."""
+
+    def __init__(self, predictor, folder):
+        self.model = model(predictor)
+        files = predictor_files(self.model, "odd", Precision())
+        write(files, folder)
+        (folder / "size.c").write_text(
+            '#include <stdio.h>\n#include "odd.h"\nint main(void) { printf("%d", (int)sizeof(odd)); return 0; }\n'
+        )
+        compile_([compiler()], folder, "-O0", "-o", "size", "size.c")
+        size = int(subprocess.run([folder / "size"], capture_output=True, text=True, check=True).stdout)
+        self.loaded = library(files, folder)
+        self.loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+        others = (name for name in self.model.layout.now if name not in ("north", "east"))
+        self.row = ("north", "east", *others)
+        self.kept = np.zeros(size + 64, dtype=np.uint8)
+        self.begin()
+
+    def begin(self):
+        self.loaded.odd_init(pointer(self.kept))
+
+    def path(self, t, values, plan=None):
+        """Path and result after one more row; what `values` lacks is 0."""
+        row = np.array([float(values.get(name, 0.0)) for name in self.row])
+        assert self.loaded.odd_record(pointer(self.kept), t, pointer(row)) == 0
+        path = np.zeros((self.model.layout.horizon, 2))
+        given = None if plan is None else pointer(plan)
+        return path, self.loaded.odd_predict(pointer(self.kept), given, pointer(path))
+
+
+def gunnerus(gear):
+    """R/V Gunnerus whose azimuth units have a gear."""
+    document = copy.deepcopy(variety()["gunnerus-28.9"].document)
+    for side in ("port", "starboard"):
+        document["thruster"][side]["actuator"] = {"alpha": gear}
+    return check_vessel(document, "gunnerus.toml")
+
+
+def limits_of(low, high):
+    return FREE | {f"{side}.alpha": (np.radians(low), np.radians(high)) for side in ("port", "starboard")}
+
+
+def played(folder, gear, limits, angles, observer=None, plan=None):
+    """Paths (N, T, 2) and alarms (N,) with angles [deg] of both units, a second apart."""
+    physics = Physics(gunnerus(gear), 20, 1.0, "rk4", observer)
+    known = "held" if plan is None else "known"
+    recorder = Recorder(Predictor(physics, "alone", Unchanged({}), limits, commands=known), folder)
+    paths, alarms = [], []
+    for i, angle in enumerate(angles):
+        values = {"u": 4.0, "north": 4.0 * i, "port.n": 2.5, "starboard.n": 2.5}
+        values |= dict.fromkeys(("port.alpha", "starboard.alpha"), np.radians(angle))
+        orders = None
+        if plan is not None:
+            orders = np.tile([values[name] for name in recorder.model.layout.planned], (20, 1))
+            for name in ("port.alpha", "starboard.alpha"):
+                orders[:, recorder.model.layout.planned.index(name)] = np.radians(plan)
+        path, result = recorder.path(float(i), values, orders)
+        assert result & ~OUTSIDE == 0
+        paths.append(path)
+        alarms.append(result == OUTSIDE)
+    return np.array(paths), alarms
+
+
+WALK = [*range(100, 700, 12), 650, 600, 560]
+
+
+@pytest.mark.parametrize("observer", [None, Observer(waves=(0.0,), change=(1.0,))], ids=["plain", "observer"])
+@pytest.mark.parametrize(
+    ("low", "high", "angles"),
+    [
+        (-170, 170, [140, 160, 165, 195, 200]),  # across 180 in one row, both within the training
+        (-170, 170, [150, 168, 175, 182, 188, 192, 195]),  # slowly: outside of it, and inside again
+        (-200, 120, [100, 110, 130, 150, 165, 165, 140]),  # in again at its other end
+        (-50, 50, [10, 130, 250, 330, 370, 390]),  # once round
+        (-200, 500, WALK),  # a training of more than a turn: on beyond it
+    ],
+)
+def test_a_unit_that_turns_all_round_goes_the_shortest_way(low, high, angles, observer, tmp_path):
+    """Inside of the training without an alarm, and nowhere does its gear go back by a turn."""
+    turns = np.arange(len(angles)) % 3 - 1
+    whole, _ = played(tmp_path / "whole", LAG, FREE, angles, observer)
+    paths, alarms = played(tmp_path / "odd", LAG, limits_of(low, high), np.array(angles) + 360 * turns, observer)
+    np.testing.assert_allclose(paths, whole, rtol=0, atol=1e-7)
+    inside = [any(low <= angle + 360 * k <= high for k in range(-3, 4)) for angle in angles]
+    assert alarms == [not within for within in inside]
+
+
+def test_the_gear_begins_where_its_first_angle_is(tmp_path):
+    """350 deg for -10, in the first row and after a pause."""
+    whole, _ = played(tmp_path / "whole", LAG, limits_of(-50, 50), [-10])
+    paths, alarms = played(tmp_path / "odd", LAG, limits_of(-50, 50), [350])
+    np.testing.assert_allclose(paths, whole, rtol=0, atol=1e-9)
+    assert alarms == [False]
+
+
+@pytest.mark.parametrize("low_high", [(-50, 50), (-175, 175)])
+def test_between_stops_a_jump_is_real(low_high, tmp_path):
+    """A unit with stops at 175 deg goes from 165 to -165 through 0, outside of the training, too."""
+    gear = LAG | {"low": np.radians(-175), "high": np.radians(175)}
+    angles = [40, 160, 165, -165, -165, -160, 172]
+    whole = []
+    recorder = Recorder(Predictor(Physics(gunnerus(gear), 20, 1.0), "alone", Unchanged({}), {}), tmp_path / "pure")
+    names = recorder.model.layout
+    reached = memory_along(
+        gunnerus(gear), {name: np.radians(angles) if "alpha" in name else np.full(7, 2.5) for name in names.commands},
+        np.arange(7.0),
+    )  # fmt: skip
+    columns = {name: np.zeros(7) for name in names.now} | {"u": np.full(7, 4.0)}
+    for name in names.commands:
+        columns[name] = np.radians(angles) if name.endswith("alpha") else np.full(7, 2.5)
+    whole = recorder.model.predictor.predict(Instants(columns, hidden=reached)).swapaxes(0, 1)
+    turns = np.array([0, 1, -1, 1, 0, 2, -1])
+    limits = limits_of(*low_high)
+    physics = Physics(gunnerus(gear), 20, 1.0)
+    other = Recorder(Predictor(physics, "alone", Unchanged({}), limits), tmp_path / "odd")
+    for i, angle in enumerate(np.array(angles) + 360 * turns):
+        values = {name: column[i] for name, column in columns.items()}
+        values |= dict.fromkeys(("port.alpha", "starboard.alpha"), np.radians(angle))
+        path, result = other.path(float(i), values)
+        np.testing.assert_allclose(path, whole[i], rtol=0, atol=1e-9)
+        assert (result == OUTSIDE) == (not low_high[0] <= angles[i] <= low_high[1])
+
+
+def test_stops_that_are_changed_aboard_count(tmp_path):
+    """As all numbers of the vessel: with stops moved to 0 and 340 deg, -20 deg is 340 and 350 none of theirs."""
+    gear = LAG | {"low": np.radians(-170), "high": np.radians(170)}
+    limits = limits_of(-30, 30)
+
+    def path(angle, *stops):
+        physics = Physics(gunnerus(gear), 20, 1.0)
+        recorder = Recorder(Predictor(physics, "alone", Unchanged({}), limits), tmp_path / f"{angle}{len(stops)}")
+        names = recorder.model.layout.parameters
+        numbers = recorder.kept[: 8 * len(names)].view(float)
+        for name, value in zip(("low", "high"), stops, strict=False):
+            for side in ("port", "starboard"):
+                numbers[names.index(f"thruster.{side}.actuator.alpha.{name}")] = np.radians(value)
+        values = {"u": 4.0, "port.n": 2.5, "starboard.n": 2.5}
+        recorder.path(0.0, values | dict.fromkeys(("port.alpha", "starboard.alpha"), np.radians(100)))
+        return recorder.path(1.0, values | dict.fromkeys(("port.alpha", "starboard.alpha"), np.radians(angle)))[0]
+
+    through, back = path(200, 0, 340), path(-160, 0, 340)
+    np.testing.assert_allclose(through, back, rtol=0, atol=1e-9)
+    assert np.abs(path(200) - through).max() > 1  # with stops at 170 deg 200 is -160: the other way round
+
+
+@pytest.mark.parametrize("low_high", [(-170, 170), (-1000, 1000)])
+def test_a_plan_goes_on_from_the_newest_row(low_high, tmp_path):
+    """Whatever turns it comes by: orders that cross 180 deg do not turn the gear back."""
+    plan = np.linspace(165, 240, 20)
+    whole, _ = played(tmp_path / "whole", LAG, FREE, [150, 165], plan=plan)
+    odd = plan + 360 * (np.arange(20) % 3 - 1)
+    paths, _ = played(tmp_path / "odd", LAG, limits_of(*low_high), [510, -195], plan=odd)
+    np.testing.assert_allclose(paths, whole, rtol=0, atol=1e-9)
+
+
+SHIPS = (2, 7, 17, 25, 33, 34, 38)  # with an azimuth unit
+
+
+@pytest.mark.parametrize("seed", [2, 25, 34])
+def test_drawn_ships_take_angles_of_any_turn(seed, tmp_path):
+    takes_any_turn(seed, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "seed", [seed + 100 * more for seed in SHIPS for more in range(4) if more or seed not in (2, 25, 34)]
+)
+def test_more_drawn_ships_take_angles_of_any_turn(seed, tmp_path):
+    takes_any_turn(seed, tmp_path)
+
+
+def takes_any_turn(seed, folder):
+    """Rows whose angles come by any turn give the paths of Python along the log in which they go on.
+
+    Angles of training are drawn, too, so also their limits: all, or a part of a turn. Rudders and units with stops keep
+    to their range, others walk without end.
+    """
+    vessel, rng = drawn_ship(seed % 100), np.random.default_rng(seed)
+    count, horizon = 12, 5
+    names = dynamics(vessel)
+    given = extreme_inputs(vessel, count, seed)
+    columns = given["start"] | given["commands"] | given["environment"] | {"north": np.zeros(count)}
+    columns["u"], columns["v"], columns["r"] = np.abs(columns["u"]), 0.1 * columns["v"], 0.1 * columns["r"]
+    step = 0.02 * float(np.sqrt(vessel.document["particulars"]["L_pp"] / 9.81))
+    t, limits, stops = 2 * step * np.arange(count), {"u": (-1e6, 1e6)}, {}
+    for name in names.commands:
+        component, _, signal = name.rpartition(".")
+        gear = vessel.document["thruster"][component].get("actuator", {}).get(signal, {})
+        stops[name] = gear.get("low", -np.inf), gear.get("high", np.inf)
+        if signal == "delta":
+            columns[name] = rng.uniform(-0.6, 0.6, count)
+            limits[name] = (-0.1, 0.2) if rng.random() < 0.5 else (-0.6, 0.6)
+        if signal == "alpha":
+            free = not np.isfinite(stops[name]).all()
+            columns[name] = np.cumsum(rng.uniform(-2.9, 2.9, count)) if free else rng.uniform(*stops[name], count)
+            begin = rng.uniform(-2, 2)
+            limits[name] = (begin, begin + rng.uniform(0.1, 5.4)) if rng.random() < 0.7 else (-1e6, 1e6)
+    predictor = Predictor(Physics(vessel, horizon, step), "alone", Unchanged({}), limits)
+    reached = memory_along(vessel, {name: columns[name] for name in names.commands}, t)
+    with np.errstate(all="ignore"):
+        expected = predictor.predict(Instants(columns, hidden=reached))
+    recorder, compared = Recorder(predictor, folder), 0
+    for i in range(count):
+        values = {name: column[i] for name, column in columns.items()}
+        for name in names.commands:
+            if name.endswith(("alpha", "delta")):
+                values[name] += TURN * rng.integers(-3, 4)
+        path, result = recorder.path(t[i], values)
+        whole = np.isfinite(expected[:, i]).all()
+        assert (result & 4 > 0) == (not whole)
+        if whole:
+            scale = max(1.0, float(np.abs(expected[:, i]).max()))
+            np.testing.assert_allclose(path, expected[:, i], rtol=0, atol=1e-9 * scale)
+            compared += 1
+    assert compared > count / 2
