@@ -172,7 +172,6 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "changes of no path": (lambda: shipid.read_plan("quick", {3: 4}), "no such block"),  # type: ignore[dict-item]
     "paths": (lambda: PHYSICS.paths(ANY), "instants must be an Instants, such as"),
     "position_error": (lambda: shipid.position_error(np.zeros(2), np.zeros(3)), "paths must both be"),
-    "a state": (lambda: roll({**START, "uu": ANY}), "start: Mariner.* has no 'uu': did you mean 'u'?"),
     "a wind": (lambda: roll(environment={"V_wind": np.zeros(1)}), "environment: .* has no 'V_wind'"),
     "keep": (lambda: roll(keep=3), "keep must be a name, or several names, not 3"),
     "keep nothing known": (lambda: roll(keep="uu"), "has no channel 'uu': did you mean 'u'?"),

@@ -72,9 +72,9 @@ def rollout(
 
     Parameters
     ----------
-    start : state name -> (S,), SI. In a dict, names of signals that the vessel does not have are passed over here and
-        in `environment`; a name that is no signal at all is an error.
-    commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step.
+    start : state name -> (S,), SI; names that the vessel does not have are passed over, missing ones raise DataError.
+    commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step. In a
+        dict for the environment, a name that is no signal at all is an error.
     step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
     parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. A DataFrame, a Series or a dict
         with dotted paths is read by these. Default: the numbers of the vessel.
@@ -102,8 +102,7 @@ def rollout(
     check_steps(num_steps)
     given = start, commands, {} if environment is None else environment, components or {}
     model, batch = prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
-    _check_names("start", start, (*model.state, *model.hidden), vessel)
-    _check_names("environment", environment, model.environment, vessel)
+    _check_environment(environment, model.environment, vessel)
     names = channels(model)
     kept = names if keep is None else names_of("keep", keep)
     job = Job(step, num_steps, method, every, places(kept, names, vessel), device)
@@ -120,12 +119,12 @@ def check_steps(num_steps: int) -> None:
         raise ShipidError(f"{num_steps:.2g} steps, at most {MOST_STEPS:.0e}: give a longer step, or a shorter time")
 
 
-def _check_names(what: str, given: object, names: Sequence[str], vessel: Vessel) -> None:
+def _check_environment(given: object, names: Sequence[str], vessel: Vessel) -> None:
     """Raise ShipidError for a name in a dict that is neither of the vessel nor of any signal; a table may have more."""
-    odd = [] if not isinstance(given, Mapping) else [name for name in given if name not in names]
-    unknown = next((str(name) for name in odd if row_of(str(name)) is None), None)
+    odd = [] if not isinstance(given, Mapping) else [str(name) for name in given if name not in names]
+    unknown = next((name for name in odd if row_of(name) is None), None)
     if unknown is not None:
-        raise ShipidError(f"{what}: {vessel.name} has no {unknown!r}: {choices(unknown, names)}")
+        raise ShipidError(f"environment: {vessel.name} has no {unknown!r}: {choices(unknown, names)}")
 
 
 @dataclass(frozen=True)
