@@ -93,7 +93,7 @@ def rollout(
     ------
     DataError : a state, command or signal of the environment that the vessel needs is missing.
     ShipidError : an array of another shape or without numbers, a step or number of steps that is not positive, an
-        unknown method, engine, state, channel, parameter or component.
+        unknown method, engine, channel, parameter, component or signal of the environment.
     """
     asked = named(engine, device)
     num_steps, every = whole_number("num_steps", num_steps, 1), whole_number("every", every, 1)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
-from shipid.physics.signals import SIGNALS, signal_of
+from shipid.physics.signals import steers
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
+Changes = Literal["held", "between"]
+"""When commands change: at the row that has them, until the next; or between that row and the one before."""
 CONSIDERABLE = 0.006  # of the time in which a ship goes her length: so late, N_v came out 2 % wrong in zigzags
 
 
@@ -35,6 +37,12 @@ class Late:
         return self.interval / 2
 
 
+def interval_of(dataset: Dataset, runs: Sequence[str]) -> float:
+    """Median time from row to row of some runs [s]."""
+    rows = dataset.frame[dataset.frame["run"].isin(runs)]
+    return float(rows.groupby("run", sort=False)["t"].diff().median())
+
+
 def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Late | None:
     """How late the commands of some runs come, where that is considerable for how fast the ship turns; else None.
 
@@ -42,13 +50,12 @@ def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Late
     """
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     by_run = rows.groupby("run", sort=False)
-    steering = [name for name in dynamics(vessel).commands if SIGNALS[signal_of(name)].turns and name in rows]
+    steering = [name for name in dynamics(vessel).commands if steers(name) and name in rows]
     steering = [name for name in steering if (by_run[name].nunique() > 1).any()]
     length = float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
     if not steering or not length:
         return None
-    interval = float(by_run["t"].diff().median())
-    late = Late(interval)
+    late = Late(interval_of(dataset, runs))
     return late if late.delay * float(rows["u"].abs().mean()) / length >= CONSIDERABLE else None
 
 

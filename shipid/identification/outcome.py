@@ -25,7 +25,7 @@ from shipid.identification.bands import LONG, Measure, bands, check_level, refus
 from shipid.identification.collinearity import digits, listed
 from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs, unfelt
-from shipid.identification.late_orders import late_orders
+from shipid.identification.late_fit import late_fit
 from shipid.identification.plausible import verdict
 from shipid.identification.profile import Profile, profile, variance_ratio
 from shipid.identification.reach import beyond, of_log, reach_of
@@ -281,7 +281,7 @@ def run_identification(
         warnings = (
             *shared,
             *solution.warnings,
-            *filter(None, (late_orders(solution, dataset, judged),)),
+            *filter(None, (late_fit(solution, dataset, judged),)),
             *unmeasured(vessel, dataset, fitted, settings),
             *_warnings(solution, judged, pairs),
             *_left(solution, curves),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset, clock_slack, sample, stretches
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, choices
-from shipid.identification.late import between_rows
+from shipid.identification.late import Changes, between_rows
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -53,7 +53,7 @@ def cut_segments(
     horizon: float,
     lags: int = 0,
     parameters_of_run: Mapping[str, Mapping[str, float]] | None = None,
-    commands: Literal["held", "between"] = "held",
+    commands: Changes = "held",
 ) -> list[ShootingSegment]:
     """Cut runs into consecutive segments of `horizon` [s]; 0: one segment for each unbroken stretch.
 
@@ -103,7 +103,7 @@ def _cut(
     step: float,
     horizon: float,
     lags: int,
-    between: Literal["held", "between"],
+    between: Changes,
 ) -> list[ShootingSegment]:
     t = rows["t"]
     count = int((t[-1] - t[0]) / step + 1e-6) if len(t) > 1 else 0
@@ -146,9 +146,8 @@ def _check_step(vessel: Vessel, rows: Mapping[str, NDArray[Any]], step: float) -
     interval = float(np.median(np.diff(rows["t"])))
     if step <= interval / 2 + clock_slack(rows["t"]):
         return
-    changing = (
-        name for name in dynamics(vessel).commands if name in dynamics(vessel).memory and np.ptp(rows[name]) > 0
-    )
-    for name in changing:
+    model = dynamics(vessel)
+    name = next((name for name in model.commands if name in model.memory and np.ptp(rows[name]) > 0), None)
+    if name is not None:
         message = f"{step:g} s: orders to the actuator of {name} change in the middle between rows, which are"
         raise DataError(f"{message} {interval:.3g} s apart: give at most {interval / 2:.3g}", path="step")

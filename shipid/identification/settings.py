@@ -16,6 +16,7 @@ from shipid import document as documents
 from shipid.checked import Checked
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, choices
+from shipid.identification.late import Changes
 from shipid.identification.plausible import within
 from shipid.physics.signals import is_output, named
 from shipid.vessel.load import Vessel
@@ -77,7 +78,7 @@ class Identify(Checked, BaseModel):
     )
     step: Positive = Field(default=1.0, description="s")
     method: Method = "rk4"
-    commands: Literal["held", "between"] = Field(
+    commands: Changes = Field(
         default="held",
         description="held: a command counts from its row to the next; between: an order to an actuator changes in the "
         "middle between two rows, any other command evenly",

@@ -14,6 +14,7 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
+from shipid.identification.late import interval_of
 from shipid.identification.residuals import Problem, build
 from shipid.identification.settings import BLOCK, Identify, columns_of
 from shipid.identification.start import by_inverse_dynamics, grown
@@ -213,8 +214,7 @@ def _searched(
 
 def _blurred(dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
     """A warning if the step of the fit is longer than the interval of the log, else no text."""
-    rows = dataset.frame[dataset.frame["run"].isin(runs)]
-    between = float(rows.groupby("run", sort=False)["t"].diff().median())
+    between = interval_of(dataset, runs)
     if settings.step <= 1.5 * between:
         return ""
     return (

@@ -13,7 +13,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, ShipidError
 from shipid.identification.fit import origin, search
-from shipid.identification.late_orders import late_orders
+from shipid.identification.late_fit import late_fit
 from shipid.identification.residuals import build, predict
 from shipid.identification.settings import POSITIVE, Identify, unknowns
 from shipid.identification.solve import LEAST, Solution, _discounted, _weakest, identify
@@ -135,10 +135,10 @@ def test_commands_that_change_between_rows(name: str, n_rpm: float, duration: fl
         assert wrong > 0.04
         assert right < wrong / 2
         judged = statistics(LinearFit.of(held))
-        found = late_orders(held, sparse, judged)
+        found = late_fit(held, sparse, judged)
         assert found.startswith(f"commands count from their row, on average {interval / 2:g} s late")
         assert ("--set step=" in found) == (gear and name == "container-175")
-        assert late_orders(between, sparse, judged) == ""
+        assert late_fit(between, sparse, judged) == ""
 
 
 def test_commands_between_rows_are_not_for_measured_outputs() -> None:

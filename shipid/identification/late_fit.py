@@ -12,6 +12,7 @@ from shipid.document import short_names
 from shipid.identification.collinearity import digits
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import evaluate
+from shipid.identification.late import interval_of
 from shipid.identification.residuals import build
 from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution
@@ -19,7 +20,7 @@ from shipid.identification.statistics import Statistics
 from shipid.vessel.dynamics import dynamics
 
 Array = NDArray[np.float64]
-LEAST_ROWS = 0.2  # rows by which the fit wants the orders earlier: below, the log has them in time
+LEAST_ROWS = 0.2  # rows by which the fit is best with earlier commands: below, the log has them in time
 OUTSIDE = 1.0  # of half the interval: a larger change of an estimate is reported
 WORTH = 0.02  # of a factor: a smaller change is not
 COARSE = 1.5  # rows: a longer step of the fit has a warning of its own
@@ -27,10 +28,10 @@ COARSE = 1.5  # rows: a longer step of the fit has a warning of its own
 
 @dataclass(frozen=True)
 class Lateness:
-    """What orders half a row earlier would do to a fit, linearised.
+    """What commands half a row earlier would do to a fit, linearised.
 
-    between : s from row to row. rows : rows by which the fit is best with earlier orders.
-    changes : (n,) of the factors.
+    between : from row to row [s]. rows : rows by which the fit is best with earlier commands. changes : (n,) of the
+        factors by half a row.
     """
 
     between: float
@@ -39,14 +40,13 @@ class Lateness:
 
 
 def lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
-    """The effect of orders half a row earlier; None where it cannot be said.
+    """The effect of commands half a row earlier; None where it cannot be computed.
 
     An order that is given between two rows is first seen in the later one. Its mean delay is half a row. The residuals
-    with all orders one row earlier show what that does, and whether they become smaller.
+    with all commands one row earlier show what that does, and whether they become smaller.
     """
     settings = solution.settings
-    rows = dataset.frame[dataset.frame["run"].isin(solution.runs)]
-    between = float(rows.groupby("run", sort=False)["t"].diff().median())
+    between = interval_of(dataset, solution.runs)
     if settings.commands == "between" or settings.step > COARSE * between:
         return None
     problem = build(solution.vessel, _earlier(dataset), solution.runs, settings)
@@ -66,8 +66,8 @@ def lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
     return Lateness(between, -float(solution.residuals @ left) / size if size > 0 else 0.0, changes)
 
 
-def late_orders(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
-    """A sentence where orders half a row earlier move an estimate out of its interval and fit better; else no text."""
+def late_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
+    """A sentence where commands half a row earlier move an estimate out of its interval and fit better; else none."""
     late = lateness(solution, dataset)
     if late is None or late.rows < LEAST_ROWS:
         return ""

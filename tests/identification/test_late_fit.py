@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.identification.late_orders import late_orders, lateness
+from shipid.identification.late_fit import late_fit, lateness
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, statistics
@@ -66,7 +66,7 @@ def fitted(log: Dataset, step: float, commands: str = "held") -> Solution:
 
 
 def sentence(solution: Solution, log: Dataset) -> str:
-    return late_orders(solution, log, statistics(LinearFit.of(solution)))
+    return late_fit(solution, log, statistics(LinearFit.of(solution)))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
