@@ -40,9 +40,11 @@ WORDS = frozenset(
     malloc qsort rand realloc srand strtod strtof strtol system memchr memcmp memcpy memmove memset strcat strchr strcmp
     strcpy strlen strncmp strncpy strstr printf fprintf sprintf snprintf scanf puts putchar getchar perror remove rename
     rewind signal raise time clock gamma j0 j1 jn y0 y1 yn index bool true false complex imaginary linux unix
+    and asm bitand bitor catch class compl delete explicit export friend mutable namespace new not operator or private
+    protected public template this throw try typeid typename using virtual xor math string
     """.split()
 )
-"""Keywords of C99 and names of its library: a file of such a name would not compile."""
+"""Keywords of C99 and C++, names of C's library and headers: a file of such a name would not compile."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,10 @@ def _head(name: str, precision: Precision) -> str:
 
 #include <math.h>
 #include <string.h>
+
+#if (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__) || defined _M_FP_FAST
+#error "compile without -ffast-math, -Ofast and /fp:fast: they take out the checks of values that are not finite"
+#endif
 
 typedef {name}_real real;
 #define M(name) {suffix}
@@ -936,7 +942,8 @@ int main(void)
 {around}    int i, status;
     {name}_init(&ship);
     for (i = 0; i < {rows}; ++i) {{
-        {name}_record(&ship, {self.model.physics.step!r} * i, row);
+        status = {name}_record(&ship, {self.model.physics.step!r} * i, row);
+        if (status) {{ printf("row %d is refused: result %d\\n", i, status); return status; }} /* a path would be that of the row before */
         row[0] += {self.model.physics.step!r}{"f" if self.precision.single else ""} * row[{row.index("u")}]; /* a straight run to the north */
     }}
     status = {name}_{predict};

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import subprocess
 from dataclasses import replace
 
@@ -352,6 +353,30 @@ def test_angles_may_wrap(kind, low, high, angles, least, tmp_path):
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-9)
 
 
+def test_fast_math_is_refused_at_compilation(tmp_path):
+    """It takes out isfinite: a row of NaN was kept, with result 0."""
+    strange = drawn("path-drawn", 7, vessel="mariner")
+    write(predictor_files(model(strange.predictor), "odd", Precision()), tmp_path)
+    for options in (["-Ofast"], ["-O2", "-ffast-math"]):
+        result = subprocess.run(
+            [compiler(), "-std=c99", *options, "-c", "odd.c"], cwd=tmp_path, capture_output=True, text=True
+        )
+        assert result.returncode != 0
+        assert "compile without -ffast-math" in result.stderr
+
+
+def test_the_example_ends_with_the_result_of_a_row_that_is_refused(tmp_path):
+    files = predictor_files(model(drawn("path-drawn", 7, vessel="mariner").predictor), "odd", Precision())
+    text = files.texts["main.c"]
+    first = re.search(r"row\[odd_NUM_ROW\] = \{([^,}]+)", text)
+    assert first is not None
+    broken = {**files.texts, "main.c": text.replace(first[0], first[0].replace(first[1], "0.0 / 0.0"), 1)}
+    write(replace(files, texts=broken), tmp_path)
+    compile_([compiler()], tmp_path, "-O0", "-o", "example", "main.c", "odd.c")
+    result = subprocess.run([tmp_path / "example"], capture_output=True, text=True)
+    assert (result.returncode, result.stdout) == (INVALID, f"row 0 is refused: result {INVALID}\n")
+
+
 def test_a_ship_without_orders_compiles_without_a_warning(tmp_path):
     strange = drawn("one-step", 6, count=3, vessel="mariner")
     vessel = variety()["mariner"]
@@ -437,6 +462,8 @@ def test_names_are_those_of_c():
     assert c_name("33.9 m") == "m_33_9_m"
     assert c_name("double") == "m_double"
     assert c_name("exp") == "m_exp"  # of the library
+    assert c_name("class") == "m_class"  # of C++
+    assert c_name("math") == "m_math"  # math.h would be that of the library
     assert c_name("Ærø") == "r"
     assert c_name("øøø") == "model"
 
