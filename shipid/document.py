@@ -336,7 +336,7 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
         places = [".".join(filter(None, (prefix, *_place(data, entry)))) for entry in problems]
         path = places[problems.index(first)]
         if first["type"] == "extra_forbidden":
-            message = f"unknown key: {choices(str(first['loc'][-1]), _fields(model, first['loc'][:-1]))}"
+            message = f"unknown key: {choices(first['loc'][-1], _fields(model, first['loc'][:-1]))}"
         elif first["type"] == "missing":
             message = "missing" + _note(model, first["loc"])
         elif first["type"] in ("union_tag_invalid", "union_tag_not_found"):
@@ -383,7 +383,7 @@ def _of_no_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:
         return f"{path}.{key}", "missing"
     tag = problem["ctx"]["tag"]
     valid = [name.strip("' ") for name in problem["ctx"]["expected_tags"].split(",")]
-    return f"{path}.{key}", f"{tag!r} is no {key}: {choices(str(tag), valid)}"
+    return f"{path}.{key}", f"{tag!r} is no {key}: {choices(tag, valid)}"
 
 
 def required(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:

@@ -44,8 +44,8 @@ class Trajectories:
 
     def __getitem__(self, name: str) -> Array:
         """One channel, (num_records, num_variants, num_samples); ShipidError for one that was not recorded."""
-        if name not in self.names:
-            raise ShipidError(f"no channel {name!r} was recorded: {choices(str(name), self.names)}")
+        if not isinstance(name, str) or name not in self.names:
+            raise ShipidError(f"no channel {name!r} was recorded: {choices(name, self.names)}")
         return self.states[..., self.names.index(name)]
 
 
@@ -100,7 +100,7 @@ def rollout(
     if num_steps % every:
         raise ShipidError(f"num_steps must be a multiple of every, not {num_steps} and {every}")
     check_steps(num_steps)
-    given = start, commands, {} if environment is None else environment, components or {}
+    given = start, commands, {} if environment is None else environment, {} if components is None else components
     model, batch = prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
     _check_names("start", start, (*model.state, *model.hidden), vessel)
     _check_names("environment", environment, model.environment, vessel)
@@ -266,7 +266,7 @@ def _variants(vessel: Vessel, names: Sequence[str], parameters: Any) -> Array:
         absent = next((name for name in names if name not in labels), None)
         odd = next((label for label in labels if label not in names), None)
         if absent is not None or odd is not None:
-            what = f"lack {absent!r}" if odd is None else f"hold {odd!r}, {choices(str(odd), names)}"
+            what = f"lack {absent!r}" if odd is None else f"hold {odd!r}, {choices(odd, names)}"
             raise ShipidError(f"parameters {what}: give every parameter of {vessel.name}, and no other")
         parameters = np.stack([numbers(f"parameter {name!r}", parameters[name]) for name in names], axis=-1)
     values = np.atleast_2d(numbers("parameters", parameters))
@@ -326,7 +326,7 @@ def _components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -
     unknown = next((path for path in given if path not in paths), None)
     if unknown is not None:
         raise ShipidError(
-            f"components: the vessel has no term {unknown!r} whose components are drawn: {choices(str(unknown), paths)}"
+            f"components: the vessel has no term {unknown!r} whose components are drawn: {choices(unknown, paths)}"
         )
     for term in model.drawn:
         entries = sum(term.widths.values())

@@ -43,7 +43,7 @@ def families(plan: Plan, name: str | None = None) -> list[Family]:
     if not chosen:
         known = name in [family.name for family in plan.families]
         fault = "draws no factor from a range" if known else "is no family"
-        hint = choices(str(name), [family.name for family in drawn])
+        hint = choices(name, [family.name for family in drawn])
         raise DocumentError(f"{name!r} {fault}: {hint}", file=plan.file, path="family")
     return chosen
 

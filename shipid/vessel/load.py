@@ -378,7 +378,7 @@ def _check_component(path: str, group: str, block: Any, file: str) -> None:
     kind, valid = block.get("kind"), kinds(group)
     if kind not in valid:
         message = "missing" if kind is None else f"{kind!r} is no kind of {group}"
-        raise DocumentError(f"{message}: {choices(str(kind), valid)}", file=file, path=f"{path}.kind")
+        raise DocumentError(f"{message}: {choices(kind, valid)}", file=file, path=f"{path}.kind")
     documents.parse(term_model(f"{group}.{kind}"), block, file, path)
 
 
