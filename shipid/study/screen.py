@@ -31,6 +31,7 @@ NUMBERS = (
     4_000_000  # sums of windows and tallies of a block, for each of pool and test: fewer members if windows are many
 )
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
+DRIVERS = 5  # of a family that are named
 FIXED = ("family", "member", "A", "A_90", "diverged")
 
 
@@ -152,10 +153,10 @@ def spread(frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def drivers(frame: pd.DataFrame, most: int = 5) -> pd.DataFrame:
+def drivers(frame: pd.DataFrame) -> pd.DataFrame:
     """What drives A in each family: rank correlations of A with a factor and with how far the factor is from 1.
 
-    The few largest, a row each: family, paths (those drawn together count once), factor, away.
+    The `DRIVERS` largest, a row each: family, paths (those drawn together count once), factor, away.
     """
     rows = []
     for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
@@ -168,6 +169,8 @@ def drivers(frame: pd.DataFrame, most: int = 5) -> pd.DataFrame:
             pair = rank_correlation(A, factor), rank_correlation(A, np.abs(factor - 1))
             rows.append((name, ", ".join(paths), *pair, max(map(abs, pair))))
     effects = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])
-    largest = effects.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(most)
+    largest = (
+        effects.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(DRIVERS)
+    )
     order = largest["family"].map(list(dict.fromkeys(effects["family"])).index)
     return largest.iloc[np.argsort(order.to_numpy(), kind="stable")].drop(columns="strength").reset_index(drop=True)
