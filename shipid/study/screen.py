@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.arguments import of_class
+from shipid.arguments import of_class, one_of, whole_number
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.engine.engines import REPEATED
@@ -75,6 +75,11 @@ def screen(
     """
     of_class("plan", plan, Plan, "as of `read_plan`")
     of_class("dataset", dataset, Dataset, "as of `read_dataset`")
+    of_class("wanted", wanted, Sequence, "such as `plan.families`")
+    for family in wanted:
+        of_class("family", family, Family, "as of `plan.families`")
+        one_of(f"base of the family {family.name!r}", family.base, plan.vessels)
+    count = whole_number("count", count, 1)
     pool, test, _ = partition(plan, dataset)
     size = min(MEMBERS, max(1, NUMBERS // (len(pool) + len(test) + BINS)))
     for family in wanted:
