@@ -18,7 +18,7 @@ from shipid.engine.integrate import Array, Batch, Job, Method
 from shipid.errors import DataError, ShipidError, choices
 from shipid.metrics import position_error, tally
 from shipid.physics.helm import Helmsman
-from shipid.physics.signals import row_of
+from shipid.physics.signals import is_command, row_of
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
@@ -74,7 +74,8 @@ def rollout(
     ----------
     start : state name -> (S,), SI. In a dict, names of signals that the vessel does not have are passed over here and
         in `environment`; a name that is no signal at all is an error.
-    commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step.
+    commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step. A command
+        that the vessel does not have is an error.
     step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
     parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. A DataFrame, a Series or a dict
         with dotted paths is read by these. Default: the numbers of the vessel.
@@ -104,6 +105,7 @@ def rollout(
     model, batch = prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
     _check_names("start", start, (*model.state, *model.hidden), vessel)
     _check_names("environment", environment, model.environment, vessel)
+    _check_names("commands", commands, model.commands, vessel)
     names = channels(model)
     kept = names if keep is None else names_of("keep", keep)
     job = Job(step, num_steps, method, every, places(kept, names, vessel), device)
@@ -121,9 +123,13 @@ def check_steps(num_steps: int) -> None:
 
 
 def _check_names(what: str, given: object, names: Sequence[str], vessel: Vessel) -> None:
-    """Raise ShipidError for a name in a dict that is neither of the vessel nor of any signal; a table may have more."""
-    odd = [] if not isinstance(given, Mapping) else [name for name in given if name not in names]
-    unknown = next((str(name) for name in odd if row_of(str(name)) is None), None)
+    """Raise ShipidError for a name in a dict that is neither of the vessel nor of any signal; a table may have more.
+
+    A command of a component is of one vessel alone, so among the commands it must be hers.
+    """
+    odd = [] if not isinstance(given, Mapping) else [str(name) for name in given if name not in names]
+    own = what == "commands"
+    unknown = next((name for name in odd if row_of(name) is None or (own and is_command(name))), None)
     if unknown is not None:
         raise ShipidError(f"{what}: {vessel.name} has no {unknown!r}: {choices(unknown, names)}")
 

@@ -213,7 +213,9 @@ class Physics:
         model = dynamics(self.ship)
         zero = np.zeros(len(instants))
         columns: Mapping[str, Array] = {"down": instants.columns.get("z", zero), **instants.columns}
-        commands = {**columns, **(instants.planned or {})}
+        given = {**columns, **(instants.planned or {})}
+        check_columns(self.ship, given, "the instants")
+        commands = {name: given[name] for name in model.commands}
         environment = {name: columns.get(name, zero) for name in model.environment}
         slow = drift = None
         if self.observer is not None:

@@ -412,6 +412,16 @@ def test_a_wrong_argument_is_one_line(wrong: dict[str, Any], message: str) -> No
         rollout(ship, **{**marked(ship), "step": 0.5, "num_steps": 4, **wrong})
 
 
+@pytest.mark.parametrize("name", ["bow.n", "port.alhpa"])
+def test_a_command_that_the_vessel_does_not_have_is_refused(name: str) -> None:
+    """Before, it was passed over without a word."""
+    ship = load_vessel("gunnerus-28.9")
+    given = marked(ship)
+    given["commands"] = {**given["commands"], name: np.zeros(2)}
+    with pytest.raises(ShipidError, match=f"commands: .* has no '{name}'"):
+        rollout(ship, **given, step=0.5, num_steps=4)
+
+
 def test_a_start_has_no_series() -> None:
     """Before, the first row was taken without a word."""
     ship = load_vessel("mariner")
