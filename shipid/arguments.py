@@ -46,7 +46,7 @@ def one_of(name: str, value: Any, valid: Iterable[str], error: Kind = ShipidErro
     """Raise `error` for a value that is none of the valid names."""
     names = list(valid)
     if not isinstance(value, str) or value not in names:
-        raise error(f"{name} {value!r} is not known: {choices(str(value), names)}")
+        raise error(f"{name} {value!r} is not known: {choices(value, names)}")
 
 
 def names_of(name: str, value: Any, error: Kind = ShipidError) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from shipid.errors import DocumentError, choices
+from shipid.units import plural
 
 Document = dict[str, Any]
 
@@ -257,25 +258,44 @@ def get(document: Any, path: str) -> Any:
     return value
 
 
-def replace(document: Any, changes: Mapping[str, Any]) -> Any:
+def replace(document: Any, changes: Mapping[str, Any], file: Path | str | None = None) -> Any:
     """A new document with the values at the given dotted paths replaced or added; other parts are shared.
 
-    Entries of a list are addressed by number or by name.
+    Entries of a list are addressed by number or by name. Raises DocumentError for a path that reaches nothing.
     """
     result = copy.copy(document)
     copied = {id(result)}
     for path, value in changes.items():
         *parents, last = parts(path)
         node = result
-        for part in parents:
-            key: Any = place_of(node, part) if isinstance(node, list) else part
+        for place, part in enumerate(parents):
+            key = _key(node, part, parents[:place], path, file)
             below = node[key] if isinstance(node, list) else node.setdefault(key, {})
             if id(below) not in copied:
                 node[key] = below = copy.copy(below)
                 copied.add(id(below))
             node = below
-        node[place_of(node, last) if isinstance(node, list) else last] = value
+        node[_key(node, last, parents, path, file)] = value
     return result
+
+
+def _key(node: Any, part: str, above: Sequence[str], path: str, file: Path | str | None) -> Any:
+    """Key of a part of a path in the node that the parts above it lead to; DocumentError if it can have none."""
+    name = ".".join(above)
+    if isinstance(node, Mapping):
+        return part
+    if not isinstance(node, list):
+        raise DocumentError(f"{name} is no table: nothing can be below it", file=file, path=path)
+    try:
+        place = place_of(node, part)
+    except ValueError:
+        hint = choices(part, filter(None, map(_name_of, node)))
+        raise DocumentError(f"there is no {name}.{part}: {hint}", file=file, path=path) from None
+    if place >= len(node):
+        last = f", {name}.0 to {name}.{len(node) - 1}" if len(node) > 1 else f", {name}.0" if node else ""
+        held = f"{len(node)} {plural(len(node), 'entry', 'entries')}"
+        raise DocumentError(f"there is no {name}.{part}: {name} has {held}{last}", file=file, path=path)
+    return place
 
 
 def plain(value: Any) -> Any:
@@ -316,7 +336,7 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
         places = [".".join(filter(None, (prefix, *_place(data, entry)))) for entry in problems]
         path = places[problems.index(first)]
         if first["type"] == "extra_forbidden":
-            message = f"unknown key: {choices(str(first['loc'][-1]), _fields(model, first['loc'][:-1]))}"
+            message = f"unknown key: {choices(first['loc'][-1], _fields(model, first['loc'][:-1]))}"
         elif first["type"] == "missing":
             message = "missing" + _note(model, first["loc"])
         elif first["type"] in ("union_tag_invalid", "union_tag_not_found"):
@@ -363,7 +383,7 @@ def _of_no_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:
         return f"{path}.{key}", "missing"
     tag = problem["ctx"]["tag"]
     valid = [name.strip("' ") for name in problem["ctx"]["expected_tags"].split(",")]
-    return f"{path}.{key}", f"{tag!r} is no {key}: {choices(str(tag), valid)}"
+    return f"{path}.{key}", f"{tag!r} is no {key}: {choices(tag, valid)}"
 
 
 def required(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:

@@ -82,10 +82,10 @@ def _legible(text: str) -> str:
     return shown if len(shown) <= LONGEST else f"{shown[: LONGEST // 2]} ... {shown[-LONGEST // 2 :]}"
 
 
-def choices(value: str, valid: Iterable[str], limit: int = 12) -> str:
+def choices(value: object, valid: Iterable[str], limit: int = 12) -> str:
     """Hint for an invalid name: `did you mean 'x'?`, or the first `limit` valid names."""
     names = sorted(valid)
-    close = get_close_matches(value, names, n=1)
+    close = get_close_matches(str(value), names, n=1)
     if close:
         return f"did you mean {close[0]!r}?"
     shown = ", ".join(names[:limit]) + (", ..." if len(names) > limit else "")

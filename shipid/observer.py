@@ -558,9 +558,12 @@ def observed_paths(
     path : as in `cut_windows`.
     engine : as in `rollout`.
     """
-    begun = observed_start(filters, columns, horizon, step, path)
+    begun, given = observed_start(filters, columns, horizon, step, path), {**columns, **(planned or {})}
+    model = dynamics(filters.vessel)
+    start = {name: begun.columns[name] for name in model.state if name in begun.columns}
+    commands = {name: given[name] for name in model.commands if name in given}
     result = rollout(
-        filters.vessel, begun.columns, {**columns, **(planned or {})}, begun.environment, step=step, num_steps=horizon,
+        filters.vessel, start, commands, begun.environment, step=step, num_steps=horizon,
         method=method, memory=memory, tau_extra=begun.tau_extra, keep=("north", "east"),
         engine=engine,
     )  # fmt: skip

@@ -22,7 +22,7 @@ from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrated
 from shipid.hybrid.method import Case, Corrector, Index, Method, Task
 from shipid.hybrid.methods import METHODS, kind_of
-from shipid.hybrid.physics import Physics, check_columns
+from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.observer import AGE, Observer
 from shipid.physics.signals import SIGNALS, measurable
 from shipid.vessel.dynamics import dynamics
@@ -159,7 +159,7 @@ class Predictor:
     ) -> Region:
         """Return the region around paths (T, S, 2) [m] of `predict` that are known already; DataError as there."""
         bands = self.check_level(level, kind)
-        of_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
+        check_instants(instants)
         paths = self._paths(paths, instants)
         return bands.region(paths, instants.columns, self.physics.step, level, pointwise=pointwise, kind=kind)
 
@@ -180,7 +180,7 @@ class Predictor:
 
     def _known(self, instants: Instants) -> Instants:
         """The instants with planned commands where the predictor takes them, and without them where it does not."""
-        of_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
+        check_instants(instants)
         parts = {name: getattr(instants, name) for name in ("columns", "past", "planned", "hidden", "estimates")}
         for part, given in parts.items():
             if part not in ("planned", "hidden") or given is not None:
@@ -518,6 +518,6 @@ def _folds(
     runs = list(windows.spans)
     unknown = next((run for run in names if run not in runs), None)
     if unknown is not None:
-        raise DataError(f"no run with windows: {choices(str(unknown), runs)}", path="validation_runs")
+        raise DataError(f"no run with windows: {choices(unknown, runs)}", path="validation_runs")
     training, judged = fold_masks(windows, names)
     return [(np.flatnonzero(training), np.flatnonzero(judged))]

@@ -60,8 +60,24 @@ def test_entries_of_a_list_are_selected_by_name() -> None:
     changed = documents.replace(study, {"family.high.members": 2, 'family."a.b".perturb.0.factor': 3})
     assert changed["family"][0] == {"name": "high", "members": 2}
     assert changed["family"][1]["perturb"] == [{"factor": 3}]
-    with pytest.raises(ValueError, match="nobody"):
-        documents.replace(study, {"family.nobody.members": 2})
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("family.hihg.members", "there is no family.hihg: did you mean 'high'?"),
+        ("family.2", "there is no family.2: family has 2 entries, family.0 to family.1"),
+        ("family.0.perturb.0", "there is no family.0.perturb.0: family.0.perturb has 0 entries"),
+        ("step.x.y", "step is no table: nothing can be below it"),
+        ("step.x", "step is no table: nothing can be below it"),
+    ],
+)
+def test_a_path_that_reaches_nothing_is_refused(path: str, message: str) -> None:
+    study = {"family": [{"name": "high", "perturb": []}, {"name": "low"}], "step": 0.5}
+    with pytest.raises(DocumentError) as caught:
+        documents.replace(study, {path: 2}, "study.toml")
+    assert str(caught.value) == f"study.toml: {path}: {message}"
+    assert study == {"family": [{"name": "high", "perturb": []}, {"name": "low"}], "step": 0.5}
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,7 @@ def test_choices_list_what_is_valid() -> None:
     assert choices("zzz", ["beta", "alpha"]) == "valid: alpha, beta"
     assert choices("zzz", (f"n{i:02}" for i in range(20))).endswith("n11, ...")
     assert choices("zzz", []) == "nothing is defined there"
+    assert choices(None, ["alpha"]) == choices([], ["alpha"]) == "valid: alpha"
 
 
 @pytest.mark.parametrize("name", ["\x1b[2J\x1b[31m", "\u202eabc", "a\rb", "\x00", "\x07"])

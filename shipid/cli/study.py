@@ -451,8 +451,8 @@ def _before_work(
     study: str, changes: list[str] | None, device: str, out: Path | None, command: str
 ) -> tuple[Plan, Path]:
     """The plan of a study and the file of a command's table, after all that can be refused before anything is done."""
+    from shipid.engine.engines import check_device
     from shipid.files import check_table
-    from shipid.hybrid.device import check_device
     from shipid.study.plan import read_plan
 
     check_device(device)

@@ -103,16 +103,25 @@ ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
 }
 
 
+def check_device(device: str) -> None:
+    """Raise ShipidError unless PyTorch can compute on the device, such as `cpu` or `cuda:0`."""
+    if device == "cpu":
+        return
+    from shipid.engine.torch import is_device
+
+    if not is_device(device):
+        raise ShipidError("PyTorch has no such device here: use cpu", path=f"--device {device}")
+
+
 def named(name: str, device: str) -> Engine | None:
     """The engine with a name; None for `auto`, `repeated`. ShipidError for an unknown name or an unsupported device."""
-    if isinstance(name, str) and name in (AUTO, REPEATED):
-        return None
-    if not isinstance(name, str) or name not in ENGINES:
-        raise ShipidError(f"there is no engine {name!r}: {choices(str(name), [AUTO, *ENGINES])}")
-    engine = ENGINES[name]
-    if device != "cpu" and not engine.any_device:
+    if not isinstance(name, str) or name not in (AUTO, REPEATED, *ENGINES):
+        raise ShipidError(f"there is no engine {name!r}: {choices(name, [AUTO, *ENGINES])}")
+    engine = ENGINES.get(name)
+    if device != "cpu" and engine is not None and not engine.any_device:
         others = " or ".join(repr(other) for other, entry in ENGINES.items() if entry.any_device)
         raise ShipidError(f"engine {name!r} runs on the CPU: use {others} on {device!r}")
+    check_device(device)
     return engine
 
 

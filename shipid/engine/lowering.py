@@ -108,13 +108,13 @@ class Lowered:
         return list(saved[-1])
 
 
-def lower(function: ca.Function, stages: Sequence[Sequence[str]] = STAGES) -> Lowered:
-    """Lower an SX function of dense vectors with one output; `stages` names the inputs that are known early.
+def lower(function: ca.Function) -> Lowered:
+    """Lower an SX function of dense vectors with one output; `STAGES` names the inputs that are known early.
 
     An instruction that has no PyTorch counterpart raises ValueError with its number.
     """
-    printed = print_function(function, stages, PYTORCH)
-    last = len(stages)
+    printed = print_function(function, STAGES, PYTORCH)
+    last = len(STAGES)
     space: dict[str, Any] = {**_NAMES, "_stack": _stack, "_channels": _channels}
     for number in range(last + 1):
         arguments = ", ".join([*printed.inputs(number), *(f"s{earlier}" for earlier in range(number))])

@@ -18,7 +18,7 @@ from shipid.engine.integrate import Array, Batch, Job, Method
 from shipid.errors import DataError, ShipidError, choices
 from shipid.metrics import position_error, tally
 from shipid.physics.helm import Helmsman
-from shipid.physics.signals import row_of
+from shipid.physics.signals import is_command, row_of
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
@@ -44,8 +44,8 @@ class Trajectories:
 
     def __getitem__(self, name: str) -> Array:
         """One channel, (num_records, num_variants, num_samples); ShipidError for one that was not recorded."""
-        if name not in self.names:
-            raise ShipidError(f"no channel {name!r} was recorded: {choices(str(name), self.names)}")
+        if not isinstance(name, str) or name not in self.names:
+            raise ShipidError(f"no channel {name!r} was recorded: {choices(name, self.names)}")
         return self.states[..., self.names.index(name)]
 
 
@@ -74,7 +74,8 @@ def rollout(
     ----------
     start : state name -> (S,), SI; names that the vessel does not have are passed over, missing ones raise DataError.
     commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step. In a
-        dict for the environment, a name that is no signal at all is an error.
+        dict, a command that the vessel does not have is an error, and so is a name in the environment that is no
+        signal at all.
     step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
     parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. A DataFrame, a Series or a dict
         with dotted paths is read by these. Default: the numbers of the vessel.
@@ -100,9 +101,10 @@ def rollout(
     if num_steps % every:
         raise ShipidError(f"num_steps must be a multiple of every, not {num_steps} and {every}")
     check_steps(num_steps)
-    given = start, commands, {} if environment is None else environment, components or {}
+    given = start, commands, {} if environment is None else environment, {} if components is None else components
     model, batch = prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
-    _check_environment(environment, model.environment, vessel)
+    _check_names("environment", environment, model.environment, vessel)
+    _check_names("commands", commands, model.commands, vessel)
     names = channels(model)
     kept = names if keep is None else names_of("keep", keep)
     job = Job(step, num_steps, method, every, places(kept, names, vessel), device)
@@ -119,12 +121,16 @@ def check_steps(num_steps: int) -> None:
         raise ShipidError(f"{num_steps:.2g} steps, at most {MOST_STEPS:.0e}: give a longer step, or a shorter time")
 
 
-def _check_environment(given: object, names: Sequence[str], vessel: Vessel) -> None:
-    """Raise ShipidError for a name in a dict that is neither of the vessel nor of any signal; a table may have more."""
+def _check_names(what: str, given: object, names: Sequence[str], vessel: Vessel) -> None:
+    """Raise ShipidError for a name in a dict that is neither of the vessel nor of any signal; a table may have more.
+
+    A command belongs to a component of one vessel, so a command that this vessel lacks is an error, too.
+    """
     odd = [] if not isinstance(given, Mapping) else [str(name) for name in given if name not in names]
-    unknown = next((name for name in odd if row_of(name) is None), None)
+    commands = what == "commands"
+    unknown = next((name for name in odd if row_of(name) is None or (commands and is_command(name))), None)
     if unknown is not None:
-        raise ShipidError(f"environment: {vessel.name} has no {unknown!r}: {choices(unknown, names)}")
+        raise ShipidError(f"{what}: {vessel.name} has no {unknown!r}: {choices(unknown, names)}")
 
 
 @dataclass(frozen=True)
@@ -265,7 +271,7 @@ def _variants(vessel: Vessel, names: Sequence[str], parameters: Any) -> Array:
         absent = next((name for name in names if name not in labels), None)
         odd = next((label for label in labels if label not in names), None)
         if absent is not None or odd is not None:
-            what = f"lack {absent!r}" if odd is None else f"hold {odd!r}, {choices(str(odd), names)}"
+            what = f"lack {absent!r}" if odd is None else f"hold {odd!r}, {choices(odd, names)}"
             raise ShipidError(f"parameters {what}: give every parameter of {vessel.name}, and no other")
         parameters = np.stack([numbers(f"parameter {name!r}", parameters[name]) for name in names], axis=-1)
     values = np.atleast_2d(numbers("parameters", parameters))
@@ -325,7 +331,7 @@ def _components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -
     unknown = next((path for path in given if path not in paths), None)
     if unknown is not None:
         raise ShipidError(
-            f"components: the vessel has no term {unknown!r} whose components are drawn: {choices(str(unknown), paths)}"
+            f"components: the vessel has no term {unknown!r} whose components are drawn: {choices(unknown, paths)}"
         )
     for term in model.drawn:
         entries = sum(term.widths.values())

@@ -157,6 +157,15 @@ def _sum(value: Any, count: int) -> Any:
     return value.expand(*value.shape[:-1], count).sum(-1)
 
 
+def is_device(name: str) -> bool:
+    """Whether PyTorch can compute on a device here."""
+    try:
+        float(torch.zeros(1, device=torch.device(name)))  # one that keeps no numbers, such as meta, cannot give it back
+    except (RuntimeError, AssertionError, TypeError, NotImplementedError, ImportError, AttributeError):
+        return False
+    return True
+
+
 def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[np.ndarray, np.ndarray]:
     """Records (R, V, S, C) and the greatest speed (V, S), in blocks of one fixed shape, the last one padded.
 

@@ -1,23 +1,9 @@
-"""What computes here: the device, the threads and the vector instructions. PyTorch is imported where it is needed."""
+"""What computes here: the threads and the vector instructions. PyTorch is imported where it is needed."""
 
 from __future__ import annotations
 
 import numpy as np
 from threadpoolctl import threadpool_info, threadpool_limits
-
-from shipid.errors import ShipidError
-
-
-def check_device(device: str) -> None:
-    """Raise ShipidError unless PyTorch can compute on the device, such as `cpu` or `cuda:0`."""
-    if device == "cpu":
-        return
-    import torch
-
-    try:
-        float(torch.zeros(1, device=device))  # one that keeps no numbers, such as meta, cannot give it back
-    except (RuntimeError, AssertionError, NotImplementedError, ImportError, AttributeError):
-        raise ShipidError("PyTorch has no such device here: use cpu", path=f"--device {device}") from None
 
 
 def vectors() -> str:

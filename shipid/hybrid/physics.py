@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from shipid.arguments import of_class, one_of, positive, whole_number
+from shipid.arguments import numbers, of_class, one_of, positive, whole_number
 from shipid.data.windows import Instants, PathSource, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance
@@ -60,8 +60,19 @@ class Physics:
         """Return the same physics with other numbers, dotted path -> value."""
         return self if self.vessel is None else replace(self, vessel=self.vessel.with_values(values))
 
+    @property
+    def ship(self) -> Vessel:
+        """The vessel; ShipidError where there is none."""
+        if self.vessel is None:
+            raise ShipidError("no physics, so nothing to roll out: give a vessel, or ask for `paths`, which are zero")
+        return self.vessel
+
     def paths(self, instants: Instants) -> Array:
-        """Paths (T, S, 2) [m] in the frame (11); zeros without physics, not finite where the rollout diverges."""
+        """Paths (T, S, 2) [m] in the frame (11); zeros without physics, not finite where the rollout diverges.
+
+        As the methods below it raises DataError for what are no instants.
+        """
+        check_instants(instants)
         if self.vessel is None:
             return np.zeros((self.horizon, len(instants), 2))
         paths, _ = self.variant_paths(instants)
@@ -105,10 +116,9 @@ class Physics:
         future : true paths (T, S, 2) [m] in the frame (11). parameters : (P,) numbers instead of the vessel's.
         Windows on which the rollout diverges are left out; the error is infinite where all do.
         """
-        assert self.vessel is not None
         start, commands, environment, slow, drift = self._inputs(instants)
         gradients = rollout_gradient(
-            self.vessel,
+            self.ship,
             start,
             commands,
             environment,
@@ -128,6 +138,9 @@ class Physics:
 
     def _north_east(self, instants: Instants, future: Array, drift: Array | None) -> Array:
         """Paths (T, S, 2) [m] in the frame (11) as north and east, less the drift of the water."""
+        future = numbers("future", future, DataError)
+        if future.shape != (self.horizon, len(instants), 2):
+            raise DataError(f"future must be {(self.horizon, len(instants), 2)}, not {future.shape}")
         goal = np.stack(from_frame(future[..., 0], future[..., 1], *_origin(instants)), axis=-1)
         if drift is not None:
             goal = goal - self.step * np.arange(1, len(future) + 1)[:, None, None] * drift.T
@@ -143,12 +156,11 @@ class Physics:
         device: str = "cpu",
     ) -> Distances:
         """Distances of V variants to the true paths `future` (T, S, 2) [m] in the frame (11), without keeping paths."""
-        assert self.vessel is not None
         if self.observer is not None:
             raise ShipidError("screening takes no observer: screen the family that it extends", path="observer")
         start, commands, environment, _, _ = self._inputs(instants)
         return distances(
-            self.vessel,
+            self.ship,
             start,
             commands,
             environment,
@@ -171,12 +183,11 @@ class Physics:
         engine: str = AUTO,
     ) -> tuple[Trajectories, tuple[Array, Array]]:
         """Trajectories of the vessel, and north and east (T, V, S) [m] over ground after 1..T steps."""
-        assert self.vessel is not None
         start, commands, environment, slow, drift = self._inputs(instants)
         if engine == AUTO and len(instants) * self.horizon > WORTH_COMPILING:
             engine = REPEATED
         result = rollout(
-            self.vessel,
+            self.ship,
             start,
             commands,
             environment,
@@ -198,19 +209,20 @@ class Physics:
 
     def _inputs(self, instants: Instants) -> Inputs:
         """Start, commands, environment, slow force and drift of a rollout; what has no column is zero."""
-        assert self.vessel is not None
-        of_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
-        model = dynamics(self.vessel)
+        check_instants(instants)
+        model = dynamics(self.ship)
         zero = np.zeros(len(instants))
         columns: Mapping[str, Array] = {"down": instants.columns.get("z", zero), **instants.columns}
-        commands = {**columns, **(instants.planned or {})}
+        given = {**columns, **(instants.planned or {})}
+        check_columns(self.ship, given, "the instants")
+        commands = {name: given[name] for name in model.commands}
         environment = {name: columns.get(name, zero) for name in model.environment}
         slow = drift = None
         if self.observer is not None:
             if not instants.estimates:
                 raise DataError("the physics has an observer: instants must hold its estimates", path="observer")
             observed = {**columns, **instants.estimates}
-            begun = observed_start(bank(self.vessel, self.observer), observed, self.horizon, self.step, self.path)
+            begun = observed_start(bank(self.ship, self.observer), observed, self.horizon, self.step, self.path)
             columns, environment, slow, drift = begun.columns, begun.environment, begun.tau_extra, begun.drift
         start = {name: columns.get(name, zero) for name in model.state}
         return start, commands, environment, slow, drift
@@ -227,6 +239,11 @@ def _in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Arr
     """Positions (T, ..., S) [m] in the frame (11) of the instants; a path that diverged is not finite."""
     with np.errstate(invalid="ignore"):  # it is flagged, and no news to the caller
         return to_frame(north, east, *_origin(instants))
+
+
+def check_instants(instants: Instants) -> None:
+    """Raise DataError for what are no instants, such as windows."""
+    of_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
 
 
 def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:

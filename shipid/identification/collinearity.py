@@ -112,11 +112,11 @@ def index_of(jacobian: Array) -> float:
     return float(1 / np.sqrt(smallest)) if smallest > UNSEEN else float("inf")
 
 
-def combinations(jacobian: Array, paths: Sequence[str], most: float = MOST_COLLINEAR) -> tuple[Combination, ...]:
-    """Smallest sets with a collinearity index above `most`; worst first.
+def combinations(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, ...]:
+    """Smallest sets with a collinearity index above `MOST_COLLINEAR`; worst first.
 
     Backward elimination: parameters are removed one by one, each time the one whose removal leaves the most collinear
-    rest, until every further removal brings the index below `most`. What is left is one set. Its parameter with the
+    rest, until every further removal brings the index below that. What is left is one set. Its parameter with the
     greatest weight is then excluded, and the search is repeated.
     """
     lengths = np.sqrt((jacobian**2).sum(axis=0))
@@ -125,8 +125,8 @@ def combinations(jacobian: Array, paths: Sequence[str], most: float = MOST_COLLI
     result = [Combination((paths[j],), (names[j],), (1.0,), float("inf")) for j in silent]
     gram = _gram(jacobian)
     left = [j for j in range(len(paths)) if j not in silent]
-    while len(left) > 1 and _gamma(gram, left) > most:
-        chosen = _shrunk(gram, left, most)
+    while len(left) > 1 and _gamma(gram, left) > MOST_COLLINEAR:
+        chosen = _shrunk(gram, left)
         weights = _weakest(gram, chosen) / lengths[chosen]
         weights = weights / weights[np.argmax(np.abs(weights))]
         labels = tuple(paths[j] for j in chosen), tuple(names[j] for j in chosen)
@@ -135,13 +135,13 @@ def combinations(jacobian: Array, paths: Sequence[str], most: float = MOST_COLLI
     return tuple(result)
 
 
-def _shrunk(gram: Array, members: list[int], most: float) -> list[int]:
-    """Remove members one by one while the collinearity index stays above `most`; the members that are left."""
+def _shrunk(gram: Array, members: list[int]) -> list[int]:
+    """Remove members one by one while the collinearity index stays above the limit; the members that are left."""
     while len(members) > 2:
         without = [[smaller for smaller in members if smaller != gone] for gone in members]
         gammas = [_gamma(gram, smaller) for smaller in without]
         best = int(np.argmax(gammas))
-        if gammas[best] <= most:
+        if gammas[best] <= MOST_COLLINEAR:
             break
         members = without[best]
     return members

@@ -138,7 +138,6 @@ def informed(
     horizon: float = 30.0,
     interval: float = 1.0,
     step: float | None = None,
-    environment: Mapping[str, float] | None = None,
 ) -> list[Informed]:
     """Simulate candidates and compute the Fisher information of the factors that each adds.
 
@@ -149,7 +148,6 @@ def informed(
     weights : measured signal (u, v, r, psi, position) -> standard deviation [m/s, rad/s, rad, m].
     horizon : of a prediction [s], 0 for whole runs. interval : between measured rows [s].
     step : of the integration (RK4) [s]; default: the interval over as much as makes it about 0.2 s by Froude's scale.
-    environment : channel -> value in all runs, such as a wind; calm by default.
 
     Raises
     ------
@@ -162,8 +160,8 @@ def informed(
         raise ShipidError("no manoeuvre is within the limits of the actuators")
     every = steps_between(vessel, interval) if step is None else max(round(interval / step), 1)
     fine = interval / every
-    log = performed(vessel, choice, step=fine, environment=environment or {})
-    cut = _cut(vessel, log, environment or {}, round(horizon / interval) * every, every)
+    log = performed(vessel, choice, step=fine)
+    cut = _cut(vessel, log, round(horizon / interval) * every, every)
     signals = {name: width for signal, width in weights.items() for name in SIGNALS[signal]}
     by_factor, by_start = _sensitivities(vessel, cut, groups, scale, signals, fine, every)
     each = _projected(by_factor, by_start)
@@ -176,15 +174,14 @@ def performed(
     *,
     step: float,
     interval: float | None = None,
-    environment: Mapping[str, float] | None = None,
 ) -> pd.DataFrame:
     """Log of all candidates, `run` 0000, 0001, ...; by a helmsman's approach where the ship does not go straight."""
     named = [one.manoeuvre.model_copy(update={"name": f"{number:04d}"}) for number, one in enumerate(choice)]
     try:
-        return perform(vessel, named, step=step, interval=interval, environment=environment or {})
+        return perform(vessel, named, step=step, interval=interval)
     except NotStraight:
         held = [one.model_copy(update={"approach": "helmsman"}) for one in named]
-        return perform(vessel, held, step=step, interval=interval, environment=environment or {})
+        return perform(vessel, held, step=step, interval=interval)
 
 
 def steps_between(vessel: Vessel, interval: float) -> int:
@@ -209,7 +206,7 @@ class _Cut:
     seen: NDArray[np.bool_]
 
 
-def _cut(vessel: Vessel, log: pd.DataFrame, environment: Mapping[str, float], steps: int, every: int) -> _Cut:
+def _cut(vessel: Vessel, log: pd.DataFrame, steps: int, every: int) -> _Cut:
     """Cut logs into predictions of `steps` steps (0: whole runs); the last, shorter one of each run is kept."""
     model, names = dynamics(vessel), log["run"].to_numpy()
     bounds = [(np.flatnonzero(names == run)[0], int((names == run).sum())) for run in dict.fromkeys(names)]
@@ -226,12 +223,11 @@ def _cut(vessel: Vessel, log: pd.DataFrame, environment: Mapping[str, float], st
     columns = {str(name): log[name].to_numpy() for name in log.columns if name != "run"}
     columns |= {**aboard(columns), "down": columns.get("z", np.zeros(len(log)))}
     still = np.zeros(len(log))
-    given = {name: np.full(len(log), float(environment.get(name, 0.0))) for name in model.environment}
     return _Cut(
         {name: columns.get(name, still)[rows[0]] for name in (*model.state, *model.hidden)},
         {name: columns[f"actual.{name}"][rows[0]] for name in model.memory},
         {name: columns[name][rows] for name in model.commands},
-        {name: columns.get(name, given[name])[rows] for name in model.environment},
+        {name: columns.get(name, still)[rows] for name in model.environment},
         np.array(runs),
         records <= np.array(lasts),
     )

@@ -166,7 +166,8 @@ def read_settings(file: Path | None = None, changes: Mapping[str, Any] | None = 
     document = {BLOCK: {}} if file is None else documents.read(file)
     if not isinstance(document.get(BLOCK, {}), dict):
         raise DocumentError("must be a table", file=file, path=BLOCK)
-    block = {**document, BLOCK: documents.replace(document.get(BLOCK, {}), changes or {})}
+    inside = {f"{BLOCK}.{path}": value for path, value in (changes or {}).items()}
+    block = documents.replace({BLOCK: {}, **document}, inside, file)
     return cast(Settings, documents.parse(Settings, block, file)).identify
 
 

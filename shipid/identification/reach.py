@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
+from shipid.identification.collinearity import listed
 from shipid.physics.signals import steers
 from shipid.simulation.standard import length_of
 from shipid.units import DEGREE
@@ -69,11 +70,7 @@ def beyond(title: str, one: Reach, data: Reach) -> str:
     far = [(there, here) for there, here, yes in parts if yes]
     if not far:
         return ""
-    return f"{title} reaches {_listed([a for a, _ in far])}; the data reach {_listed([b for _, b in far])}"
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return f"{title} reaches {listed([a for a, _ in far])}; the data reach {listed([b for _, b in far])}"
 
 
 def of_log(vessel: Vessel, frame: pd.DataFrame) -> Reach:

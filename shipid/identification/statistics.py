@@ -182,10 +182,10 @@ class Statistics:
         return np.asarray(scaled.T @ scaled)
 
 
-def statistics(fit: LinearFit, widest: float = WIDEST) -> Statistics:
+def statistics(fit: LinearFit) -> Statistics:
     """Compute covariances, 95 % intervals and identifiability of a fit.
 
-    A factor is identified if its 95 % interval from the data alone, without its prior, is within +-`widest` base
+    A factor is identified if its 95 % interval from the data alone, without its prior, is within +-`WIDEST` base
     values. Collinearity explains a wider interval; it is not a criterion, because collinear factors may still be
     identified. All results are linear at the estimate. For a wide interval, the profile likelihood
     (`shipid.identification.profile`) shows whether the interval is finite.
@@ -208,7 +208,7 @@ def statistics(fit: LinearFit, widest: float = WIDEST) -> Statistics:
     n = len(fit.paths)
     full = {name: _spread(values, free, n) for name, values in {"errors": errors, "half": half, "alone": alone}.items()}
     identifiable = np.zeros(n, dtype=bool)
-    identifiable[free] = alone <= widest
+    identifiable[free] = alone <= WIDEST
     correlations = np.eye(n)
     scale = np.where(best.errors > 0, best.errors, 1.0)
     correlations[np.ix_(free, free)] = best.matrix / np.outer(scale, scale)

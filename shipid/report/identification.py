@@ -19,7 +19,7 @@ from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.structures import group_table
 from shipid.report.tables import Cell, Table, decimals, figure, text
-from shipid.report.wording import bound, counted, listed, number, scientific, short
+from shipid.report.wording import bound, counted, listed, number, scientific, short, wrapped
 
 ROW, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
 WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [px]
@@ -166,17 +166,7 @@ def _span(frame: pd.DataFrame) -> tuple[float, float]:
 def _hover(row: Mapping[Any, Any]) -> str:
     interval = f"{row['factor_low']:.3g} ... {row['factor_high']:.3g}"
     words = [f"<b>{label(str(row['path']))}</b> x {row['factor']:.4g}, 95 % {interval}"]
-    return "<br>".join([*words, *_broken(label(str(row["reason"])))])
-
-
-def _broken(words: str, most: int = 70) -> list[str]:
-    """Break words into lines of at most `most` characters."""
-    lines = [""]
-    for word in words.split():
-        if len(lines[-1]) + len(word) > most:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return lines
+    return "<br>".join([*words, *wrapped(label(str(row["reason"])), 70)])
 
 
 def numbers(content: IdentificationContent) -> Table:

@@ -26,6 +26,7 @@ from shipid.report import (
     search,
 )
 from shipid.report.figure import Chip, Control, Figure, Panel, Scale, label
+from shipid.report.wording import wrapped
 
 FIGURES: dict[str, Callable[[Any], Figure | None]] = {
     "error_map": error_map.error_map,
@@ -170,7 +171,8 @@ def _titled(figure: go.Figure, record: Figure) -> go.Figure:
         figure.add_traces([_entry(chip) for chip in record.chips])
         if record.scale:
             figure.add_trace(_bar(record.scale))
-    words = f"{label(record.title)}<br><sup>{label(_wrapped(record.takeaway))}</sup>".replace("\n", "<br>")
+    takeaway = label("\n".join(wrapped(record.takeaway, 110))).replace("\n", "<br>")
+    words = f"{label(record.title)}<br><sup>{takeaway}</sup>"
     figure.update_layout(
         title={"text": words, "x": 0, "xref": "paper", "y": 1, "yref": "container", "yanchor": "top", "pad": {"t": 14}},
         width=WIDTH,
@@ -217,12 +219,3 @@ def _bar(scale: Scale) -> go.Scatter:
         },
     }
     return go.Scatter(x=[None, None], y=[None, None], mode="markers", marker=marker, showlegend=False, hoverinfo="skip")
-
-
-def _wrapped(text: str, most: int = 110) -> str:
-    lines = [""]
-    for word in text.split():
-        if len(lines[-1]) + len(word) > most:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return "\n".join(lines)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from shipid.simulation.manoeuvre import (
 from shipid.units import GRAVITY, RPM, plural
 from shipid.vessel.load import Vessel
 
+Side = Literal["starboard", "port"]
 FROUDE = 0.2  # default speed: U = 0.2 sqrt(g L)
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
 LEAST_STEPS, MOST_STEPS = 10, 1e7  # steps for a ship length, and of a manoeuvre
@@ -89,7 +90,7 @@ def standard(
     """
     of_class("vessel", vessel, Vessel, "as of `load_vessel`")
     if not isinstance(name, str) or name not in KINDS:
-        raise ShipidError(f"no manoeuvre is called {name!r}: {choices(str(name), KINDS)}", path="NAME")
+        raise ShipidError(f"no manoeuvre is called {name!r}: {choices(name, KINDS)}", path="NAME")
     build, most = KINDS[name]
     angles = numbers("angles", angles).ravel().tolist()
     if len(angles) > most:
@@ -100,8 +101,10 @@ def standard(
         greatest = MOST_HEADING if place else MOST_HELM
         if not angle <= greatest:
             raise ShipidError(f"{angle:g} deg: give at most {greatest:g} deg", path="ANGLES")
+    if not isinstance(side, str) or side not in get_args(Side):
+        raise ShipidError(f"{side!r} is no side: starboard or port", path="--side")
     if not isinstance(approach, str) or approach not in APPROACHES:
-        raise ShipidError(f"{approach!r} is no approach: {choices(str(approach), APPROACHES)}", path="--approach")
+        raise ShipidError(f"{approach!r} is no approach: {choices(approach, APPROACHES)}", path="--approach")
     for option, value in (("--duration", duration), ("--step", step)):
         if value is not None and not 0 < number(option.strip("-"), value) < np.inf:
             raise ShipidError(f"{value:g} s must be positive and finite", path=option)
@@ -118,7 +121,7 @@ def standard(
     if step is not None and step > passing / LEAST_STEPS:
         words = f"{step:g} s is too long for this ship, which runs a length in {passing:.3g} s"
         raise ShipidError(f"{words}: give {passing / LEAST_STEPS:.3g} s or less", path="--step")
-    manoeuvre = build(angles, side, duration, passing, how)
+    manoeuvre = build(angles, cast(Side, side), duration, passing, how)
     steps = manoeuvre.length / interval * STEPS
     if steps > MOST_STEPS:
         option = "--duration" if step is None else "--step"
@@ -188,32 +191,32 @@ def _round(value: float) -> float:
     return float(f"{steps[np.argmin(np.abs(np.log(steps / value)))]:.6g}")
 
 
-Build = Callable[[Sequence[float], str, float | None, float, dict[str, Any]], Approached]
+Build = Callable[[Sequence[float], Side, float | None, float, dict[str, Any]], Approached]
 
 
-def _zigzag(angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]) -> Zigzag:
+def _zigzag(angles: Sequence[float], side: Side, duration: float | None, passing: float, how: dict[str, Any]) -> Zigzag:
     helm = angles[0] if angles else 10.0
     heading = angles[1] if len(angles) > 1 else helm
     time = how["execute_at"] + ZIGZAG * passing if duration is None else duration
-    return Zigzag(angle_deg=helm, execute_heading_deg=heading, side=_side(side), duration=time, **how)
+    return Zigzag(angle_deg=helm, execute_heading_deg=heading, side=side, duration=time, **how)
 
 
 def _turning(
-    angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]
+    angles: Sequence[float], side: Side, duration: float | None, passing: float, how: dict[str, Any]
 ) -> TurningCircle:
     time = how["execute_at"] + TURN * passing if duration is None else duration
-    return TurningCircle(angle_deg=angles[0] if angles else 35.0, side=_side(side), duration=time, **how)
+    return TurningCircle(angle_deg=angles[0] if angles else 35.0, side=side, duration=time, **how)
 
 
 def _pull_out(
-    angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]
+    angles: Sequence[float], side: Side, duration: float | None, passing: float, how: dict[str, Any]
 ) -> PullOut:
     time = how["execute_at"] + TURN * passing if duration is None else duration
     turn = (time - how["execute_at"]) / 2
-    return PullOut(angle_deg=angles[0] if angles else 20.0, side=_side(side), turn=turn, duration=time, **how)
+    return PullOut(angle_deg=angles[0] if angles else 20.0, side=side, turn=turn, duration=time, **how)
 
 
-def _spiral(angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]) -> Spiral:
+def _spiral(angles: Sequence[float], side: Side, duration: float | None, passing: float, how: dict[str, Any]) -> Spiral:
     sense, most = (1 if side == "starboard" else -1), angles[0] if angles else HELMS[0]
     there = [sense * most / HELMS[0] * helm for helm in HELMS]
     hold = LEVEL * passing if duration is None else duration
@@ -221,7 +224,7 @@ def _spiral(angles: Sequence[float], side: str, duration: float | None, passing:
 
 
 def _reverse_spiral(
-    angles: Sequence[float], side: str, duration: float | None, passing: float, how: dict[str, Any]
+    angles: Sequence[float], side: Side, duration: float | None, passing: float, how: dict[str, Any]
 ) -> ReverseSpiral:
     sense = 1 if side == "starboard" else -1
     most = angles[0] if angles else float(np.rad2deg(0.25 / passing))  # r L / U = 0.25
@@ -231,19 +234,13 @@ def _reverse_spiral(
 
 def _stop(
     angles: Sequence[float],  # noqa: ARG001
-    side: str,  # noqa: ARG001
+    side: Side,  # noqa: ARG001
     duration: float | None,
     passing: float,
     how: dict[str, Any],
 ) -> CrashStop:
     time = how["execute_at"] + STOP * passing if duration is None else duration
     return CrashStop(astern_rpm=how["n_rpm"], duration=time, **how)
-
-
-def _side(side: str) -> Any:
-    if side not in ("starboard", "port"):
-        raise ShipidError(f"{side!r} is no side: starboard or port", path="--side")
-    return side
 
 
 KINDS: dict[str, tuple[Build, int]] = {

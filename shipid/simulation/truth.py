@@ -164,9 +164,6 @@ def vessel_of(truth: Truth, vessel: Vessel) -> Vessel:
         return vessel.with_values(truth.set) if truth.set else vessel
     except DocumentError as error:
         raise DocumentError(error.message, path=f"truth.set.{error.path}") from None
-    except (ValueError, IndexError, TypeError, AttributeError):
-        message = f"a path goes below a number of {truth.vessel}: see `shipid vessel show {truth.vessel}`"
-        raise DocumentError(message, path="truth.set") from None
 
 
 def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:

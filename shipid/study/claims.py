@@ -256,15 +256,18 @@ class Claims:
             raise
         except OSError:
             return False
-        try:
-            age = self._me.stat().st_mtime - status.st_mtime
-        except FileNotFoundError:
-            self._sign_in()
-            age = self._me.stat().st_mtime - status.st_mtime
+        age = self._now() - status.st_mtime
         if age < -LATE:  # the clock was set back: a living process renews its file with the time of now
             first = self._ahead.setdefault((status.st_ino, status.st_mtime_ns), time.monotonic())
             return time.monotonic() - first > LATE
         return age > LATE
+
+    def _now(self) -> float:
+        """Time at which this process last renewed its file."""
+        while True:
+            with suppress(FileNotFoundError):
+                return self._me.stat().st_mtime
+            self._sign_in()
 
     def _is_mine(self, file: Path) -> bool:
         try:

@@ -33,7 +33,6 @@ from shipid.physics.signals import SIGNALS, named
 from shipid.predictor import MOST_STEPS
 from shipid.simulation.truth import Truth, check_truth, old_keys, vessel_of
 from shipid.study.ranges import LONGEST_NAME, Cut, check_memory, check_ranges, check_seeds
-from shipid.units import plural
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
@@ -633,33 +632,15 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
     by_name("changes", changes or {}, "a dotted path to a value", DocumentError)
     file = documents.find(str(name), "studies")
     document = documents.read(file)
-    known = dict(documents.leaves(document))
     for path in changes or {}:
         head = str(path).split(".", 1)[0]
         if head not in Study.model_fields:
             raise DocumentError(f"--set: no such block: {choices(head, Study.model_fields)}", file=file, path=str(path))
-    for path, value in (changes or {}).items():
-        try:
-            document = documents.replace(document, {path: value})
-        except IndexError:
-            raise DocumentError(f"--set: {_beyond(document, path)}", file=file, path=path) from None
-        except (ValueError, TypeError, AttributeError):
-            message = f"--set cannot reach this path: {choices(path, known)}"
-            raise DocumentError(message, file=file, path=path) from None
+    try:
+        document = documents.replace(document, changes or {})
+    except DocumentError as error:
+        raise DocumentError(f"--set: {error.message}", file=file, path=error.path) from None
     return build_plan(document, file, changes=changes)
-
-
-def _beyond(document: Document, path: str) -> str:
-    """Which list of a document a path leaves, and how long the list is."""
-    keys = documents.parts(path)
-    value: Any = document
-    for place, key in enumerate(keys):
-        if isinstance(value, list) and documents.place_of(value, key) >= len(value):
-            name = ".".join(keys[:place])
-            last = f", {name}.0 to {name}.{len(value) - 1}" if len(value) > 1 else f", {name}.0" if value else ""
-            return f"there is no {name}.{key}: {name} has {len(value)} {plural(len(value), 'entry', 'entries')}{last}"
-        value = value[documents.place_of(value, key)] if isinstance(value, list) else value[key]
-    raise KeyError(path)
 
 
 def build_plan(
@@ -756,8 +737,8 @@ def _changed(document: Document, changes: Mapping[str, Any], where: str, file: P
             raise DocumentError(message, file=file, path=f"{where}.{path}")
         try:
             document = documents.replace(document, {path: value})
-        except (ValueError, IndexError, TypeError, AttributeError):
-            raise DocumentError("is no key of this study", file=file, path=f"{where}.{path}") from None
+        except DocumentError as error:
+            raise DocumentError(error.message, file=file, path=f"{where}.{path}") from None
     return document
 
 

@@ -21,9 +21,10 @@ from shipid.arguments import of_class, path_of, whole_number
 from shipid.capacity import processor
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
+from shipid.engine.engines import check_device
 from shipid.engine.native import engine
 from shipid.files import make_folder, read_json, write_json
-from shipid.hybrid.device import check_device, use_threads, vectors
+from shipid.hybrid.device import use_threads, vectors
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Case, Corrector, Fitted, Task
 from shipid.hybrid.physics import Physics

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.arguments import of_class
+from shipid.arguments import of_class, one_of, whole_number
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.engine.engines import REPEATED
@@ -31,6 +31,7 @@ NUMBERS = (
     4_000_000  # sums of windows and tallies of a block, for each of pool and test: fewer members if windows are many
 )
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
+DRIVERS = 5  # of a family that are named
 FIXED = ("family", "member", "A", "A_90", "diverged")
 
 
@@ -43,7 +44,7 @@ def families(plan: Plan, name: str | None = None) -> list[Family]:
     if not chosen:
         known = name in [family.name for family in plan.families]
         fault = "draws no factor from a range" if known else "is no family"
-        hint = choices(str(name), [family.name for family in drawn])
+        hint = choices(name, [family.name for family in drawn])
         raise DocumentError(f"{name!r} {fault}: {hint}", file=plan.file, path="family")
     return chosen
 
@@ -74,6 +75,11 @@ def screen(
     """
     of_class("plan", plan, Plan, "as of `read_plan`")
     of_class("dataset", dataset, Dataset, "as of `read_dataset`")
+    of_class("wanted", wanted, Sequence, "such as `plan.families`")
+    for family in wanted:
+        of_class("family", family, Family, "as of `plan.families`")
+        one_of(f"base of the family {family.name!r}", family.base, plan.vessels)
+    count = whole_number("count", count, 1)
     pool, test, _ = partition(plan, dataset)
     size = min(MEMBERS, max(1, NUMBERS // (len(pool) + len(test) + BINS)))
     for family in wanted:
@@ -152,10 +158,10 @@ def spread(frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def drivers(frame: pd.DataFrame, most: int = 5) -> pd.DataFrame:
+def drivers(frame: pd.DataFrame) -> pd.DataFrame:
     """What drives A in each family: rank correlations of A with a factor and with how far the factor is from 1.
 
-    The few largest, a row each: family, paths (those drawn together count once), factor, away.
+    The `DRIVERS` largest, a row each: family, paths (those drawn together count once), factor, away.
     """
     rows = []
     for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
@@ -168,6 +174,8 @@ def drivers(frame: pd.DataFrame, most: int = 5) -> pd.DataFrame:
             pair = rank_correlation(A, factor), rank_correlation(A, np.abs(factor - 1))
             rows.append((name, ", ".join(paths), *pair, max(map(abs, pair))))
     effects = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])
-    largest = effects.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(most)
+    largest = (
+        effects.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(DRIVERS)
+    )
     order = largest["family"].map(list(dict.fromkeys(effects["family"])).index)
     return largest.iloc[np.argsort(order.to_numpy(), kind="stable")].drop(columns="strength").reset_index(drop=True)

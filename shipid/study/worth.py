@@ -97,12 +97,12 @@ def _crossing(values: Array, limits: tuple[float, float]) -> Array:
     return crossing
 
 
-def runs_without_physics(table: ErrorTable, model: str, place: int, rival: str = NO_MODEL) -> Estimate:
-    """Runs that a rival needs for the error that a model has with the amount of this place.
+def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
+    """Runs that pure data needs for the error that a model has with the amount of this place.
 
     Interpolated between amounts along ln H over ln N_D; where more data made it worse, the best so far counts.
     """
-    rivals = np.stack([table.by_run(rival, k) for k in range(len(table.amounts))])
+    rivals = np.stack([table.by_run(NO_MODEL, k) for k in range(len(table.amounts))])
     values = np.vstack([rivals, table.by_run(model, place)[None]])
     limits = float(table.amounts[0]), float(table.amounts[-1])
     noise = np.array([*table.noise, table.noise[place]])

@@ -137,7 +137,7 @@ class Vessel:
             if type(value) is not float or not least < abs(value) < most  # 0 among them; most are not: quick
         }
         documents.check_values(odd, self.file)
-        document = documents.replace(self.document, values)
+        document = documents.replace(self.document, values, self.file)
         numbers = all(type(value) in (float, int) for value in values.values())
         if numbers and values.keys() <= self._units.keys() and documents.suits(model_for(document), document):
             vessel = Vessel(document, self.file)  # terms, names and units are as they were
@@ -378,7 +378,7 @@ def _check_component(path: str, group: str, block: Any, file: str) -> None:
     kind, valid = block.get("kind"), kinds(group)
     if kind not in valid:
         message = "missing" if kind is None else f"{kind!r} is no kind of {group}"
-        raise DocumentError(f"{message}: {choices(str(kind), valid)}", file=file, path=f"{path}.kind")
+        raise DocumentError(f"{message}: {choices(kind, valid)}", file=file, path=f"{path}.kind")
     documents.parse(term_model(f"{group}.{kind}"), block, file, path)
 
 

@@ -266,7 +266,7 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "shipid.data.checks:check_dataset": lambda *_: None,
         "shipid.identification.outcome:check": lambda *_, **__: None,
         "shipid.cli.identify:_look": lambda *_: None,
-        "shipid.hybrid.device:check_device": lambda *_: None,
+        "shipid.engine.engines:check_device": lambda *_: None,
         "shipid.engine.engines:named": lambda *_: None,
         "shipid.study.prepare:obtain": lambda *_: LOG,
         "shipid.study.screen:notes": lambda *_: [],

@@ -392,6 +392,9 @@ def test_parameters_with_names_are_taken_by_name() -> None:
         ({"step": -0.5}, "step must be a number above 0"),
         ({"step": "0.5"}, "step must be a number above 0"),
         ({"num_steps": 4.5}, "num_steps must be a whole number, 1 or more, not 4.5"),
+        ({"device": "nope"}, "PyTorch has no such device here: use cpu"),
+        ({"device": None}, "PyTorch has no such device here: use cpu"),
+        ({"components": pd.DataFrame({"waves": [1.0]})}, "has no term 'waves' whose components are drawn"),
         ({"every": 0}, "every must be a whole number, 1 or more, not 0"),
         ({"tau_extra": 1e5}, r"tau_extra must be \(3,\), \(2, 3\) or \(4, 2, 3\), not \(\)"),
         ({"tau_extra": np.zeros((2, 1))}, r"tau_extra must be .*, not \(2, 1\)"),
@@ -407,6 +410,16 @@ def test_a_wrong_argument_is_one_line(wrong: dict[str, Any], message: str) -> No
     ship = load_vessel("gunnerus-28.9")
     with pytest.raises(ShipidError, match=message):
         rollout(ship, **{**marked(ship), "step": 0.5, "num_steps": 4, **wrong})
+
+
+@pytest.mark.parametrize("name", ["bow.n", "port.alhpa"])
+def test_a_command_that_the_vessel_does_not_have_is_refused(name: str) -> None:
+    """Before, it was passed over without a word."""
+    ship = load_vessel("gunnerus-28.9")
+    given = marked(ship)
+    given["commands"] = {**given["commands"], name: np.zeros(2)}
+    with pytest.raises(ShipidError, match=f"commands: .* has no '{name}'"):
+        rollout(ship, **given, step=0.5, num_steps=4)
 
 
 def test_a_start_has_no_series() -> None:
@@ -426,3 +439,5 @@ def test_a_channel_that_was_not_recorded_is_named() -> None:
     path = rollout(ship, **marked(ship), step=0.5, num_steps=4, keep=["north", "east"])
     with pytest.raises(ShipidError, match="no channel 'u' was recorded: valid: east, north"):
         path["u"]
+    with pytest.raises(ShipidError, match="was recorded: valid: east, north"):
+        path[np.zeros(2)]  # type: ignore[index]

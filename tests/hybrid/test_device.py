@@ -12,8 +12,9 @@ import pytest
 import torch
 from threadpoolctl import threadpool_info
 
+from shipid.engine.engines import check_device
 from shipid.errors import ShipidError
-from shipid.hybrid.device import check_device, use_threads, vectors
+from shipid.hybrid.device import use_threads, vectors
 
 
 def threads() -> set[int]:
@@ -53,7 +54,8 @@ def test_a_library_that_is_loaded_afterwards_has_no_more_threads() -> None:
 
 def test_the_processor_needs_no_pytorch() -> None:
     code = (
-        "import sys; from shipid.hybrid.device import *; check_device('cpu'); print(vectors(), 'torch' in sys.modules)"
+        "import sys; from shipid.engine.engines import check_device; from shipid.hybrid.device import vectors; "
+        "check_device('cpu'); print(vectors(), 'torch' in sys.modules)"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout == f"{vectors()} False\n"

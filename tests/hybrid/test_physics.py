@@ -202,3 +202,28 @@ def test_physics_of_a_wrong_argument_is_refused(wrong: dict[str, Any], message: 
     """Before, every integrator but `euler` was rk4, `Euler` too."""
     with pytest.raises(ShipidError, match=message):
         Physics(**{"vessel": SHIP, "horizon": 5, "step": 1.0, **wrong})
+
+
+def test_without_a_vessel_there_is_nothing_to_roll_out(windows: Windows) -> None:
+    """Before, an AssertionError; paths are zero."""
+    none = Physics(None, windows.horizon, windows.step)
+    for ask in (
+        lambda: none.states(windows.instants()),
+        lambda: none.variant_paths(windows.instants()),
+        lambda: none.distances(windows.instants(), windows.future),
+        lambda: none.gradient(windows.instants(), windows.future, []),
+    ):
+        with pytest.raises(ShipidError, match="no physics, so nothing to roll out"):
+            ask()
+
+
+def test_what_are_no_instants_or_no_paths_is_refused(windows: Windows) -> None:
+    for physics in (RIGHT, Physics(None, 5, 1.0)):
+        with pytest.raises(
+            DataError, match=r"instants must be an Instants, such as `windows\.instants\(\)`, not Windows"
+        ):
+            physics.paths(windows)  # type: ignore[arg-type]
+    with pytest.raises(DataError, match=r"future must be \(\d+, \d+, 2\), not \(2, \d+, 2\)"):
+        RIGHT.distances(windows.instants(), windows.future[:2])
+    with pytest.raises(DataError, match="future must be an array of numbers"):
+        RIGHT.gradient(windows.instants(), "x", ["inertia.m"])  # type: ignore[arg-type]

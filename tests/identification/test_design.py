@@ -150,7 +150,7 @@ def test_predictions_go_on_as_the_run_was_logged(name: str) -> None:
     ship = variety()[name]
     one = TurningCircle(n_rpm=180, approach="rest", duration=60)
     log = perform(ship, [one], step=0.2, environment={})
-    cut = _cut(ship, log, {}, 50, 5)
+    cut = _cut(ship, log, 50, 5)
     how = {"step": 0.2, "num_steps": 50, "method": "rk4", "memory": cut.memory or None}
     path = rollout(ship, cut.start, cut.commands, cut.environment, **how)  # type: ignore[arg-type]
     for state in ("u", "v", "r"):

@@ -364,6 +364,13 @@ def test_a_bad_settings_file_is_one_line(text: str, message: str, tmp_path: Path
     assert str(error.value).startswith(str(file))
 
 
+def test_a_change_of_settings_that_reaches_nothing_is_one_line() -> None:
+    """Before, `--set horizon.x=1` ended in a traceback."""
+    with pytest.raises(DocumentError, match=r"identify\.horizon is no table") as error:
+        read_settings(None, {"horizon": 20, "horizon.x": 1})
+    assert error.value.path == "identify.horizon.x"
+
+
 def test_digests_know_values_not_names_of_files(log: Dataset) -> None:
     assert Dataset(log.frame.copy(), {**log.metadata, "source": "x"}).digest == log.digest
     other = log.frame.copy()

@@ -305,7 +305,10 @@ def test_values_of_the_block_are_set_on_the_ship() -> None:
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
-    [({"inertia.mass": 8e5}, "^truth.set.inertia.mass: "), ({"inertia.m.kg": 1.0}, "^truth.set: a path goes below")],
+    [
+        ({"inertia.mass": 8e5}, "^truth.set.inertia.mass: "),
+        ({"inertia.m.kg": 1.0}, "^truth.set.inertia.m.kg: inertia.m is no table"),
+    ],
 )
 def test_a_wrong_value_of_the_block_has_its_path(wrong: dict[str, float], message: str) -> None:
     """Before, it had the path in the vessel, or none."""

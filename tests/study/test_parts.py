@@ -121,7 +121,7 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "no value": ({"repeat": {"seed": []}}, "repeat.seed", "must have 1 or more entries"),
     "an unknown block": ({"repeat": {"sead": [1]}}, "repeat.sead", "did you mean 'seed'"),
     "a part of parts": ({"repeat": {"repeat.seed": [1]}}, "repeat.repeat.seed", "no such block"),
-    "a path into a number": ({"repeat": {"truth.seed.x": [1]}}, "repeat.truth.seed.x", "is no key of this study"),
+    "a path into a number": ({"repeat": {"truth.seed.x": [1]}}, "repeat.truth.seed.x", "truth.seed is no table"),
     "a wrong value": ({"repeat": {"prediction.step": [-1.0]}}, "prediction.step", "must be above 0"),
 }
 

@@ -12,7 +12,7 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.engine import engines, native
-from shipid.errors import DataError, DocumentError
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.files import write_table
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error, summary
@@ -20,7 +20,7 @@ from shipid.study import screen as module
 from shipid.study.plan import Plan
 from shipid.study.prepare import obtain, partition, prepare, window_memory
 from shipid.study.screen import drivers, families, joined, notes, screen, spread
-from shipid.vessel.perturb import members
+from shipid.vessel.perturb import Family, members
 from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
 
@@ -194,3 +194,21 @@ def test_what_is_not_measured_is_reported(recorded: Callable[..., tuple[Plan, Da
     ]
     plan, dataset = recorded(weaving(), split={"test": 2}, family=families_)
     assert notes(plan, dataset, families(plan)) == ["R/V Gunnerus, 28.9 m: V_w, beta_w not measured, assumed 0"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"count": -1}, "count must be a whole number, 1 or more, not -1"),
+        ({"count": "x"}, "count must be a whole number"),
+        ({"wanted": None}, "wanted must be a Sequence, such as `plan.families`, not NoneType"),
+        ({"wanted": ["wrong"]}, "family must be a Family, as of `plan.families`, not 'wrong'"),
+        ({"wanted": [Family(name="z", base="mariner")]}, "base of the family 'z' 'mariner' is not known"),
+        ({"wanted": [Family(name="z")]}, "base of the family 'z' None is not known"),
+    ],
+)
+def test_a_wrong_argument_is_one_line(plan: Plan, wrong: dict[str, Any], message: str) -> None:
+    """Before, a negative count gave no rows without a word, and the others were tracebacks."""
+    given: dict[str, Any] = {"wanted": plan.families, "count": 2, **wrong}
+    with pytest.raises(ShipidError, match=message):
+        next(screen(plan, obtain(plan), **given))

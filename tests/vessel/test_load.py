@@ -190,6 +190,14 @@ def test_a_new_value_that_no_document_may_hold_is_named(path: str, value: object
     assert raised.value.path == path
 
 
+def test_a_new_value_below_a_number_is_refused() -> None:
+    """Before, it was a TypeError of a dict."""
+    ship = load_vessel("gunnerus-28.9")
+    with pytest.raises(DocumentError, match=r"inertia\.m is no table: nothing can be below it") as raised:
+        ship.with_values({"inertia.m.x": 1.0})
+    assert (raised.value.path, raised.value.file) == ("inertia.m.x", ship.file)
+
+
 @pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "mariner", "gunnerus-33.9"])
 def test_numbers_of_numpy_are_numbers(name: str) -> None:
     """Equations assembled from them first hold every term, and the document is the one of plain numbers."""
