@@ -25,6 +25,7 @@ from pydantic import Field, field_validator
 
 from shipid.data.dataset import DATED, Array
 from shipid.errors import DataError
+from shipid.logs.foreign import ENOUGH, foreign
 from shipid.logs.repairs import Strict
 from shipid.units import KNOT
 
@@ -268,14 +269,16 @@ def _hour_back(steps: Any) -> Any:
 
 def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
+    if form.skip_rows == 0:
+        _refuse_foreign(file)
     with file.open("rb") as stream:
         head = stream.read(LONGEST_LINE)
-        if b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32")):
-            raise DataError(
-                "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding",
-                file=file,
-                path="format.encoding",
-            )
+    if b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32")):
+        kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, head[:4096])), None)
+        message = "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding"
+        if kind is not None:
+            raise DataError(f"is no text: set [format] kind = {kind!r}", file=file, path="format.kind")
+        raise DataError(message, file=file, path="format.encoding")
     widest(head, form.separator, file)
     return parse_text(file, form, file)
 
@@ -509,7 +512,16 @@ def _decimal(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
     return column.str.replace(",", ".") if form.decimal == "," else column
 
 
+def _refuse_foreign(file: Path) -> None:
+    """Raise DataError with the remedy where a file is of a kind that no reader reads."""
+    with file.open("rb") as stream:
+        other = foreign(stream.read(ENOUGH))
+    if other is not None:
+        raise DataError(other.sentence, file=file, path="format.kind")
+
+
 def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:
+    _refuse_foreign(file)
     try:
         stored = pyarrow.parquet.read_table(file)
         plain = [place for place, field in enumerate(stored.schema) if not pyarrow.types.is_nested(field.type)]
@@ -526,6 +538,7 @@ def _mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
     """
     from scipy.io import loadmat
 
+    _refuse_foreign(file)
     try:
         variables = loadmat(file, simplify_cells=True)
         vectors, other = dict(_vectors(variables)), dict(_no_vectors(variables))
@@ -607,6 +620,7 @@ def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
     """Return sentences as rows: `time` [s] and the columns of `SENTENCES`, NaN where a sentence has no value."""
     import pynmea2
 
+    _refuse_foreign(file)
     rows: list[dict[str, float]] = []
     unreadable, clock = 0, _Clock()
     for number, line in enumerate(file.read_bytes().decode("latin-1").splitlines(), start=1):
@@ -790,7 +804,7 @@ def _is_parquet(_: Path, head: bytes) -> dict[str, Any] | None:
 
 
 def _is_mat(_: Path, head: bytes) -> dict[str, Any] | None:
-    return {"kind": "mat"} if head.startswith((b"MATLAB 5.0", b"\x89HDF")) else None
+    return {"kind": "mat"} if head.startswith((b"MATLAB 5.0", b"MATLAB 7.3")) else None
 
 
 def _is_nmea(_: Path, head: bytes) -> dict[str, Any] | None:

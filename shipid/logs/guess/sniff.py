@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
+from shipid.logs.foreign import foreign
 from shipid.logs.guess.words import is_run, parts_of, units_in
 from shipid.logs.importing import even_clock, repeated_rows, rounding_of
 from shipid.logs.mapping import EPOCHS, clock_seconds, since_midnight
@@ -51,17 +52,6 @@ CLOCK_WORDS = frozenset(
         "gmt datenum"
     ).split()
 )
-PACKED = {
-    b"\x1f\x8b": "packed by gzip",
-    b"BZh": "packed by bzip2",
-    b"\xfd7zXZ": "packed by xz",
-    b"7z\xbc\xaf": "a 7z archive",
-    b"PK\x03\x04": "a ZIP archive, or a workbook (.xlsx, .ods)",
-    b"\xd0\xcf\x11\xe0": "an old workbook (.xls)",
-    b"SQLite format 3": "a data base of SQLite",
-    b"\x89HDF": "an HDF5 file",
-}
-"""First bytes of a file that is no log as it is -> what it is."""
 WRITTEN = {
     "ns": "ns nsec nanos nanosec nanoseconds",
     "us": "us usec micros microsec microseconds",
@@ -180,6 +170,9 @@ def _sample(file: Path, encoding: str, size: int) -> str:
 
 
 def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
+    other = foreign(head)
+    if other is not None:
+        raise DataError(other.sentence, file=file)
     for reader in READERS.values():
         form = reader.detect(file, head) if reader.detect else None
         if form is not None:
@@ -191,9 +184,6 @@ def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
 def _encoding(head: bytes, file: Path) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    packed = next((name for mark, name in PACKED.items() if head.startswith(mark)), None)
-    if packed is not None:
-        raise DataError(f"{packed}: unpack it, or export the log as text or Parquet", file=file)
     if b"\0" in head:
         raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
     for encoding in ("utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8", "cp1252"):
