@@ -38,6 +38,7 @@ from shipid.logs.mapping import (
     Segment,
     Source,
     clock_seconds,
+    degrees_of,
     is_dated,
     read_mapping,
     to_si,
@@ -278,6 +279,8 @@ def _columns(
     for name, column in mapping.columns.items():
         table, times, form, other = files[column.file or ""]
         numbers = _numbers(table, column.source, form, other, f"columns.{name}.from")
+        if column.unit == "ddmm":
+            numbers = _of_minutes(numbers, other, f"columns.{name}.unit")
         unit = to_si(column.unit, name)
         factor = column.sign * column.factor * unit
         values = numbers * factor if factor != 1.0 else numbers
@@ -301,6 +304,17 @@ def _columns(
         columns = {name: values for name, (_, values) in channels.items()}
     rows = pd.DataFrame({"t": t, **columns, "flags": np.zeros(len(t), dtype=np.int64)}, copy=False)
     return rows, records, read, begins
+
+
+def _of_minutes(numbers: NDArray[np.float64], file: Path, path: str) -> NDArray[np.float64]:
+    """Degrees and minutes (N,) as degrees."""
+    degrees = degrees_of(numbers)
+    wrong = np.isfinite(numbers) & ~np.isfinite(degrees)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        message = f"{numbers[row]:.10g} in row {row + 1} has 60 minutes or more: is the unit deg?"
+        raise DataError(message, file=file, path=path)
+    return degrees
 
 
 def _begins(log: pd.DataFrame, t: NDArray[np.float64], parts: Parts, file: Path) -> Begins:

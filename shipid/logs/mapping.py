@@ -34,7 +34,7 @@ UNITS: dict[str, dict[str, float]] = {
     | {"date": 1.0, "datenum": 1.0, "excel": 1.0, "hhmmss": 1.0},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
-    "rad": {"rad": 1.0, "deg": DEGREE},
+    "rad": {"rad": 1.0, "deg": DEGREE, "ddmm": DEGREE},
     "rad/s": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / MINUTE},
     "rev/s": {"rev/s": 1.0, "rpm": RPM, "rad/s": 0.15915494309189535},
     "N": {"N": 1.0, "kN": 1e3},
@@ -45,7 +45,7 @@ UNITS: dict[str, dict[str, float]] = {
 mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 
 `date`, `datenum` and `excel` are read as seconds since 1970 (UTC), and so are the times of segments and breaks;
-`hhmmss` as seconds since the first midnight.
+`hhmmss` as seconds since the first midnight. `ddmm`, of latitude and longitude only, are degrees and minutes.
 """
 EPOCHS = {"datenum": 719529.0, "excel": 25569.0}
 """Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system)."""
@@ -266,6 +266,13 @@ def since_midnight(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return since
 
 
+def degrees_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Numbers (N,) such as 6326.4, 63 degrees and 26.4 minutes, in degrees; NaN where there are 60 minutes or more."""
+    size = np.abs(values)
+    degrees = size // 100 + np.where(size % 100 < 60, size % 100, np.nan) / 60.0
+    return np.asarray(np.copysign(degrees, values), dtype=np.float64)
+
+
 def is_dated(unit: str) -> bool:
     """Whether a clock in this unit is read as seconds since 1970."""
     return unit == "date" or unit in EPOCHS
@@ -320,6 +327,9 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
             hint = f"or <component>.<signal> with a signal of {', '.join((*named('command'), *named('output')))}"
             raise DocumentError(f"unknown column: {choices(name, mapped)} ({hint})", file=file, path=path)
         _factor(column.unit, unit, file, f"{path}.unit")
+        if column.unit == "ddmm" and name not in ("latitude", "longitude"):
+            message = "only latitude and longitude are in degrees and minutes: write deg or rad"
+            raise DocumentError(message, file=file, path=f"{path}.unit")
         if (column.direction is None) == (name == "beta_w"):
             message = "must be 'towards' or 'from' for beta_w, and belongs to no other column"
             raise DocumentError(message, file=file, path=f"{path}.direction")

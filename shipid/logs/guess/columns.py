@@ -24,6 +24,7 @@ from shipid.logs.guess.defects import defects_of_motion, defects_of_rows, defect
 from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import Frame, choose_pose
+from shipid.logs.guess.scales import take_scales
 from shipid.logs.guess.sniff import Sniffed, is_clock
 from shipid.logs.guess.sources import Source, read_source
 from shipid.logs.guess.unused import reasons
@@ -93,6 +94,7 @@ def guess(
     state.taken.update(numbering)
     if source.parts:
         _runs(state, source)
+    take_scales(state)
     if len(state.chosen.first) < 5:
         raise DataError(f"{len(sniffed.t)} rows are too few for a draft", file=source.path)
     outputs = reserve_outputs(state)
