@@ -219,7 +219,10 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
     ]
     rows, more = apply_repairs(rows, others, off, file)
     rows, estimated = _estimated(rows, mapping, file) if mapping.estimate is not None else (rows, [])
-    if "beta_w" in mapping.columns and mapping.columns["beta_w"].relative:
+    relative = mapping.columns["beta_w"].relative if "beta_w" in mapping.columns else False
+    if relative == "angle":
+        rows = rows.assign(beta_w=rows["beta_w"] + rows["psi"])
+    elif relative:
         rows = _true_wind(rows)
     known = [name for name in (*required(), *optional()) if name in rows]
     commands = [str(name) for name in rows.columns if is_command(str(name))]

@@ -138,7 +138,7 @@ class Column(Strict):
     sign: Literal[-1, 1] = 1
     frame: Literal["body", "earth"] = "body"
     direction: Literal["towards", "from"] | None = None
-    relative: bool = False
+    relative: bool | Literal["angle"] = False
     wrap: bool = False
     latency: float = 0.0
     interpolation: Literal["linear", "previous", "angle"] | None = None
