@@ -345,7 +345,9 @@ def _passed_over(table: pd.DataFrame) -> Records:
     note = "no NMEA 0183 sentence, or its checksum fails"
     records: Records = [{"kind": "unreadable", "column": "", "count": count, "note": note}] if count else []
     ragged = table.attrs.get("ragged", [])
-    note = f"lines with another number of cells, the first is line {ragged[0]}" if ragged else ""
+    note = (
+        f"lines that repeat the header or have another number of cells, the first is line {ragged[0]}" if ragged else ""
+    )
     return [*records, {"kind": "ragged", "column": "", "count": len(ragged), "note": note}] if ragged else records
 
 

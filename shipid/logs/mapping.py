@@ -13,7 +13,7 @@ from pydantic import Field, SerializeAsAny
 from shipid import document
 from shipid.data.dataset import DATED, STANDARD_DEVIATIONS, optional, required, unit_of
 from shipid.errors import DocumentError, choices
-from shipid.logs.readers import DAY, LAST_DATE, READERS, Format, TextFormat, over_midnights
+from shipid.logs.readers import DAY, LAST_DATE, NEXT_DAY, READERS, Format, TextFormat, over_midnights
 from shipid.logs.repairs import (
     INPUTS,
     REPAIRS,
@@ -31,7 +31,7 @@ from shipid.units import DEGREE, KNOT, MINUTE, RPM
 
 UNITS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": MINUTE, "h": 3600.0, "d": DAY}
-    | {"date": 1.0, "datenum": 1.0, "excel": 1.0, "hhmmss": 1.0},
+    | {"date": 1.0, "datenum": 1.0, "excel": 1.0, "hhmmss": 1.0, "s of day": 1.0, "s of week": 1.0},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
     "rad": {"rad": 1.0, "deg": DEGREE, "ddmm": DEGREE},
@@ -49,6 +49,8 @@ mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 """
 EPOCHS = {"datenum": 719529.0, "excel": 25569.0}
 """Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system)."""
+AGAIN = {"s of day": DAY, "s of week": 7 * DAY}
+"""Unit of a clock in seconds that begins again -> after how many seconds."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
 ESTIMATED = ("u", "v", "r")
 Manoeuvre = Literal[
@@ -253,6 +255,9 @@ def clock_seconds(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]
     """Numbers (N,) of a clock in one of its units as seconds; days of MATLAB and Excel as seconds since 1970."""
     if unit == "hhmmss":
         return since_midnight(values)
+    if unit in AGAIN:
+        steps = np.diff(values, prepend=values[:1])
+        return np.asarray(values + AGAIN[unit] * np.cumsum(steps < NEXT_DAY - AGAIN[unit]), dtype=np.float64)
     return (values - EPOCHS[unit]) * DAY if unit in EPOCHS else values * to_si(unit, "t")
 
 

@@ -40,6 +40,8 @@ DAY_OF = (
     r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)|\d\d?(?P<gap>[- ])[A-Za-z]{3}(?P=gap)\d{4}"
 )
 """A date without a time."""
+ORDINAL = r"^(\d{4})[-:/ ](\d{3})[-:/ T](\d\d:\d\d:\d\d(?:\.\d+)?)Z?$"
+"""A date with the day of the year: 2024-135 08:00:00, 2024:135:08:00:00.5."""
 ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
 """The end of a date in ISO 8601 that says its zone."""
 DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y")
@@ -71,7 +73,7 @@ class TextFormat(Format):
     header: bool = True
     names: tuple[str, ...] | None = Field(default=None, min_length=1)
     missing: tuple[str, ...] = ("", "nan", "NaN")
-    ragged: Literal["refuse", "drop"] = "refuse"  # lines with more or fewer cells than the header
+    ragged: Literal["refuse", "drop"] = "refuse"  # lines with more or fewer cells than the header, or its names again
 
     @field_validator("separator")
     @classmethod
@@ -166,6 +168,10 @@ def seconds(dates: pd.Series[Any]) -> Array:
             texts = texts.str.replace(r",\s+", " ", regex=True).str.replace(",", ".")
         if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
             return _since_midnight(dates)
+        ordinal = texts.str.extract(ORDINAL)
+        if len(texts) and ordinal.notna().all(axis=None):
+            joined = ordinal[0] + " " + ordinal[1] + " " + ordinal[2]
+            return _since_1970(_moments(joined, "%Y %j %H:%M:%S").reindex(dates.index))
         written = ways_of(texts)
         if written:
             moments = min((_moments(texts, one) for one in written), key=_unlikely)
@@ -331,9 +337,10 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
     if not len(table):
         raise _nothing_left(form, file)
     names, table = _named_columns(table, form, file)
+    table, again = _without_headers(table, names, form, file)
     table, ragged = _without_ragged(table, names, source, form, file)
     table.columns = pd.Index(names)
-    table.attrs["ragged"] = ragged
+    table.attrs["ragged"] = sorted([*again, *ragged])
     return table.reset_index(drop=True)
 
 
@@ -371,6 +378,29 @@ def _named_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[l
     if form.header:
         return ["" if pd.isna(name) else str(name).strip() for name in table.iloc[0]], table.iloc[1:]
     return [str(number + 1) if number < width else "" for number in range(table.shape[1])], table
+
+
+def _without_headers(
+    table: pd.DataFrame, names: list[str], form: TextFormat, file: Path
+) -> tuple[pd.DataFrame, list[int]]:
+    """Return the rows that do not repeat the header, and the line numbers of the others; refuse them if so declared.
+
+    Files that were put one behind the other have such lines.
+    """
+    named = [index for index, name in enumerate(names) if name]
+    again = np.zeros(len(table), dtype=bool)
+    if form.header and form.names is None and named:
+        again = table.iloc[:, named[0]].str.strip().eq(names[named[0]]).to_numpy(dtype=bool, na_value=False)
+    for index in named if again.any() else ():
+        again = again & table.iloc[:, index].str.strip().eq(names[index]).to_numpy(dtype=bool, na_value=False)
+    if not again.any():
+        return table, []
+    lines = [int(number) + 1 + form.skip_rows for number in table.index[again]]
+    if form.ragged == "refuse":
+        more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
+        message = f"repeats the header{more}: remove the line, split the log there, or set [format] ragged = 'drop'"
+        raise DataError(message, file=file, path=f"line {lines[0]}")
+    return table.loc[~again], lines
 
 
 def _without_ragged(

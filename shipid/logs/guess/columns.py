@@ -25,6 +25,7 @@ from shipid.logs.guess.pose import Frame, choose_pose
 from shipid.logs.guess.scales import take_scales
 from shipid.logs.guess.sniff import Sniffed, is_clock
 from shipid.logs.guess.sources import Source, read_source
+from shipid.logs.guess.stuck import find_stuck
 from shipid.logs.guess.unused import reasons
 from shipid.logs.guess.wind import choose_wind
 from shipid.physics.signals import named
@@ -94,7 +95,9 @@ def guess(
         _runs(state, source)
     take_scales(state)
     if len(state.chosen.first) < 5:
-        raise DataError(f"{len(sniffed.t)} rows are too few for a draft", file=source.path)
+        rows = f"{len(sniffed.t)} rows over {sniffed.t[-1] - sniffed.t[0]:.3g} s are too few for a draft"
+        clock = f"is {sniffed.clock['from']!r} the clock, in {sniffed.clock['unit']}?"
+        raise DataError(f"{rows}: {clock}", file=source.path)
     outputs = reserve_outputs(state)
     choose_pose(state, source.path, frame)
     if state.numbered:  # or a yaw rate, which a sway speed resembles, may be taken for one
@@ -112,6 +115,7 @@ def guess(
     _others(state)
     choose_wind(state)
     defects_of_rows(state, sniffed)
+    find_stuck(state)
     defects_of_spikes(state)
     defects_of_motion(state)
     left = reasons(state, numbering)

@@ -175,16 +175,16 @@ def _jumps(state: State, path: Complex) -> None:
         sentence = f"the position jumps {count} of the files and does not come back: `data check` shows where"
         state.find("position jumps", (), 0.9, sentence)
     elif stay:
-        words = ", ".join(f"{_when(state, start)} to {_when(state, end)} ({far:.0f} m)" for start, end, far in stay[:6])
+        words = ", ".join(f"{when(state, start)} to {when(state, end)} ({far:.0f} m)" for start, end, far in stay[:6])
         repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
         state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
     if spikes and not any(one.kind == "position spikes" for one in state.findings):  # one repair mends them all
-        words = ", ".join(_when(state, (start + end) / 2) for start, end, _ in spikes[:6])
+        words = ", ".join(when(state, (start + end) / 2) for start, end, _ in spikes[:6])
         words = f"at {len(spikes)} place{'s' * (len(spikes) > 1)} of the files" if state.joined else f"near {words}"
         state.find("position spikes", (), 0.8, f"the position leaves and comes back {words}", OF_POSITIONS)
 
 
-def _when(state: State, t: float) -> str:
+def when(state: State, t: float) -> str:
     """A time [s] as the clock of the log has it: a date, or a number."""
     return date_of(t) if is_date(t, state.clock_unit) else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
 
@@ -212,7 +212,7 @@ def _times(state: State, rows: NDArray[np.intp]) -> str:
     count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
     if state.joined:
         return f"in {count} of the files"
-    words = ", ".join(_when(state, float(state.t[row])) for row in rows[:FEW])
+    words = ", ".join(when(state, float(state.t[row])) for row in rows[:FEW])
     return f"near {words}" if len(rows) <= FEW else f"in {count}, the first near {words}"
 
 

@@ -86,7 +86,7 @@ def _by_motion(state: State, speed: str, angle: str, drafted: Reading) -> tuple[
     beta = state.columns[angle] * to_si(likely_unit(state, angle, "beta_w"), "beta_w")
     spans = _turns(state.t, state.psi)
     written = unit_in_name(speed, "m/s")
-    units = (written,) if written else SPEEDS
+    units: tuple[str, ...] = (written,) if written else SPEEDS
     readings = [drafted, Reading("true", drafted.unit, drafted.direction)]
     readings += [Reading("angle", drafted.unit, drafted.direction)]
     readings += [Reading("apparent", unit, way) for unit in units for way in ("from", "towards")]
@@ -107,8 +107,8 @@ def _by_motion(state: State, speed: str, angle: str, drafted: Reading) -> tuple[
         best = plain  # the kind is sure, unit and direction are not
     alike = {one.unit for one in left if one.kind == best.kind and left[one] < left[best] / CLEARLY}
     if best.kind == "apparent" and len(alike) > 1:
-        units = ", ".join(sorted(alike - {best.unit}))
-        state.ask(("V_w",), f"is {speed!r} in {best.unit}? The motion of the ship fits {units} nearly as well")
+        rivals = ", ".join(sorted(alike - {best.unit}))
+        state.ask(("V_w",), f"is {speed!r} in {best.unit}? The motion of the ship fits {rivals} nearly as well")
     how = {"apparent": f" in {best.unit}, {best.direction!r}"}.get(best.kind, "")
     turned = f"while the ship turns, {WORDS[best.kind]}{how}, changes by {left[best]:.2g} m/s (RMS)"
     sentence = (
