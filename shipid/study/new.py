@@ -328,6 +328,9 @@ def _path(seen: Survey, dataset: Dataset, horizon: float) -> Choice:
     half, whole = (separation(dataset, lag) for lag in (horizon / 2, horizon))
     parting = f"{half:.2g} m in {horizon / 2:g} s, {whole:.2g} m in {horizon:g} s"
     apart = f"positions and the integral of u, v, psi part by {parting}"
+    if seen.stream is not None:
+        what = f"u and v look like speeds through the water ({_flow(seen)}), and the true path is the positions"
+        return Choice("data.path", "position", f"{apart} (RMS): {what}")
     if share <= UNTRUE_PATHS and whole < GROWING * half:
         why = f"{apart} (RMS): that does not grow, so it is jitter of the positions, and the true path is the integral"
         return Choice("data.path", "velocity", why)
@@ -339,7 +342,21 @@ def _path(seen: Survey, dataset: Dataset, horizon: float) -> Choice:
     return Choice("data.path", "velocity", f"{away} by more than 5 % of the way; {scatter}")
 
 
+def _flow(seen: Survey) -> str:
+    """The current that u and v lack, in words."""
+    assert seen.stream is not None
+    current, share = seen.stream
+    towards = float(np.degrees(np.angle(current))) % 360.0
+    return f"a steady {abs(current):.2g} m/s towards {towards:.0f} deg explains {share:.0%} of the difference"
+
+
 def _wrong_velocities(seen: Survey) -> Iterator[str]:
+    if seen.stream is not None:
+        yield (
+            f"u and v look like speeds through the water, not over ground: {_flow(seen)}. "
+            "Leave them out of the mapping, write [estimate] in their place, and import again"
+        )
+        return
     if abs(seen.factor - 1) > SYSTEMATIC:
         size, turn = abs(seen.factor), float(np.degrees(np.angle(seen.factor)))
         yield (
