@@ -65,3 +65,20 @@ def test_a_slow_receiver_in_a_fast_log_is_not_stuck(every: int, tmp_path: Path) 
     frame[["SOG", "COG"]] = frame[["SOG", "COG"]].to_numpy()[held]
     frame.to_csv(tmp_path / "log.csv", index=False)
     assert "frozen sensor" not in guess(tmp_path / "log.csv").kinds
+
+
+@pytest.mark.parametrize(("name", "share", "told"), [("SOG", 0.9, True), ("r", 0.7, True), ("SOG", 1.2, False)])
+def test_a_sensor_that_stops_at_a_limit_is_clipped(name: str, share: float, told: bool, tmp_path: Path) -> None:
+    frame = bridge()
+    most = share * np.percentile(frame[name].abs(), 99)
+    frame.assign(**{name: frame[name].clip(-most, most)}).to_csv(tmp_path / "log.csv", index=False)
+    found = [finding for finding in guess(tmp_path / "log.csv").findings if finding.kind == "clipped"]
+    assert [finding.columns for finding in found if finding.columns == (name,)] == ([(name,)] if told else [])
+
+
+@pytest.mark.parametrize("decimals", [0, 1])
+def test_a_speed_in_coarse_steps_is_not_clipped(decimals: int, tmp_path: Path) -> None:
+    frame = bridge().assign(SOG=lambda x: (x["SOG"] / 0.5144).round(decimals))
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    found = [finding for finding in guess(tmp_path / "log.csv").findings if finding.kind == "clipped"]
+    assert ("SOG",) not in [finding.columns for finding in found]
