@@ -38,6 +38,7 @@ from shipid.logs.mapping import (
     Segment,
     Source,
     clock_seconds,
+    degrees_of,
     is_dated,
     read_mapping,
     to_si,
@@ -218,7 +219,10 @@ def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Prog
     ]
     rows, more = apply_repairs(rows, others, off, file)
     rows, estimated = _estimated(rows, mapping, file) if mapping.estimate is not None else (rows, [])
-    if "beta_w" in mapping.columns and mapping.columns["beta_w"].relative:
+    relative = mapping.columns["beta_w"].relative if "beta_w" in mapping.columns else False
+    if relative == "angle":
+        rows = rows.assign(beta_w=rows["beta_w"] + rows["psi"])
+    elif relative:
         rows = _true_wind(rows)
     known = [name for name in (*required(), *optional()) if name in rows]
     commands = [str(name) for name in rows.columns if is_command(str(name))]
@@ -278,6 +282,8 @@ def _columns(
     for name, column in mapping.columns.items():
         table, times, form, other = files[column.file or ""]
         numbers = _numbers(table, column.source, form, other, f"columns.{name}.from")
+        if column.unit == "ddmm":
+            numbers = _of_minutes(numbers, other, f"columns.{name}.unit")
         unit = to_si(column.unit, name)
         factor = column.sign * column.factor * unit
         values = numbers * factor if factor != 1.0 else numbers
@@ -301,6 +307,17 @@ def _columns(
         columns = {name: values for name, (_, values) in channels.items()}
     rows = pd.DataFrame({"t": t, **columns, "flags": np.zeros(len(t), dtype=np.int64)}, copy=False)
     return rows, records, read, begins
+
+
+def _of_minutes(numbers: NDArray[np.float64], file: Path, path: str) -> NDArray[np.float64]:
+    """Degrees and minutes (N,) as degrees."""
+    degrees = degrees_of(numbers)
+    wrong = np.isfinite(numbers) & ~np.isfinite(degrees)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        message = f"{numbers[row]:.10g} in row {row + 1} has 60 minutes or more: is the unit deg?"
+        raise DataError(message, file=file, path=path)
+    return degrees
 
 
 def _begins(log: pd.DataFrame, t: NDArray[np.float64], parts: Parts, file: Path) -> Begins:
@@ -328,7 +345,9 @@ def _passed_over(table: pd.DataFrame) -> Records:
     note = "no NMEA 0183 sentence, or its checksum fails"
     records: Records = [{"kind": "unreadable", "column": "", "count": count, "note": note}] if count else []
     ragged = table.attrs.get("ragged", [])
-    note = f"lines with another number of cells, the first is line {ragged[0]}" if ragged else ""
+    note = (
+        f"lines that repeat the header or have another number of cells, the first is line {ragged[0]}" if ragged else ""
+    )
     return [*records, {"kind": "ragged", "column": "", "count": len(ragged), "note": note}] if ragged else records
 
 

@@ -13,7 +13,7 @@ from pydantic import Field, SerializeAsAny
 from shipid import document
 from shipid.data.dataset import DATED, STANDARD_DEVIATIONS, optional, required, unit_of
 from shipid.errors import DocumentError, choices
-from shipid.logs.readers import DAY, LAST_DATE, READERS, Format, TextFormat, over_midnights
+from shipid.logs.readers import DAY, LAST_DATE, NEXT_DAY, READERS, Format, TextFormat, over_midnights
 from shipid.logs.repairs import (
     INPUTS,
     REPAIRS,
@@ -31,10 +31,10 @@ from shipid.units import DEGREE, KNOT, MINUTE, RPM
 
 UNITS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": MINUTE, "h": 3600.0, "d": DAY}
-    | {"date": 1.0, "datenum": 1.0, "excel": 1.0, "hhmmss": 1.0},
+    | {"date": 1.0, "datenum": 1.0, "excel": 1.0, "hhmmss": 1.0, "s of day": 1.0, "s of week": 1.0},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
-    "rad": {"rad": 1.0, "deg": DEGREE},
+    "rad": {"rad": 1.0, "deg": DEGREE, "ddmm": DEGREE},
     "rad/s": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / MINUTE},
     "rev/s": {"rev/s": 1.0, "rpm": RPM, "rad/s": 0.15915494309189535},
     "N": {"N": 1.0, "kN": 1e3},
@@ -45,10 +45,12 @@ UNITS: dict[str, dict[str, float]] = {
 mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 
 `date`, `datenum` and `excel` are read as seconds since 1970 (UTC), and so are the times of segments and breaks;
-`hhmmss` as seconds since the first midnight.
+`hhmmss` as seconds since the first midnight. `ddmm`, of latitude and longitude only, are degrees and minutes.
 """
 EPOCHS = {"datenum": 719529.0, "excel": 25569.0}
 """Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system)."""
+AGAIN = {"s of day": DAY, "s of week": 7 * DAY}
+"""Unit of a clock in seconds that begins again -> after how many seconds."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
 ESTIMATED = ("u", "v", "r")
 Manoeuvre = Literal[
@@ -138,7 +140,7 @@ class Column(Strict):
     sign: Literal[-1, 1] = 1
     frame: Literal["body", "earth"] = "body"
     direction: Literal["towards", "from"] | None = None
-    relative: bool = False
+    relative: bool | Literal["angle"] = False
     wrap: bool = False
     latency: float = 0.0
     interpolation: Literal["linear", "previous", "angle"] | None = None
@@ -253,6 +255,9 @@ def clock_seconds(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]
     """Numbers (N,) of a clock in one of its units as seconds; days of MATLAB and Excel as seconds since 1970."""
     if unit == "hhmmss":
         return since_midnight(values)
+    if unit in AGAIN:
+        steps = np.diff(values, prepend=values[:1])
+        return np.asarray(values + AGAIN[unit] * np.cumsum(steps < NEXT_DAY - AGAIN[unit]), dtype=np.float64)
     return (values - EPOCHS[unit]) * DAY if unit in EPOCHS else values * to_si(unit, "t")
 
 
@@ -264,6 +269,13 @@ def since_midnight(values: NDArray[np.float64]) -> NDArray[np.float64]:
     known = np.flatnonzero(np.isfinite(since))
     since[known] = over_midnights(since[known])
     return since
+
+
+def degrees_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Numbers (N,) such as 6326.4, 63 degrees and 26.4 minutes, in degrees; NaN where there are 60 minutes or more."""
+    size = np.abs(values)
+    degrees = size // 100 + np.where(size % 100 < 60, size % 100, np.nan) / 60.0
+    return np.asarray(np.copysign(degrees, values), dtype=np.float64)
 
 
 def is_dated(unit: str) -> bool:
@@ -320,6 +332,9 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
             hint = f"or <component>.<signal> with a signal of {', '.join((*named('command'), *named('output')))}"
             raise DocumentError(f"unknown column: {choices(name, mapped)} ({hint})", file=file, path=path)
         _factor(column.unit, unit, file, f"{path}.unit")
+        if column.unit == "ddmm" and name not in ("latitude", "longitude"):
+            message = "only latitude and longitude are in degrees and minutes: write deg or rad"
+            raise DocumentError(message, file=file, path=f"{path}.unit")
         if (column.direction is None) == (name == "beta_w"):
             message = "must be 'towards' or 'from' for beta_w, and belongs to no other column"
             raise DocumentError(message, file=file, path=f"{path}.direction")

@@ -25,6 +25,7 @@ from pydantic import Field, field_validator
 
 from shipid.data.dataset import DATED, Array
 from shipid.errors import DataError
+from shipid.logs.foreign import ENOUGH, foreign
 from shipid.logs.repairs import Strict
 from shipid.units import KNOT
 
@@ -39,13 +40,14 @@ DAY_OF = (
     r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)|\d\d?(?P<gap>[- ])[A-Za-z]{3}(?P=gap)\d{4}"
 )
 """A date without a time."""
+ORDINAL = r"^(\d{4})[-:/ ](\d{3})[-:/ T](\d\d:\d\d:\d\d(?:\.\d+)?)Z?$"
+"""A date with the day of the year: 2024-135 08:00:00, 2024:135:08:00:00.5."""
 ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
 """The end of a date in ISO 8601 that says its zone."""
 DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y")
 DAYS += ("%d-%m-%Y", "%m-%d-%Y", "%y/%m/%d", "%d-%b-%Y", "%d %b %Y")
 HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
-NUMBER = r"[-+]?[\d.,]+(?:[eE][-+]?\d+)?"
 SAMPLES = 60  # texts by which the way of writing is looked for
 _DOTTED = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})")
 _DATED = re.compile(r"\d{4}([-/]?)\d\d\1\d\d")
@@ -71,7 +73,7 @@ class TextFormat(Format):
     header: bool = True
     names: tuple[str, ...] | None = Field(default=None, min_length=1)
     missing: tuple[str, ...] = ("", "nan", "NaN")
-    ragged: Literal["refuse", "drop"] = "refuse"  # lines with more or fewer cells than the header
+    ragged: Literal["refuse", "drop"] = "refuse"  # lines with more or fewer cells than the header, or its names again
 
     @field_validator("separator")
     @classmethod
@@ -166,6 +168,10 @@ def seconds(dates: pd.Series[Any]) -> Array:
             texts = texts.str.replace(r",\s+", " ", regex=True).str.replace(",", ".")
         if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
             return _since_midnight(dates)
+        ordinal = texts.str.extract(ORDINAL)
+        if len(texts) and ordinal.notna().all(axis=None):
+            joined = ordinal[0] + " " + ordinal[1] + " " + ordinal[2]
+            return _since_1970(_moments(joined, "%Y %j %H:%M:%S").reindex(dates.index))
         written = ways_of(texts)
         if written:
             moments = min((_moments(texts, one) for one in written), key=_unlikely)
@@ -269,14 +275,16 @@ def _hour_back(steps: Any) -> Any:
 
 def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
+    if form.skip_rows == 0:
+        _refuse_foreign(file)
     with file.open("rb") as stream:
         head = stream.read(LONGEST_LINE)
-        if b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32")):
-            raise DataError(
-                "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding",
-                file=file,
-                path="format.encoding",
-            )
+    if b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32")):
+        kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, head[:4096])), None)
+        message = "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding"
+        if kind is not None:
+            raise DataError(f"is no text: set [format] kind = {kind!r}", file=file, path="format.kind")
+        raise DataError(message, file=file, path="format.encoding")
     widest(head, form.separator, file)
     return parse_text(file, form, file)
 
@@ -329,9 +337,10 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
     if not len(table):
         raise _nothing_left(form, file)
     names, table = _named_columns(table, form, file)
+    table, again = _without_headers(table, names, form, file)
     table, ragged = _without_ragged(table, names, source, form, file)
     table.columns = pd.Index(names)
-    table.attrs["ragged"] = ragged
+    table.attrs["ragged"] = sorted([*again, *ragged])
     return table.reset_index(drop=True)
 
 
@@ -367,17 +376,31 @@ def _named_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[l
         names = [*form.names, *[""] * (table.shape[1] - len(form.names))]
         return names, table
     if form.header:
-        header = table.iloc[0].fillna("").str.strip()
-        below = table.iloc[1:]
-        if header.str.fullmatch(NUMBER).any():
-            return list(header), below  # numbers are no header: equal rows may be data
-        again = np.ones(len(below), dtype=bool)  # a logger that began anew in the same file has written it again
-        for place, name in enumerate(header):
-            again &= below.iloc[:, place].fillna("").str.strip().eq(name).to_numpy()
-            if not again.any():
-                return list(header), below
-        return list(header), below.loc[~again]
+        return ["" if pd.isna(name) else str(name).strip() for name in table.iloc[0]], table.iloc[1:]
     return [str(number + 1) if number < width else "" for number in range(table.shape[1])], table
+
+
+def _without_headers(
+    table: pd.DataFrame, names: list[str], form: TextFormat, file: Path
+) -> tuple[pd.DataFrame, list[int]]:
+    """Return the rows that do not repeat the header, and the line numbers of the others; refuse them if so declared.
+
+    Files that were put one behind the other have such lines.
+    """
+    named = [index for index, name in enumerate(names) if name]
+    again = np.zeros(len(table), dtype=bool)
+    if form.header and form.names is None and named:
+        again = table.iloc[:, named[0]].str.strip().eq(names[named[0]]).to_numpy(dtype=bool, na_value=False)
+    for index in named if again.any() else ():
+        again = again & table.iloc[:, index].str.strip().eq(names[index]).to_numpy(dtype=bool, na_value=False)
+    if not again.any():
+        return table, []
+    lines = [int(number) + 1 + form.skip_rows for number in table.index[again]]
+    if form.ragged == "refuse":
+        more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
+        message = f"repeats the header{more}: remove the line, split the log there, or set [format] ragged = 'drop'"
+        raise DataError(message, file=file, path=f"line {lines[0]}")
+    return table.loc[~again], lines
 
 
 def _without_ragged(
@@ -519,7 +542,16 @@ def _decimal(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
     return column.str.replace(",", ".") if form.decimal == "," else column
 
 
+def _refuse_foreign(file: Path) -> None:
+    """Raise DataError with the remedy where a file is of a kind that no reader reads."""
+    with file.open("rb") as stream:
+        other = foreign(stream.read(ENOUGH))
+    if other is not None:
+        raise DataError(other.sentence, file=file, path="format.kind")
+
+
 def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:
+    _refuse_foreign(file)
     try:
         stored = pyarrow.parquet.read_table(file)
         plain = [place for place, field in enumerate(stored.schema) if not pyarrow.types.is_nested(field.type)]
@@ -537,6 +569,7 @@ def _mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
     """
     from scipy.io import loadmat
 
+    _refuse_foreign(file)
     try:
         variables = loadmat(file, simplify_cells=True)
         vectors, further = dict(_vectors(variables)), list(_no_vectors(variables))
@@ -623,6 +656,7 @@ def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
     """Return sentences as rows: `time` [s] and the columns of `SENTENCES`, NaN where a sentence has no value."""
     import pynmea2
 
+    _refuse_foreign(file)
     rows: list[dict[str, float]] = []
     unreadable, clock = 0, _Clock()
     for number, line in enumerate(file.read_bytes().decode("latin-1").splitlines(), start=1):
@@ -806,7 +840,7 @@ def _is_parquet(_: Path, head: bytes) -> dict[str, Any] | None:
 
 
 def _is_mat(_: Path, head: bytes) -> dict[str, Any] | None:
-    return {"kind": "mat"} if head.startswith((b"MATLAB 5.0", b"\x89HDF")) else None
+    return {"kind": "mat"} if head.startswith((b"MATLAB 5.0", b"MATLAB 7.3")) else None
 
 
 def _is_nmea(_: Path, head: bytes) -> dict[str, Any] | None:

@@ -325,12 +325,12 @@ def _path(seen: Survey, dataset: Dataset, horizon: float) -> Choice:
     share = float(seen.runs["straying"].mean())
     away = f"positions leave the integral of u, v, psi in {int(seen.runs['straying'].sum())} of {len(seen.runs)} runs"
     size, turn = abs(seen.factor), float(np.degrees(np.angle(seen.factor)))
-    if seen.stream and share > UNTRUE_PATHS:
-        why = f"{away}, by a steady {_flow(seen)}: u and v look like speeds through the water, see above"
-        return Choice("data.path", "velocity", f"{why}; the path of the integral is that through the water")
     half, whole = (separation(dataset, lag) for lag in (horizon / 2, horizon))
     parting = f"{half:.2g} m in {horizon / 2:g} s, {whole:.2g} m in {horizon:g} s"
     apart = f"positions and the integral of u, v, psi part by {parting}"
+    if seen.stream is not None:
+        what = f"u and v look like speeds through the water ({_flow(seen)}), and the true path is the positions"
+        return Choice("data.path", "position", f"{apart} (RMS): {what}")
     if share <= UNTRUE_PATHS and whole < GROWING * half:
         why = f"{apart} (RMS): that does not grow, so it is jitter of the positions, and the true path is the integral"
         return Choice("data.path", "velocity", why)
@@ -343,15 +343,18 @@ def _path(seen: Survey, dataset: Dataset, horizon: float) -> Choice:
 
 
 def _flow(seen: Survey) -> str:
-    towards = float(np.degrees(np.angle(seen.stream))) % 360.0
-    return f"{abs(seen.stream):.2g} m/s towards {towards:.0f} deg ({100 * seen.stream_share:.0f} % of the misfit)"
+    """The current that u and v lack, in words."""
+    assert seen.stream is not None
+    current, share = seen.stream
+    towards = float(np.degrees(np.angle(current))) % 360.0
+    return f"a steady {abs(current):.2g} m/s towards {towards:.0f} deg explains {share:.0%} of the difference"
 
 
 def _wrong_velocities(seen: Survey) -> Iterator[str]:
-    if seen.stream and float(seen.runs["straying"].mean()) > UNTRUE_PATHS:
+    if seen.stream is not None:
         yield (
-            f"positions drift from the integral of u, v, psi by a steady {_flow(seen)}: u and v look like speeds "
-            "through the water. For motion over ground take [estimate] in the mapping in their place, and import again"
+            f"u and v look like speeds through the water, not over ground: {_flow(seen)}. "
+            "Leave them out of the mapping, write [estimate] in their place, and import again"
         )
         return
     if abs(seen.factor - 1) > SYSTEMATIC:

@@ -15,11 +15,9 @@ from shipid.physics.signals import steers
 from shipid.study.kinds import kinds_of, longest
 
 GRAVE = ("range", "overlap")  # checks that fail where a unit is wrong, spikes are left, or a run is there twice
+LAG = 10.0  # s, over which positions and velocities are compared
+WEAK, FLOW, FACTOR = 0.03, 0.5, 0.1  # of the speed; of the misfit that a current may, and that a factor must, leave
 OF_A_KIND = 3  # runs of a kind from which one may be set aside
-
-STREAM_WINDOW = 10.0  # s, over which jitter of the positions is little
-STREAM_SHARE, CLEARER = 0.6, 0.5  # least share of the misfit that a stream explains; what it leaves, of a factor's rest
-SLOW_STREAM = 0.02  # of the speed: a slower stream is not reported
 
 
 @dataclass(frozen=True)
@@ -32,16 +30,15 @@ class Survey:
     step : usual time between rows [s].
     factor : positions over integrated velocities, the best complex factor; its angle is a turn.
     faults : sentences on what no ship does, run by run.
-    stream : steady velocity [m/s], north + i east, that positions have more than u, v, psi say; 0 where there is none.
-    stream_share : share of the misfit of positions and velocities that it explains.
+    stream : steady current, north + i east [m/s], that u and v lack where they look like speeds through the water,
+        and the share of what positions and velocities part by that it explains; None where they do not.
     """
 
     runs: pd.DataFrame
     step: float
     factor: complex
     faults: tuple[str, ...] = ()
-    stream: complex = 0j
-    stream_share: float = 0.0
+    stream: tuple[complex, float] | None = None
 
     @property
     def speed(self) -> float:
@@ -78,9 +75,7 @@ def survey(dataset: Dataset) -> Survey:
     step = round(float(np.median(steps)), 6) if len(steps) else 1.0
     grave = failed[failed["check"].astype(str).str.startswith(GRAVE)]
     faults = tuple(f"run {row['run']!r}: {row['sentence']}" for row in grave.to_dict("records"))
-    return Survey(
-        pd.DataFrame(list(runs.values()), index=list(runs)), step, _factor(dataset), faults, *_stream(dataset)
-    )
+    return Survey(pd.DataFrame(list(runs.values()), index=list(runs)), step, _factor(dataset), faults, _stream(dataset))
 
 
 def _factor(dataset: Dataset) -> complex:
@@ -97,33 +92,33 @@ def _factor(dataset: Dataset) -> complex:
     return complex(np.vdot(ran, was) / size) if size > 0 else 1.0 + 0.0j
 
 
-def _stream(dataset: Dataset) -> tuple[complex, float]:
-    """The steady velocity [m/s] that u, v, psi lack, and its share of their misfit to the positions.
+def _stream(dataset: Dataset) -> tuple[complex, float] | None:
+    """The steady current, north + i east [m/s], that u and v lack, and its share of the misfit to positions.
 
-    0 where a factor explains the misfit as well: a wrong unit, or runs of one heading.
+    Changes over `LAG` are compared. None where the current explains little, where a factor explains about as much, such
+    as a wrong unit or heading on one course, or where it is weak.
     """
-    run: list[NDArray[Any]] = []
-    seen: list[NDArray[Any]] = []
-    span: list[NDArray[Any]] = []
+    run, seen, lags = [], [], []
     for _, rows in pieces(dataset):
-        t, psi = rows["t"].to_numpy(), rows["psi"].to_numpy()
-        velocity = (rows["u"].to_numpy() + 1j * rows["v"].to_numpy()) * np.exp(1j * psi)
-        way = cumulative_integral(t, velocity.real) + 1j * cumulative_integral(t, velocity.imag)
-        position = rows["north"].to_numpy() + 1j * rows["east"].to_numpy()
-        places = np.unique(np.searchsorted(t, np.arange(t[0], t[-1], STREAM_WINDOW)))
-        for into, values in ((run, way), (seen, position), (span, t)):
-            into.append(np.diff(np.asarray(values)[places]))
-    ran, was, lasted = np.concatenate(run), np.concatenate(seen), np.concatenate(span).real
-    misfit = was - ran
-    before, size, time = (float(np.sum(np.abs(one) ** 2)) for one in (misfit, ran, lasted))
-    if not (before > 0 and size > 0):
-        return 0j, 0.0
-    stream = complex(np.sum(misfit * lasted) / time)
-    factor = complex(np.vdot(ran, misfit) / size)
-    left, scaled = (float(np.sum(np.abs(misfit - one) ** 2)) for one in (stream * lasted, factor * ran))
-    speed = float(np.sum(np.abs(ran)) / np.sum(lasted))
-    clear = left < (1 - STREAM_SHARE) * before and left < CLEARER * scaled and abs(stream) > SLOW_STREAM * speed
-    return (stream, 1 - left / before) if clear else (0j, 0.0)
+        t = rows["t"].to_numpy()
+        path, position = _way(rows), rows["north"].to_numpy() + 1j * rows["east"].to_numpy()
+        last = np.minimum(np.searchsorted(t, t + LAG), len(t) - 1)
+        whole = t[last] - t >= 0.5 * LAG
+        run.append((path[last] - path)[whole])
+        seen.append((position[last] - position)[whole])
+        lags.append((t[last] - t)[whole])
+    ran, was, lag = np.concatenate(run), np.concatenate(seen), np.concatenate(lags)
+    size = float(np.vdot(ran, ran).real)
+    apart = float(np.sum(np.abs(was - ran) ** 2))
+    if size <= 0 or apart <= 0:
+        return None
+    current = complex(np.sum(lag * (was - ran)) / np.sum(lag**2))
+    left = float(np.sum(np.abs(was - ran - current * lag) ** 2))
+    by_factor = float(np.sum(np.abs(was - np.vdot(ran, was) / size * ran) ** 2))
+    weak = abs(current) < WEAK * float(np.sum(np.abs(ran)) / np.sum(lag))
+    if weak or by_factor < FACTOR * apart or left > FLOW * min(apart, by_factor):
+        return None
+    return current, 1.0 - left / apart
 
 
 def separation(dataset: Dataset, lag: float) -> float:
@@ -133,14 +128,19 @@ def separation(dataset: Dataset, lag: float) -> float:
     """
     parted = []
     for _, rows in pieces(dataset):
-        t, psi = rows["t"].to_numpy(), rows["psi"].to_numpy()
-        velocity = (rows["u"].to_numpy() + 1j * rows["v"].to_numpy()) * np.exp(1j * psi)
-        run = cumulative_integral(t, velocity.real) + 1j * cumulative_integral(t, velocity.imag)
-        apart = rows["north"].to_numpy() + 1j * rows["east"].to_numpy() - run
+        t = rows["t"].to_numpy()
+        apart = rows["north"].to_numpy() + 1j * rows["east"].to_numpy() - _way(rows)
         early = t <= t[-1] - lag
         parted.append(np.interp(t[early] + lag, t, apart) - apart[early])
     every = np.abs(np.concatenate(parted))
     return float(np.sqrt(np.mean(every**2))) if len(every) else 0.0
+
+
+def _way(rows: pd.DataFrame) -> NDArray[np.complex128]:
+    """Integral of u, v, psi from the first row of a stretch, north + i east [m]."""
+    t, psi = rows["t"].to_numpy(), rows["psi"].to_numpy()
+    velocity = (rows["u"].to_numpy() + 1j * rows["v"].to_numpy()) * np.exp(1j * psi)
+    return np.asarray(cumulative_integral(t, velocity.real) + 1j * cumulative_integral(t, velocity.imag))
 
 
 def helm_sense(dataset: Dataset) -> dict[str, float]:

@@ -27,7 +27,7 @@ def test_bundled_mappings_are_valid_and_have_a_source(name: str) -> None:
 
 DEFINED = {  # from the definitions: an inch is 25.4 mm, a nautical mile 1852 m, a turn 2 pi
     "s": {"s": 1, "ms": 1 / 1000, "us": 1 / 1000**2, "ns": 1 / 1000**3, "min": 60, "h": 60 * 60, "d": 24 * 60 * 60}
-    | {"date": 1, "datenum": 1, "excel": 1, "hhmmss": 1},
+    | {"date": 1, "datenum": 1, "excel": 1, "hhmmss": 1, "s of day": 1, "s of week": 1},
     "m": {"m": 1, "cm": 1 / 100, "mm": 1 / 1000, "km": 1000, "ft": 12 * 0.0254, "nmi": 1852},
     "m/s": {
         "m/s": 1,
@@ -37,7 +37,7 @@ DEFINED = {  # from the definitions: an inch is 25.4 mm, a nautical mile 1852 m,
         "cm/s": 1 / 100,
         "mm/s": 1 / 1000,
     },
-    "rad": {"rad": 1, "deg": 2 * math.pi / 360},
+    "rad": {"rad": 1, "deg": 2 * math.pi / 360, "ddmm": 2 * math.pi / 360},
     "rad/s": {"rad/s": 1, "deg/s": 2 * math.pi / 360, "deg/min": 2 * math.pi / 360 / 60},
     "rev/s": {"rev/s": 1, "rpm": 1 / 60, "rad/s": 1 / (2 * math.pi)},
     "N": {"N": 1, "kN": 1000},

@@ -635,12 +635,3 @@ def test_whole_seconds_may_be_written_without_a_fraction(style: str, rate: int) 
     times = seconds(texts)
     np.testing.assert_allclose(np.diff(times), 1 / rate, atol=1e-5)
     np.testing.assert_array_equal(seconds(texts.astype("category")), times)
-
-
-def test_a_header_that_comes_again_is_no_row(tmp_path: Path) -> None:
-    """Before, the log was refused: its clock had no value in that row."""
-    file = tmp_path / "log.csv"
-    file.write_text("time, rpm\n0,1\n1,2\ntime, rpm\n2,3\n time,rpm \n3,4\n")
-    table = read_table(file, TextFormat(), "time")
-    assert table["time"].tolist() == ["0", "1", "2", "3"]
-    assert table["rpm"].tolist() == ["1", "2", "3", "4"]

@@ -200,6 +200,23 @@ def test_velocities_that_drift_are_not_the_true_path(tmp_path: Path) -> None:
     assert document["data"]["path"] == "position"
 
 
+def test_speeds_through_the_water_are_said(tmp_path: Path) -> None:
+    """In a current of 0.6 m/s towards south-west, runs on eight headings: positions are no scatter."""
+    plain = trial()
+    frame, current = plain.frame.copy(), 0.6 * np.exp(1j * np.radians(225.0))
+    for index, run in enumerate(plain.runs):
+        rows = frame["run"] == run
+        place = (frame["north"] + 1j * frame["east"])[rows].to_numpy() * np.exp(1j * np.pi / 4 * index)
+        place += current * frame["t"][rows].to_numpy()
+        frame.loc[rows, "north"], frame.loc[rows, "east"] = place.real, place.imag
+        frame.loc[rows, "psi"] += np.pi / 4 * index
+    draft, document = drafted(tmp_path, Dataset(frame, plain.metadata))
+    assert document["data"]["path"] == "position"
+    words = "look like speeds through the water, not over ground: a steady 0.6 m/s towards 225 deg explains"
+    assert any(words in warning for warning in draft.warnings)
+    assert "scatter" not in draft.text
+
+
 def test_a_wrong_unit_is_reported(tmp_path: Path) -> None:
     """Knots taken for m/s: positions say half the way."""
     draft, document = drafted(tmp_path, trial(u=3600 / 1852))

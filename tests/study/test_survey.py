@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.data.dataset import Dataset
 from shipid.study.survey import helm_sense, separation, survey, typical_runs
 from tests.logs.conftest import as_dataset, turning
 
@@ -87,8 +88,9 @@ def test_speeds_through_the_water_lack_a_steady_vector(seed: int) -> None:
         east=frame["east"] + drift.imag * T + rng.normal(0, 0.3, len(T)),
     )
     seen = survey(as_dataset(moved))
-    assert seen.stream == pytest.approx(drift, abs=0.05)
-    assert seen.stream_share > 0.8
+    assert seen.stream is not None
+    assert seen.stream[0] == pytest.approx(drift, abs=0.05)
+    assert seen.stream[1] > 0.8
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -100,4 +102,34 @@ def test_jitter_and_a_wrong_unit_are_no_stream(seed: int) -> None:
     straight = turning(T, r=1e-7)
     wrong = [frame.assign(u=1.3 * frame["u"], v=1.3 * frame["v"]), straight.assign(u=1.3 * straight["u"])]
     for one in (frame, jitter, *wrong):
-        assert survey(as_dataset(one)).stream == 0
+        assert survey(as_dataset(one)).stream is None
+
+
+def drifting(current: complex, *runs: pd.DataFrame) -> Dataset:
+    """Runs with u and v through the water of a steady current, north + i east [m/s]."""
+    return as_dataset(
+        *(run.assign(north=run["north"] + current.real * T, east=run["east"] + current.imag * T) for run in runs)
+    )
+
+
+def test_speeds_through_the_water_show_the_current() -> None:
+    noise = np.random.default_rng(3).normal(0, 0.2, (2, len(T)))
+    circles = [
+        turning(T, psi0=psi0).assign(north=lambda x: x["north"] + noise[0], east=lambda x: x["east"] + noise[1])
+        for psi0 in (0.0, 2.0)
+    ]
+    stream = survey(drifting(0.4 + 0.6j, *circles)).stream
+    assert stream is not None
+    current, share = stream
+    assert current == pytest.approx(0.4 + 0.6j, abs=0.02)
+    assert share > 0.9
+    assert survey(as_dataset(*circles)).stream is None
+
+
+def test_what_is_no_current_is_none() -> None:
+    """A wrong unit, a turned heading, a drift of one straight run, and a weak current."""
+    straight = turning(T, r=1e-6)
+    assert survey(as_dataset(turning(T).assign(u=lambda x: 1.3 * x["u"], v=lambda x: 1.3 * x["v"]))).stream is None
+    assert survey(as_dataset(turning(T).assign(psi=lambda x: x["psi"] + 0.1))).stream is None
+    assert survey(drifting(0.5 + 0.3j, straight)).stream is None
+    assert survey(drifting(0.05 + 0.02j, turning(T))).stream is None

@@ -164,6 +164,8 @@ class State:
     chosen : windows over which changes are compared. taken : columns of the log that already have a meaning.
     joined : whether t runs over several files, so that it is the clock of none of them.
     spikes : column -> rows that leave it and come back at once, and the least by how much; `columns` have none of them.
+    scaled : column -> factor by which `columns` has it already, and why. units : column -> unit of the log, where
+    `columns` has it in another.
     position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
@@ -174,6 +176,8 @@ class State:
     chosen: Windows
     joined: bool = False
     spikes: dict[str, tuple[NDArray[np.intp], float]] = field(default_factory=dict)
+    scaled: dict[str, tuple[float, str]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
     taken: set[str] = field(default_factory=set)
     suggestions: list[Suggestion] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
@@ -234,6 +238,11 @@ class State:
     def suggest(self, name: str, source: str, unit: str, confidence: float, why: str, **extra: Any) -> None:
         """Suggest column `source` of the log for column `name` of the dataset; it is then taken."""
         self.taken.add(source)
+        if source in self.scaled:
+            factor, what = self.scaled[source]
+            extra["factor"] = float(f"{factor * extra.get('factor', 1.0):.9g}")
+            why = f"{why}; {what}"
+        unit = self.units.get(source, unit)
         self.suggestions.append(Suggestion(name, source, unit, round(confidence, 2), why, extra))
 
     def find(

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,16 +16,18 @@ from shipid.arguments import path_of
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
-from shipid.logs.guess.clues import Finding, Question, State, Suggestion, unit_in_name
-from shipid.logs.guess.commands import ask_for_electrical, ask_for_shares, choose_commands, likely_unit
+from shipid.logs.guess.clues import Finding, Question, State, Suggestion
+from shipid.logs.guess.commands import choose_commands, likely_unit
 from shipid.logs.guess.defects import defects_of_motion, defects_of_rows, defects_of_spikes, take_spikes
 from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import Frame, choose_pose
+from shipid.logs.guess.scales import take_scales
 from shipid.logs.guess.sniff import Sniffed, is_clock
 from shipid.logs.guess.sources import Source, read_source
+from shipid.logs.guess.stuck import find_stuck
 from shipid.logs.guess.unused import reasons
-from shipid.logs.guess.words import parts_of, wind_kind
+from shipid.logs.guess.wind import choose_wind
 from shipid.physics.signals import named
 from shipid.vessel.load import Vessel
 
@@ -93,8 +93,11 @@ def guess(
     state.taken.update(numbering)
     if source.parts:
         _runs(state, source)
+    take_scales(state)
     if len(state.chosen.first) < 5:
-        raise DataError(f"{len(sniffed.t)} rows are too few for a draft", file=source.path)
+        rows = f"{len(sniffed.t)} rows over {sniffed.t[-1] - sniffed.t[0]:.3g} s are too few for a draft"
+        clock = f"is {sniffed.clock['from']!r} the clock, in {sniffed.clock['unit']}?"
+        raise DataError(f"{rows}: {clock}", file=source.path)
     outputs = reserve_outputs(state)
     choose_pose(state, source.path, frame)
     if state.numbered:  # or a yaw rate, which a sway speed resembles, may be taken for one
@@ -109,10 +112,10 @@ def guess(
     suggest_outputs(state, outputs)
     if vessel is not None:
         name_commands(state, vessel)
-    ask_for_electrical(state)
-    ask_for_shares(state)
     _others(state)
+    choose_wind(state)
     defects_of_rows(state, sniffed)
+    find_stuck(state)
     defects_of_spikes(state)
     defects_of_motion(state)
     left = reasons(state, numbering)
@@ -136,31 +139,9 @@ def _runs(state: State, source: Source) -> None:
 
 
 def _others(state: State) -> None:
-    """Choose roll, pitch, wind and other environment columns by their names alone."""
+    """Choose roll, pitch and other environment columns by their names alone."""
     further = [name for name, row in named("environment").items() if row.names and name not in ("V_w", "beta_w")]
     for meaning in ("phi", "theta", *further):
         for name in state.called(meaning)[:1]:
             unit, sign = likely_unit(state, name, meaning), "by its name; the log does not show its sign"
             state.suggest(meaning, name, unit, 0.5, "by its name" if meaning in further else sign)
-    if {"apparent_angle", "apparent_speed"} <= set(state.free()):
-        why = "the sentence says that it is relative to the bow"
-        state.suggest("V_w", "apparent_speed", "m/s", 0.9, why)
-        state.suggest("beta_w", "apparent_angle", "deg", 0.9, why, direction="from", relative=True, wrap=True)
-    pairs = list(product(state.called("V_w"), state.called("beta_w")))
-    if pairs:
-        speed, angle = min(pairs, key=_wind_order)
-        kinds = {wind_kind(speed), wind_kind(angle)} - {""}
-        kind = kinds.pop() if len(kinds) == 1 else ""
-        reason = f"the names say {kind}" if kind else "the log does not show whether it is true or apparent"
-        state.suggest("V_w", speed, unit_in_name(speed, "m/s") or "m/s", 0.5, f"by its name; {reason}")
-        way = "from" if "towards" not in angle.lower() else "towards"
-        custom = "" if "from" in parts_of(angle) or way == "towards" else ", as is usual at sea"
-        relative: dict[str, Any] = {"relative": True} if kind == "apparent" else {}
-        why, turn = f"by its name; taken as {way!r}{custom}", likely_unit(state, angle, "beta_w")
-        state.suggest("beta_w", angle, turn, 0.5, why, direction=way, wrap=True, **relative)
-
-
-def _wind_order(pair: tuple[str, str]) -> tuple[bool, bool]:
-    """Speed and direction of one wind first, then those of the true wind; else the order of the names."""
-    kinds = [wind_kind(name) for name in pair]
-    return len({*kinds} - {""}) > 1, "true" not in kinds

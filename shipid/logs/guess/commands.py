@@ -11,7 +11,7 @@ from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import SEEN, State, unit_in_name
 from shipid.logs.guess.twins import choose_twins, twins
-from shipid.logs.guess.words import fits, is_order, parts_of, side_of
+from shipid.logs.guess.words import fits, is_electrical, is_order, parts_of, side_of, units_in
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import SIGNALS, is_command, is_shaft, named, steers
 
@@ -22,9 +22,14 @@ ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a
 TOGETHER = 0.2  # of the range of a column: how far twin rudders are apart
 TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 USUAL = np.radians(20.0)  # rudder angle of a usual turn
-ELECTRICAL = re.compile(r"(?<![A-Za-z])[eE]-?(rpm|RPM)|(?<=[a-z])ERPM|[eE]lec[a-z]*[ _-]*(rpm|RPM|Rpm)")
-SHARE = re.compile(r"%|‰|percent|per[ _]?mille?|promille|(?<![a-z])(pct|norm(ali[sz]ed)?|pwm)(?![a-z])", re.IGNORECASE)
-WIDEST_RUDDER = 90.0  # deg: no rudder turns farther
+LARGEST = 47.0  # deg: of a rudder; what is larger may be no angle
+BOTH_SIDES = 0.2  # of all turning, that is to the lesser side
+SHARES = {
+    ("per cent", "%", "pct", "percent", "prozent"): 100.0,
+    ("per mille", "‰", "permille", "promille", "permil"): 1000.0,
+    ("shares of 1", "norm", "normalised", "normalized", "-1..1", "-1...1", "-1 to 1", "p.u.", "pu"): 1.0,
+}
+"""Words for a share of the largest value -> what that value is in it."""
 NEAR = 15.0  # times from that: a unit further off is doubted
 
 
@@ -79,11 +84,52 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
                 extra["sign"] = -1
                 sentence = f"positive {name!r} turns to {sides[0]} ({seen}); here to {sides[1]}"
                 state.find("wrong sign of rudder", (name,), confidence, sentence)
+        share = _ask_for_share(state, name, signal)
+        if share or (signal == "delta" and name not in turned and _ask_for_side(state, name, r)):
+            confidence, why = 0.3, f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
+            why += " of an angle that the log does not say" if share else ", and never negative"
+            if not share:
+                extra.pop("sign", None)
+                state.findings[:] = [one for one in state.findings if one.columns != (name,)]
         component = side_of(name) or SIGNALS[signal].component
         if signal == "delta" and side_of(name):
             component = f"{side_of(name)}_rudder"
         state.suggest(unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
     return azimuth
+
+
+def _ask_for_share(state: State, name: str, signal: str) -> bool:
+    """Ask where an angle that steers may be a share of its largest one; return whether its name says that it is."""
+    top = float(np.abs(state.columns[name]).max())
+    said = {part for text in units_in(name) for part in [text.strip().lower()]} | set(parts_of(name)[-1:])
+    for words, full in SHARES.items():
+        if said & set(words):
+            remedy = f"Write factor = (deg at {full:g}) / {full:g}"
+            state.ask((signal,), f"{name!r} is in {words[0]}: of which angle? {remedy}")
+            return True
+    if unit_in_name(name, SIGNALS[signal].unit) is not None or not steers(signal):
+        return False
+    others = next((one.unit for one in state.suggestions if one.name == "psi"), None)
+    if likely_unit(state, name, signal) == "rad" and (others == "deg" or top == 1.0) and top <= 1.0:
+        text = f"{name!r}, up to {top:.4g}, has no unit: rad, deg, or a share (-1 to 1) of the largest angle?"
+        state.ask((signal,), f"{text} rad is a guess")
+    elif signal == "delta" and top > LARGEST:
+        text = f"{name!r}, up to {top:.4g}, has no unit: deg, or per cent or per mille of the largest angle?"
+        state.ask((signal,), f"{text} deg is a guess")
+    return False
+
+
+def _ask_for_side(state: State, name: str, r: Array | None) -> bool:
+    """Ask where a rudder angle is never negative and the ship turns to both sides; return whether it is so."""
+    values = state.columns[name]
+    if r is None or values.min() < 0 or np.ptp(values) == 0:
+        return False
+    sides = [float(np.sum(np.clip(sign * r, 0, None))) for sign in (1, -1)]
+    if min(sides) < BOTH_SIDES * sum(sides):
+        return False
+    text = f"{name!r} is never negative, but the ship turns to both sides: which column says the side of the rudder, "
+    state.ask(("delta",), f"{text}or which value is amidships (offset)?")
+    return True
 
 
 def _screws(state: State) -> set[str]:
@@ -154,7 +200,8 @@ def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
             fallback = AZIMUTH if azimuth and usual == SCREW else usual
             component = side_of(name) or fallback
             if SIGNALS[signal].shaft:
-                unit, confidence, why, extra = (_tunnel_unit if component in TUNNELS else _shaft_unit)(state, name)
+                tunnel = component in TUNNELS and not is_electrical(name)
+                unit, confidence, why, extra = (_tunnel_unit if tunnel else _shaft_unit)(state, name)
             else:
                 written = unit_in_name(name, SIGNALS[signal].unit)
                 unit, confidence, extra = likely_unit(state, name, signal), 0.9 if written else 0.7, {}
@@ -179,29 +226,6 @@ def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, An
     return unit, 0.4, f"{why}; in {unit} as the other shafts" if others else why, {}
 
 
-def ask_for_electrical(state: State) -> None:
-    """Ask for the pole pairs of shafts whose names say electrical turns."""
-    for one in state.suggestions:
-        if one.name.endswith(".n") and ELECTRICAL.search(one.source):
-            turns = f"{one.source!r} looks like electrical rpm of a brushless motor: that is rpm times the pole pairs"
-            state.ask(("n",), f"{turns}. Write factor = 1 / (pole pairs), with a gear also its ratio")
-
-
-def ask_for_shares(state: State) -> None:
-    """Ask for the largest angle where a rudder is no angle, by its name or as no rudder turns so far."""
-    for one in state.suggestions:
-        if not one.name.endswith(".delta") or one.source not in state.columns:
-            continue
-        largest = float(np.nanmax(np.abs(state.columns[one.source])))
-        angle = np.degrees(largest * to_si(one.unit, one.name))
-        if SHARE.search(one.source) or angle > WIDEST_RUDDER:
-            state.ask(
-                ("delta",),
-                f"{one.source!r}, up to {largest:.4g}, looks like no angle (in {one.unit} it is {angle:.3g} deg): a "
-                "share of the largest angle? Write factor = (deg at the largest value) / (largest value), unit = 'deg'",
-            )
-
-
 def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
     """Return unit, confidence, reason and further keys of a shaft speed.
 
@@ -212,6 +236,10 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
     top = float(np.abs(values).max())
     written = unit_in_name(name, "rev/s")
     why = f"by its name; up to {top:.4g}"
+    if is_electrical(name):
+        remedy = "Write factor = 2 / poles; a gear divides it further"
+        state.ask(("n",), f"{name!r}, up to {top:.4g}, is the electrical speed of a motor: of how many poles? {remedy}")
+        return "rpm", 0.3, f"{why} electrical rpm, of a number of poles that the log does not say", {"factor": 1.0}
     if written == "%":
         state.ask(("n",), f"{name!r} is in per cent: of which shaft speed? Write factor = (rpm at 100 %) / 100")
         return "rpm", 0.3, f"{why} per cent of a shaft speed that the log does not say", {"factor": 1.0}

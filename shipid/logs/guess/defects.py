@@ -20,6 +20,14 @@ POSITIONS = ("latitude", "longitude", "north", "east")
 SPIKY = ("speed", "u", "v", "r", "psi", "phi", "V_w")
 OF_POSITIONS = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
 FEW = 4  # times that a sentence names
+MEASURED = ("speed", "u", "v", "r")
+LEVELS, BESIDE, PILE, ABOVE, RETURNS = (
+    30,
+    3,
+    0.03,
+    4.0,
+    3,
+)  # values; levels beside a limit; share of rows; times; visits
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 STREAM = 0.5  # of the misfit of positions and velocities: less is no current
@@ -42,11 +50,18 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
             )
             state.find("interpolated from a slower log", tuple(moving), 0.9, sentence)
     for column in state.suggestions:
+        values = state.columns[column.source]
         if is_shaft(column.name):
-            values = state.columns[column.source]
             top = float(np.mean(values == values.max()))
             if 0.05 < top < 0.9 and evidence.visits(values) >= VISITS:
                 sentence = f"{100 * top:.0f} % of the rows have exactly the largest value, {values.max():g}"
+                state.find("clipped", (column.source,), 0.7, sentence)
+        elif column.name in MEASURED:
+            limits = [limit for limit in (values.max(), values.min()) if _piles_up(values, float(limit))]
+            if limits:
+                most = ", ".join(f"{limit:g}" for limit in limits)
+                share = float(np.mean(np.isin(values, limits)))
+                sentence = f"{100 * share:.0f} % of the rows of {column.source!r} stop at {most}, and few come near it"
                 state.find("clipped", (column.source,), 0.7, sentence)
     steps = np.diff(sniffed.t)
     holes = int(np.sum(steps > evidence.GAP * np.median(steps)))
@@ -59,6 +74,20 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
         state.find(
             "missing values", tuple(missing), 0.99, f"some rows have no value in {', '.join(map(repr, missing))}"
         )
+
+
+def _piles_up(values: Array, limit: float) -> bool:
+    """Whether a signal (N,) stops at a limit: there are far more rows than near it, in several visits.
+
+    A rounded speed that is held has many rows at its largest value, but about as many next to it.
+    """
+    near = np.abs(values - limit)
+    levels = np.unique(near)
+    if limit == 0 or len(levels) < LEVELS:
+        return False
+    at = near == 0
+    beside = np.mean((near > 0) & (near <= levels[BESIDE]))
+    return bool(PILE < at.mean() < 0.9 and at.mean() > ABOVE * beside and evidence.visits(-near) >= RETURNS)
 
 
 def defects_of_motion(state: State) -> None:
@@ -175,16 +204,16 @@ def _jumps(state: State, path: Complex) -> None:
         sentence = f"the position jumps {count} of the files and does not come back: `data check` shows where"
         state.find("position jumps", (), 0.9, sentence)
     elif stay:
-        words = ", ".join(f"{_when(state, start)} to {_when(state, end)} ({far:.0f} m)" for start, end, far in stay[:6])
+        words = ", ".join(f"{when(state, start)} to {when(state, end)} ({far:.0f} m)" for start, end, far in stay[:6])
         repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
         state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
     if spikes and not any(one.kind == "position spikes" for one in state.findings):  # one repair mends them all
-        words = ", ".join(_when(state, (start + end) / 2) for start, end, _ in spikes[:6])
+        words = ", ".join(when(state, (start + end) / 2) for start, end, _ in spikes[:6])
         words = f"at {len(spikes)} place{'s' * (len(spikes) > 1)} of the files" if state.joined else f"near {words}"
         state.find("position spikes", (), 0.8, f"the position leaves and comes back {words}", OF_POSITIONS)
 
 
-def _when(state: State, t: float) -> str:
+def when(state: State, t: float) -> str:
     """A time [s] as the clock of the log has it: a date, or a number."""
     return date_of(t) if is_date(t, state.clock_unit) else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
 
@@ -212,7 +241,7 @@ def _times(state: State, rows: NDArray[np.intp]) -> str:
     count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
     if state.joined:
         return f"in {count} of the files"
-    words = ", ".join(_when(state, float(state.t[row])) for row in rows[:FEW])
+    words = ", ".join(when(state, float(state.t[row])) for row in rows[:FEW])
     return f"near {words}" if len(rows) <= FEW else f"in {count}, the first near {words}"
 
 

@@ -16,7 +16,7 @@ from shipid.logs import segments as cutting
 from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
 from shipid.logs.guess.columns import Guess
 from shipid.logs.importing import import_log, sha256_of
-from shipid.logs.mapping import Mapping, Segment, is_date, is_dated, read_mapping, to_si
+from shipid.logs.mapping import Mapping, Segment, degrees_of, is_date, is_dated, read_mapping, to_si
 from shipid.logs.readers import LARGE, date_of
 
 ENABLED = 0.8  # a repair less sure than this is drafted switched off
@@ -146,7 +146,9 @@ def _origin(guess: Guess) -> Iterator[str]:
             column = guess.column(key)
             assert column is not None
             values = guess.sniffed.columns[column.source]
-            yield from _lines({key: round(float(values[np.isfinite(values)][0]), 7)})
+            first = values[np.isfinite(values)][:1]
+            first = degrees_of(first) if column.unit == "ddmm" else first * column.extra.get("factor", 1.0)
+            yield from _lines({key: round(column.extra.get("sign", 1) * float(first[0]), 7)})
 
 
 def _columns(guess: Guess) -> Iterator[str]:

@@ -313,6 +313,7 @@ def plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
 
 def _take(state: State, best: Pose, sure: list[str]) -> None:
     """Take a hypothesis: decide sign, origin and frame of the heading, and ask where nothing decides."""
+    best = _other_way(state, best)
     north, east, heading, unit = best.north, best.east, best.heading, best.unit
     turn = 2 * np.pi / to_si(unit, "psi")
     psi, false = evidence.heal(state.columns[heading], turn, state.t)
@@ -362,6 +363,10 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
         state.find("zero of the heading", (heading,), abs(best.same), sentence)
     if swap:
         north, east = east, north
+    misnamed = not best.on_globe and best.settled in state.columns
+    if misnamed and all(fits(one).get(way, 0.0) > 0.9 for one, way in ((north, "east"), (east, "north"))):
+        sentence = f"{best.settled!r} agrees with the track only with {north!r} as north and {east!r} as east"
+        state.find("north and east swapped", (north, east), agreement, sentence)
     _ask_frame(state, best, clear, compass, undecided, heading not in sure and not state.numbered)
     names = ("latitude", "longitude") if best.on_globe else ("north", "east")
     why = f"course over ground keeps to the heading (agreement {agreement:.3f} of 1)"
@@ -388,6 +393,26 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     state.position = np.conj(place) if best.east_sign < 0 else place
     state.psi = sign * angle + np.radians(offset)
     state.chosen = evidence.windows(state.t, evidence.lively(state.t, state.psi, state.chosen))
+
+
+def _other_way(state: State, best: Pose) -> Pose:
+    """Return the hypothesis with latitude and longitude changed round where only so a compass agrees with the track."""
+    if not best.on_globe or not _is_compass(best.heading) or abs(best.mirrored) <= abs(best.same):
+        return best
+    if not _on_globe(state, best.east, best.north):
+        return best
+    other = _best(state, [(best.east, best.north, True, 0.3)], [best.heading])
+    if other is None or other.misfit > POOR or abs(other.mirrored) > abs(other.same):
+        return best
+    if other.misfit > 0.7 * best.misfit:
+        state.ask(
+            ("latitude", "longitude", "psi"),
+            f"is {best.north!r} the longitude and {best.east!r} the latitude? Else {best.heading!r} counts to port",
+        )
+        return best
+    sentence = f"course and heading agree only with {best.north!r} as longitude and {best.east!r} as latitude"
+    state.find("latitude and longitude swapped", (best.north, best.east), abs(other.same), sentence)
+    return other
 
 
 def _length_unit(north: str, east: str) -> str:

@@ -16,14 +16,16 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
+from shipid.logs.foreign import foreign
 from shipid.logs.guess.words import is_run, parts_of, units_in
 from shipid.logs.importing import even_clock, repeated_rows, rounding_of
-from shipid.logs.mapping import EPOCHS, clock_seconds, since_midnight
+from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, since_midnight
 from shipid.logs.readers import (
     DAY,
     DAY_OF,
     LONGEST_LINE,
     LOOKED_AT,
+    NEXT_DAY,
     READERS,
     TIME_OF_DAY,
     TextFormat,
@@ -48,35 +50,9 @@ CLOCK_WORDS = frozenset(
     (
         "t tvec time timestamp stamp clock sec secs seconds date datetime utc ms zeit messzeit zeitstempel "
         "tid tidspunkt sekunden millis epoch zulu hora temps heure elapsed stempel mess uhrzeit klokke tiempo "
-        "gmt datenum"
+        "gmt datenum tow itow sow sod"
     ).split()
 )
-UNPACK, SAVE = "unpack it, or export the log as text or Parquet", "save its sheet as CSV"
-EXPORT = "export it as CSV, Parquet, .mat or NMEA"
-PACKED = {
-    b"\x1f\x8b": ("packed by gzip", UNPACK),
-    b"BZh": ("packed by bzip2", UNPACK),
-    b"\xfd7zXZ": ("packed by xz", UNPACK),
-    b"\x28\xb5\x2f\xfd": ("packed by zstd", UNPACK),
-    b"7z\xbc\xaf": ("a 7z archive", UNPACK),
-    b"PK\x03\x04": ("a ZIP archive", UNPACK),
-    b"\xd0\xcf\x11\xe0": ("an old workbook (.xls)", SAVE),
-    b"SQLite format 3": ("a data base of SQLite, such as a bag of ROS 2 (.db3)", EXPORT),
-    b"\x89HDF": ("an HDF5 file", EXPORT),
-    b"#ROSBAG": ("a bag of ROS (.bag)", EXPORT),
-    b"\x89MCAP": ("a bag of ROS 2 (.mcap)", EXPORT),
-    b"ULog": ("a log of PX4 (.ulg)", f"{EXPORT}, as ulog2csv does"),
-    b"\xa3\x95": ("a log of ArduPilot (.bin)", f"{EXPORT}, as mavlogdump.py does"),
-    b"TDSm": ("a file of LabVIEW (.tdms)", EXPORT),
-    b"MDF ": ("a file of measurements (.mf4)", EXPORT),
-    b"CDF": ("a netCDF file", EXPORT),
-    b"ARROW1": ("a Feather file", "export it as Parquet"),
-    b"\x93NUMPY": ("an array of NumPy (.npy)", "export it as CSV or Parquet, with names of columns"),
-    b"%PDF": ("a PDF", "export the log as CSV"),
-}
-WORKBOOKS = {".xlsx": "a workbook (.xlsx)", ".xlsm": "a workbook (.xlsm)", ".ods": "a workbook (.ods)"}
-"""Ending of a ZIP archive that is a workbook -> what it is."""
-"""First bytes of a file that is no log as it is -> what it is, and what to do."""
 WRITTEN = {
     "ns": "ns nsec nanos nanosec nanoseconds",
     "us": "us usec micros microsec microseconds",
@@ -144,14 +120,17 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     if isinstance(model, TextFormat):
         widest(head, model.separator, file)
         sampled = size > SAMPLE
-        table = parse_text(io.StringIO(_sample(file, model.encoding, size)), model, file)
+        tolerant = model.model_copy(update={"ragged": "drop"})
+        table = parse_text(io.StringIO(_sample(file, model.encoding, size)), tolerant, file)
         if sampled:
             notes = (f"{len(table)} rows from {BLOCKS + 1} places of {size / 1e6:.0f} MB were looked at",)
         ragged = table.attrs["ragged"]
         if ragged and not sampled:
             form["ragged"] = "drop"
-            first = f"{len(ragged)} lines have another number of cells than the header, the first is line {ragged[0]}"
-            notes = (*notes, f"{first}: they are left out")
+            count = "1 line repeats" if len(ragged) == 1 else f"{len(ragged)} lines repeat"
+            have = "has" if len(ragged) == 1 else "have"
+            first = f"{count} the header or {have} another number of cells, the first is line {ragged[0]}"
+            notes = (*notes, f"{first}: left out")
         if len(table) < 2:
             raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)
     else:
@@ -195,27 +174,20 @@ def _sample(file: Path, encoding: str, size: int) -> str:
 
 
 def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
+    other = foreign(head)
+    if other is not None:
+        raise DataError(other.sentence, file=file)
     for reader in READERS.values():
         form = reader.detect(file, head) if reader.detect else None
         if form is not None:
             return form
     encoding = _encoding(head, file)
-    if re.match(r"\s*(\{|\[\s*\{|<[?!a-zA-Z])", head[:400].decode(encoding, "ignore")):
-        kind = "XML or HTML" if head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<") else "JSON"
-        raise DataError(
-            f"{kind}, not a table: export it as CSV, with one line of names and a line for each row", file=file
-        )
     return _text_format(head.decode(encoding, "ignore").splitlines()[:LOOKED_AT], encoding, file, names)
 
 
 def _encoding(head: bytes, file: Path) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    packed = next((one for mark, one in PACKED.items() if head.startswith(mark)), None)
-    if packed is not None and head.startswith(b"PK") and file.suffix.lower() in WORKBOOKS:
-        packed = WORKBOOKS[file.suffix.lower()], SAVE
-    if packed is not None:
-        raise DataError(f"{packed[0]}: {packed[1]}", file=file)
     if b"\0" in head:
         raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
     for encoding in ("utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8", "cp1252"):
@@ -443,16 +415,18 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     for name in [*candidates[:1], *rounded] if candidates and candidates[0] in called else [*rounded, *candidates[:1]]:
         unit = _unit_of_clock(name, finite[name])
         t = clock_seconds(finite[name], unit)
-        rate = _rate(t) if name in rounded or _is_coarse(t) else None
+        rises = bool(np.all(np.diff(t) > 0))  # after midnight, too
+        rate = _rate(t) if not rises or _is_coarse(t) else None
         if rate is not None:
             return {"from": name, "unit": unit, "every": rate[0]}, rate[1]
-        if name in rising:
+        if rises:
             return {"from": name, "unit": unit}, t
     if rising:
         unit = _unit_of_clock(rising[0], finite[rising[0]])
         return {"from": rising[0], "unit": unit}, clock_seconds(finite[rising[0]], unit)
     first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
-    fault = f"{called[0]!r} {_fault(first)}" if called else "none rises from row to row"
+    fault = f"{called[0]!r} {_unread(table, called[0], first) or _fault(first)}" if called else "none rises"
+    fault = fault if called else "none rises from row to row"
     raise DataError(f"no column can be the clock: {fault}", file=file)
 
 
@@ -484,6 +458,9 @@ def _looks_dated(column: pd.Series[Any]) -> bool:
 
 def _unit_of_clock(name: str, values: Array) -> str:
     """Return the unit of a clock: as its name says; else dates, times of day, or ms, us or ns if it counts so."""
+    again = _again(values)
+    if again is not None and not _is_time_of_day(values):
+        return again
     inside = [text.strip().lower().replace("µ", "u").replace("μ", "u") for text in units_in(name)]
     parts = parts_of(name)
     last = [] if "of" in parts else parts[-1:]  # seconds of the day
@@ -496,6 +473,8 @@ def _unit_of_clock(name: str, values: Array) -> str:
         return dates
     if written or ends not in ("", "s"):
         return written or ends
+    if {"day", "year"} <= set(parts) or {"doy", "yday", "jday"} & set(parts):
+        return "d"  # the day of the year
     if _is_time_of_day(values):
         return "hhmmss"
     if ends and DATES["d"][0] < values[0] / DAY < DATES["d"][1]:
@@ -505,6 +484,19 @@ def _unit_of_clock(name: str, values: Array) -> str:
         step = 0.0 if slow else float(np.median(steps))
         return next((unit for unit, (least, far) in FINE.items() if values[0] > least or step >= far), "ms")
     return "s"
+
+
+def _again(values: Array) -> str | None:
+    """Return the unit of seconds that begin again after a day or a week; None where none do.
+
+    A row may be missing there, so that a clock goes back by a little less than that, but not by an hour.
+    """
+    steps = np.diff(values)
+    back = steps[steps < 0]
+    for unit, period in AGAIN.items():
+        if len(back) and values.min() >= 0 and values.max() < period and np.all(back + period < NEXT_DAY):
+            return unit
+    return None
 
 
 def _is_time_of_day(values: Array) -> bool:
@@ -571,6 +563,18 @@ def _roundest(value: float, slack: float) -> float:
 def _counts(values: Array) -> bool:
     """Whether a column only counts rows."""
     return bool(np.all(np.diff(values) == 1.0) and values[0] in (0.0, 1.0))
+
+
+def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
+    """Say which text in a clock is no time; empty where a cell is empty, or where none is a time."""
+    if not np.isfinite(values).any() or np.isfinite(values).all():
+        return ""
+    row = int(np.argmax(~np.isfinite(values)))
+    text = str(_called(table, name).iloc[row]).strip()
+    if text.lower() in _WORDS_FOR_NOTHING:
+        return ""
+    what = "a leap second" if re.search(r":60(\D|$)", text) else "a comment" if text[:1] in "#%/;" else "no time"
+    return f"holds {text[:40]!r} in row {row + 1}, {what}: remove the line"
 
 
 def _fault(values: Array) -> str:

@@ -151,6 +151,7 @@ PHRASES: dict[str, str] = {
         "motore, velocita asse, velocita elica, elica, toeren tal, toeren, schroef toeren tal, as toeren tal, "
         "schroef toeren, schroef, propell omdreininger, omdreininger, omdreinings tall, motor tur tall, "
         "omdrejninger, omdrejnings tal, propel omdrejninger, varv tal, propeller varv tal, axel varv tal, "
+        "erpm, motor erpm, esc erpm, shaft erpm, thruster erpm, e rpm, electrical rpm, electric rpm, elec rpm, "
         "schrauben dreh zahl, schrauben welle, welle, wellen rpm, propell rpm, aksel rpm, shaft revs, shaft rev"
     ),
     "pitch": (
@@ -352,6 +353,13 @@ def _phrases() -> dict[str, tuple[tuple[str, ...], ...]]:
         return tuple(tuple(SYNONYMS.get(word, word) for word in phrase.split()) for phrase in text.split(","))
 
     return {meaning: cut(text) for meaning, text in PHRASES.items()} | {"": cut(OTHERS)}
+
+
+def is_electrical(name: str) -> bool:
+    """Whether a name says the electrical speed of a motor: that of its shaft times its pairs of poles."""
+    parts = parts_of(name)
+    joined = "_".join(parts)
+    return bool(re.search(r"(^|_)(erpm|e_rpm|elec(tr(ic(al)?)?)?_rpm|eldrehzahl)(_|$)", joined))
 
 
 def is_order(name: str) -> bool:

@@ -377,11 +377,11 @@ def test_a_name_says_its_unit(name: str, unit: str | None) -> None:
         (("TWS", "AWA", "AWS"), ("AWS", "AWA"), True),
         (("Wind speed", "Wind true from [deg]"), ("Wind speed", "Wind true from [deg]"), None),
         (("Wind", "Wind dir"), ("Wind", "Wind dir"), None),
-        (("TWS", "TWA"), ("TWS", "TWA"), None),
+        (("TWS", "TWA"), ("TWS", "TWA"), "angle"),
     ],
 )
 def test_names_say_which_wind(
-    names: tuple[str, ...], taken: tuple[str, str], relative: bool | None, tmp_path: Path
+    names: tuple[str, ...], taken: tuple[str, str], relative: bool | str | None, tmp_path: Path
 ) -> None:
     log = as_bridge(si_log())
     wind = {name: np.random.default_rng(i).uniform(3.0, 8.0, len(log)) for i, name in enumerate(names)}

@@ -10,7 +10,10 @@ import pytest
 from scipy.io import savemat
 
 from shipid.errors import DataError
+from shipid.logs.guess.columns import guess
 from shipid.logs.guess.sniff import _is_time_of_day, cells, plain, sniff
+from shipid.logs.mapping import clock_seconds
+from shipid.logs.readers import TextFormat, read_table
 
 T = np.arange(0.0, 10.0, 0.5)
 TABLE = pd.DataFrame({"time": T, "N": 1.5 * T, "psi": 30.0 + T})
@@ -344,33 +347,85 @@ def test_a_packed_log_is_named_as_one(name: str, tmp_path: Path) -> None:
     assert "unpack it" in caught.value.message
 
 
-FOREIGN = {
-    "log.xlsx": (b"PK\x03\x04" + bytes(90), r"a workbook \(.xlsx\): save its sheet as CSV"),
-    "log.ods": (b"PK\x03\x04" + bytes(90), r"a workbook \(.ods\): save its sheet as CSV"),
-    "log.xls": (b"\xd0\xcf\x11\xe0" + bytes(90), r"an old workbook \(.xls\): save its sheet as CSV"),
-    "log.bag": (b"#ROSBAG V2.0\n" + bytes(90), "a bag of ROS"),
-    "log.mcap": (b"\x89MCAP0\r\n" + bytes(90), "a bag of ROS 2"),
-    "log.db3": (b"SQLite format 3\0" + bytes(90), "a data base of SQLite, such as a bag of ROS 2"),
-    "log.ulg": (b"ULog\x01\x12\x35" + bytes(90), "a log of PX4"),
-    "log.bin": (b"\xa3\x95\x80\x80" + bytes(90), "a log of ArduPilot"),
-    "log.tdms": (b"TDSm" + bytes(90), "a file of LabVIEW"),
-    "one.json": (b'[{"time": 0, "rpm": 1},\n{"time": 1, "rpm": 1}]', "JSON, not a table: export it as CSV"),
-    "two.json": (b'{"time": [0, 1, 2],\n "rpm": [1, 2, 3]}', "JSON, not a table: export it as CSV"),
-    "log.gpx": (b'<?xml version="1.0"?>\n<gpx>\n</gpx>\n', "XML or HTML, not a table: export it as CSV"),
-}
-
-
-@pytest.mark.parametrize("name", FOREIGN)
-def test_a_file_that_is_no_table_is_called_what_it_is(name: str, tmp_path: Path) -> None:
-    """Before, a workbook was to be unpacked, and others had an unknown format or no numbers with any separator."""
-    content, expected = FOREIGN[name]
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(DataError, match=f": {expected}"):
-        sniff(tmp_path / name)
-
-
 def test_a_column_of_yes_and_no_is_no_number(tmp_path: Path) -> None:
     TABLE.assign(rpm=T > 3).to_parquet(tmp_path / "log.parquet")
     sniffed = sniff(tmp_path / "log.parquet")
     assert "rpm" not in sniffed.columns
     assert any("'rpm' holds words" in note for note in sniffed.notes)
+
+
+START_OF_DAY = pd.Timestamp("2024-05-14 23:58:00") + pd.to_timedelta(0.5 * np.arange(600), unit="s")
+
+
+def with_clock(name: str, values: list[object]) -> pd.DataFrame:
+    return pd.DataFrame({name: values, "north": np.arange(600.0), "heading": 0.1})
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "unit"),
+    [
+        ("UTC", [moment.strftime("%H%M%S.%f")[:9] for moment in START_OF_DAY], "hhmmss"),
+        ("Seconds of day", [(86280 + 0.5 * k) % 86400 for k in range(600)], "s of day"),
+        ("TOW [s]", [(604680 + 0.5 * k) % 604800 for k in range(600)], "s of week"),
+        ("Time", [moment.strftime("%Y-%j %H:%M:%S.%f") for moment in START_OF_DAY], "date"),
+        ("Time", [moment.strftime("%Y:%j:%H:%M:%S.%f") for moment in START_OF_DAY], "date"),
+        ("Day of year", [135.9986 + 0.5 * k / 86400 for k in range(600)], "d"),
+    ],
+)
+def test_clocks_that_begin_again_and_days_of_the_year(
+    name: str, values: list[object], unit: str, tmp_path: Path
+) -> None:
+    """Rows are 0.5 s apart, over midnight or the end of the week, in the draft and in the import."""
+    file = tmp_path / "log.csv"
+    with_clock(name, values).to_csv(file, index=False)
+    sniffed = sniff(file)
+    assert sniffed.clock == {"from": name, "unit": unit}
+    np.testing.assert_allclose(np.diff(sniffed.t), 0.5, atol=1e-4)
+    if unit == "date":
+        assert sniffed.t[0] == pytest.approx(START_OF_DAY[0].timestamp())
+        return
+    read = clock_seconds(pd.read_csv(file)[name].to_numpy(float), unit)
+    np.testing.assert_allclose(np.diff(read), 0.5, atol=1e-4)
+
+
+def test_a_clock_that_goes_back_by_less_than_a_day_is_refused(tmp_path: Path) -> None:
+    values = [86280 + 0.5 * k if k < 300 else 40000 + 0.5 * k for k in range(600)]
+    with_clock("Seconds of day", values).assign(north=0.0).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=r"goes back from .* in row 301"):
+        sniff(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("# operator, zigzag,2", "holds '# operator' in row 31, a comment: remove the line"),
+        ("2016-12-31T23:59:60Z,1,2", "a leap second: remove the line"),
+        ("later,1,2", "holds 'later' in row 31, no time: remove the line"),
+    ],
+)
+def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -> None:
+    lines = ["time,north,heading", *(f"{k},{2 * k},0.1" for k in range(60))]
+    with pytest.raises(DataError) as caught:
+        sniff(log_of(tmp_path, [*lines[:31], line, *lines[31:]]))
+    assert words in caught.value.message
+
+
+def test_the_header_again_and_lines_of_words_are_left_out(tmp_path: Path) -> None:
+    lines = ["time,north,heading", *(f"{k},{2 * k},0.1" for k in range(60))]
+    file = log_of(tmp_path, [*lines[:20], "# zigzag", *lines[20:40], lines[0], *lines[40:]])
+    sniffed = sniff(file)
+    assert sniffed.form["ragged"] == "drop"
+    assert sniffed.notes == (
+        "2 lines repeat the header or have another number of cells, the first is line 21: left out",
+    )
+    np.testing.assert_array_equal(sniffed.t, np.arange(60.0))
+    with pytest.raises(DataError, match="repeats the header: remove the line") as caught:
+        read_table(log_of(tmp_path, [*lines[:40], lines[0], *lines[40:]]), TextFormat(), "time")
+    assert caught.value.path == "line 41"
+
+
+def test_rows_in_too_short_a_time_name_the_clock(tmp_path: Path) -> None:
+    frame = pd.DataFrame({"t": 1e-5 * np.arange(6), "N": np.arange(6.0), "E": 0.0, "heading": 0.1})
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=r"6 rows over 5e-05 s are too few .* is 't' the clock, in s\?"):
+        guess(tmp_path / "log.csv")

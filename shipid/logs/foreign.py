@@ -1,0 +1,85 @@
+"""Files that are no log as they are: what they are, known by their first bytes, and how to make a log of them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+ENOUGH = 4096  # first bytes that tell
+UNPACK = "unpack it"
+SHEET = "save its sheet as CSV (one header line, one row for each time)"
+TOPICS = "export the topics as CSV with one clock, or each with its own clock ([file.<name>] of a mapping)"
+
+
+@dataclass(frozen=True)
+class Foreign:
+    """One kind of file. starts : regular expression of its first bytes. name : what it is. remedy : what to do."""
+
+    starts: bytes
+    name: str
+    remedy: str
+
+    @property
+    def sentence(self) -> str:
+        """What it is and what to do, for a message."""
+        return f"{self.name}: {self.remedy}"
+
+
+FOREIGN = (
+    Foreign(rb"PK\x03\x04.{26}mimetypeapplication/vnd\.oasis", "an OpenDocument sheet (.ods)", SHEET),
+    Foreign(rb"PK\x03\x04.{0,4000}?(?:\[Content_Types\]\.xml|xl/)", "an Excel workbook (.xlsx)", SHEET),
+    Foreign(
+        rb"PK\x03\x04.{26}[^/\0]{1,80}\.npy", "arrays of NumPy (.npz)", "write them as columns of a CSV or Parquet file"
+    ),
+    Foreign(rb"PK\x03\x04", "a ZIP archive", UNPACK),
+    Foreign(rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook (.xls)", SHEET),
+    Foreign(rb"\x1f\x8b", "packed by gzip", UNPACK),
+    Foreign(rb"BZh[1-9]1AY&SY", "packed by bzip2", UNPACK),
+    Foreign(rb"\xfd7zXZ\0", "packed by xz", UNPACK),
+    Foreign(rb"\x28\xb5\x2f\xfd", "packed by zstd", UNPACK),
+    Foreign(rb"7z\xbc\xaf\x27\x1c", "a 7z archive", UNPACK),
+    Foreign(rb"Rar!\x1a\x07", "a RAR archive", UNPACK),
+    Foreign(rb".{257}ustar", "a tar archive", UNPACK),
+    Foreign(rb"#ROSBAG V", "a recording of ROS (.bag)", TOPICS),
+    Foreign(rb"\x89MCAP0\r\n", "a recording of ROS (.mcap)", TOPICS),
+    Foreign(
+        rb"SQLite format 3\0",
+        "a data base of SQLite (.db3, .sqlite)",
+        f"write its table as CSV; of a recording of ROS, {TOPICS}",
+    ),
+    Foreign(
+        rb"ULog\x01\x12\x35",
+        "a flight log of PX4 (.ulg)",
+        "convert it with ulog2csv, which writes a CSV file for each topic; [file.<name>] of a mapping joins them",
+    ),
+    Foreign(
+        rb"\xa3\x95",
+        "a flight log of ArduPilot (.bin)",
+        "convert it with mavlogdump.py --format csv, a CSV file for each type of message",
+    ),
+    Foreign(rb"TDS[mh]", "a file of LabVIEW (.tdms)", "export its channels as CSV, or .mat"),
+    Foreign(rb"MDF     ", "a measurement file of ASAM (.mdf, .mf4)", "export its channels as CSV, or .mat"),
+    Foreign(rb"\x89HDF\r\n\x1a\n", "an HDF5 file (.h5)", "write its vectors as columns of a CSV or Parquet file"),
+    Foreign(rb"CDF[\x01\x02\x05]", "a netCDF file (.nc)", "write its vectors as columns of a CSV or Parquet file"),
+    Foreign(rb"ARROW1\0", "a Feather or Arrow file", "write it as Parquet, with pandas.read_feather and to_parquet"),
+    Foreign(rb"\x93NUMPY", "an array of NumPy (.npy)", "write it as CSV with a header line"),
+    Foreign(rb"\x80[\x02-\x05][\x95}\]c(]", "a pickle of Python (.pkl)", "write the table as CSV or Parquet"),
+    Foreign(rb"\xb5\x62", "raw messages of a GNSS receiver (UBX)", "log NMEA 0183, or export the solution as CSV"),
+    Foreign(rb"(?:\xd4\xc3\xb2\xa1|\xa1\xb2\xc3\xd4|\x0a\x0d\x0d\x0a)", "a recording of a network (.pcap)", TOPICS),
+    Foreign(rb"%PDF-", "a PDF", "export the table itself as CSV"),
+    Foreign(
+        rb"\s*<(?:!doctype html|html|table|meta|head)\b", "a page (HTML)", f"if it shows the log, open it and {SHEET}"
+    ),
+    Foreign(rb"\s*<\?xml[^>]*>.{0,2000}?<(?:gpx|kml)\b", "a track (GPX, KML)", "export it as CSV or NMEA 0183"),
+    Foreign(rb"\s*<\?xml\b", "XML", "export the table as CSV"),
+    Foreign(
+        rb"\s*(?:\{\s*\"|\[\s*[\[{])", "JSON", "write it as CSV, such as with pandas.read_json and to_csv(index=False)"
+    ),
+)
+"""Kinds of files that a log is not, the more special first. To add one: a row here."""
+
+
+def foreign(head: bytes) -> Foreign | None:
+    """Return what kind of file begins with these bytes, where it is one that no reader reads; else None."""
+    start = head[:ENOUGH].removeprefix(b"\xef\xbb\xbf")
+    return next((one for one in FOREIGN if re.match(one.starts, start, re.DOTALL | re.IGNORECASE)), None)

@@ -1,0 +1,176 @@
+"""Angles and positions in numbers that are no degrees, and values that are shares of something: right, or asked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.errors import DataError, DocumentError
+from shipid.files import write_new
+from shipid.logs.guess.columns import Guess, guess
+from shipid.logs.guess.draft import draft_mapping
+from shipid.logs.importing import import_log, read_mapping
+from shipid.logs.mapping import degrees_of
+from tests.logs.simulated import SCHEDULE, as_bridge, si_log
+
+LOG = si_log()
+BRIDGE = as_bridge(LOG)
+SIZE = 6378137.0  # m
+LATITUDE, LONGITUDE = 63.44, 10.40
+ROUND = 1.0 - 0.00669438  # b^2 / a^2 of WGS 84
+WIDE = 1.0 - 0.00669438 * np.sin(np.radians(LATITUDE)) ** 2
+LAT = LATITUDE + np.degrees(LOG["north"] / (SIZE * ROUND / WIDE**1.5))
+LON = LONGITUDE + np.degrees(LOG["east"] / (SIZE / WIDE**0.5 * np.cos(np.radians(LATITUDE))))
+
+
+def on_globe(lat: pd.Series, lon: pd.Series, **more: object) -> pd.DataFrame:
+    frame = BRIDGE.drop(columns=["N", "E"]).rename(columns={"psi": "Heading"})
+    return frame.assign(lat=lat, lon=lon, **more)
+
+
+def drafted(frame: pd.DataFrame, folder: Path) -> tuple[Guess, Dataset]:
+    frame.to_csv(folder / "log.csv", index=False)
+    proposal = guess(folder / "log.csv")
+    mapping = write_new(draft_mapping(proposal), folder / "draft.toml")
+    whole = read_mapping(mapping).model_copy(update={"segment": ()})
+    return proposal, import_log(whole, folder / "log.csv")
+
+
+def asked(proposal: Guess) -> str:
+    return " ".join(question.sentence for question in proposal.questions)
+
+
+def turned(dataset: Dataset) -> np.ndarray:
+    """Error of the heading [rad], rows of the import against the truth."""
+    psi = np.interp(dataset.frame["t"], LOG["t"], np.unwrap(LOG["psi"]))
+    return np.asarray(np.abs(np.angle(np.exp(1j * (dataset.frame["psi"].to_numpy() - psi)))))
+
+
+@pytest.mark.parametrize(
+    ("name", "turn", "decimals"),
+    [("Heading", 400.0, 2), ("Heading [gon]", 400.0, 2), ("hdg", 36000.0, 0), ("Heading", 3600.0, 0)],
+)
+def test_a_heading_in_other_parts_of_a_turn_is_the_heading(
+    name: str, turn: float, decimals: int, tmp_path: Path
+) -> None:
+    frame = BRIDGE.drop(columns="psi")
+    frame[name] = (BRIDGE["psi"] * turn / 360.0).round(decimals) % turn
+    proposal, dataset = drafted(frame, tmp_path)
+    column = proposal.column("psi")
+    assert column is not None
+    assert column.extra["factor"] == pytest.approx(360.0 / turn)
+    assert f"a whole turn is {turn:g}" in column.evidence
+    assert turned(dataset).max() < np.radians(0.3)
+    assert dataset.frame["v"].to_numpy() == pytest.approx(LOG["v"].to_numpy(), abs=1e-6)
+
+
+def test_a_unit_in_the_name_decides_where_a_heading_never_jumps(tmp_path: Path) -> None:
+    frame = BRIDGE.drop(columns="psi").iloc[:400]
+    frame["Heading [0.01 deg]"] = (BRIDGE["psi"] * 100).round()
+    proposal, dataset = drafted(frame, tmp_path)
+    column = proposal.column("psi")
+    assert column is not None
+    assert column.extra["factor"] == 0.01
+    assert turned(dataset).max() < np.radians(0.3)
+
+
+@pytest.mark.parametrize("how", ["1e-7", "ddmm"])
+def test_positions_of_receivers_are_degrees(how: str, tmp_path: Path) -> None:
+    if how == "1e-7":
+        frame = on_globe((LAT * 1e7).round().astype("int64"), (LON * 1e7).round().astype("int64"))
+    else:
+        frame = on_globe(*((x // 1 * 100 + x % 1 * 60).round(6) for x in (LAT, LON)))
+    proposal, dataset = drafted(frame, tmp_path)
+    run = dataset.frame
+    for name in ("north", "east"):
+        np.testing.assert_allclose(run[name] - run[name][0], LOG[name] - LOG[name][0], atol=1.0, err_msg=name)
+    assert ("without a sign" in asked(proposal)) == (how == "ddmm")
+
+
+def test_latitude_and_longitude_changed_round_are_found(tmp_path: Path) -> None:
+    proposal, dataset = drafted(on_globe(LON.round(7), LAT.round(7)), tmp_path)
+    assert "latitude and longitude swapped" in proposal.kinds
+    assert turned(dataset).max() < np.radians(0.3)
+    assert proposal.column("psi").extra == {"wrap": True}  # type: ignore[union-attr]
+    right = guess(as_file(on_globe(LAT.round(7), LON.round(7)), tmp_path))
+    assert "latitude and longitude swapped" not in right.kinds
+
+
+def test_names_of_north_and_east_changed_round_are_said_where_a_course_shows_it(tmp_path: Path) -> None:
+    course = np.degrees(LOG["psi"] + np.arctan2(LOG["v"], LOG["u"])) % 360.0
+    frame = BRIDGE.rename(columns={"N": "East", "E": "North", "psi": "Heading"}).assign(COG=course)
+    proposal, _ = drafted(frame, tmp_path)
+    assert proposal.column("north").source == "East"  # type: ignore[union-attr]
+    assert "north and east swapped" in proposal.kinds
+
+
+@pytest.mark.parametrize(("text", "value"), [(6326.4, 63.44), (-1024.0, -10.4), (5960.0, np.nan), (0.0, 0.0)])
+def test_degrees_and_minutes(text: float, value: float) -> None:
+    np.testing.assert_allclose(degrees_of(np.array([text])), [value])
+
+
+def test_minutes_above_60_are_refused_with_their_row(tmp_path: Path) -> None:
+    frame = on_globe(*((x // 1 * 100 + x % 1 * 60).round(6) for x in (LAT, LON)))
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    mapping = write_new(draft_mapping(guess(tmp_path / "log.csv"), False), tmp_path / "draft.toml")
+    frame.loc[3, "lat"] = 6375.0
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    mapping.write_text("\n".join(line for line in mapping.read_text().splitlines() if "sha256" not in line))
+    with pytest.raises(DataError, match="6375 in row 4 has 60 minutes or more"):
+        import_log(read_mapping(mapping), tmp_path / "log.csv")
+
+
+def test_only_positions_are_in_degrees_and_minutes(tmp_path: Path) -> None:
+    mapping = draft_mapping(guess(as_file(BRIDGE, tmp_path)), False).replace('unit = "deg"', 'unit = "ddmm"', 1)
+    with pytest.raises(DocumentError, match="only latitude and longitude"):
+        read_mapping(write_new(mapping, tmp_path / "draft.toml"))
+
+
+def as_file(frame: pd.DataFrame, folder: Path) -> Path:
+    frame.to_csv(folder / "log.csv", index=False)
+    return folder / "log.csv"
+
+
+FULL = 35.0  # deg: the largest angle
+RUDDER = BRIDGE["rudder"]
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "words"),
+    [
+        ("rudder [%]", RUDDER / FULL * 100, "is in per cent: of which angle"),
+        ("rudder [‰]", RUDDER / FULL * 1000, "is in per mille: of which angle"),
+        ("rudder", RUDDER / FULL * 1000, "per cent or per mille of the largest angle"),
+        ("rudder", RUDDER / FULL, "a share (-1 to 1) of the largest angle"),
+        ("rudder", RUDDER.abs(), "is never negative, but the ship turns to both sides"),
+        ("rudder", RUDDER + FULL, "is never negative, but the ship turns to both sides"),
+        ("motor_erpm", BRIDGE["rpm"] * 7, "is the electrical speed of a motor: of how many poles"),
+        ("eRPM", BRIDGE["rpm"] * 7, "is the electrical speed of a motor: of how many poles"),
+        ("bow thruster erpm", BRIDGE["rpm"] * 7, "is the electrical speed of a motor: of how many poles"),
+    ],
+)
+def test_what_the_log_does_not_say_is_asked(name: str, values: pd.Series, words: str, tmp_path: Path) -> None:
+    old = "rudder" if "rudder" in name else "rpm"
+    proposal = guess(as_file(BRIDGE.drop(columns=old).assign(**{name: values}), tmp_path))
+    assert words in asked(proposal)
+    assert not any(finding.kind == "wrong sign of rudder" for finding in proposal.findings if "never" in words)
+
+
+def test_a_sound_log_is_not_asked(tmp_path: Path) -> None:
+    for frame in (BRIDGE, BRIDGE.assign(rudder=np.radians(RUDDER), psi=np.radians(BRIDGE["psi"]))):
+        text = asked(guess(as_file(frame, tmp_path)))
+        assert "rudder" not in text
+        assert "rpm" not in text
+
+
+def test_circles_to_one_side_with_a_rudder_to_one_side_are_not_asked(tmp_path: Path) -> None:
+    """A rudder that is never negative is right where the ship turns to starboard only."""
+    ends = np.cumsum([seconds for seconds, _, _ in SCHEDULE])
+    inside = LOG["t"].between(ends[9] + 20, ends[10] - 20)
+    assert LOG["r"][inside].min() > 0
+    frame = BRIDGE[inside].assign(rudder=RUDDER[inside].clip(lower=0))
+    assert "never negative" not in asked(guess(as_file(frame.reset_index(drop=True), tmp_path)))

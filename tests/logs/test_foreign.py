@@ -1,0 +1,126 @@
+"""Files that are no log as they are: each is named, with what to do, by the draft and by the import."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import sqlite3
+import tarfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.errors import DataError
+from shipid.logs.foreign import foreign
+from shipid.logs.guess.sniff import sniff
+from shipid.logs.readers import MatFormat, NmeaFormat, ParquetFormat, TextFormat, read_table
+
+TABLE = pd.DataFrame({"time": np.arange(30.0), "north": 2.0 * np.arange(30.0), "heading": 0.1})
+TEXT = TABLE.to_csv(index=False).encode()
+BINARY = bytes(range(256)) * 40
+
+
+def zipped(**files: bytes) -> bytes:
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name.replace("__", "/"), content)
+    return held.getvalue()
+
+
+def tarred() -> bytes:
+    held = io.BytesIO()
+    with tarfile.open(fileobj=held, mode="w") as archive:
+        entry = tarfile.TarInfo("log.csv")
+        entry.size = len(TEXT)
+        archive.addfile(entry, io.BytesIO(TEXT))
+    return held.getvalue()
+
+
+def saved(write: str) -> bytes:
+    held = io.BytesIO()
+    np.save(held, TABLE.to_numpy()) if write == "npy" else np.savez(held, north=TABLE["north"])
+    return held.getvalue()
+
+
+SHEET = zipped(**{"[Content_Types].xml": b"<x/>", "xl__workbook.xml": b"<x/>", "xl__worksheets__sheet1.xml": b"<x/>"})
+OPEN = zipped(mimetype=b"application/vnd.oasis.opendocument.spreadsheet", **{"content.xml": b"<x/>"})
+FILES = {
+    "log.xlsx": (SHEET, "Excel workbook", "save its sheet as CSV"),
+    "log.ods": (OPEN, "OpenDocument", "save its sheet as CSV"),
+    "log.xls": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + BINARY, "old Excel workbook", "save its sheet as CSV"),
+    "page.xls": (TABLE.to_html().encode(), "a page", "save its sheet as CSV"),
+    "log.csv.gz": (gzip.compress(TEXT), "packed by gzip", "unpack it"),
+    "log.zip": (zipped(**{"log.csv": TEXT}), "a ZIP archive", "unpack it"),
+    "log.tar": (tarred(), "a tar archive", "unpack it"),
+    "log.zst": (b"\x28\xb5\x2f\xfd" + BINARY, "packed by zstd", "unpack it"),
+    "log.npz": (saved("npz"), "arrays of NumPy", "CSV or Parquet"),
+    "log.npy": (saved("npy"), "an array of NumPy", "CSV"),
+    "records.json": (TABLE.to_json(orient="records").encode(), "JSON", "CSV"),
+    "lines.jsonl": (TABLE.to_json(orient="records", lines=True).encode(), "JSON", "CSV"),
+    "split.json": (json.dumps(TABLE.to_dict("split"), indent=1).encode(), "JSON", "CSV"),
+    "log.xml": (b'<?xml version="1.0"?>\n<log><row>1</row></log>', "XML", "CSV"),
+    "log.gpx": (b'<?xml version="1.0"?>\n<gpx version="1.1"><trk></trk></gpx>', "a track", "CSV or NMEA"),
+    "log.bag": (b"#ROSBAG V2.0\n" + BINARY, "a recording of ROS", "topics as CSV"),
+    "log.mcap": (b"\x89MCAP0\r\n" + BINARY, "a recording of ROS", "topics as CSV"),
+    "log.ulg": (b"ULog\x01\x12\x35\x01" + BINARY, "PX4", "ulog2csv"),
+    "log.bin": (b"\xa3\x95\x80\x80" + BINARY, "ArduPilot", "mavlogdump"),
+    "log.tdms": (b"TDSm" + BINARY, "LabVIEW", "CSV"),
+    "log.mf4": (b"MDF     4.10" + BINARY, "ASAM", "CSV"),
+    "log.h5": (b"\x89HDF\r\n\x1a\n" + BINARY, "HDF5", "CSV or Parquet"),
+    "log.nc": (b"CDF\x01" + BINARY, "netCDF", "CSV or Parquet"),
+    "log.feather": (b"ARROW1\0\0" + BINARY, "Feather", "Parquet"),
+    "log.pdf": (b"%PDF-1.7\n" + BINARY, "a PDF", "CSV"),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_line_names_the_kind_and_what_to_do(name: str, tmp_path: Path) -> None:
+    content, kind, remedy = FILES[name]
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(DataError) as drafted:
+        sniff(tmp_path / name)
+    said = [drafted.value.message]
+    for form in (TextFormat(), ParquetFormat(kind="parquet"), MatFormat(kind="mat"), NmeaFormat(kind="nmea")):
+        with pytest.raises(DataError) as read:
+            read_table(tmp_path / name, form, "time")
+        said.append(read.value.message)
+    for message in said:
+        assert kind in message
+        assert remedy in message
+        assert "\n" not in message
+
+
+def test_a_data_base_is_named(tmp_path: Path) -> None:
+    with sqlite3.connect(tmp_path / "log.db3") as base:
+        TABLE.to_sql("log", base, index=False)
+    base.close()
+    with pytest.raises(DataError, match="SQLite"):
+        sniff(tmp_path / "log.db3")
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        TEXT,
+        b"\xef\xbb\xbf" + TEXT,
+        b"[s],[m]\n1,2\n",
+        b"PAR1",
+        b"MATLAB 5.0 MAT-file",
+        b"$GPGGA,",
+        b"MDF,x\n1,2\n",
+        b"",
+    ],
+)
+def test_what_a_reader_reads_is_not_foreign(head: bytes) -> None:
+    assert foreign(head) is None
+
+
+def test_a_track_before_the_table_may_be_skipped(tmp_path: Path) -> None:
+    """A text with a head of XML is read where the mapping skips the head."""
+    (tmp_path / "log.txt").write_bytes(b'<?xml version="1.0"?>\n' + TEXT)
+    assert len(read_table(tmp_path / "log.txt", TextFormat(skip_rows=1), "time")) == len(TABLE)
