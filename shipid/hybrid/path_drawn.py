@@ -43,6 +43,8 @@ class PathDrawn(Searched):
     terms : the compensation is a polynomial of time with so many terms: what is faster is waves.
     mirror : share of the trials in which port and starboard are mirror images.
     averaged : the compensation is the mean of the networks of so many best trials.
+    search_windows : about so many windows, evenly taken from each run, judge all trials where there are more; the
+        best are then judged, and solved, with all windows.
     memory : what the inputs hold of the past; `history_scale`, `error_scale`, `observer_scale` are their scales.
     choose : whether validation chooses between no memory, the error of the physics, and that with history; with
         `memory.observer` also between its estimates alone and everything. Each has an equal share of the trials.
@@ -70,6 +72,7 @@ class PathDrawn(Searched):
     terms: PositiveInt = 8
     mirror: Probability = 0.75
     averaged: PositiveInt = 8
+    search_windows: PositiveInt = 1000
     memory: Memory = Memory()
     history_scale: Scale = (2.0, 32.0)
     error_scale: Scale = (2.0, 32.0)

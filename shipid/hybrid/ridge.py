@@ -7,6 +7,9 @@ left-out block is (I - H_bb)^-1 r_b. So a trial is judged by every manoeuvre at 
 A ship whose port and starboard sides are alike answers mirrored inputs with the mirrored path. A mirrored trial pairs
 each hidden unit with its mirror image, with equal output weights for x and opposite ones for y: the compensation then
 has this symmetry exactly, and each manoeuvre counts twice.
+
+Windows of a run are alike. Where there are many, trials are compared by a part of them, evenly taken from each run.
+The best ones are judged once more, and solved, with all of them: successive halving (Jamieson and Talwalkar, 2016).
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
@@ -26,13 +30,17 @@ from shipid.hybrid.features import Inputs, choose_features, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
 from shipid.hybrid.mirror import reflection as _reflection
 from shipid.hybrid.products import gram, hidden, matmul, sums_of_squares
-from shipid.hybrid.search import Search
+from shipid.hybrid.search import CLOSING, Search
 from shipid.hybrid.settings import seed_of
 from shipid.hybrid.trials import diverged
+
+Mask = NDArray[np.bool_]
 
 if TYPE_CHECKING:
     from shipid.hybrid.path_drawn import PathDrawn
 
+GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
+FINAL = 2  # trials by a part of the windows that one by all costs, about
 SPARE = 4  # further trials whose errors without each run are kept
 SOUND = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are then right to about 1e-5
 ROUNDING = 1e-3  # by which a sum of squares must be greater to be so for sure: a hundred times what `SOUND` leaves
@@ -51,6 +59,10 @@ class _Inputs:
     values: Tensor
     reflection: Array | None
     groups: tuple[str, ...]
+
+    def part(self, rows: Tensor) -> _Inputs:
+        """The same with some of the windows."""
+        return replace(self, values=self.values[rows])
 
 
 @dataclass(frozen=True)
@@ -93,24 +105,19 @@ class _Best:
         self.kept: list[tuple[float, dict[str, float], Network]] = []
         self.left_out: list[tuple[float, _LeftOut]] = []  # of some more trials: without a fold, others may be the best
 
-    def consider(
-        self,
-        params: dict[str, float],
-        value: float,
-        network: Callable[[], Network],
-        left_out: Callable[[], _LeftOut],
-    ) -> None:
+    def consider(self, trial: _Verdict) -> None:
         """Solve the network if the trial is among the best."""
-        if len(self.kept) < self.most or value < self.kept[-1][0]:
-            self.kept = sorted([*self.kept, (value, params, network())], key=lambda kept: kept[0])[: self.most]
+        if len(self.kept) < self.most or trial.value < self.kept[-1][0]:
+            new = trial.value, trial.params, trial.network()
+            self.kept = sorted([*self.kept, new], key=lambda kept: kept[0])[: self.most]
         most = self.most + SPARE
-        if len(self.left_out) < most or value < self.left_out[-1][0]:
-            self.left_out = sorted([*self.left_out, (value, left_out())], key=lambda kept: kept[0])[:most]
+        if len(self.left_out) < most or trial.value < self.left_out[-1][0]:
+            self.left_out = sorted([*self.left_out, (trial.value, trial.left_out())], key=lambda kept: kept[0])[:most]
 
-    def fitted(self, inputs: Inputs, rows: list[Row], errors: Array) -> Fitted:
-        """Average the best networks; `errors` are those on runs left out."""
+    def fitted(self, inputs: Inputs, rows: list[Row], seconds: float, errors: Array) -> Fitted:
+        """Average the best networks; `seconds` of the whole fit [s], `errors` those on runs left out."""
         compensator = Compensator(inputs, tuple(kept[2] for kept in self.kept), self.kept[0][1])
-        return Fitted(compensator, rows, sum(row["seconds"] for row in rows), errors)
+        return Fitted(compensator, rows, seconds, errors)
 
     def without(self, folds: Sequence[Index]) -> Array:
         """Errors (2, S, r) on the basis where no fold has a part in the choice of the trials that judge it."""
@@ -135,69 +142,232 @@ class _Group:
     plain: _Inputs
     mirrored: _Inputs | None
 
+    def inputs(self, point: Mapping[str, float]) -> _Inputs:
+        """The inputs of a trial."""
+        return self.mirrored if point["mirror"] and self.mirrored is not None else self.plain
+
+    def part(self, rows: Tensor) -> _Group:
+        """The same with some of the windows; means and spreads of inputs stay those of all."""
+        mirrored = None if self.mirrored is None else self.mirrored.part(rows)
+        return _Group(self.names, [side[rows] for side in self.outputs], self.plain.part(rows), mirrored)
+
+    def only(self, names: Sequence[str], terms: int) -> _Group:
+        """The same for some of the foundations; `terms` is r."""
+        columns = [self.names.index(name) * terms + term for name in names for term in range(terms)]
+        return replace(self, names=tuple(names), outputs=[side[:, columns] for side in self.outputs])
+
+
+@dataclass(frozen=True)
+class _Judges:
+    """Windows by which trials are judged: all, or a part.
+
+    rows : places of the windows among all, (S,). share : of all windows, by which a ridge shrinks as the sum of squares
+    does. blocks : what each fold leaves out of them. faster : sum of squares [m^2] of each foundation over those judged
+    that no network follows. count : number of windows that are judged.
+    """
+
+    rows: Index
+    share: float
+    blocks: list[_Block]
+    faster: dict[str, float]
+    count: int
+
+    @classmethod
+    def of(cls, task: Task, windows: Index, rows: Index, targets: Mapping[str, Array], basis: Array) -> _Judges:
+        """Take some rows (S,) of the windows, numbered as in the task; targets (T, S, 2) [m] of each foundation."""
+        taken = windows[rows]
+        folds = [tuple(part[np.isin(part, taken)] for part in fold) for fold in task.folds]
+        judged = np.concatenate([validation for _, validation in folds])
+        faster = {key: _faster(paths[:, judged], basis) for key, paths in targets.items()}
+        blocks = _blocks([(training, validation) for training, validation in folds], taken, task.device)
+        return cls(rows, len(rows) / len(windows), blocks, faster, len(judged))
+
+
+@dataclass(frozen=True)
+class _Verdict:
+    """One trial for one foundation.
+
+    value : mean squared error [m^2] on runs left out. ridges : numbers of the ridges that all folds, or all but one,
+    choose. network : solves the network. left_out : the errors without each fold.
+    """
+
+    value: float
+    ridges: Index
+    params: dict[str, float]
+    network: Callable[[], Network]
+    left_out: Callable[[], _LeftOut]
+
 
 def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
     """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
     predicted by the solution without any window outside its training part. The compensator is the mean of the networks
-    of the best trials, solved with all windows of the folds.
+    of the best trials, solved with all windows of the folds. With more than `search_windows` windows, a part of them
+    chooses the trials that are judged by all, and of these the best make the compensator.
     """
-    inputs = method.inputs(task.commands)
-    windows = np.unique(np.concatenate([part for fold in task.folds for part in fold]))
-    tables, device = _of_windows(shared_tables(task, inputs), windows), task.device
-    blocks = _blocks(task.folds, windows, device)
-    targets = task.targets
-    names = [key for key, paths in targets.items() if np.isfinite(paths[:, windows]).all()]
-    basis = smooth_basis(task.windows.horizon, method.terms)
-    terms = basis.shape[1]
-    paths = {key: np.tensordot(basis.T, targets[key][:, windows], 1) for key in names}
-    judged = np.concatenate([validation for _, validation in task.folds])
-    faster = {key: _faster(targets[key][:, judged], basis) for key in names}
-    best = {key: _Best(method.averaged) for key in names}
-    search = Search(task, names, method, again=True)  # networks are solved again: it costs less than to keep them
-    ridges = method.path()
-    groups: dict[frozenset[str], list[_Group]] = {}
+    tuning = _Tuning(task, method)
+    tuning.search()
+    tuning.judge_finalists()
+    return {key: tuning.fitted(key) for key in task.cases}
 
-    for number, point in search.left(method.points() if names else ()):
-        rows: dict[str, Row] = {}
-        left_out = method.left_out(point)
-        if left_out not in groups:
-            groups[left_out] = _groups({key: tables[key] for key in names}, paths, left_out, len(windows), device)
-        for group in groups[left_out]:
-            start = time.process_time()
-            seen = group.mirrored if point["mirror"] and group.mirrored is not None else group.plain
-            drawn = _draw(seen, point, method.units, seed_of(task.seed, number))
-            parts = _parts(seen, drawn, group.outputs, device)
-            errors, others, kept = _left_out(parts, ridges, blocks, terms)
-            for k, key in enumerate(group.names):
-                ridge = ridges[errors[:, k].argmin()]
-                params = {**point, "mirror": float(seen is group.mirrored), "ridge": ridge}
-                value = float(errors[:, k].min() + faster[key]) / (2 * len(basis) * len(judged))
-                mine = slice(k * terms, (k + 1) * terms)
-                network = partial(_network, seen, drawn, parts, mine, ridge, basis)
-                without = partial(_chosen_without, others[:, :, k], kept, mine)
-                best[key].consider(params, value, network, without)
-                rows[key] = {"number": number, "params": params, "value": value, "state": "complete"}
-            seconds = (time.process_time() - start) / len(group.names)
-            for key in group.names:
-                rows[key] |= {"seconds": seconds, "epochs": 0}
-        search.keep(rows)
-        if task.on_trial is not None:
-            task.on_trial(number + 1, search.count or number + 1)
-    search.write()
-    if not names and task.on_trial is not None:
-        task.on_trial(method.trials, method.trials)
-    fitted, folds = {}, [row.cpu().numpy() for block in blocks for row in block.rows]
-    for key in targets:
-        if key not in best:
-            fitted[key] = diverged(method, method.points())
-            continue
-        missed = np.tensordot(basis, best[key].without(folds), (1, 2)).transpose(0, 2, 1)
-        errors = np.full_like(targets[key], np.nan)
-        errors[:, windows] = targets[key][:, windows] - np.tensordot(basis, paths[key], 1) + missed
-        fitted[key] = best[key].fitted(inputs, search.rows[key], errors)
-    return fitted
+
+class _Tuning:
+    """What the trials of a task share, and the best of them so far.
+
+    windows : those of all folds. names : foundations whose targets are numbers. every : all windows as judges; first :
+    those that judge all trials. promising : of each foundation value, number and ridges of its trials by a part of the
+    windows. seconds : of each foundation, its share of the work [s].
+    """
+
+    def __init__(self, task: Task, method: PathDrawn) -> None:
+        self.task, self.method, self.inputs = task, method, method.inputs(task.commands)
+        self.windows = np.unique(np.concatenate([part for fold in task.folds for part in fold]))
+        self.targets = task.targets
+        sound = {key: paths for key, paths in self.targets.items() if np.isfinite(paths[:, self.windows]).all()}
+        self.names = list(sound)
+        tables = _of_windows(shared_tables(task, self.inputs), self.windows)
+        self.tables = {key: tables[key] for key in self.names}
+        self.basis = smooth_basis(task.windows.horizon, method.terms)
+        self.terms = self.basis.shape[1]
+        self.paths = {key: np.tensordot(self.basis.T, paths[:, self.windows], 1) for key, paths in sound.items()}
+        self.every = _Judges.of(task, self.windows, np.arange(len(self.windows)), sound, self.basis)
+        rows = evenly(task.windows.run[self.windows], method.search_windows)
+        whole = len(rows) == len(self.windows) or _lacks_a_part(task.folds, self.windows[rows])
+        self.first = self.every if whole else _Judges.of(task, self.windows, rows, sound, self.basis)
+        self.finalists = method.averaged + SPARE
+        self.best = {key: _Best(method.averaged) for key in self.names}
+        self.promising: dict[str, list[tuple[float, int, Index]]] = {key: [] for key in self.names}
+        self.points: dict[int, dict[str, float]] = {}
+        self.groups: dict[frozenset[str], tuple[list[_Group], list[_Group]]] = {}  # with all windows, and the first
+        self.rows: dict[str, list[Row]] = {}
+        self.seconds: dict[str, float] = {}
+
+    def search(self) -> None:
+        """Judge all trials, by a part of the windows where they are many."""
+        task, whole = self.task, self.first is self.every
+        # networks are solved again after a break: it costs less than to keep them
+        closing = CLOSING if whole else FINAL * self.finalists
+        search = Search(task, self.names, self.method, again=True, closing=closing)
+        for number, point in search.left(self.method.points() if self.names else ()):
+            self.points[number] = point
+            made: dict[str, Row] = {}
+            for group in self._groups(point)[1]:
+                start = time.process_time()
+                for key, verdict in self._judged(group, number, self.first).items():
+                    if whole:
+                        self.best[key].consider(verdict)
+                    else:
+                        self.promising[key].append((verdict.value, number, verdict.ridges))
+                    value = {"value": verdict.value, "state": "complete"}
+                    made[key] = {"number": number, "params": verdict.params, **value}
+                seconds = (time.process_time() - start) / len(group.names)
+                for key in group.names:
+                    made[key] |= {"seconds": seconds, "epochs": 0}
+            search.keep(made)
+            if task.on_trial is not None:
+                task.on_trial(number + 1, search.count or number + 1)
+        search.write()
+        if not self.names and task.on_trial is not None:
+            task.on_trial(self.method.trials, self.method.trials)
+        self.rows = search.rows
+        self.seconds = {key: sum(row["seconds"] for row in rows) for key, rows in search.rows.items()}
+
+    def judge_finalists(self) -> None:
+        """Judge the best trials of a search by a part of the windows once more, by all windows."""
+        finals: dict[int, dict[str, Index]] = {}  # trial -> foundation -> numbers of ridges
+        for key, tried in self.promising.items():
+            for _, number, ridges in sorted(tried, key=lambda trial: trial[:2])[: self.finalists]:
+                finals.setdefault(number, {})[key] = ridges
+        for number, wanted in sorted(finals.items()):
+            for group in self._groups(self.points[number])[0]:
+                names = [key for key in group.names if key in wanted]
+                start = time.process_time()
+                for key, verdict in self._judged(group.only(names, self.terms), number, self.every, wanted).items():
+                    self.best[key].consider(verdict)
+                for key in names:
+                    self.seconds[key] += (time.process_time() - start) / len(names)
+
+    def fitted(self, key: str) -> Fitted:
+        """The mean of the best networks of a foundation, and its errors on runs left out."""
+        if key not in self.best:
+            return diverged(self.method, self.method.points())
+        folds = [row.cpu().numpy() for block in self.every.blocks for row in block.rows]
+        missed = np.tensordot(self.basis, self.best[key].without(folds), (1, 2)).transpose(0, 2, 1)
+        errors, targets = np.full_like(self.targets[key], np.nan), self.targets[key][:, self.windows]
+        errors[:, self.windows] = targets - np.tensordot(self.basis, self.paths[key], 1) + missed
+        return self.best[key].fitted(self.inputs, self.rows[key], self.seconds[key], errors)
+
+    def _groups(self, point: Mapping[str, float]) -> tuple[list[_Group], list[_Group]]:
+        """Foundations with the same inputs in a trial together, with all windows, and with those that judge first."""
+        left_out = self.method.left_out(point)
+        if left_out not in self.groups:
+            groups = _groups(self.tables, self.paths, left_out, len(self.windows), self.task.device)
+            rows = torch.as_tensor(self.first.rows, device=self.task.device)
+            first = groups if self.first is self.every else [group.part(rows) for group in groups]
+            self.groups[left_out] = groups, first
+        return self.groups[left_out]
+
+    def _judged(
+        self, group: _Group, number: int, judges: _Judges, wanted: Mapping[str, Index] | None = None
+    ) -> dict[str, _Verdict]:
+        """One trial for some foundations; `wanted` are the numbers of the ridges of each, by default all."""
+        if not group.names:
+            return {}
+        point, terms, ridges = self.points[number], self.terms, self.method.path()
+        seen = group.inputs(point)
+        drawn = _draw(seen, point, self.method.units, seed_of(self.task.seed, number))
+        parts = _parts(seen, drawn, group.outputs, self.task.device)
+        asked = None
+        if wanted is not None:
+            asked = np.stack([np.isin(range(len(ridges)), wanted[key]) for key in group.names], axis=1)
+        scaled = [ridge * judges.share for ridge in ridges]
+        errors, others, kept = _left_out(parts, scaled, judges.blocks, terms, asked)
+        verdicts = {}
+        for k, key in enumerate(group.names):
+            place, columns = int(errors[:, k].argmin()), slice(k * terms, (k + 1) * terms)
+            chosen = np.unique([place, *others[:, :, k].argmin(axis=0)])
+            verdicts[key] = _Verdict(
+                value=float(errors[place, k] + judges.faster[key]) / (2 * len(self.basis) * judges.count),
+                ridges=_down_to(ridges, judges.share, chosen),
+                params={**point, "mirror": float(seen is group.mirrored), "ridge": ridges[place]},
+                network=partial(_network, seen, drawn, parts, columns, scaled[place], self.basis),
+                left_out=partial(_chosen_without, others[:, :, k], kept, k),
+            )
+        return verdicts
+
+
+def _lacks_a_part(folds: Sequence[tuple[Index, Index]], chosen: Index) -> bool:
+    """Whether a fold has no training or no validation window among some windows."""
+    return any(not np.isin(part, chosen).any() for fold in folds for part in fold)
+
+
+def evenly(run: NDArray[np.str_], most: int) -> Index:
+    """Places of about `most` of the windows (S,), evenly taken from each run, one at least; all where they are few.
+
+    run : name of the run of each window, (S,). The windows of a run are in the order of time. Each run begins at
+    another part of a step, so that all moments of alike manoeuvres are seen.
+    """
+    if len(run) <= most:
+        return np.arange(len(run))
+    taken = []
+    for number, name in enumerate(np.unique(run)):
+        mine = np.flatnonzero(run == name)
+        count = max(1, round(len(mine) * most / len(run)))
+        phase = (0.5 + number * GOLDEN) % 1.0
+        taken.append(mine[((np.arange(count) + phase) * len(mine) / count).astype(int)])
+    return np.sort(np.concatenate(taken))
+
+
+def _down_to(ridges: Sequence[float], share: float, chosen: Index) -> Index:
+    """Numbers of the rising ridges that all windows may choose where a share of them chose these.
+
+    A fit to a part has ridges smaller by that share, which is right where windows are alike. Where each has news, a
+    ridge is right for any number of windows. So that of all windows is one of those chosen, or smaller by that share.
+    """
+    lowest = np.searchsorted(ridges, share * np.asarray(ridges)[chosen] * (1 + 1e-9), side="right") - 1
+    ranges = zip(np.maximum(lowest, 0), chosen, strict=True)
+    return np.unique(np.concatenate([np.arange(low, high + 1) for low, high in ranges]))
 
 
 def _of_windows(tables: Mapping[str, Mapping[str, Array]], windows: Index) -> dict[str, dict[str, Array]]:
@@ -334,36 +504,42 @@ def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
 class _Errors:
     """Errors of a trial over judged windows, each fold without itself, for every ridge; in single precision."""
 
-    def __init__(self, shape: tuple[int, int], num_ridges: int) -> None:
-        self.shape = shape  # (S, K r)
-        self.blocks: list[list[tuple[slice, Tensor, tuple[int, ...], Tensor]]] = [[] for _ in range(num_ridges)]
+    def __init__(self, num_windows: int, terms: int, num_ridges: int) -> None:
+        self.num_windows, self.terms = num_windows, terms
+        self.blocks: list[list[tuple[_Piece, list[int], Tensor]]] = [[] for _ in range(num_ridges)]
 
-    def keep(self, ridge: int, folds: slice, rows: Tensor, sides: tuple[int, ...], errors: Tensor) -> None:
-        """Keep the errors (folds, j, sides x K r) on some rows (folds, j) of the windows."""
-        self.blocks[ridge].append((folds, rows, sides, errors.float()))
+    def keep(self, ridge: int, piece: _Piece, models: list[int], errors: Tensor) -> None:
+        """Keep the errors (folds, j, sides x models x r) of some models on the judged windows of a piece."""
+        self.blocks[ridge].append((piece, models, errors.float()))
 
-    def of(self, ridges: Array, columns: slice) -> Tensor:
-        """Errors (2, S, r) on some columns, each fold by the ridge of this number; not numbers where none judges."""
-        width = len(range(self.shape[1])[columns])
-        selected = torch.full((2, self.shape[0], width), torch.nan, dtype=torch.float32)
+    def of(self, ridges: Array, model: int) -> Tensor:
+        """Errors (2, S, r) of a model, each fold by the ridge of this number; not numbers where none judges."""
+        selected = torch.full((2, self.num_windows, self.terms), torch.nan, dtype=torch.float32)
         for ridge in np.unique(ridges):
-            for folds, rows, sides, errors in self.blocks[ridge]:
-                mine = torch.as_tensor(ridges[folds] == ridge, device=errors.device)
-                for place, side in enumerate(sides):
-                    selected[side, rows[mine].cpu()] = errors.chunk(len(sides), dim=2)[place][..., columns][mine].cpu()
+            for piece, models, errors in self.blocks[ridge]:
+                mine = torch.as_tensor(ridges[piece.folds] == ridge, device=errors.device)
+                rows, first = piece.block.rows[mine].cpu(), models.index(model) * self.terms
+                for side, of_side in zip(piece.sides, errors.chunk(len(piece.sides), dim=2), strict=True):
+                    selected[side, rows] = of_side[mine, :, first : first + self.terms].cpu()
         return selected
 
 
 def _left_out(
-    parts: Sequence[_Part], ridges: Sequence[float], blocks: Sequence[_Block], terms: int
+    parts: Sequence[_Part],
+    ridges: Sequence[float],
+    blocks: Sequence[_Block],
+    terms: int,
+    wanted: Mask | None = None,
 ) -> tuple[Array, Array, _Errors]:
-    """Errors over judged windows, each block without itself; `terms` is r.
+    """Errors over judged windows, each block without itself.
+
+    `terms` is r. `wanted` (ridges, K) says which ridges are asked of which models, all by default.
 
     A run left out is never predicted better than with itself in the fit. So a ridge whose fit already misses more than
     other ridges do on runs left out is passed over: it would not be chosen, neither by all folds nor by all but one.
 
     Returns sums of squares (ridges, K) [m^2] over all folds, those over all folds but one (ridges, F, K), and the
-    errors. The sums of a ridge that is passed over are infinite.
+    errors. The sums of a ridge that is passed over, or not wanted, are infinite.
     """
     targets, ends = parts[0].targets, np.cumsum([len(block.out) for block in blocks])
     pieces = [
@@ -371,33 +547,38 @@ def _left_out(
         for sides, part in _alike(parts)
         for end, block in zip(ends, blocks, strict=True)
     ]
-    sums = targets.new_full((len(ridges), targets.shape[1] // terms), torch.inf)
-    others = targets.new_full((len(ridges), ends[-1], targets.shape[1] // terms), torch.inf)
-    errors = _Errors((targets.shape[0], targets.shape[1]), len(ridges))
+    num_models = targets.shape[1] // terms
+    sums = targets.new_full((len(ridges), num_models), torch.inf)
+    others = targets.new_full((len(ridges), ends[-1], num_models), torch.inf)
+    errors = _Errors(len(targets), terms, len(ridges))
     bounded = all(block.all_judged for block in blocks)  # what is left out is, not every part of it
 
-    def but_one(made: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
-        """Sums of squares over all folds, (K,), and over all but one, (F, K)."""
-        by_fold = torch.zeros_like(others[0])
+    def but_one(made: Sequence[Tensor], count: int) -> tuple[Tensor, Tensor]:
+        """Sums of squares over all folds, (count,), and over all but one, (F, count), of so many models."""
+        by_fold = targets.new_zeros((ends[-1], count))
         for piece, one in zip(pieces, made, strict=True):
-            squares = sums_of_squares(one).reshape(len(one), len(piece.sides), -1, terms)
+            squares = sums_of_squares(one).reshape(len(one), len(piece.sides), count, terms)
             by_fold[piece.folds] += squares.sum(dim=(1, 3))
         return by_fold.sum(dim=0), by_fold.sum(dim=0) - by_fold
 
     for i in sorted(range(len(ridges)), key=ridges.__getitem__):
-        missed = [piece.solver.missed(ridges[i]) for piece in pieces]
+        models = list(range(num_models)) if wanted is None else np.flatnonzero(wanted[i]).tolist()
+        if not models:
+            continue
+        columns = None if len(models) == num_models else [k * terms + term for k in models for term in range(terms)]
+        missed = [piece.solver.missed(ridges[i], piece.columns(columns, targets.shape[1])) for piece in pieces]
         if bounded and all(
-            (least > (1 + ROUNDING) * known.amin(dim=0)).all()
-            for least, known in zip(but_one(missed), (sums, others), strict=True)
+            (least > (1 + ROUNDING) * known[..., models].amin(dim=0)).all()
+            for least, known in zip(but_one(missed, len(models)), (sums, others), strict=True)
         ):
             continue
         made = [
-            piece.block.of_judged(piece.solver.without(ridges[i], one))
+            piece.block.of_judged(piece.solver.without(ridges[i], one, piece.columns(columns, targets.shape[1])))
             for piece, one in zip(pieces, missed, strict=True)
         ]
-        sums[i], others[i] = but_one(made)
+        sums[i, models], others[i][:, models] = but_one(made, len(models))
         for piece, one in zip(pieces, made, strict=True):
-            errors.keep(i, piece.folds, piece.block.rows, piece.sides, one)
+            errors.keep(i, piece, models, one)
     return sums.cpu().numpy(), others.cpu().numpy(), errors
 
 
@@ -420,14 +601,20 @@ class _Piece:
     block: _Block
     solver: _FewRows | _ManyRows
 
+    def columns(self, of_side: list[int] | None, width: int) -> list[int] | slice:
+        """Columns of all its sides, from those of one side, which has so many; all of them by default."""
+        if of_side is None:
+            return slice(None)
+        return [place * width + column for place in range(len(self.sides)) for column in of_side]
+
 
 def _solver(part: _Part, block: _Block) -> _FewRows | _ManyRows:
     return (_FewRows if block.out.shape[1] <= part.features.shape[1] else _ManyRows)(part, block)
 
 
-def _chosen_without(others: Array, errors: _Errors, columns: slice) -> _LeftOut:
-    """A trial without each fold in turn, on some columns: others (ridges, F) [m^2] over all folds but that one."""
-    return _LeftOut(others.min(axis=0), errors.of(others.argmin(axis=0), columns))
+def _chosen_without(others: Array, errors: _Errors, model: int) -> _LeftOut:
+    """A trial without each fold in turn, for one model: others (ridges, F) [m^2] over all folds but that one."""
+    return _LeftOut(others.min(axis=0), errors.of(others.argmin(axis=0), model))
 
 
 class _FewRows:
@@ -444,13 +631,13 @@ class _FewRows:
         self.columns = self.rows.mT.contiguous()
         self.unit = torch.eye(self.shape[1], device=out.device)
 
-    def missed(self, ridge: float) -> Tensor:
-        """What the fit of all windows misses of the targets, (folds, b, K r), in single precision."""
-        weights = (self.part.product / (self.part.eigenvalues + ridge)[:, None]).float()
+    def missed(self, ridge: float, columns: list[int] | slice) -> Tensor:
+        """What the fit of all windows misses of some columns of the targets, (folds, b, C), in single precision."""
+        weights = (self.part.product[:, columns] / (self.part.eigenvalues + ridge)[:, None]).float()
         fitted = matmul(self.flat, weights)
-        return torch.sub(self.targets, fitted, out=fitted).view(*self.shape, -1)
+        return torch.sub(self.targets[:, columns], fitted, out=fitted).view(*self.shape, -1)
 
-    def without(self, ridge: float, missed: Tensor) -> Tensor:
+    def without(self, ridge: float, missed: Tensor, columns: list[int] | slice) -> Tensor:
         """What a fit without each block misses of it; by Cholesky's factors of I - H_bb.
 
         In double precision for blocks with a squared pivot below `SOUND`, which limits the digits.
@@ -464,15 +651,15 @@ class _FewRows:
         errors = matmul(inverse.mT, matmul(inverse, missed))
         if unsound.any():
             errors = errors.double()
-            errors[unsound] = self._double(self.block.out[unsound], diagonal)
+            errors[unsound] = self._double(self.block.out[unsound], diagonal, columns)
         return errors
 
-    def _double(self, out: Tensor, diagonal: Tensor) -> Tensor:
-        """Errors of some blocks (folds, b) of windows without themselves, (folds, b, K r), in double precision."""
+    def _double(self, out: Tensor, diagonal: Tensor, columns: list[int] | slice) -> Tensor:
+        """Errors of some blocks (folds, b) of windows without themselves, (folds, b, C), in double precision."""
         rows = self.part.rotated(out)
         weighted = rows / diagonal
         remainder = self.unit.double() - matmul(weighted, rows.mT)
-        missed = self.part.targets[out] - matmul(weighted, self.part.product)
+        missed = self.part.targets[:, columns][out] - matmul(weighted, self.part.product[:, columns])
         solved: Tensor = torch.linalg.solve(remainder, missed)
         return solved
 
@@ -486,14 +673,16 @@ class _ManyRows:
         self.within = matmul(self.rows.mT, self.rows)
         self.other = part.product - matmul(self.rows.mT, self.targets)
 
-    def missed(self, ridge: float) -> Tensor:
-        """What the fit of all windows misses of the targets, (folds, b, K r)."""
-        return self.targets - matmul(self.rows, self.part.product / (self.part.eigenvalues + ridge)[:, None])
+    def missed(self, ridge: float, columns: list[int] | slice) -> Tensor:
+        """What the fit of all windows misses of some columns of the targets, (folds, b, C)."""
+        weights = self.part.product[:, columns] / (self.part.eigenvalues + ridge)[:, None]
+        return self.targets[..., columns] - matmul(self.rows, weights)
 
-    def without(self, ridge: float, _: Tensor) -> Tensor:
+    def without(self, ridge: float, _: Tensor, columns: list[int] | slice) -> Tensor:
         """What a fit without each block misses of it."""
         remainder = torch.diag(self.part.eigenvalues + ridge) - self.within
-        return self.targets - matmul(self.rows, torch.linalg.solve(remainder, self.other))
+        solved = torch.linalg.solve(remainder, self.other[..., columns])
+        return self.targets[..., columns] - matmul(self.rows, solved)
 
 
 def _network(

@@ -21,7 +21,7 @@ TOGETHER = 5.0  # s for which quick trials are kept, to be written together
 CLOSING = 1  # trials that the last fit costs, about
 
 
-def affordable(budget: float, before: float, seconds: Sequence[float]) -> int | None:
+def affordable(budget: float, before: float, seconds: Sequence[float], closing: int = CLOSING) -> int | None:
     """How many trials fit into a budget; None before enough have been timed, or half of the budget is gone.
 
     Parameters
@@ -29,11 +29,12 @@ def affordable(budget: float, before: float, seconds: Sequence[float]) -> int | 
     budget : core-seconds for everything [s].
     before : what the search has cost before its first trial [s].
     seconds : of the trials so far [s]; the first one also warms up, so the others tell the price.
+    closing : trials that what follows the search costs, about.
     """
     if not seconds or (len(seconds) < TIMED and before + sum(seconds) < budget / 2):
         return None
     price = max(fmean(seconds[1:] or seconds), 1e-6)
-    return max(len(seconds), int((budget - before) / price) - CLOSING)
+    return max(len(seconds), int((budget - before) / price) - closing)
 
 
 class Search:
@@ -43,6 +44,7 @@ class Search:
     ----------
     task, method : what is searched.
     names : the foundations.
+    closing : as in `affordable`.
     again : each trial needs what the one before left behind, so nothing is taken over from an interrupted search but
         its number of trials; the digits are the same.
 
@@ -51,8 +53,10 @@ class Search:
     rows : foundation -> its trials so far, those of an interrupted search first.
     """
 
-    def __init__(self, task: Task, names: Iterable[str], method: Searched, *, again: bool = False) -> None:
-        self.begun = time.process_time()
+    def __init__(
+        self, task: Task, names: Iterable[str], method: Searched, *, again: bool = False, closing: int = CLOSING
+    ) -> None:
+        self.begun, self.closing = time.process_time(), closing
         self.method, self.journal = method, task.journal
         self.cells = {name: task.cells.get(name, name) for name in names}
         self.rows: dict[str, list[Row]] = {name: [] for name in self.cells}
@@ -121,6 +125,6 @@ class Search:
         assert self.method.budget is not None
         seconds = [sum(rows[k]["seconds"] for rows in self.rows.values()) for k in range(done)]
         before = time.process_time() - self.begun if self.before is None else self.before
-        self.count = affordable(self.method.budget * len(self.rows), before, seconds)
+        self.count = affordable(self.method.budget * len(self.rows), before, seconds, self.closing)
         if self.count is not None and self.journal is not None:
             self.journal.decide(list(self.cells.values()), self.count)

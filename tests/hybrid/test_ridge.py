@@ -12,12 +12,16 @@ from shipid.hybrid.ridge import (
     _Best,
     _blocks,
     _chosen_without,
+    _down_to,
     _Errors,
     _FewRows,
     _left_out,
     _LeftOut,
+    _Piece,
     _reflection,
+    _Verdict,
     _with_axes,
+    evenly,
     smooth_basis,
 )
 from tests.hybrid.tasks import compensation, tune
@@ -27,6 +31,7 @@ RUDDER = ("engine.n", "rudder.delta")
 SMALL = PathDrawn(trials=6, units=24, terms=4)
 STEPS, LENGTHS = 9, (18, 25, 18, 30, 11, 18)  # windows of the runs
 ALL = np.arange(sum(LENGTHS))
+EVERY = slice(None)  # column
 ENDS = np.cumsum(LENGTHS)
 RUNS = [np.arange(end - length, end) for length, end in zip(LENGTHS, ENDS, strict=True)]
 FOLDS = [(np.setdiff1d(ALL, run), run) for run in RUNS]
@@ -95,7 +100,7 @@ def test_single_precision_ends_where_digits_would():
     (block, *_) = _blocks(FOLDS, ALL, "cpu")
     few = _FewRows(part, block)
     for ridge, single in ((1e4, True), (1e-6, False)):
-        errors = few.without(ridge, few.missed(ridge))
+        errors = few.without(ridge, few.missed(ridge, EVERY), EVERY)
         assert (errors.dtype == torch.float32) == single, ridge
 
 
@@ -108,7 +113,7 @@ def test_one_unsound_block_is_in_double_precision_and_leaves_the_others_as_they_
     wanted = rng.normal(size=(len(ALL), 4))
     (block,) = _blocks([(np.setdiff1d(ALL, run), run) for run in runs], ALL, "cpu")
     few = _FewRows(part_of(features, wanted), block)
-    errors = few.without(ridge, few.missed(ridge))
+    errors = few.without(ridge, few.missed(ridge, EVERY), EVERY)
     off = np.empty(len(runs))
     for fold, run in enumerate(runs):
         others = np.setdiff1d(ALL, run)
@@ -146,9 +151,8 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(units, ridge, kind
     np.testing.assert_allclose(sums[0], expected, rtol=rtol)
     np.testing.assert_allclose(others[0].sum(axis=0), (len(folds) - 1) * expected, rtol=rtol)
     judged = np.unique(np.concatenate([part for _, part in folds]))
-    kept = errors.of(np.zeros(len(folds), dtype=int), slice(None))
-    squares = np.square(kept[:, judged].double().numpy()).reshape(2, len(judged), 3, 2)
-    np.testing.assert_allclose(squares.sum(axis=(0, 1, 3)), expected, rtol=1e-5)
+    kept = [errors.of(np.zeros(len(folds), dtype=int), model)[:, judged].double().numpy() for model in range(3)]
+    np.testing.assert_allclose([np.square(one).sum() for one in kept], expected, rtol=1e-5)
 
 
 def drawn_parts(seed):
@@ -187,15 +191,81 @@ def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged, least, mos
         np.testing.assert_array_equal(sums[~passed], one_by_one[~passed])
         np.testing.assert_array_equal(sums.argmin(axis=0), one_by_one.argmin(axis=0))
         np.testing.assert_array_equal(others.argmin(axis=0), but_one.argmin(axis=0))
-        kept = errors.of(others[:, :, 0].argmin(axis=0), slice(0, 2))
+        kept = errors.of(others[:, :, 0].argmin(axis=0), 0)
         assert np.isfinite(kept[:, np.concatenate([judged for _, judged in folds])].numpy()).all()
     assert least <= passed_over <= most
 
 
+@pytest.mark.parametrize("many_rows", [False, True])
+def test_what_is_asked_of_some_models_is_what_all_are_told(many_rows):
+    """Draws by seed: some ridges of some models give the digits of all ridges of all models, and nothing else."""
+    ridges = list(np.geomspace(1e-3, 1e3, 5))
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        runs = np.split(np.arange(60), [20, 35])
+        folds = [(np.setdiff1d(np.arange(60), run), run) for run in runs]
+        units = int(rng.integers(2, 8)) if many_rows else 40
+        seen = [rng.normal(size=(60, units)) for _ in range(2)]
+        parts = [part_of(one, one[:, :2] @ rng.normal(size=(2, 8)) + rng.normal(size=(60, 8))) for one in seen]
+        blocks, wanted = _blocks(folds, np.arange(60), "cpu"), rng.random((5, 4)) < 0.4
+        sums, others, errors = _left_out(parts, ridges, blocks, 2, wanted)
+        alone = [_left_out(parts, [ridge], blocks, 2) for ridge in ridges]
+        told = np.isfinite(sums)
+        assert not (told & ~wanted).any()
+        assert (told.any(axis=0) == wanted.any(axis=0)).all()
+        np.testing.assert_allclose(sums[told], np.concatenate([one[0] for one in alone])[told], rtol=1e-4)
+        for ridge, model in zip(*np.nonzero(told), strict=True):
+            np.testing.assert_allclose(others[ridge, :, model], alone[ridge][1][0, :, model], rtol=1e-4)
+            kept, expected = (one.of(np.full(3, i), model) for one, i in ((errors, ridge), (alone[ridge][2], 0)))
+            np.testing.assert_allclose(kept, expected, rtol=1e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_windows_are_taken_evenly_from_each_run(seed):
+    rng = np.random.default_rng(seed)
+    lengths = rng.integers(1, 60, rng.integers(1, 12))
+    run = np.repeat([f"run {number}" for number in range(len(lengths))], lengths)
+    most = int(rng.integers(1, 2 * len(run)))
+    taken = evenly(run, most)
+    if len(run) <= most:
+        np.testing.assert_array_equal(taken, np.arange(len(run)))
+        return
+    assert (np.diff(taken) > 0).all()
+    counts = np.array([(run[taken] == name).sum() for name in np.unique(run)])
+    shares = np.array([(run == name).sum() for name in np.unique(run)]) * most / len(run)
+    assert (counts >= 1).all()
+    assert (np.abs(counts - np.maximum(shares, 1)) <= 0.5).all()
+    for name in np.unique(run):
+        steps = np.diff(taken[run[taken] == name])
+        assert len(steps) == 0 or np.ptp(steps) <= 1
+
+
+def test_all_windows_choose_the_ridge_of_a_part_or_one_that_is_smaller_by_its_share():
+    ridges = [1e-3, 1e-2, 1e-1, 1.0, 10.0]
+    assert _down_to(ridges, 1.0, np.array([3])).tolist() == [3]
+    assert _down_to(ridges, 0.5, np.array([3])).tolist() == [2, 3]
+    assert _down_to(ridges, 0.1, np.array([3])).tolist() == [2, 3]
+    assert _down_to(ridges, 0.03, np.array([1, 4])).tolist() == [0, 1, 2, 3, 4]
+    assert _down_to([0.5], 0.1, np.array([0])).tolist() == [0]
+
+
+def test_a_part_of_the_windows_chooses_nearly_as_well_as_all(columns, targets):
+    """The networks are solved with all windows, so that what a part chooses costs little, on the paths and in bands."""
+    whole, part = (
+        tune(columns, TWINS, targets, FOLDS, recipe(trials=12, search_windows=most), seed=0)["rough"]
+        for most in (1000, 60)
+    )
+    judged = [np.square(one.left_out[:, ALL]).mean() for one in (whole, part)]
+    assert judged[1] == pytest.approx(judged[0], rel=0.1)
+    assert len(part.corrector.networks) == len(whole.corrector.networks)
+    assert {trial["number"] for trial in part.trials} == set(range(12))
+
+
+@pytest.mark.parametrize("search_windows", [1000, 40])
 @pytest.mark.parametrize("mirror", [0.0, 1.0])
-def test_errors_left_out_are_those_of_a_model_without_the_run(columns, targets, mirror):
+def test_errors_left_out_are_those_of_a_model_without_the_run(columns, targets, mirror, search_windows):
     """One trial, one ridge: nothing is chosen, so a fit without the run must give the same errors on it."""
-    plain = recipe(trials=1, averaged=1, ridge=0.1, mirror=mirror)
+    plain = recipe(trials=1, averaged=1, ridge=0.1, mirror=mirror, search_windows=search_windows)
     fitted = tune(columns, TWINS, targets, FOLDS, plain, seed=0)["rough"]
     (network,) = fitted.corrector.networks
     table = columns | wind(columns)
@@ -219,19 +289,21 @@ def test_a_run_has_no_part_in_the_choice_of_what_judges_it():
     """Two trials, two folds: the first is best for fold 0 and the second for fold 1, so each judges the other fold."""
     search, rows = _Best(most=1), [np.array([0, 1]), np.array([2, 3])]
     for number, by_fold in enumerate([[1.0, 5.0], [4.0, 2.0]]):
-        errors = torch.full((2, 4, 3), float(number))
-        others = sum(by_fold) - np.array(by_fold)
-        search.consider({}, sum(by_fold), lambda: None, lambda o=others, e=errors: _LeftOut(o, e))
+        left_out = _LeftOut(sum(by_fold) - np.array(by_fold), torch.full((2, 4, 3), float(number)))
+        search.consider(_Verdict(sum(by_fold), np.array([0]), {}, lambda: None, lambda kept=left_out: kept))
     np.testing.assert_array_equal(search.without(rows)[0, :, 0], [1.0, 1.0, 0.0, 0.0])
 
 
 def test_a_run_has_no_part_in_the_choice_of_the_ridge_that_judges_it():
     """The first ridge is best for fold 0 and the second for fold 1, so each judges the other fold."""
-    errors = _Errors((4, 2), 2)
+    errors = _Errors(4, 2, 2)
+    folds = [(np.array([2, 3]), np.array([0, 1])), (np.array([0, 1]), np.array([2, 3]))]
+    (block,) = _blocks(folds, np.arange(4), "cpu")
+    piece = _Piece((0, 1), slice(0, 2), block, None)
     for ridge in (0, 1):
-        errors.keep(ridge, slice(0, 2), torch.tensor([[0, 1], [2, 3]]), (0, 1), torch.full((2, 2, 4), float(ridge)))
+        errors.keep(ridge, piece, [0], torch.full((2, 2, 4), float(ridge)))
     by_fold = np.array([[1.0, 5.0], [4.0, 2.0]])
-    left_out = _chosen_without(by_fold.sum(axis=1, keepdims=True) - by_fold, errors, slice(None))
+    left_out = _chosen_without(by_fold.sum(axis=1, keepdims=True) - by_fold, errors, 0)
     np.testing.assert_array_equal(left_out.others, [2.0, 1.0])
     np.testing.assert_array_equal(left_out.errors[0, :, 0], [1.0, 1.0, 0.0, 0.0])
 
