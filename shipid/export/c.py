@@ -42,9 +42,12 @@ WORDS = frozenset(
     rewind signal raise time clock gamma j0 j1 jn y0 y1 yn index bool true false complex imaginary linux unix
     and asm bitand bitor catch class compl delete explicit export friend mutable namespace new not operator or private
     protected public template this throw try typeid typename using virtual xor math string
+    begin_filters first_turn free_memory get_memory go_filters guid identifier kind_of kinds nearest_turn no no_band
+    predict_from radius_of refuse same_turn self set start_values t va_list
     """.split()
 )
-"""Keywords of C99 and C++, names of C's library and headers: a file of such a name would not compile."""
+"""Keywords of C99 and C++, names of C's library and headers and of the sources themselves: a file of such a name would
+not compile."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,8 @@ class Files:
 def c_name(text: str) -> str:
     """A name for C from any text: letters, digits and _, with a letter first."""
     name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower() or "model"
-    return f"m_{name}" if name[0].isdigit() or name in WORDS or name.endswith("_t") else name  # _t: types of POSIX
+    taken = name in WORDS or name.endswith("_t") or re.fullmatch(r"f\d+(_.*)?", name)  # types of POSIX; functions
+    return f"m_{name}" if taken or name[0].isdigit() else name
 
 
 def strings(values: Sequence[str]) -> str:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
+from shipid.export.c import c_name
+from shipid.export.fmu import predictor_unit, vessel_unit
+from shipid.export.model import model
 from shipid.export.write import TARGETS, export_predictor, export_vessel
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.compensator import Normaliser
@@ -20,6 +25,20 @@ from tests.export.strange import drawn
 @pytest.fixture(scope="module")
 def simple():
     return Predictor(Physics(load_vessel("mariner"), 3, 5.0), "alone", Unchanged({}), {})
+
+
+@pytest.mark.parametrize("kind", ["path-drawn", "recurrent"])
+def test_no_name_of_an_export_is_one_of_its_source(kind):
+    """Before, a predictor called `guid`, `kinds` or `no` gave an FMU that no compiler took."""
+    kept = model(drawn(kind, 1).predictor)
+    vessel = vessel_unit(load_vessel("mariner"), "zzz", "rk4")
+    for unit in (predictor_unit(kept, "zzz"), vessel):
+        source = "\n".join([*unit.files.texts.values(), unit.wrapper])
+        names = re.findall(r"^(?:static |const |typedef )*\w[\w ]*? \*?(\w+)(?= ?[(\[;=])", source, re.MULTILINE)
+        ours = {name for name in names if not name.lower().startswith(("zzz", "fmi2"))}
+        assert len(ours) > 5
+        assert [name for name in sorted(ours) if c_name(name) == name] == []
+    assert [c_name(name) for name in ("self", "set", "t")] == ["m_self", "m_set", "m_t"]  # within functions
 
 
 def test_the_folder_of_c_holds_three_files(simple, tmp_path):
