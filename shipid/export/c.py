@@ -66,9 +66,12 @@ def c_name(text: str) -> str:
 
 
 def strings(values: Sequence[str]) -> str:
-    """C strings, one a line."""
-    escaped = (json.dumps(value).replace("?", "\\?") for value in values)
-    return ",\n    ".join(escaped) or "0"
+    """C strings in UTF-8, one a line; all but plain characters as octal numbers of three digits."""
+    return ",\n    ".join(f'"{"".join(map(_escaped, value.encode("utf-8", "replace")))}"' for value in values) or "0"
+
+
+def _escaped(byte: int) -> str:
+    return chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?' else f"\\{byte:03o}"
 
 
 def comment(lines: Sequence[str]) -> str:

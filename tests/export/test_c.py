@@ -16,7 +16,7 @@ from shipid.data.windows import Instants, past_of
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
 from shipid.export.blocks import Precision
-from shipid.export.c import c_name, predictor_files, vessel_files
+from shipid.export.c import Files, c_name, predictor_files, strings, vessel_files
 from shipid.export.casadi import predictor_function
 from shipid.export.equations import Equations
 from shipid.export.model import model
@@ -473,3 +473,12 @@ def test_examples_run(tmp_path):
     text = run_example(predictor_files(model(predictor), "m", Precision()), tmp_path / "a")
     assert "30 s: " in text
     assert "psi" in run_example(vessel_files(load_vessel("mariner"), "m", "rk4", Precision()), tmp_path / "b")
+
+
+def test_any_text_is_a_string_of_c(tmp_path):
+    """Before, a kind of manoeuvre with an emoji or a control character gave C that no compiler takes."""
+    texts = ['zig "zag"', "ö ü", "🚢 turn", "a\nb\tc\x07", "what??/ \\ back", "é1", "%d", ""]
+    source = f"const char *const texts[] = {{\n    {strings(texts)}}};\n"
+    loaded = library(Files("texts", {"texts.c": source}), tmp_path, "-O0", "-trigraphs")
+    stored = (ctypes.c_char_p * len(texts)).in_dll(loaded, "texts")
+    assert [text.decode() for text in stored] == texts
