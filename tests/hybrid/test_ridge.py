@@ -261,6 +261,24 @@ def test_a_part_of_the_windows_chooses_nearly_as_well_as_all(columns, targets):
     assert {trial["number"] for trial in part.trials} == set(range(12))
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_a_part_of_strange_windows_judges_too(seed):
+    """Runs of 1 to 60 windows, 1 window to half of them as judges; a fold without any is judged by all windows."""
+    rng = np.random.default_rng(seed)
+    lengths = rng.integers(1, 60, rng.integers(3, 9))
+    count, ends = lengths.sum(), np.cumsum(lengths)
+    runs = [np.arange(end - length, end) for end, length in zip(ends, lengths, strict=True)]
+    folds = [(np.setdiff1d(np.arange(count), run), run) for run in runs]
+    columns = drawn(seed=seed, count=count)
+    targets = {name: scale * rng.normal(size=(STEPS, count, 2)) for name, scale in (("one", 1.0), ("other", 5.0))}
+    most = int(rng.choice([1, max(count // 5, 1), count // 2]))
+    method = recipe(trials=int(rng.integers(1, 20)), averaged=3, search_windows=most)
+    for fitted in tune(columns, TWINS, targets, folds, method, seed=seed).values():
+        assert np.isfinite(fitted.left_out).all()
+        assert len(fitted.corrector.networks) == min(method.trials, 3)
+        assert len(fitted.trials) == method.trials
+
+
 @pytest.mark.parametrize("search_windows", [1000, 40])
 @pytest.mark.parametrize("mirror", [0.0, 1.0])
 def test_errors_left_out_are_those_of_a_model_without_the_run(columns, targets, mirror, search_windows):
