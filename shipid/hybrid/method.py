@@ -136,7 +136,7 @@ class Fitted:
 
     corrector : the fitted method; None where every trial failed (targets that are not numbers).
     trials : a row each: number, params, value (mean squared validation error [m^2]), epochs, seconds, state
-        (`complete` or `diverged`).
+        (`complete`, `stopped` where some of the windows alone judged it, or `diverged`).
     seconds : time spent on this foundation, its share of what is done for several at once.
     left_out : errors (T, S, 2) [m], true less predicted, on the windows of the task, by models that saw the run of the
         window neither in training nor in the choice of hyperparameters; not numbers where there are none. None where

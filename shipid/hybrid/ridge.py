@@ -114,10 +114,10 @@ class _Best:
         if len(self.left_out) < most or trial.value < self.left_out[-1][0]:
             self.left_out = sorted([*self.left_out, (trial.value, trial.left_out())], key=lambda kept: kept[0])[:most]
 
-    def fitted(self, inputs: Inputs, rows: list[Row], seconds: float, errors: Array) -> Fitted:
-        """Average the best networks; `seconds` of the whole fit [s], `errors` those on runs left out."""
+    def fitted(self, inputs: Inputs, rows: list[Row], errors: Array) -> Fitted:
+        """Average the best networks; `errors` are those on runs left out."""
         compensator = Compensator(inputs, tuple(kept[2] for kept in self.kept), self.kept[0][1])
-        return Fitted(compensator, rows, seconds, errors)
+        return Fitted(compensator, rows, sum(row["seconds"] for row in rows), errors)
 
     def without(self, folds: Sequence[Index]) -> Array:
         """Errors (2, S, r) on the basis where no fold has a part in the choice of the trials that judge it."""
@@ -217,7 +217,7 @@ class _Tuning:
 
     windows : those of all folds. names : foundations whose targets are numbers. every : all windows as judges; first :
     those that judge all trials. promising : of each foundation value, number and ridges of its trials by a part of the
-    windows. seconds : of each foundation, its share of the work [s].
+    windows. rows : of each foundation, its trials.
     """
 
     def __init__(self, task: Task, method: PathDrawn) -> None:
@@ -241,7 +241,6 @@ class _Tuning:
         self.points: dict[int, dict[str, float]] = {}
         self.groups: dict[frozenset[str], tuple[list[_Group], list[_Group]]] = {}  # with all windows, and the first
         self.rows: dict[str, list[Row]] = {}
-        self.seconds: dict[str, float] = {}
 
     def search(self) -> None:
         """Judge all trials, by a part of the windows where they are many."""
@@ -271,11 +270,13 @@ class _Tuning:
         if not self.names and task.on_trial is not None:
             task.on_trial(self.method.trials, self.method.trials)
         self.rows = search.rows
-        self.seconds = {key: sum(row["seconds"] for row in rows) for key, rows in search.rows.items()}
 
     def judge_finalists(self) -> None:
-        """Judge the best trials of a search by a part of the windows once more, by all windows."""
+        """Judge the best trials of a search by a part of the windows once more, by all windows; the others stopped."""
+        if self.first is self.every:
+            return
         finals: dict[int, dict[str, Index]] = {}  # trial -> foundation -> numbers of ridges
+        self.rows = {key: [{**row, "state": "stopped"} for row in rows] for key, rows in self.rows.items()}
         for key, tried in self.promising.items():
             for _, number, ridges in sorted(tried, key=lambda trial: trial[:2])[: self.finalists]:
                 finals.setdefault(number, {})[key] = ridges
@@ -285,8 +286,10 @@ class _Tuning:
                 start = time.process_time()
                 for key, verdict in self._judged(group.only(names, self.terms), number, self.every, wanted).items():
                     self.best[key].consider(verdict)
+                    value = {"value": verdict.value, "params": verdict.params, "state": "complete"}
+                    self.rows[key][number] |= value
                 for key in names:
-                    self.seconds[key] += (time.process_time() - start) / len(names)
+                    self.rows[key][number]["seconds"] += (time.process_time() - start) / len(names)
 
     def fitted(self, key: str) -> Fitted:
         """The mean of the best networks of a foundation, and its errors on runs left out."""
@@ -296,7 +299,7 @@ class _Tuning:
         missed = np.tensordot(self.basis, self.best[key].without(folds), (1, 2)).transpose(0, 2, 1)
         errors, targets = np.full_like(self.targets[key], np.nan), self.targets[key][:, self.windows]
         errors[:, self.windows] = targets - np.tensordot(self.basis, self.paths[key], 1) + missed
-        return self.best[key].fitted(self.inputs, self.rows[key], self.seconds[key], errors)
+        return self.best[key].fitted(self.inputs, self.rows[key], errors)
 
     def _groups(self, point: Mapping[str, float]) -> tuple[list[_Group], list[_Group]]:
         """Foundations with the same inputs in a trial together, with all windows, and with those that judge first."""

@@ -41,10 +41,10 @@ def search(content: ReportContent) -> Figure | None:
         title="Trials of the search",
         takeaway=_takeaway(frame, names),
         how="Each dot is a trial: the root of its validation error over the best of its cell; "
-        f"{_thinned(frame)}diamonds are those whose networks the cell uses; those beyond {CEILING:g} times lie at the "
-        "upper edge, those that diverged above it. The line joins the medians of all that ended. Rank correlation "
-        "(Spearman) is taken within each cell, then averaged over cells: it sees what rises or falls throughout, not "
-        "an optimum in the middle.",
+        f"{_thinned(frame)}{_stopped(frame)}diamonds are those whose networks the cell uses; those beyond "
+        f"{CEILING:g} times lie at the upper edge, those that diverged above it. The line joins the medians of all "
+        "that have a value. Rank correlation (Spearman) is taken within each cell, then averaged over cells: it sees "
+        "what rises or falls throughout, not an optimum in the middle.",
         alternative="Dots of the relative validation error of trials over each hyperparameter; a table sums up.",
         height=270,
         views=views,
@@ -92,7 +92,8 @@ def importance(frame: pd.DataFrame, name: str) -> float:
 def _relative(trials: pd.DataFrame) -> pd.DataFrame:
     """Trials with `ratio` [1]: the root of the value over the best of the cell."""
     good = trials.value.where(trials.state.ne("diverged")).astype(float)
-    return trials.assign(value=good, ratio=np.sqrt(good / good.groupby(trials.cell).transform("min")))
+    best = good.where(trials.state.eq("complete")).groupby(trials.cell).transform("min")
+    return trials.assign(value=good, ratio=np.sqrt(good / best))
 
 
 def _chips(frame: pd.DataFrame) -> list[Chip]:
@@ -145,6 +146,11 @@ def _some(frame: pd.DataFrame, most: int) -> pd.DataFrame:
 def _thinned(frame: pd.DataFrame) -> str:
     most = MOST_DOTS + MOST_CHOSEN
     return f"of many, at most {most:,} are drawn in a panel; " if len(frame) > most else ""
+
+
+def _stopped(frame: pd.DataFrame) -> str:
+    early = frame.state.eq("stopped").any()
+    return "triangles are those that a part of the windows judged, and that were not among the best; " if early else ""
 
 
 def _medians(frame: pd.DataFrame, name: str) -> Floats:

@@ -32,7 +32,8 @@ def by_model(results: Results) -> pd.DataFrame:
     The method is the one that the study judges by. Failed cells are left out.
     """
     cells = judged_cells(results)
-    loss = [min((t["value"] for t in trials if t["value"] is not None), default=np.nan) for trials in cells["trials"]]
+    ended = [[trial["value"] for trial in trials if trial["state"] == "complete"] for trials in cells["trials"]]
+    loss = [min((value for value in values if value is not None), default=np.nan) for values in ended]
     good = cells.assign(loss=loss)[cells["status"] == "ok"]
     grouped = good.groupby(["model", "family", "N_D"], sort=False)
     frame = grouped.agg(

@@ -72,7 +72,7 @@ def by_hand(
             "seed": seed,
         }
         row |= {"runs": N_D, "minutes": 1.0, "A": A, "A_90": A, "A_rms": A, "H": np.nan, "H_90": np.nan}
-        row["trials"] = [{"value": (losses or {}).get(model, H)}]
+        row["trials"] = [{"value": (losses or {}).get(model, H), "state": "complete"}]
         row |= {"rms": np.nan, "status": "failed", "sentence": "no training converged"}
         if H is not None:
             row |= {"H": H, "rms": 1.1 * H, "status": "ok", "sentence": ""}
