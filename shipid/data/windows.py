@@ -338,6 +338,15 @@ def concatenate(parts: Sequence[Windows]) -> Windows:
     )
 
 
+def evenly(indices: NDArray[np.int64], count: int, phase: float = 0.5) -> NDArray[np.int64]:
+    """At most `count` of some indices, evenly spread; `phase`, from 0 to 1, is the place of each in its stretch."""
+    if len(indices) <= count:
+        return indices
+    places = np.round((np.arange(count) + phase) / count * len(indices) - 0.5).astype(int)
+    chosen: NDArray[np.int64] = indices[places]
+    return chosen
+
+
 def gaps(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]:
     """Times (start, end) [s] without rows, inside the unbroken stretches of each run; runs that have none are left out.
 

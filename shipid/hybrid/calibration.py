@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.data.windows import evenly
 from shipid.hybrid.bands import FEWEST, LEVELS, TRAITS, Bands, nearest, track, traits, turned
 from shipid.metrics import lengths
 
@@ -247,7 +248,7 @@ def _from_training(runs: _Runs, points: Array) -> tuple[Array, Array, Array]:
     deviation = np.sqrt(runs.weight @ (points - runs.weight @ points) ** 2)
     spread = np.maximum(deviation, np.maximum(1e-3 * np.abs(points).max(axis=0), 1e-9))
     each = max(-(-CENTRES // runs.count), 1)
-    chosen = np.concatenate([_evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
+    chosen = np.concatenate([evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
     centres = points[chosen]
     away = np.empty(len(points))
     for one in range(runs.count):
@@ -256,20 +257,12 @@ def _from_training(runs: _Runs, points: Array) -> tuple[Array, Array, Array]:
     return centres, spread, away
 
 
-def _evenly(indices: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """At most `count` of some indices, evenly spread."""
-    if len(indices) <= count:
-        return indices
-    chosen: NDArray[np.int64] = indices[np.round((np.arange(count) + 0.5) / count * len(indices) - 0.5).astype(int)]
-    return chosen
-
-
 def _spread_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Indices of sound windows, at most `WINDOWS` of each run, in order."""
     rows = np.flatnonzero(sound)
     if not len(rows):
         return rows
-    parts = [_evenly(rows[run[rows] == name], WINDOWS) for name in np.unique(run[rows])]
+    parts = [evenly(rows[run[rows] == name], WINDOWS) for name in np.unique(run[rows])]
     return np.sort(np.concatenate(parts))
 
 

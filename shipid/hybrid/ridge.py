@@ -25,6 +25,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from shipid.data.windows import evenly
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import Inputs, choose_features, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
@@ -232,7 +233,7 @@ class _Tuning:
         self.terms = self.basis.shape[1]
         self.paths = {key: np.tensordot(self.basis.T, paths[:, self.windows], 1) for key, paths in sound.items()}
         self.every = _Judges.of(task, self.windows, np.arange(len(self.windows)), sound, self.basis)
-        rows = evenly(task.windows.run[self.windows], method.search_windows)
+        rows = part_of_runs(task.windows.run[self.windows], method.search_windows)
         whole = len(rows) == len(self.windows) or _lacks_a_part(task.folds, self.windows[rows])
         self.first = self.every if whole else _Judges.of(task, self.windows, rows, sound, self.basis)
         self.finalists = method.averaged + SPARE
@@ -345,7 +346,7 @@ def _lacks_a_part(folds: Sequence[tuple[Index, Index]], chosen: Index) -> bool:
     return any(not np.isin(part, chosen).any() for fold in folds for part in fold)
 
 
-def evenly(run: NDArray[np.str_], most: int) -> Index:
+def part_of_runs(run: NDArray[np.str_], most: int) -> Index:
     """Places of about `most` of the windows (S,), evenly taken from each run, one at least; all where they are few.
 
     run : name of the run of each window, (S,). The windows of a run are in the order of time. Each run begins at
@@ -357,8 +358,7 @@ def evenly(run: NDArray[np.str_], most: int) -> Index:
     for number, name in enumerate(np.unique(run)):
         mine = np.flatnonzero(run == name)
         count = max(1, round(len(mine) * most / len(run)))
-        phase = (0.5 + number * GOLDEN) % 1.0
-        taken.append(mine[((np.arange(count) + phase) * len(mine) / count).astype(int)])
+        taken.append(evenly(mine, count, (0.5 + number * GOLDEN) % 1.0))
     return np.sort(np.concatenate(taken))
 
 

@@ -22,7 +22,7 @@ from shipid.hybrid.ridge import (
     _reflection,
     _Verdict,
     _with_axes,
-    evenly,
+    part_of_runs,
     smooth_basis,
 )
 from tests.hybrid.tasks import compensation, tune
@@ -227,7 +227,7 @@ def test_windows_are_taken_evenly_from_each_run(seed):
     lengths = rng.integers(1, 60, rng.integers(1, 12))
     run = np.repeat([f"run {number}" for number in range(len(lengths))], lengths)
     most = int(rng.integers(1, 2 * len(run)))
-    taken = evenly(run, most)
+    taken = part_of_runs(run, most)
     if len(run) <= most:
         np.testing.assert_array_equal(taken, np.arange(len(run)))
         return
