@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.structures import group_table
 from shipid.report.tables import Cell, Table, decimals, figure, text
-from shipid.report.wording import bound, counted, listed, number, scientific, short, wrapped
+from shipid.report.wording import bound, counted, listed, number, scientific, short
 
 ROW, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
 WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [px]
@@ -166,7 +167,7 @@ def _span(frame: pd.DataFrame) -> tuple[float, float]:
 def _hover(row: Mapping[Any, Any]) -> str:
     interval = f"{row['factor_low']:.3g} ... {row['factor_high']:.3g}"
     words = [f"<b>{label(str(row['path']))}</b> x {row['factor']:.4g}, 95 % {interval}"]
-    return "<br>".join([*words, *wrapped(label(str(row["reason"])), 70)])
+    return "<br>".join([*words, *wrap(label(str(row["reason"])), 70)])
 
 
 def numbers(content: IdentificationContent) -> Table:

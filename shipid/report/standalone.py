@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,6 @@ from shipid.report import (
     search,
 )
 from shipid.report.figure import Chip, Control, Figure, Panel, Scale, label
-from shipid.report.wording import wrapped
 
 FIGURES: dict[str, Callable[[Any], Figure | None]] = {
     "error_map": error_map.error_map,
@@ -171,7 +171,7 @@ def _titled(figure: go.Figure, record: Figure) -> go.Figure:
         figure.add_traces([_entry(chip) for chip in record.chips])
         if record.scale:
             figure.add_trace(_bar(record.scale))
-    takeaway = label("\n".join(wrapped(record.takeaway, 110))).replace("\n", "<br>")
+    takeaway = label("\n".join(wrap(record.takeaway, 110))).replace("\n", "<br>")
     words = f"{label(record.title)}<br><sup>{takeaway}</sup>"
     figure.update_layout(
         title={"text": words, "x": 0, "xref": "paper", "y": 1, "yref": "container", "yanchor": "top", "pad": {"t": 14}},

@@ -49,16 +49,6 @@ def shortened(name: str, most: int) -> str:
     return name if len(name) <= most else f"{name[: most // 2 - 1]}…{name[most // 2 - most :]}"
 
 
-def wrapped(text: str, most: int) -> list[str]:
-    """Break a text between words into lines of about so many characters."""
-    lines = [""]
-    for word in text.split():
-        if len(lines[-1]) + len(word) > most:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return lines
-
-
 def metres(value: float) -> str:
     """Write a length with its unit."""
     return f"{number(value)} m"

@@ -10,7 +10,6 @@ from shipid.report.wording import (
     scientific,
     short,
     shortened,
-    wrapped,
 )
 
 
@@ -64,12 +63,6 @@ def test_lists():
 
 def test_units_stay_with_their_numbers():
     assert bound("H = 0.94 m, 5 models") == "H\u00a0=\u00a00.94\u00a0m, 5 models"
-
-
-def test_lines_break_between_words() -> None:
-    assert wrapped("", 10) == [""]
-    assert wrapped("one two three  four", 10) == ["one two", "three four"]
-    assert wrapped("hydrodynamics of", 4) == ["", "hydrodynamics", "of"]
 
 
 def test_a_long_name_loses_its_middle() -> None:
