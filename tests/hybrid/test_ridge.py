@@ -198,7 +198,7 @@ def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged, least, mos
 
 
 @pytest.mark.parametrize("many_rows", [False, True])
-def test_what_is_asked_of_some_models_is_what_all_are_told(many_rows):
+def test_some_ridges_of_some_models_give_the_digits_of_all(many_rows):
     """Draws by seed: some ridges of some models give the digits of all ridges of all models, and nothing else."""
     ridges = list(np.geomspace(1e-3, 1e3, 5))
     for seed in range(20):

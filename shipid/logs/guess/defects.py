@@ -21,13 +21,8 @@ SPIKY = ("speed", "u", "v", "r", "psi", "phi", "V_w")
 OF_POSITIONS = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
 FEW = 4  # times that a sentence names
 MEASURED = ("speed", "u", "v", "r")
-LEVELS, BESIDE, PILE, ABOVE, RETURNS = (
-    30,
-    3,
-    0.03,
-    4.0,
-    3,
-)  # values; levels beside a limit; share of rows; times; visits
+LEVELS, BESIDE = 30, 3  # values that a signal has at least; of them beside a limit
+PILE, ABOVE, RETURNS = 0.03, 4.0, 3  # of the rows, at a limit; times as many as beside it; visits
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 STREAM = 0.5  # of the misfit of positions and velocities: less is no current
