@@ -22,6 +22,7 @@ from shipid.errors import DataError, ResultError, choices
 from shipid.metrics import lengths
 
 Array = NDArray[np.float64]
+Places = NDArray[np.int64]
 LEVELS = np.arange(1, 100) / 100
 """Levels that the tables of a band hold; between them it interpolates."""
 FEWEST = 3  # runs: one is left out, and two are needed to see how much runs differ
@@ -274,11 +275,17 @@ def distance(columns: Mapping[str, Array], names: tuple[str, ...], centres: Arra
     return nearest(np.stack([columns[name] for name in names], axis=1) / spread, centres / spread)
 
 
-def nearest(points: Array, centres: Array) -> Array:
-    """Root mean square distance over coordinates of points (S, d) from the nearest of the centres (m, d), (S,)."""
+def nearest(points: Array, centres: Array, run: Places | None = None, run_of_centre: Places | None = None) -> Array:
+    """Root mean square distance over coordinates of points (S, d) from the nearest of the centres (m, d), (S,).
+
+    run, run_of_centre : number of the run of each point (S,) and centre (m,): those of the same run are passed over.
+    """
     middle = centres.mean(axis=0)
     points, centres = points - middle, centres - middle  # else large coordinates would cost digits
-    which = ((centres**2).sum(axis=1)[:, None] - 2 * centres @ points.T).argmin(axis=0)
+    squares = (centres**2).sum(axis=1)[:, None] - 2 * centres @ points.T
+    if run is not None and run_of_centre is not None:
+        squares[run_of_centre[:, None] == run] = np.inf
+    which = squares.argmin(axis=0)
     away = points - centres[which]  # anew: sums of squares leave half the digits
     distances: Array = np.sqrt((away**2).mean(axis=1))
     return distances

@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
 WINDOWS = 60  # of a run that calibrate, at most
+PART = 4096  # windows whose distances are computed at once
 TIGHTER = 0.97  # an ellipse is taken where its radius is at most this share of that of a circle
 PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed to matter, as a logarithm
 
@@ -250,11 +251,9 @@ def _from_training(runs: _Runs, points: Array) -> tuple[Array, Array, Array]:
     each = max(-(-CENTRES // runs.count), 1)
     chosen = np.concatenate([evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
     centres = points[chosen]
-    away = np.empty(len(points))
-    for one in range(runs.count):
-        mine, others = runs.place == one, runs.place[chosen] != one
-        away[mine] = nearest(points[mine] / spread, centres[others] / spread)
-    return centres, spread, away
+    parts = [slice(first, first + PART) for first in range(0, len(points), PART)]
+    away = [nearest(points[part] / spread, centres / spread, runs.place[part], runs.place[chosen]) for part in parts]
+    return centres, spread, np.concatenate(away)
 
 
 def _spread_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -262,8 +261,9 @@ def _spread_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArra
     rows = np.flatnonzero(sound)
     if not len(rows):
         return rows
-    parts = [evenly(rows[run[rows] == name], WINDOWS) for name in np.unique(run[rows])]
-    return np.sort(np.concatenate(parts))
+    place = np.unique(run[rows], return_inverse=True)[1]
+    parts = np.split(rows[np.argsort(place, kind="stable")], np.cumsum(np.bincount(place))[:-1])
+    return np.sort(np.concatenate([evenly(part, WINDOWS) for part in parts]))
 
 
 def _runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _Runs:

@@ -123,10 +123,11 @@ class _Best:
     def without(self, folds: Sequence[Index]) -> Array:
         """Errors (2, S, r) on the basis where no fold has a part in the choice of the trials that judge it."""
         others = np.stack([one.others for _, one in self.left_out])  # (trials, F)
-        errors = np.full_like(np.asarray(self.left_out[0][1].errors), np.nan)
+        tried = np.stack([np.asarray(one.errors) for _, one in self.left_out])  # (trials, 2, S, r)
+        errors: Array = np.full_like(tried[0], np.nan)
         best = np.argsort(others, axis=0, kind="stable")[: self.most]
         for fold, rows in enumerate(folds):
-            errors[:, rows] = np.mean([self.left_out[i][1].errors[:, rows].numpy() for i in best[:, fold]], axis=0)
+            errors[:, rows] = tried[best[:, fold, None], :, rows].mean(axis=0).swapaxes(0, 1)
         return errors
 
 
@@ -321,6 +322,7 @@ class _Tuning:
         point, terms, ridges = self.points[number], self.terms, self.method.path()
         seen = group.inputs(point)
         drawn = _draw(seen, point, self.method.units, seed_of(self.task.seed, number))
+        layer = _layer(seen, drawn)  # the same array for all foundations
         parts = _parts(seen, drawn, group.outputs, self.task.device)
         asked = None
         if wanted is not None:
@@ -335,7 +337,7 @@ class _Tuning:
                 value=float(errors[place, k] + judges.faster[key]) / (2 * len(self.basis) * judges.count),
                 ridges=_down_to(ridges, judges.share, chosen),
                 params={**point, "mirror": float(seen is group.mirrored), "ridge": ridges[place]},
-                network=partial(_network, seen, drawn, parts, columns, scaled[place], self.basis),
+                network=partial(_network, seen, layer, parts, columns, scaled[place], self.basis),
                 left_out=partial(_chosen_without, others[:, :, k], kept, k),
             )
         return verdicts
@@ -688,21 +690,27 @@ class _ManyRows:
         return self.targets[..., columns] - matmul(self.rows, solved)
 
 
+def _layer(seen: _Inputs, drawn: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Weights (d, M) and offsets (M,) of the hidden layer of a network: the units drawn, and their mirror images."""
+    weight, offset = drawn
+    if seen.reflection is None:
+        return drawn
+    return np.concatenate([weight, seen.reflection @ weight], axis=1), np.concatenate([offset, offset])
+
+
 def _network(
-    seen: _Inputs, drawn: tuple[Array, Array], parts: Sequence[_Part], columns: slice, ridge: float, basis: Array
+    seen: _Inputs, layer: tuple[Array, Array], parts: Sequence[_Part], columns: slice, ridge: float, basis: Array
 ) -> Network:
     """The network whose targets are some columns of a trial, solved with all windows."""
-    weight, offset = drawn
     x, y = (
         (part.axes @ (part.product[:, columns] / (part.eigenvalues + ridge)[:, None])).cpu().numpy()
-        / len(offset) ** 0.5
+        / part.features.shape[1] ** 0.5
         for part in parts
     )
     if seen.reflection is not None:
-        weight, offset = np.concatenate([weight, seen.reflection @ weight], axis=1), np.concatenate([offset, offset])
         x, y = np.concatenate([x, x]) / 2**0.5, np.concatenate([y, -y]) / 2**0.5
     output = np.concatenate([x, y], axis=1)
-    return Network(seen.features, seen.normaliser, basis, ((weight, offset), (output, np.zeros(output.shape[1]))))
+    return Network(seen.features, seen.normaliser, basis, (layer, (output, np.zeros(output.shape[1]))))
 
 
 def _side(paths: Sequence[Array], axis: int, num_windows: int, device: str) -> Tensor:

@@ -24,6 +24,7 @@ from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.engines import check_device
 from shipid.engine.native import engine
 from shipid.files import make_folder, read_json, write_json
+from shipid.hybrid.compensator import shared_units
 from shipid.hybrid.device import use_threads, vectors
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Case, Corrector, Fitted, Task
@@ -309,7 +310,6 @@ def run_unit(
     runs = prepared.runs(plan, batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
     known = predictions(plan, prepared, runs, device, {name for name, _ in unit.pairs})
-    shared = {"N_D": batch.N_D, "seed": batch.seed, "runs": len(runs), "minutes": covered(windows) / 60}
     ways = {way.name: replace(way, foundations=unit.foundations(way.name)) for way in plan.methods}
     fitted = {
         name: _fitted(plan, prepared, batch, windows, known, way, device, journal)
@@ -317,25 +317,40 @@ def run_unit(
         if way.foundations
     }
     left_out = refitted(plan, prepared, batch, windows, fitted, device)
-    results: Results = []
-    for name, method in unit.pairs:
-        way = ways[method]
-        one, result = known[name], fitted[way.name][name]
-        row = {"cell": batch.cell(name, way.name), **_names(one, way, prepared.test), **shared}
-        errors, seconds = left_out.get((name, way.name), (None, 0.0))
-        row |= {"seconds": result.seconds + one.seconds + seconds, "trials": result.trials}
-        if result.corrector is None:
-            predictor, paths, outcome = None, None, _failed(one.sentence or "no training converged")
-        else:
-            predictor = _predictor(plan, prepared, one.foundation, way, batch, result.corrector, windows)
-            if one.foundation.family not in plan.fitted and result.left_out is not None:
-                errors = result.left_out  # fair: numbers and observer were not taken from these runs
-            bands, reason = bands_of(errors, windows, predictor.limits, prepared.kinds)
-            known_why = {} if bands is not None else {"no_band": reason}
-            predictor = replace(predictor, bands=bands, provenance={**predictor.provenance, **known_why})
-            outcome, paths = _judged(plan, prepared, one, predictor, way)
-        results.append(store.Cell({**row, **outcome}, predictor, paths))
-    return results
+    with shared_units():
+        return [
+            _cell(plan, prepared, batch, windows, known[name], ways[method], fitted[method][name], left_out)
+            for name, method in unit.pairs
+        ]
+
+
+def _cell(
+    plan: Plan,
+    prepared: Prepared,
+    batch: Batch,
+    windows: Windows,
+    one: Prediction,
+    way: Way,
+    result: Fitted,
+    left_out: Mapping[tuple[str, str], tuple[Array, float]],
+) -> store.Cell:
+    """The predictor of a foundation and a method with its bands, and its errors on the test; `left_out` of refits."""
+    name = one.foundation.name
+    row = {"cell": batch.cell(name, way.name), **_names(one, way, prepared.test)}
+    row |= {"N_D": batch.N_D, "seed": batch.seed, "runs": len(prepared.runs(plan, batch))}
+    row["minutes"] = covered(windows) / 60
+    errors, seconds = left_out.get((name, way.name), (None, 0.0))
+    row |= {"seconds": result.seconds + one.seconds + seconds, "trials": result.trials}
+    if result.corrector is None:
+        return store.Cell({**row, **_failed(one.sentence or "no training converged")}, None, None)
+    predictor = _predictor(plan, prepared, one.foundation, way, batch, result.corrector, windows)
+    if one.foundation.family not in plan.fitted and result.left_out is not None:
+        errors = result.left_out  # fair: numbers and observer were not taken from these runs
+    bands, reason = bands_of(errors, windows, predictor.limits, prepared.kinds)
+    known_why = {} if bands is not None else {"no_band": reason}
+    predictor = replace(predictor, bands=bands, provenance={**predictor.provenance, **known_why})
+    outcome, paths = _judged(plan, prepared, one, predictor, way)
+    return store.Cell({**row, **outcome}, predictor, paths)
 
 
 def refitted(

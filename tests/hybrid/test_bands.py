@@ -129,6 +129,14 @@ def test_the_nearest_point_is_the_nearest() -> None:
     np.testing.assert_allclose(nearest(points, centres), by_hand, rtol=1e-6)
 
 
+def test_centres_of_the_same_run_are_passed_over() -> None:
+    rng = np.random.default_rng(3)
+    points, centres = rng.normal(size=(40, 3)), rng.normal(size=(12, 3))
+    run, of_centre = rng.integers(0, 4, 40), np.arange(12) % 4
+    by_hand = [nearest(point[None], centres[of_centre != mine])[0] for point, mine in zip(points, run, strict=True)]
+    np.testing.assert_allclose(nearest(points, centres, run, of_centre), by_hand, rtol=1e-12)
+
+
 def test_levels_between_those_of_the_table() -> None:
     table = LEVELS**2
     assert at_level(table, 0.9) == pytest.approx(0.81)

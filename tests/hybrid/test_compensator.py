@@ -1,15 +1,18 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
 from shipid.errors import DataError, ResultError
+from shipid.hybrid import compensator as module
 from shipid.hybrid.compensator import (
     Compensator,
     Network,
     Normaliser,
     flatten,
+    shared_units,
     unflatten,
 )
 from shipid.hybrid.features import Inputs, choose_features, feature_table
@@ -65,6 +68,26 @@ def test_prediction_is_the_mean_of_pytorch_networks(compensator, columns):
         x, y = h[:, :4].numpy().T, h[:, 4:].numpy().T  # (12): all dx, then all dy
         expected.append(np.stack([network.basis @ x, network.basis @ y], axis=-1))
     np.testing.assert_allclose(compensation(compensator, columns), np.mean(expected, axis=0), atol=1e-10)
+
+
+@pytest.mark.parametrize(("kept", "computed"), [(module.KEPT, 4), (0, 8)])
+def test_shared_hidden_layers_change_no_digit(compensator, columns, monkeypatch, kept, computed):
+    """Two compensators that differ in their output weights, two sets of inputs, each of two networks."""
+    turned = [
+        replace(one, layers=(*one.layers[:-1], (-one.layers[-1][0], one.layers[-1][1]))) for one in compensator.networks
+    ]
+    both = compensator, replace(compensator, networks=tuple(turned))
+    tables = columns, columns | {"u": columns["u"] + 1.0}
+    expected = [compensation(one, table) for table in tables for one in both]
+    calls, plain = [], module._of_layers
+    monkeypatch.setattr(module, "KEPT", kept)
+    monkeypatch.setattr(module, "_of_layers", lambda layers, inputs: calls.append(1) or plain(layers, inputs))
+    with shared_units():
+        made = [compensation(one, table) for table in tables for one in both]
+    np.testing.assert_array_equal(made, expected)
+    assert len(calls) == computed
+    compensation(compensator, columns)
+    assert len(calls) == computed + 2  # nothing is kept after the block
 
 
 def test_columns_are_matched_by_name(compensator, columns):
