@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from statistics import fmean
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -145,33 +146,36 @@ def _spots(content: ReportContent, means: pd.DataFrame, rows: pd.DataFrame) -> l
     pure, rival = set(rows.model[rows.family == DATA_DRIVEN]), data_driven(content)
     learned = {size: H for (model, size), H in errors.items() if model == rival}
     place, accuracy = {str(name): i for i, name in enumerate(rows.model)}, dict(zip(rows.model, rows.A, strict=True))
+    cells: dict[tuple[str, int], list[dict[Hashable, Any]]] = {}
+    for cell in content.cells[content.cells.model.isin(rows.model)].to_dict("records"):
+        cells.setdefault((str(cell["model"]), int(cell["N_D"])), []).append(cell)
     spots = []
-    shown = content.cells[content.cells.model.isin(rows.model)]
-    for (model, size), cells in shown.groupby(["model", "N_D"], sort=True):
-        key = str(model), int(str(size))
-        H, floor = errors.get(key, math.nan), learned.get(key[1], math.inf)
-        worse = key[0] not in pure and floor <= H
-        words = _words(cells, *key, float(accuracy[key[0]]), H, floor if worse else None)
-        spots.append(Spot(key[0], place[key[0]], key[1], H, worse, words))
+    for (model, size), mine in sorted(cells.items()):
+        H, floor = errors.get((model, size), math.nan), learned.get(size, math.inf)
+        worse = model not in pure and floor <= H
+        words = _words(mine, model, size, float(accuracy[model]), H, floor if worse else None)
+        spots.append(Spot(model, place[model], size, H, worse, words))
     return spots
 
 
-def _words(cells: pd.DataFrame, model: str, size: int, A: float, H: float, learned: float | None) -> str:
-    """Return the lines of the hover box of one model and N_D."""
-    good = cells[cells.status.eq("ok") & cells.H.notna()]
+def _words(
+    cells: Sequence[dict[Hashable, Any]], model: str, size: int, A: float, H: float, learned: float | None
+) -> str:
+    """Return the lines of the hover box of one model and N_D, of which there are some cells."""
+    good = sorted((one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])), key=lambda one: one["H"])
     lines = [f"<b>{label(model)}</b>, " + (f"A {metres(A)}, " if math.isfinite(A) else "") + f"N_D = {size}"]
-    if good.empty:
-        first = cells.iloc[0]
-        return "<br>".join([*lines, label(f"{first.status}: {first.sentence}".rstrip(": "))])
-    lines.append(f"H {metres(H)}, H_90 {metres(float(good.H_90.mean()))}")
+    if not good:
+        first = cells[0]
+        return "<br>".join([*lines, label(f"{first['status']}: {first['sentence']}".rstrip(": "))])
+    best, worst = good[0], good[-1]
+    lines.append(f"H {metres(H)}, H_90 {metres(fmean(one['H_90'] for one in good))}")
     if len(cells) > 1:
-        lines.append(f"{number(good.H.min())} to {metres(good.H.max())} over {counted(len(good), 'seed')}")
+        lines.append(f"{number(best['H'])} to {metres(worst['H'])} over {counted(len(good), 'seed')}")
     if len(good) < len(cells):
         lines.append(f"{len(cells) - len(good)} of {counted(len(cells), 'seed')} gave no result")
     if learned is not None:
         lines.append(f"no better than pure data-driven, {metres(learned)}")
-    best = good.sort_values("H").iloc[0]
-    return "<br>".join([*lines, label(str(best.hyperparameters))] if best.get("hyperparameters") else lines)
+    return "<br>".join([*lines, label(str(best["hyperparameters"]))] if best.get("hyperparameters") else lines)
 
 
 def _widths(counts: Sequence[int]) -> dict[int, float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from shipid.report.content import PUBLISHED, Floats, ReportContent
 from shipid.report.wording import counted, fixed, listed, number
@@ -45,9 +45,9 @@ def cell_html(cell: Cell, numeric: bool, first: bool) -> Markup:
     read, key = cell.text.lower(), f"{cell.key:.6g}" if isinstance(cell.key, float | int) else cell.key
     given = {"scope": "row" if first else "", "class": classes, "data-key": "" if key == read else key}
     given["title"] = cell.text if long else ""
-    attributes = Markup("").join(Markup(' {}="{}"').format(*pair) for pair in given.items() if pair[1])
-    tag = Markup("th" if first else "td")
-    return Markup("<{0}{1}>{2}</{0}>").format(tag, attributes, cell.text)
+    attributes = "".join(f' {name}="{escape(value)}"' for name, value in given.items() if value)
+    tag = "th" if first else "td"
+    return Markup(f"<{tag}{attributes}>{escape(cell.text)}</{tag}>")  # all that is not ours is escaped
 
 
 def text(value: object) -> Cell:

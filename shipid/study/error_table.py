@@ -143,4 +143,8 @@ def _by_run(path: Array, true: Array, place: NDArray[np.int64], metric: Metric =
     error = position_error(path, true)
     if metric == "H":
         return np.bincount(place, error.mean(axis=0)) / np.bincount(place)
-    return np.array([np.quantile(error[:, place == k], 0.9) for k in range(place.max() + 1)])
+    sizes = np.bincount(place)
+    if (sizes == sizes[0]).all():  # all at once: a call of each takes ten times as long
+        order = np.argsort(place, kind="stable")
+        return np.asarray(np.quantile(error[:, order].reshape(len(error), len(sizes), -1), 0.9, axis=(0, 2)))
+    return np.array([np.quantile(error[:, place == k], 0.9) for k in range(len(sizes))])
