@@ -265,17 +265,27 @@ def replace(document: Any, changes: Mapping[str, Any], file: Path | str | None =
     """
     result = copy.copy(document)
     copied = {id(result)}
+    tables: dict[str, dict[str, Any]] = {}  # by path, copied already: most changes are several of one table
     for path, value in changes.items():
-        *parents, last = parts(path)
-        node = result
-        for place, part in enumerate(parents):
-            key = _key(node, part, parents[:place], path, file)
-            below = node[key] if isinstance(node, list) else node.setdefault(key, {})
-            if id(below) not in copied:
-                node[key] = below = copy.copy(below)
-                copied.add(id(below))
-            node = below
-        node[_key(node, last, parents, path, file)] = value
+        above, _, name = path.rpartition(".")
+        if above in tables and '"' not in name:
+            node, key = tables[above], name
+        else:
+            *parents, last = parts(path)
+            node = result
+            for place, part in enumerate(parents):
+                key = _key(node, part, parents[:place], path, file)
+                below = node[key] if isinstance(node, list) else node.setdefault(key, {})
+                if id(below) not in copied:
+                    node[key] = below = copy.copy(below)
+                    copied.add(id(below))
+                node = below
+            key = _key(node, last, parents, path, file)
+            if above and '"' not in name and isinstance(node, dict):
+                tables[above] = node
+        node[key] = value
+        if isinstance(value, dict | list):
+            tables.clear()  # it may have taken the place of one of them
     return result
 
 

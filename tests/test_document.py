@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import copy
 import random
+import re
 import shutil
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -34,6 +36,31 @@ def test_every_leaf_is_got_by_its_path() -> None:
 def test_get_names_what_is_missing(path: str, part: str) -> None:
     with pytest.raises(KeyError, match=f"there is no '{part}'"):
         documents.get(NESTED, path)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_changes_at_once_are_those_one_by_one(seed: int) -> None:
+    """Paths of a few keys, in which a later change may take the place of a table that an earlier one changed."""
+    rng = random.Random(seed)
+    document = {"a": {"b": {"x": 1, "p.q": {"x": 2}}, "l": [{"x": 3}, {"name": "n", "x": 4}]}, "x": 5}
+    heads = ["", "a.", "a.b.", "a.c.", "a.c.d.", 'a.b."p.q".', "a.l.0.", "a.l.n."]
+    tails = ["x", "y", '"p.q"', "b", "l", "c"]
+    changes: dict[str, Any] = {}
+    for _ in range(8):
+        path = rng.choice(heads) + rng.choice(tails)
+        value = {"x": 6, "b": {}, "d": {}} if path.rpartition(".")[2] in ("b", "c") else rng.randint(7, 99)
+        changes[path] = [{"x": value}, {"name": "n"}] if path == "a.l" else value
+    expected: Any = document
+    try:
+        for path, value in copy.deepcopy(changes).items():
+            expected = documents.replace(expected, {path: value})
+    except DocumentError as error:
+        with pytest.raises(DocumentError, match=re.escape(str(error))):
+            documents.replace(document, changes)
+        return
+    before = copy.deepcopy(document)
+    assert documents.replace(document, changes) == expected
+    assert document == before
 
 
 def test_replace_leaves_the_original_alone() -> None:

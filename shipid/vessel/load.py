@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
@@ -341,12 +341,12 @@ def _check_behind(vessel: Vessel) -> None:
 def _check_sense(vessel: Vessel) -> None:
     """DocumentError for impossible values: added mass of the wrong sign, a stern ahead of the bow, tonnes for kg."""
     values = vessel.parameters
-    for path, value in values.items():
-        group, _, name = path.rpartition(".")
-        if group == "added_mass" and AXES["uvwpqr".index(name[2])] == name[0] and value > 0:
+    for path, group, name in _with_a_sense(tuple(values)):
+        value = values[path]
+        if group == "added_mass" and value > 0:
             message = f"{value:g}: added mass is on the force side, so {name} is negative"
             raise DocumentError(message, file=vessel.file, path=path)
-        if ".actuator." in path and name in ("low", "high"):
+        if name in ("low", "high"):
             _check_limit(path, value, values.get(f"{group}.low", -np.inf), vessel.file)
         if name == "x_fwd" and value <= values.get(f"{group}.x_aft", -np.inf):
             raise DocumentError(f"{value:g}: must be ahead of x_aft", file=vessel.file, path=path)
@@ -357,6 +357,18 @@ def _check_sense(vessel: Vessel) -> None:
         if not LEAST_BLOCK < share < MOST_BLOCK:
             message = f"{values['inertia.m']:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?"
             raise DocumentError(message, file=vessel.file, path="inertia.m")
+
+
+@lru_cache(maxsize=64)  # members of a family have the same numbers
+def _with_a_sense(paths: tuple[str, ...]) -> list[tuple[str, str, str]]:
+    """Path, group and name of those numbers that `_check_sense` looks at: added mass of an axis, limits, the bow."""
+    chosen = []
+    for path in paths:
+        group, _, name = path.rpartition(".")
+        axis = group == "added_mass" and AXES["uvwpqr".index(name[2])] == name[0]
+        if axis or name == "x_fwd" or (".actuator." in path and name in ("low", "high")):
+            chosen.append((path, group, name))
+    return chosen
 
 
 def _check_limit(path: str, value: float, low: float, file: str) -> None:
