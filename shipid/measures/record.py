@@ -16,6 +16,7 @@ POINTS = 4  # samples of the interpolating polynomial
 HALVINGS = 60
 TOP = 0.2  # share of a rise that is its top
 DRIFT = 1.5  # tolerances by which a level differs from the next one at least
+ROUNDING = 1e-10  # of the largest coefficient of a fitted slope: smaller ones of higher powers are rounding
 STEADY = 0.05  # relative change over a stretch that counts as none
 
 
@@ -158,7 +159,9 @@ def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, f
         last = first + 4
     some = slice(first, last + 1)
     shape = np.polynomial.Polynomial.fit(t[some] - t[top], values[some], 4)
-    roots = np.asarray(shape.deriv().roots(), dtype=complex)
+    slope = shape.deriv()
+    slope = slope.trim(ROUNDING * float(np.abs(slope.coef).max()))  # else far roots take the digits of the near one
+    roots = np.asarray(slope.roots(), dtype=complex)
     turns = roots.real[np.abs(roots.imag) < 1e-9] + t[top]
     turns = turns[(turns > max(t[first], start)) & (turns < min(t[last], end))]
     if not len(turns):

@@ -53,6 +53,19 @@ def test_extremes_lie_inside() -> None:
     assert np.isnan(extreme(T, T, 0.0, 5.0)[0])  # still rising where it ends
 
 
+@pytest.mark.parametrize("cubic", [0.0, 1e-12, 1e-6, 0.02])
+def test_extremes_of_drawn_records_are_exact(cubic: float) -> None:
+    """Polynomials of degree 2 and 3 at drawn times: the fit has rounding, or nearly nothing, in its higher powers."""
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        t = np.cumsum(rng.uniform(0.1, 0.6, 40)) * 10.0 ** rng.integers(-1, 3)
+        middle, spread = t[20] + rng.uniform(-0.4, 0.4) * (t[20] - t[19]), t[30] - t[20]
+        x = (t - middle) / spread
+        when, value = extreme(t, 3.0 - x**2 + cubic * x**3, t[14], t[26])
+        assert when == pytest.approx(middle, abs=1e-7 * spread)
+        assert value == pytest.approx(3.0, abs=1e-12)
+
+
 @pytest.mark.parametrize("rate", [2.3, 5.0, 20.0])
 def test_an_angle_in_motion_is_traced_back(rate: float) -> None:
     """A rudder that moves to 35 deg at `rate` from 3.21 s on, sampled at 10 Hz."""
