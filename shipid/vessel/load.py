@@ -25,7 +25,7 @@ from shipid.physics.inertia import mass
 from shipid.physics.signals import row_of
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import Binding, bindings, units
-from shipid.vessel.ranges import UNUSUAL, contradiction, out_of_range
+from shipid.vessel.ranges import UNUSUAL, contradiction, first_of, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
@@ -104,16 +104,20 @@ class Vessel:
     @property
     def mass(self) -> NDArray[np.float64]:
         """Mass plus added mass (n, n) [kg, kg m, kg m^2] in the degrees of freedom of the vessel; a copy."""
-        return self._mass.copy()
+        first: NDArray[np.float64] = self._masses[0]
+        return first.copy()
 
     @cached_property
-    def _mass(self) -> NDArray[np.float64]:
+    def _masses(self) -> NDArray[np.float64]:
+        """`mass` of every member (members, n, n), where the numbers are those of several; else of one."""
         blocks, numbers = [self.bound[name] for name in ("inertia", "added_mass")], []
         for target in (target for block in blocks for target in block.values()):
             assert isinstance(target, str | int | float)  # neither function takes a list or a table
             numbers.append(self._parameters[target] if isinstance(target, str) else target)
-        M = np.asarray(mass(*(tuple(block) for block in blocks))(numbers))
-        return M[np.ix_(self.axes, self.axes)]
+        columns = np.array(np.broadcast_arrays(*numbers))
+        M = np.asarray(mass(*(tuple(block) for block in blocks))(columns))  # (6, 6 members)
+        each: NDArray[np.float64] = M.reshape(6, -1, 6).swapaxes(0, 1)
+        return each[np.ix_(range(len(each)), self.axes, self.axes)]
 
     @cached_property
     def structure(self) -> str:
@@ -146,6 +150,31 @@ class Vessel:
             _check_numbers(vessel)
             return vessel
         return check_vessel(document, self.file)
+
+    def takes(self, values: Mapping[str, NDArray[np.float64]]) -> bool:
+        """Whether `with_values` takes every one of n members, checked together: dotted path -> their values (n,).
+
+        False says nothing of any member: `with_values` has to be asked for each.
+        """
+        least, most = documents.LEAST_NUMBER, documents.MOST_NUMBER
+        apart = ("particulars.", "constants.")  # other checks read them in the document, and those of tables are by row
+        known = all(
+            path in self._units and not path.startswith(apart) and not path.rpartition(".")[2].isdecimal()
+            for path in values
+        )
+        if not known or not all(np.all((least < abs(v)) & (abs(v) < most)) for v in values.values()):
+            return False
+        for end in (np.min, np.max):  # the limits of a key of a block are those of an interval
+            document = documents.replace(self.document, {path: float(end(value)) for path, value in values.items()})
+            if not documents.suits(model_for(document), document):
+                return False
+        several = Vessel(self.document, self.file)
+        several.__dict__.update(bound=self.bound, _units=self._units, _parameters={**self._parameters, **values})
+        try:
+            _check_numbers(several)
+        except DocumentError:
+            return False
+        return True
 
 
 def load_vessel(name: str | Path, relative_to: str | Path | None = None) -> Vessel:
@@ -315,7 +344,7 @@ def check_vessel(document: Document, file: str) -> Vessel:
 
 
 def _check_numbers(vessel: Vessel) -> None:
-    """Checks of the values of a document whose names are valid."""
+    """Checks of the values of a document whose names are valid; of all members where the numbers are arrays."""
     for path, key, block in term_blocks(vessel.document):
         _check_order(path, block, vessel.file)
         if key == "thruster.four_quadrant":
@@ -343,19 +372,21 @@ def _check_sense(vessel: Vessel) -> None:
     values = vessel.parameters
     for path, group, name in _with_a_sense(tuple(values)):
         value = values[path]
-        if group == "added_mass" and value > 0:
-            message = f"{value:g}: added mass is on the force side, so {name} is negative"
+        if group == "added_mass" and not np.all(value <= 0):
+            message = f"{first_of(value <= 0, value)[0]:g}: added mass is on the force side, so {name} is negative"
             raise DocumentError(message, file=vessel.file, path=path)
         if name in ("low", "high"):
             _check_limit(path, value, values.get(f"{group}.low", -np.inf), vessel.file)
-        if name == "x_fwd" and value <= values.get(f"{group}.x_aft", -np.inf):
-            raise DocumentError(f"{value:g}: must be ahead of x_aft", file=vessel.file, path=path)
+        if name == "x_fwd" and not np.all(ahead := value > values.get(f"{group}.x_aft", -np.inf)):
+            raise DocumentError(f"{first_of(ahead, value)[0]:g}: must be ahead of x_aft", file=vessel.file, path=path)
     sizes = vessel.document.get("particulars", {})
     rho = vessel.document.get("constants", {}).get("rho")
     if rho is not None and {"L_pp", "B", "T"} <= sizes.keys():
-        share = values["inertia.m"] / (rho * sizes["L_pp"] * sizes["B"] * sizes["T"])
-        if not LEAST_BLOCK < share < MOST_BLOCK:
-            message = f"{values['inertia.m']:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?"
+        shares = values["inertia.m"] / (rho * sizes["L_pp"] * sizes["B"] * sizes["T"])
+        usual = (shares > LEAST_BLOCK) & (shares < MOST_BLOCK)
+        if not np.all(usual):
+            m, share = first_of(usual, values["inertia.m"], shares)
+            message = f"{m:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?"
             raise DocumentError(message, file=vessel.file, path="inertia.m")
 
 
@@ -374,10 +405,12 @@ def _with_a_sense(paths: tuple[str, ...]) -> list[tuple[str, str, str]]:
 def _check_limit(path: str, value: float, low: float, file: str) -> None:
     """DocumentError for limits of an actuator that leave no range, or for an angle in degrees."""
     row = row_of(path.rsplit(".", 2)[-2])
-    if row is not None and row.angle and abs(value) > MOST_RADIANS:
-        raise DocumentError(f"{value:g}: is in rad, and that is more than a full turn", file=file, path=path)
-    if path.endswith(".high") and value <= low:
-        raise DocumentError(f"{value:g}: must be above low, {low:g}", file=file, path=path)
+    if row is not None and row.angle and not np.all(within := abs(value) <= MOST_RADIANS):
+        message = f"{first_of(within, value)[0]:g}: is in rad, and that is more than a full turn"
+        raise DocumentError(message, file=file, path=path)
+    if path.endswith(".high") and not np.all(above := value > low):
+        high, low = first_of(above, value, low)
+        raise DocumentError(f"{high:g}: must be above low, {low:g}", file=file, path=path)
 
 
 def _check_component(path: str, group: str, block: Any, file: str) -> None:
@@ -447,7 +480,8 @@ def _check_units(vessel: Vessel) -> None:
 
 def _check_inertia(vessel: Vessel) -> None:
     """DocumentError if mass plus added mass is not positive definite in the degrees of freedom of the vessel."""
-    if np.linalg.eigvalsh(vessel.mass + vessel.mass.T)[0] <= 0:
+    M = vessel._masses
+    if np.any(np.linalg.eigvalsh(M + M.swapaxes(1, 2))[:, 0] <= 0):
         remedy = (
             "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
         )

@@ -15,6 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import tomlkit
 from pydantic import (
     AfterValidator,
@@ -292,7 +293,7 @@ def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str 
     member : from 0. counter : how often it was redrawn. Raises ShipidError where one of them is no whole number, and
     DocumentError for a path that the base lacks or a member that is no valid vessel.
     """
-    return _Drawn.of(family, base, file).member(member, counter)
+    return _Drawn.of(family, base, file).members([member], counter)[0]
 
 
 def members(
@@ -305,7 +306,7 @@ def members(
     drawn = _Drawn.of(family, base, file)
     if not isinstance(numbers, Iterable | None):
         raise DocumentError(f"numbers must be several whole numbers, such as [0, 1], not {numbers!r}")
-    return [drawn.member(number) for number in (range(family.members) if numbers is None else numbers)]
+    return drawn.members(range(family.members) if numbers is None else numbers)
 
 
 @dataclass(frozen=True)
@@ -359,10 +360,17 @@ class _Drawn:
         changes = _changes(family, base, file)
         return cls(family, base, file, changes, base.parameters)
 
-    def member(self, number: int, counter: int = 0) -> Variant:
-        """Member of a number from 0, drawn again so often."""
-        number, counter = whole_number("member", number), whole_number("counter", counter)  # of 1.0 is another hash
-        family, base, original, values = self.family, self.base, self.original, dict[str, float]()
+    def members(self, numbers: Iterable[int], counter: int = 0) -> list[Variant]:
+        """Members of these numbers from 0, each drawn again so often."""
+        numbers = [whole_number("member", number) for number in numbers]  # of 1.0 is another hash
+        counter = whole_number("counter", counter)
+        drawn = {number: self._values(number, counter) for number in numbers}
+        self._check(drawn)
+        return [self._variant(number, drawn[number], counter) for number in numbers]
+
+    def _values(self, number: int, counter: int) -> dict[str, float]:
+        """Path -> value of everything that one member changes."""
+        family, original, values = self.family, self.original, dict[str, float]()
         for change in self.changes:
             for path, argument in change.arguments.items():
                 u = 0.0
@@ -370,21 +378,28 @@ class _Drawn:
                     key, times = change.keys.get(path, (path, 0))
                     u = uniform(family.seed, family.name, number, key, times, counter)
                 values[path] = change.rule.change(values.get(path, original[path]), argument, u)
-        self._check(number, values)
+        return values
+
+    def _variant(self, number: int, values: Mapping[str, float], counter: int) -> Variant:
+        family, base, original = self.family, self.base, self.original
         factors = {path: value / original[path] for path, value in values.items() if original[path] != 0}
         name = family.name if family.members == 1 else f"{family.name}-{number + 1}"
         of, digest = family.base or base.key, base.digest
         return Variant(name, family.name, number, of, digest, values, factors, counter, family.seed, original)
 
-    def _check(self, number: int, values: Mapping[str, float]) -> None:
-        """DocumentError for a member that is no valid vessel, such as one of negative mass."""
-        try:
-            self.base.with_values(values)
-        except DocumentError as error:
-            message = f"member {number + 1} would not be a valid vessel: {error.path}: {error.message}"
-            if values.get(error.path or "") == 0:
-                message = f"{message}: {WITHOUT}"
-            raise DocumentError(message, file=self.file, path=f"family.{self.family.name}") from None
+    def _check(self, drawn: Mapping[int, Mapping[str, float]]) -> None:
+        """DocumentError for the first member that is no valid vessel, such as one of negative mass."""
+        paths = next(iter(drawn.values()), {})  # all members change the same ones
+        if self.base.takes({path: np.array([values[path] for values in drawn.values()]) for path in paths}):
+            return
+        for number, values in drawn.items():
+            try:
+                self.base.with_values(values)
+            except DocumentError as error:
+                message = f"member {number + 1} would not be a valid vessel: {error.path}: {error.message}"
+                if values.get(error.path or "") == 0:
+                    message = f"{message}: {WITHOUT}"
+                raise DocumentError(message, file=self.file, path=f"family.{self.family.name}") from None
 
 
 def uniform(*key: Any) -> float:

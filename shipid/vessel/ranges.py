@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from shipid import document as documents
 from shipid.units import GRAVITY
 
@@ -81,7 +83,7 @@ def out_of_range(
 ) -> tuple[str, str] | None:
     """Dotted path of the first number that no ship has, and a sentence; None where all are usual.
 
-    values, units : of every number that the equations use, by dotted path.
+    values, units : of every number that the equations use, by dotted path; arrays (members,) are checked together.
     """
     meant = document.get(UNUSUAL, [])
     size = _size(document, values)
@@ -90,7 +92,9 @@ def out_of_range(
     for path, number in limited:
         least, most = ends[number]
         value = values[path]
-        if not least <= abs(value) <= most and not _is_meant(path, meant):
+        usual = (least <= abs(value)) & (abs(value) <= most)
+        if not np.all(usual) and not _is_meant(path, meant):
+            value, least, most = first_of(usual, value, least, most)
             words = f"{value:g}: expected {ranges[number].words} ({least:.3g} to {most:.3g})"
             return path, f"{words}; {_remedy(path)}"
     for path, names in tables:
@@ -98,6 +102,12 @@ def out_of_range(
         if widest <= TURN and not _is_meant(path, meant):
             return path, f"angles up to {widest:.3g}: expected degrees, are these radians? {_remedy(path)}"
     return None
+
+
+def first_of(holds: Any, *numbers: Any) -> list[float]:
+    """Numbers of the first member of which something does not hold: each an array (members,), or one for all."""
+    place = int(np.argmin(holds))
+    return [float(np.broadcast_to(number, np.shape(holds)).flat[place]) for number in numbers]
 
 
 def contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> tuple[str, str] | None:
@@ -180,7 +190,7 @@ def _size(document: Mapping[str, Any], values: Mapping[str, float]) -> Size:
     """Length and mass; the length of a ship of this mass where the document gives none."""
     m = abs(values["inertia.m"])
     usual = 5.4 * (m / WATER) ** (1 / 3)
-    return Size(float((document.get("particulars") or {}).get("L_pp") or usual), m)
+    return Size((document.get("particulars") or {}).get("L_pp") or usual, m)
 
 
 def _is_meant(path: str, meant: Iterable[str]) -> bool:

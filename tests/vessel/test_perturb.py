@@ -10,6 +10,7 @@ from shipid.errors import DocumentError, ShipidError
 from shipid.physics.grammar import derivative
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Perturbation, Variant, draw, members, resolve, uniform
+from tests.drawn_ships import drawn_ship
 
 HULL = {"parameters": ["hull.derivatives.*"], "factor": (0.4, 1.6)}
 MASS = {"parameters": ["inertia.m"], "factor": (0.6, 1.4)}
@@ -316,3 +317,45 @@ def test_a_family_that_extends_another_is_not_drawn_without_it() -> None:
         with pytest.raises(DocumentError, match="extends 'a', whose perturbations come first"):
             call()
     assert len(members(resolve([first, other])[1], base)[0].values) > 1
+
+
+def _checked_apart(path: str) -> bool:
+    """Whether `takes` leaves a number to `with_values`: sizes, constants and rows of tables."""
+    return path.startswith(("particulars.", "constants.")) or path.rpartition(".")[2].isdecimal()
+
+
+def _takes_each(vessel: Vessel, rows: list[dict[str, float]]) -> bool:
+    for row in rows:
+        try:
+            vessel.with_values(row)
+        except DocumentError:
+            return False
+    return True
+
+
+@pytest.mark.parametrize("dof", [3, 4, 6])
+def test_members_are_taken_together_where_each_is_taken(dof: int) -> None:
+    """Ships and factors drawn by seed, some of them impossible; what is checked by row or by document is left out."""
+    verdicts = []
+    for seed in range(60):
+        vessel, random = drawn_ship(seed, dof), np.random.default_rng(seed)
+        paths = [path for path, value in vessel.parameters.items() if value and not (seed % 2 and _checked_apart(path))]
+        chosen = random.permutation(paths)[: random.integers(1, len(paths) + 1)].tolist()
+        spread = random.choice([0.05, 0.4, 0.99, 1.5, 50.0])
+        factors = 1 + spread * random.uniform(-1, 1, (len(chosen), random.integers(1, 12)))
+        columns = {
+            path: vessel.parameters[path] * row for path, row in zip(chosen, factors, strict=True) if np.all(row != 0)
+        }
+        rows = [dict(zip(columns, row, strict=True)) for row in np.transpose(list(columns.values())).tolist()]
+        together, each = vessel.takes(columns), _takes_each(vessel, rows)
+        by_row = any(_checked_apart(path) for path in columns)
+        assert together == each if not by_row else not together
+        verdicts.append((together, each))
+    assert {(True, True), (False, False)} <= set(verdicts)
+
+
+def test_members_of_bundled_ships_are_checked_together(bundled_vessel: Vessel) -> None:
+    numbers = {path: value for path, value in bundled_vessel.parameters.items() if value != 0}
+    values = {path: value * np.array([0.99, 1.0, 1.01]) for path, value in numbers.items() if not _checked_apart(path)}
+    assert bundled_vessel.takes(values)
+    assert not bundled_vessel.takes(values | {"inertia.m": numbers["inertia.m"] * np.array([1.0, 1e3, 1.0])})
