@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from shipid.arguments import names_of, of_class, path_of
 from shipid.errors import DataError, choices
 from shipid.files import open_file, whole
-from shipid.physics.signals import SIGNALS, is_command, is_output, named, signal_of
+from shipid.physics.signals import SIGNALS, is_command, is_output, named, signal_of, wraps
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Dataset:
     def __post_init__(self) -> None:
         check_schema(self.frame, self.metadata)
         # what passed the check stays: later changes of the caller's table are not seen (pandas copies on write)
-        object.__setattr__(self, "frame", self.frame.copy(deep=False))
+        object.__setattr__(self, "frame", self.frame.reset_index(drop=True))
         object.__setattr__(self, "metadata", deepcopy(self.metadata))
 
     @property
@@ -84,8 +84,8 @@ class Dataset:
 
     @property
     def digest(self) -> str:
-        """SHA-256 (first 16 hex digits) of the names and values of the table; the file name does not matter."""
-        sha = hashlib.sha256()
+        """SHA-256 (first 16 hex digits) of the table, its flags and its clock; the file does not matter."""
+        sha = hashlib.sha256("\0".join([*self.metadata.get("flags", []), str(shares_clock(self))]).encode())
         for name, column in self.frame.items():
             text = name == "run"
             sha.update(f"{name}\0".encode())
@@ -229,11 +229,6 @@ def in_force(rows: pd.DataFrame | Mapping[str, NDArray[Any]], edges: Array) -> d
         rounding = 2 * slack * most / widths + 1e-9 * np.abs(values).max()  # of the clock, and of the sums
         result[name] = np.where(np.abs(mean - at_start[name]) > rounding, mean, at_start[name])
     return result
-
-
-def wraps(name: str) -> bool:
-    """Whether a column is an angle of the ship or the weather, unwrapped before it is interpolated."""
-    return name in SIGNALS and SIGNALS[name].angle
 
 
 def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:

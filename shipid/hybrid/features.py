@@ -77,6 +77,8 @@ OneOrMore = NonNegativeFloat | tuple[PositiveFloat, ...]
 class Memory(Checked, BaseModel):
     """What a method takes from the past: all in seconds before the instant; nothing by default.
 
+    Times are rounded to whole steps of the prediction, one at least.
+
     Parameters
     ----------
     history : u, v, r and the commands so long ago, less their present values.

@@ -10,11 +10,11 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PositiveInt
+from pydantic import Field, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import ResultError, ShipidError
@@ -24,11 +24,13 @@ from shipid.hybrid.method import Fitted, Index, Task, shared_tables
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
-from shipid.hybrid.settings import Probability, Scale, Searched, seed_of
+from shipid.hybrid.settings import Searched, seed_of
 from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of, used
 from shipid.hybrid.units import taken
 
 Array = NDArray[np.float64]
+Leaf = Annotated[float, Field(ge=1.0)]
+Share = Annotated[float, Field(gt=0.0, le=1.0)]
 LEAF = -1  # the child of a node that has none
 NODES = ("first", "left", "right", "feature", "threshold", "value")
 
@@ -152,8 +154,8 @@ class Forest(Searched):
 
     trials: PositiveInt = 6
     trees: PositiveInt = 60
-    leaf: Scale = (1.0, 16.0)
-    share: Probability | tuple[Probability, Probability] = (0.4, 1.0)
+    leaf: Leaf | tuple[Leaf, Leaf] = (1.0, 16.0)
+    share: Share | tuple[Share, Share] = (0.4, 1.0)
     terms: PositiveInt = 6
     mirror: bool = True
     memory: Memory = Memory()

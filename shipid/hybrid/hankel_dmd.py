@@ -12,11 +12,11 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PositiveFloat
+from pydantic import Field, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError
@@ -173,10 +173,10 @@ class HankelDMD(Searched):
     meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = HankelCorrector
 
-    delays: tuple[PositiveFloat, ...] = (2.0, 4.0, 8.0)
+    delays: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (2.0, 4.0, 8.0)
     ridge: Scale = (1e-8, 1e-1)
     mirror: bool = True
-    samples: int = 300
+    samples: PositiveInt = 300
 
     @property
     def past(self) -> float:
@@ -197,7 +197,7 @@ class HankelDMD(Searched):
         return fit_each(task, self, lambda: points, lambda name: self._fit(task, name))
 
     def _fit(self, task: Task, name: str) -> Fitted:
-        search = Search(task, [name], self)
+        search = Search(task, [name], self.model_copy(update={"trials": len(self.delays)}))
         steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
         for number, seconds in search.left(self.delays):
             start = time.process_time()

@@ -22,6 +22,7 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
+from shipid.hybrid.bands import nearest
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Fitted, Index, Task
@@ -90,20 +91,20 @@ class Alarm:
             apart = np.minimum(apart, np.linalg.norm(z - centres[-1], axis=1))
         few = np.arange(0, len(z), max(len(z) // MOST, 1))
         z, run = z[few], run[few]
-        across = [nearest(z[run == name], z[run != name]).max() for name in np.unique(run) if (run != name).any()]
+        across = [_away(z[run == name], z[run != name]).max() for name in np.unique(run) if (run != name).any()]
         return cls(normaliser, np.array(centres), float(max([*across, apart.max()])))
 
     def weight(self, table: Mapping[str, Array], fade: float) -> Array:
         """1 within the radius of a centre, falling to 0 at `fade` (in standard deviations) beyond it, (S,)."""
         z = self.normaliser.apply(table)
-        weights = np.clip(1 - (nearest(z, self.centres) - self.radius) / fade, 0.0, 1.0)
+        weights = np.clip(1 - (_away(z, self.centres) - self.radius) / fade, 0.0, 1.0)
         return np.where(np.isfinite(weights), weights, 0.0)
 
 
-def nearest(z: Array, centres: Array) -> Array:
+def _away(z: Array, centres: Array) -> Array:
     """Distance of each point (S, d) to the nearest of the centres (C, d), (S,)."""
-    squares = np.square(z).sum(axis=1)[:, None] - 2 * z @ centres.T + np.square(centres).sum(axis=1)
-    return np.asarray(np.sqrt(np.maximum(squares.min(axis=1), 0.0)))
+    distances: Array = np.sqrt(z.shape[1]) * nearest(z, centres)
+    return distances
 
 
 @dataclass(frozen=True)

@@ -115,8 +115,8 @@ class _Best:
         if len(self.left_out) < most or trial.value < self.left_out[-1][0]:
             self.left_out = sorted([*self.left_out, (trial.value, trial.left_out())], key=lambda kept: kept[0])[:most]
 
-    def fitted(self, inputs: Inputs, rows: list[Row], errors: Array) -> Fitted:
-        """Average the best networks; `errors` are those on runs left out."""
+    def fitted(self, inputs: Inputs, rows: list[Row], errors: Array | None) -> Fitted:
+        """Average the best networks; `errors` are those on runs left out, if there are any."""
         compensator = Compensator(inputs, tuple(kept[2] for kept in self.kept), self.kept[0][1])
         return Fitted(compensator, rows, sum(row["seconds"] for row in rows), errors)
 
@@ -294,10 +294,15 @@ class _Tuning:
                     self.rows[key][number]["seconds"] += (time.process_time() - start) / len(names)
 
     def fitted(self, key: str) -> Fitted:
-        """The mean of the best networks of a foundation, and its errors on runs left out."""
+        """The mean of the best networks of a foundation, and its errors on runs left out.
+
+        With a single fold there are none: nothing but that fold can choose the trials that judge it.
+        """
         if key not in self.best:
             return diverged(self.method, self.method.points())
         folds = [row.cpu().numpy() for block in self.every.blocks for row in block.rows]
+        if len(folds) == 1:
+            return self.best[key].fitted(self.inputs, self.rows[key], None)
         missed = np.tensordot(self.basis, self.best[key].without(folds), (1, 2)).transpose(0, 2, 1)
         errors, targets = np.full_like(self.targets[key], np.nan), self.targets[key][:, self.windows]
         errors[:, self.windows] = targets - np.tensordot(self.basis, self.paths[key], 1) + missed

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shipid import document as documents
 from shipid.data.dataset import Dataset, pieces
-from shipid.engine.rollout import rollout
+from shipid.engine.rollout import SPEED_LIMIT, rollout
 from shipid.errors import DataError
 from shipid.identification.residuals import build
 from shipid.identification.segments import LEAST_STEPS, ShootingSegment
@@ -132,13 +132,20 @@ def _predicted(
         memory={name: np.array([segment.memory[name][0] for segment in segments]) for name in model.memory},
         keep=CHANNELS,
     )
-    states = np.where(path.diverged[None, :, :, None], np.nan, path.states)
     result = {}
     for piece, segment in enumerate(segments):
         result[0, piece] = np.array([column(segment, name) for name in CHANNELS]).T
         for number in range(len(values)):
-            result[number + 1, piece] = states[: segment.num_steps + 1, number, piece]
+            states = path.states[: segment.num_steps + 1, number, piece]  # what follows belongs to no log
+            failed = path.diverged[number, piece] and not _is_sound(states)
+            result[number + 1, piece] = np.full_like(states, np.nan) if failed else states
     return result
+
+
+def _is_sound(states: Array) -> bool:
+    """Whether states (N + 1, channels) are finite and those of a ship; see `Trajectories.diverged`."""
+    speed = np.hypot(states[:, CHANNELS.index("u")], states[:, CHANNELS.index("v")])
+    return bool(np.isfinite(states).all() and (speed <= SPEED_LIMIT).all())
 
 
 def _series(parts: Sequence[tuple[str, int, str, ShootingSegment, Array]]) -> pd.DataFrame:

@@ -25,11 +25,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, pieces, wraps
+from shipid.data.dataset import Dataset, pieces
 from shipid.data.kinematics import STATES, Noise, smooth
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError
 from shipid.identification.collinearity import Collinearity, collinearity
+from shipid.physics.signals import wraps
 from shipid.simulation.log import aboard
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel

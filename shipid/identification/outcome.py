@@ -206,6 +206,8 @@ def without_shared(
     before, after = (one.frame["run"].value_counts() for one in (dataset, apart))
     lost = {run: 1.0 - int(after.get(run, 0)) / int(before[run]) for run in runs}
     left = tuple(run for run in runs if after.get(run, 0) > 1)
+    if not left and not any(lost.values()):
+        raise DataError("every run to fit has a single row: a prediction needs several", path="runs")
     if not left:
         clocks = "where every run has its clock, metadata['clock'] must be 'run'"
         raise DataError(f"every run shares its moments with the runs held out: hold out others ({clocks})", path="runs")
@@ -559,7 +561,7 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
 
     def refit(name: str, factor: float, start: Array) -> tuple[float, Array]:
         limits = {**solution.settings.bounds, **held, name: (factor, factor)}
-        changed = solution.settings.model_copy(update={"bounds": limits, "drop": None, "ranges": False})
+        changed = solution.settings.model_copy(update={"bounds": limits, "drop": None})
         begin = dict(zip(solution.paths, start.tolist(), strict=True))
         again = identify(solution.vessel, dataset, solution.runs, changed, start=begin)
         return (again.objective if again.status == "ok" else float("inf")), again.factors

@@ -358,7 +358,7 @@ class Prediction:
         """Derivatives (rows, k) to a run's nuisances and initial states, times `root` (m,), and their values (k,)."""
         parts, xi = [self.by_nuisance[rows]], [self.nuisances[run]]
         if self.away.size:
-            segments = np.unique(self.segment[rows])
+            segments = np.flatnonzero(self.problem.whole.run == run)  # one without a measured row stays at 0
             belongs = self.segment[rows][:, None] == segments  # (rows, segments)
             parts.append((belongs[:, :, None] * self.by_start[rows][:, None]).reshape(len(belongs), -1))
             xi.append(self.away[segments].ravel())

@@ -126,13 +126,10 @@ def identify(
             break
         discounted, effective = _discounted(solution)
         before = solution
-        solution = replace(
-            _identified(vessel, dataset, runs, discounted, solution, progress),
-            effective=effective,
-            objective_start=before.objective_start,
-        )
+        solution = replace(_identified(vessel, dataset, runs, discounted, solution, progress), effective=effective)
         solution = replace(solution, seconds=solution.seconds + before.seconds)
-    return solution
+    problem = build(vessel, dataset, runs, solution.settings)  # both objectives with the same deviations
+    return replace(solution, objective_start=evaluate(problem, *_begun(problem, start)).objective)
 
 
 def _discounted(solution: Solution) -> tuple[Identify, dict[str, float]]:
@@ -185,11 +182,7 @@ def _searched(
     problem: Problem, dataset: Dataset, start: Mapping[str, float] | Solution | None, progress: Progress | None
 ) -> tuple[Result, float]:
     """Result of the first search that converges (else of the best), and the objective at the initial factors."""
-    if isinstance(start, Solution):
-        factors = _factors(problem, dict(zip(start.paths, start.factors.tolist(), strict=True)))
-        point = start.point if _fits(start.point, origin(problem)) else origin(problem)
-    else:
-        factors, point = _factors(problem, start or {}), origin(problem)
+    factors, point = _begun(problem, start)
     objective_start = evaluate(problem, factors, point).objective
     ways = ORDER["base"] if start is not None else ORDER[problem.settings.start]
     result, before = None, 0
@@ -221,6 +214,14 @@ def _blurred(dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
         f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: faster "
         f"changes of the commands are lost; compare with step {between:.3g}"
     )
+
+
+def _begun(problem: Problem, start: Mapping[str, float] | Solution | None) -> tuple[Array, Point]:
+    """Initial factors within the bounds, and where nuisances and initial states begin."""
+    if not isinstance(start, Solution):
+        return _factors(problem, start or {}), origin(problem)
+    factors = _factors(problem, dict(zip(start.paths, start.factors.tolist(), strict=True)))
+    return factors, start.point if _fits(start.point, origin(problem)) else origin(problem)
 
 
 def _factors(problem: Problem, start: Mapping[str, float]) -> Array:

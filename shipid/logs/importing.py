@@ -25,7 +25,6 @@ from shipid.data.dataset import (
     required,
     sample,
     units_of,
-    wraps,
 )
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices, is_utf_8
@@ -65,7 +64,7 @@ from shipid.logs.repairs import (
     apply_repairs,
     interpolate_at,
 )
-from shipid.physics.signals import is_command, is_output, row_of
+from shipid.physics.signals import is_command, is_output, row_of, wraps
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 

@@ -251,6 +251,18 @@ def released(record: Record, over: HelmOver) -> int:
     return over.row + int(back[0]) if over.angle and len(back) else len(record.t)
 
 
+def _level_from(values: Array, last: int, tolerance: float) -> int:
+    """First row from which on all values are within `tolerance` of that of row `last`; back in doubled strides."""
+    end, stride = last, 64
+    while end > 0:
+        start = max(end - stride, 0)
+        off = np.flatnonzero(np.abs(values[start:end] - values[last]) > tolerance)
+        if len(off):
+            return start + int(off[-1]) + 1
+        end, stride = start, 2 * stride
+    return 0
+
+
 def plateaus(t: Array, values: Array, tolerance: float) -> list[tuple[int, int]]:
     """First and last rows of the plateaus: stretches with all values within `tolerance` of their last value.
 
@@ -259,8 +271,7 @@ def plateaus(t: Array, values: Array, tolerance: float) -> list[tuple[int, int]]
     stretches: list[tuple[int, int]] = []
     last = len(t) - 1
     while last > 0:
-        off = np.flatnonzero(np.abs(values[:last] - values[last]) > tolerance)
-        first = int(off[-1]) + 1 if len(off) else 0
+        first = _level_from(values, last, tolerance)
         stretches.append((first, last))
         last = first - 1
     longest = max((t[b] - t[a] for a, b in stretches), default=0.0)

@@ -339,6 +339,11 @@ def turns_round(command: str) -> bool:
     return row is not None and row.angle and row.reach[1] - row.reach[0] >= 2 * math.pi
 
 
+def wraps(name: str) -> bool:
+    """Whether a column is an angle of the ship or the weather, unwrapped before it is interpolated."""
+    return name in SIGNALS and SIGNALS[name].angle
+
+
 def orders_thrust(name: str) -> bool:
     """Whether the last part of a name is a command that does not steer: a shaft speed or a pitch."""
     row = row_of(name)

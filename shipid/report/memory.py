@@ -174,9 +174,9 @@ def gain(content: ReportContent) -> Figure | None:
         takeaway=_takeaway_gain(frame),
         how="Above: H (15) with (solid) and without (dotted) what is compared, over the same test windows, mean over "
         "the seeds that both have. Below: the difference, with over without, with its 95 % interval from "
-        f"{counted(2000, 'draw')} of the test runs with replacement, both rivals on the same runs. Windows of one run "
-        "are alike, so runs are drawn whole; with fewer than eight runs such intervals are too narrow. Every interval "
-        "is for one comparison alone: of many, one in twenty excludes 0 by chance."
+        "draws of the test runs with replacement, both rivals on the same runs, or Student's where that is wider. "
+        "Windows of one run are alike, so runs are drawn whole; with fewer than five runs there is none. Every "
+        "interval is for one comparison alone: of many, one in twenty excludes 0 by chance."
         + _left_out(frame, models)
         + _unequal(frame),
         alternative="Lines of the position error H over the number of manoeuvres, in pairs with and without memory or "
@@ -260,7 +260,7 @@ def _differences(frame: pd.DataFrame, models: Sequence[str]) -> Plot:
 
 def _interval(row: dict[Any, Any]) -> str:
     low, high = float(row["low"]), float(row["high"])
-    bracket = f" [{number(low)}, {number(high)}]" if math.isfinite(low) else ", no interval from one run"
+    bracket = f" [{number(low)}, {number(high)}]" if math.isfinite(low) else ", no interval from fewer than five runs"
     return f"{number(float(row['difference']))} m{bracket}"
 
 

@@ -12,15 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
+from shipid.physics.signals import wraps
 from shipid.vessel.perturb import uniform
 
 Array = NDArray[np.float64]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 UNMEASURED = ("run", "t", "flags")
-WRAPPING = ("psi", "beta_w")
-"""Angle columns; the measured series are unwrapped, as in a dataset."""
-
 SAME = 1e-6  # of a step of the record: two instants closer than this are equal
 
 
@@ -77,7 +75,7 @@ def _log(run: str, rows: pd.DataFrame, sensors: Mapping[str, Sensor], interval: 
     log = rows.iloc[::stride].copy()
     for name, sensor in sensors.items():
         truth = rows[name].to_numpy(dtype=np.float64)
-        truth = np.unwrap(truth) if name in WRAPPING else truth
+        truth = np.unwrap(truth) if wraps(name) else truth
         log[name] = _samples(sensor, truth, step, stride, (seed, run, name))
     return log
 

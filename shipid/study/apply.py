@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.causal import causal_columns
-from shipid.data.dataset import Dataset, clock_slack, in_force, pieces, read_dataset
+from shipid.data.dataset import Dataset, clock_slack, in_force, pieces, read_dataset, sample
 from shipid.data.windows import Instants, from_frame, future_of, past_of
 from shipid.errors import DataError, ResultError, choices
 from shipid.files import check_table, write_table
@@ -127,7 +127,7 @@ def _along(
         planned = in_force(rows, t[first:last] + physics.step * np.arange(physics.horizon + 1)[:, None])
     hidden = None if predictor.vessel is None else states_along(predictor.vessel, dataset.commands, rows)
     hidden = hidden and {name: values[first:last] for name, values in hidden.items()}
-    columns = {str(name): rows[name].to_numpy()[first:last] for name in rows.columns if name != "run"}
+    columns = {**sample(rows, t[first:last]), "t": t[first:last]}
     past = past_of(rows, t[first:last], predictor.past, physics.step, physics.path)
     known = {}
     if estimates is not None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from shipid.files import TEMPORARY, read_json
 from shipid.study import claims, seals, store
+from shipid.study.plan import Plan
 from shipid.study.seals import Fault
 
 WORDS = {
@@ -26,15 +27,30 @@ class Checked:
 
 
 def check_folder(folder: Path) -> Checked:
-    """Check the files of a run's folder against their digests.
+    """Check the files of a run's folder against their digests, those of all its parts included.
 
     Raises ResultError if it is not the folder of a run, or if its study, vessels or provenance were edited.
     """
     plan = store.stored_plan(folder)
+    names = [name for name in plan.parts if store.part_folder(folder, name).is_dir()]
+    checked = [_checked(store.part_folder(folder, name), plan.parts[name].plan, name) for name in names]
+    checked.append(_checked(folder, plan))
+    lines = [line for one in checked for line in one.lines]
+    if plan.parts:
+        lines += [f"{name}: not begun" for name in plan.parts if name not in names]
+    return Checked(lines, [fault for one in checked for fault in one.faults])
+
+
+def _checked(folder: Path, plan: Plan, part: str = "") -> Checked:
+    """Check one folder of cells; `part` is its name in a study of several parts."""
+    if part:
+        store.stored_plan(folder)  # says what was edited
     faults = seals.faults(folder)
     lines = [f"{folder / fault.file}: {WORDS[fault.kind]}" for fault in faults]
+    if plan.parts:
+        return Checked(lines, faults)
     done = sum(len(unit.pairs) for unit in store.finished(folder, plan.units))
-    lines.append(f"{done} of {plan.cells} cells finished, {len(faults)} faults")
+    lines.append(f"{part}{': ' if part else ''}{done} of {plan.cells} cells finished, {len(faults)} faults")
     if held := claims.held(folder):
         lines.append(f"at work, or ended without giving back: {', '.join(held)}")
     left = [place for place in folder.rglob(f"{TEMPORARY}*") if place.is_dir()]

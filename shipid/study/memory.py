@@ -14,6 +14,7 @@ from shipid.metrics import over_time, position_error
 from shipid.observer import bank, observe
 from shipid.predictor import Predictor
 from shipid.study import store
+from shipid.study.evidence import contrasts
 from shipid.study.plan import Foundation, Way
 from shipid.study.prepare import known_by_then
 from shipid.study.results import Results, shown_runs, with_gaps
@@ -21,7 +22,6 @@ from shipid.study.results import Results, shown_runs, with_gaps
 Array = np.ndarray
 Added = Literal["memory", "observer", "both"]
 ALONE = "physics alone"
-RESAMPLES, SEED = 2000, 0  # of the bootstrap over test runs
 ORDER = 0.05  # share of a command's range in a run that counts as a new order
 NOT_COMPARED = ("memory", "choose", "history_scale", "error_scale", "observer_scale")  # settings of memory itself
 ALONG = [
@@ -115,45 +115,31 @@ def _observed(foundations: Sequence[Foundation]) -> Iterator[tuple[Foundation, F
                 yield one, other
 
 
-def paired_interval(difference: Array, counts: Array) -> tuple[float, float]:
-    """95 % interval of a mean difference over windows by a bootstrap over test runs.
-
-    Runs are drawn whole, with replacement, because windows of one run are alike. No number from a single run.
-
-    Parameters
-    ----------
-    difference : (R,) sum of the differences over the windows of each run.
-    counts : (R,) number of windows of each run.
-    """
-    if len(counts) < 2:
-        return np.nan, np.nan
-    drawn = np.random.default_rng(SEED).integers(0, len(counts), (RESAMPLES, len(counts)))
-    means = difference[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
-    low, high = np.quantile(means, [0.025, 0.975])
-    return float(low), float(high)
-
-
 def memory_frame(results: Results) -> pd.DataFrame:
-    """H [m] of both members of every pair at every N_D, and their difference with its paired 95 % interval.
+    """H [m] of both members of every pair at every N_D, and their difference with its interval by `contrasts`.
 
     Columns: comparison, added, model (the foundation without), without, with, N_D (0: physics alone), A [m] of the
     foundation without, H_without, H_with, difference, low, high [m], runs, better (test runs with a lower error), seeds
     (that both have), differs.
     """
-    rows = []
+    rows, differences = list[dict[str, Any]](), list[Array]()
     runs, place = np.unique(results.test.run, return_inverse=True)
     counts = np.bincount(place).astype(float)
     for pair, N_D, before, after, seeds in _errors(results):
         sums = np.bincount(place, after - before)
-        low, high = paired_interval(sums, counts)
+        differences.append(sums / counts)
         rows.append(
             _names(pair, results.plan.label)
             | {"N_D": N_D, "A": _accuracy(results, pair.without[0], N_D)}
             | {"H_without": before.mean(), "H_with": after.mean(), "difference": (after - before).mean()}
-            | {"low": low, "high": high, "runs": len(runs), "better": int((sums < 0).sum()), "seeds": seeds}
+            | {"low": np.nan, "high": np.nan, "runs": len(runs), "better": int((sums < 0).sum()), "seeds": seeds}
             | {"differs": ", ".join(pair.differs)}
         )
-    return pd.DataFrame(rows)
+    frame = pd.DataFrame(rows)
+    if rows:
+        judged = contrasts(np.stack(differences), counts)
+        frame["low"], frame["high"] = judged.low, judged.high
+    return frame
 
 
 def memory_time_frame(results: Results) -> pd.DataFrame:

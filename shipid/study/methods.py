@@ -11,8 +11,7 @@ from scipy.special import stdtrit
 
 from shipid.arguments import of_class
 from shipid.metrics import over_time, position_error
-from shipid.study.evidence import mean_errors
-from shipid.study.memory import paired_interval
+from shipid.study.evidence import contrasts, mean_errors
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results
 
@@ -74,8 +73,8 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
     the others. `H_low`, `H_high`: 95 % interval of H over test runs, without what another training would give; not a
     number with fewer than five. `difference` is H less that of the method `reference` over the `pairs` of cells in
-    which both have one, every cell with the same weight, with a 95 % interval `low`, `high` by a bootstrap over test
-    runs: all windows and cells of a run, in its world, are drawn together. `better` counts test runs with a lower
+    which both have one, every cell with the same weight, with a 95 % interval `low`, `high` as of `contrasts`, over
+    test runs: all windows and cells of a run, in its world, are drawn together. `better` counts test runs with a lower
     error. `least`, `greatest`: the difference by world; `world_low`, `world_high`: Student's 95 % interval over worlds,
     from three on. The family `with physics` is all of them but `none`.
     """
@@ -138,10 +137,11 @@ def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapp
     if not keys:
         return row
     values, weights = np.array(list(sums.values())), np.array(list(counts.values()), dtype=float)
-    low, high = paired_interval(values, weights)
+    judged = contrasts((values / weights)[None, :], weights)
     worlds = list(dict.fromkeys(world for world, _ in sums))
     means = np.array([_mean(sums, counts, world) for world in worlds])
-    row |= {"difference": float(values.sum() / weights.sum()), "low": low, "high": high, "worlds": len(worlds)}
+    row |= {"difference": float(values.sum() / weights.sum()), "worlds": len(worlds)}
+    row |= {"low": float(judged.low[0]), "high": float(judged.high[0])}
     row |= {"better": int((values < 0).sum()), "least": float(means.min()), "greatest": float(means.max())}
     if len(worlds) >= LEAST:
         wide = float(stdtrit(len(worlds) - 1, (1 + CONFIDENCE) / 2) * means.std(ddof=1) / len(worlds) ** 0.5)

@@ -7,6 +7,7 @@ import math
 import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
@@ -21,12 +22,12 @@ from shipid.arguments import by_name
 from shipid.data.windows import Commands, PathSource
 from shipid.document import Document
 from shipid.engine.integrate import Method as Integrator
-from shipid.errors import DocumentError, choices
+from shipid.errors import DataError, DocumentError, choices
 from shipid.files import as_argument
 from shipid.hybrid.method import Method
 from shipid.hybrid.methods import method_of
 from shipid.identification.settings import Identify, unknowns
-from shipid.logs.importing import sha256_of
+from shipid.logs.importing import digest_of, sha256_of
 from shipid.logs.mapping import read_mapping
 from shipid.observer import Observer, bank
 from shipid.physics.signals import SIGNALS, named
@@ -782,12 +783,16 @@ def mapping_of(data: Data, file: Path) -> str | None:
 
 
 def _sources(data: Data, file: Path) -> dict[str, str]:
-    """Digests of what the runs come from; a missing file is reported when it is read."""
-    mapping = mapping_of(data, file)
-    digests = {} if mapping is None else {"mapping": read_mapping(mapping).digest}
-    for key, name in (("log", data.log), ("dataset", data.dataset)):
-        if name is not None and beside(file.parent, name).is_file():
-            digests[key] = sha256_of(beside(file.parent, name))
+    """Digests of what the runs come from, every file of it; a missing file is reported when it is read."""
+    source, digests = mapping_of(data, file), dict[str, str]()
+    if source is not None:
+        mapping = read_mapping(source)
+        digests["mapping"] = mapping.digest
+        if data.log is not None:
+            with suppress(DataError):
+                digests["log"] = digest_of(mapping, beside(file.parent, data.log))
+    if data.dataset is not None and beside(file.parent, data.dataset).is_file():
+        digests["dataset"] = sha256_of(beside(file.parent, data.dataset))
     return digests
 
 

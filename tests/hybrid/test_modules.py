@@ -8,7 +8,7 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.modules import Alarm, Modules, modules_of, nearest, shares, without
+from shipid.hybrid.modules import Alarm, Modules, modules_of, shares, without
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.stepping import free
 from shipid.vessel.load import load_vessel
@@ -92,8 +92,3 @@ def test_what_one_run_is_to_the_others_a_new_run_may_be():
     between = {"u": np.array([2.0, 6.0]), "v": np.zeros(2)}
     np.testing.assert_array_equal(alarm.weight(between, 1.0), 1.0)
     assert alarm.radius >= 3.0 / table["u"].std()
-
-
-def test_the_nearest_centre():
-    z, centres = np.array([[0.0, 0.0], [3.0, 4.0]]), np.array([[0.0, 1.0], [3.0, 4.0]])
-    np.testing.assert_allclose(nearest(z, centres), [1.0, 0.0], atol=1e-7)

@@ -13,12 +13,15 @@ from shipid.report.section import drawn
 from shipid.report.sections import SECTIONS
 from shipid.study import memory
 from shipid.study.contents import report_content
+from shipid.study.evidence import FEWEST_RUNS, contrasts
 from shipid.study.results import Results, read_results
 from tests.study.tiny import run_here, tiny_plan
 
 SMALL: dict[str, Any] = {"kind": "path-drawn", "trials": 1, "terms": 4, "units": 8}
 CHANGES: dict[str, Any] = {
     "truth.run_up": 4.0,
+    "truth.manoeuvres": 12,
+    "split.test": 5,
     "method": [
         {"name": "drawn", **SMALL},
         {"name": "remembers", **SMALL, "memory": {"history": [2.0], "error": 4.0}},
@@ -143,23 +146,19 @@ def test_an_order_is_marked_once(results: Results) -> None:
     assert after[after["run"] == run]["t"].tolist() == [frame["t"][place]]
 
 
-def test_interval_of_one_run_is_no_number() -> None:
-    assert np.isnan(memory.paired_interval(np.array([1.0]), np.array([5.0]))).all()
-
-
-def test_interval_of_equal_runs_has_no_width() -> None:
-    counts = np.array([2.0, 3.0, 7.0])
-    assert memory.paired_interval(-0.4 * counts, counts) == pytest.approx((-0.4, -0.4))
-
-
-def test_interval_covers_as_often_as_it_says() -> None:
-    """Of 300 studies with 20 test runs each and a true difference of 0, some 5 % have an interval free of it."""
-    random, missed = np.random.default_rng(5), 0
-    for _ in range(300):
-        counts = random.integers(20, 60, 20).astype(float)
-        low, high = memory.paired_interval(counts * random.normal(0, 1, 20), counts)
-        missed += not low <= 0 <= high
-    assert 0.02 < missed / 300 < 0.12
+def test_intervals_are_those_of_contrasts(results: Results) -> None:
+    """Over test runs, paired, by which verdicts are decided too."""
+    runs, test = sorted(set(results.test.run)), results.test
+    assert len(runs) == FEWEST_RUNS
+    before, after = (
+        [position_error(results.physics[name], test.future)[:, test.run == run].mean() for run in runs]
+        for name in ("wrong-2", "seen-2")
+    )
+    windows = np.array([(test.run == run).sum() for run in runs], dtype=float)
+    judged = contrasts(np.subtract(after, before)[None, :], windows)
+    frame = memory.memory_frame(results).set_index(["comparison", "model"])
+    row = frame.loc[("observer: physics alone", "wrong-2")]
+    assert (row["low"], row["high"]) == pytest.approx((judged.low[0], judged.high[0]))
 
 
 def test_the_page_shows_it(results: Results) -> None:
