@@ -287,3 +287,13 @@ def test_planned_commands_are_all_there_and_of_the_horizon() -> None:
         ):
             with pytest.raises(DataError, match=message):
                 known.predict(Instants(WINDOWS.columns, planned=wrong))
+
+
+def test_one_fold_calibrates_no_band() -> None:
+    """The runs that validate chose the trials and the ridge, and no other fold can choose them without these."""
+    method = PathDrawn(trials=2, units=20, terms=2)
+    one = fit(method, NONE, turns(12), validation_runs=["M1", "M2", "M3", "M4"])
+    assert one.bands is None
+    assert "refits" in one.provenance["no_band"]
+    assert fit(method, NONE, turns(12)).bands is not None
+    assert fit(method, NONE, turns(12), validation_runs=["M1", "M2"], refits=4).bands is not None

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from shipid.errors import DocumentError
 from shipid.hybrid.hankel_dmd import HankelDMD, delayed
 from tests.hybrid.worlds import FINE, fitted, ship, world
 
@@ -35,3 +37,16 @@ def test_a_delay_names_how_many_steps_ago():
         **{"past-1.u": 8.0, "past-2.u": 7.0, "port.past-1.n": 6.0, "port.past-2.n": 5.0},
         **{"missed.past-1.v": 4.0, "missed.past-2.v": 3.0},
     }
+
+
+def test_every_delay_is_tried_however_few_the_trials():
+    here = world(ship(), ship(), force=late, past=8, known=True)
+    method = HankelDMD(delays=(1.0, 2.0, 3.0, 4.0), trials=2)
+    (result,) = method.fit(here.task()).values()
+    assert [row["params"]["delays"] for row in result.trials] == [1.0, 2.0, 3.0, 4.0]
+
+
+@pytest.mark.parametrize("wrong", [{"delays": ()}, {"samples": 0}, {"samples": -1}])
+def test_settings_that_no_fit_can_have(wrong):
+    with pytest.raises(DocumentError, match=next(iter(wrong))):
+        HankelDMD(**wrong)

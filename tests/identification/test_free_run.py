@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
@@ -77,3 +78,17 @@ def test_what_nobody_measured_is_named_unless_it_is_estimated_or_set() -> None:
     assert unfelt(ship, calm, both, DATA.runs) == ["V_c", "beta_c"]
     measured = Dataset(calm.frame.assign(V_w=3.0, beta_w=0.5), DATA.metadata)
     assert unfelt(SHIP, measured, SETTINGS, DATA.runs) == []
+
+
+def test_a_short_run_does_not_diverge_because_a_longer_one_is_in_company() -> None:
+    """What becomes of a ship after the end of her log belongs to no log."""
+    wild = SHIP.with_values({"hull.derivatives.N_ur": -3 * SHIP.parameters["hull.derivatives.N_ur"]})
+    long, short = (trials(SHIP, runs=1, steps=steps).frame.assign(run=name) for steps, name in ((600, "a"), (30, "b")))
+    both = Dataset(pd.concat([long, short]), DATA.metadata)
+    (alone,), together = (
+        free_runs({"wild": wild}, data, data.runs, SETTINGS).errors.query("run == 'b'").to_dict("records")
+        for data in (both.select(["b"]), both)
+    )
+    assert np.isfinite(alone["position"])
+    for name in ("u", "v", "r", "position", "samples"):
+        assert together[0][name] == pytest.approx(alone[name], rel=1e-9)

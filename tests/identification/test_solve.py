@@ -12,7 +12,7 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, ShipidError
-from shipid.identification.fit import origin, search
+from shipid.identification.fit import evaluate, origin, search
 from shipid.identification.late_fit import late_fit
 from shipid.identification.residuals import build, predict
 from shipid.identification.settings import POSITIVE, Identify, unknowns
@@ -547,3 +547,33 @@ def test_intervals_of_discounted_fits_cover(noise: str) -> None:
         known, true = statistics(LinearFit.of(solution)), [SHIP.parameters[p] / base.parameters[p] for p in FEW]
         held += ((known.low <= true) & (true <= known.high)).tolist()
     assert np.mean(held) > 0.90 - 2 * (0.9 * 0.1 / len(held)) ** 0.5
+
+
+def test_a_segment_without_a_measured_row_changes_nothing() -> None:
+    """Its initial state has no residuals, so it stays where it is, and those of other segments take their steps."""
+    data = trials(SHIP, runs=2, steps=60)
+    t, first = data.frame["t"], data.frame["run"] == data.runs[0]
+    gap = Dataset(data.frame[~(first & (t > 20.5) & (t < 40.5))], data.metadata)
+    wanted = settings(nuisance=["initial_state"], horizon=20, method="rk4")
+    base = SHIP.with_values({path: 0.85 * SHIP.parameters[path] for path in FEW})
+    task = build(base, gap, gap.runs, wanted)
+    counts = np.bincount(predict(task, np.ones(4), np.zeros((2, 0))).segment, minlength=len(task.segments))
+    assert 0 in counts[:-1]
+    solution = identify(base, gap, gap.runs, wanted)
+    assert solution.status == "ok"
+    away = {name: value for name, value in solution.nuisances[gap.runs[0]].items() if "initial_state.2." in name}
+    assert len(away) == 3
+    assert set(away.values()) == {0.0}
+    after = {name: value for name, value in solution.nuisances[gap.runs[0]].items() if "initial_state.3." in name}
+    assert 0.0 not in after.values()
+    assert solution.objective == pytest.approx(np.square(solution.residuals).sum(), rel=1e-6)
+
+
+def test_both_objectives_of_a_discounted_fit_have_the_same_weights() -> None:
+    data = walked(trials(SHIP, runs=4, steps=60), 0)
+    fit = identify(degraded(SHIP), data, data.runs, settings(discount=True))
+    start = build(degraded(SHIP), data, data.runs, fit.settings)
+    assert fit.objective_start == pytest.approx(evaluate(start, start.unknown.centre, origin(start)).objective)
+    at_end = identify(fit.identified, data, data.runs, fit.settings.model_copy(update={"discount": False}))
+    assert fit.objective <= fit.objective_start
+    assert at_end.objective_start == pytest.approx(fit.objective, rel=1e-3)

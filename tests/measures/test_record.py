@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 
 from shipid.errors import DataError
-from shipid.measures.record import crossing, departure, extreme, integral, mean, plateaus, settled, value_at
+from shipid.measures.record import (
+    _level_from,
+    crossing,
+    departure,
+    extreme,
+    integral,
+    mean,
+    plateaus,
+    settled,
+    value_at,
+)
 from tests.measures.made_records import every, stopped
 
 T = np.cumsum(np.array([0.0, 0.7, 0.4, 0.5, 0.9, 0.3, 0.6, 0.8, 0.5, 0.4]))
@@ -96,3 +106,15 @@ def test_what_is_no_record_is_refused_by_name(name: str, spoil) -> None:  # type
     record = every(stopped(), 1.0)
     with pytest.raises(DataError, match=f"^{name}: "):
         replace(record, **{name: spoil(getattr(record, name))})
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_plateaus_are_those_of_a_plain_search(seed: int) -> None:
+    """From each last row back to the first row that is off, however long the record."""
+    random = np.random.default_rng(seed)
+    values = np.repeat(random.normal(0, 1, 12), random.integers(1, 400, 12)) + random.normal(0, 0.05, 1)
+    values = values + random.normal(0, random.choice([0.0, 0.02, 0.2]), len(values))
+    tolerance = random.choice([0.05, 0.3])
+    for last in random.integers(0, len(values), 20):
+        off = np.flatnonzero(np.abs(values[:last] - values[last]) > tolerance)
+        assert _level_from(values, int(last), tolerance) == (off[-1] + 1 if len(off) else 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import shipid
 from shipid.errors import DocumentError, ResultError, ShipidError
 from shipid.study import store
+from shipid.study.check import check_folder
 from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, read_plan
 from shipid.study.results import read_cells, read_results
@@ -142,3 +144,20 @@ def test_bundled_comparisons_have_their_parts(name: str, count: int) -> None:
     assert len([way for way in plan.methods if way.method.compensates]) >= 8
     budgets = {getattr(way.method, "budget", None) for way in plan.methods if way.method.compensates}
     assert len(budgets) == 1  # equal, so that nobody wins by time
+
+
+def test_a_check_looks_through_every_part(four: tuple[Plan, Path], tmp_path: Path) -> None:
+    plan, folder = four
+    shutil.copytree(folder, tmp_path / "run")
+    each = next(iter(plan.parts.values())).plan.cells
+    sound = check_folder(tmp_path / "run")
+    assert not sound.faults
+    assert [line for line in sound.lines if "cells" in line] == [
+        f"{name}: {each} of {each} cells finished, 0 faults" for name in plan.parts
+    ]
+    next((tmp_path / "run" / "parts" / "known-2" / "cells").iterdir()).unlink()
+    shutil.rmtree(tmp_path / "run" / "parts" / "held-1")
+    damaged = check_folder(tmp_path / "run")
+    assert len(damaged.faults) == 1
+    assert "held-1: not begun" in damaged.lines
+    assert any(line.startswith("known-2: ") and line.endswith("1 faults") for line in damaged.lines)

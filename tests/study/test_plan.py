@@ -17,7 +17,7 @@ from shipid.hybrid.features import Memory
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
-from shipid.study.plan import NO_MODEL, build_plan, read_plan
+from shipid.study.plan import NO_MODEL, Data, _sources, build_plan, read_plan
 from shipid.study.prepare import all_windows, obtain
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import mixed_plan, tiny_plan
@@ -421,3 +421,22 @@ def test_the_plan_and_the_preparation_alone_read_the_study_document() -> None:
 def _imported(node: ast.Attribute) -> bool:
     """Whether `x.study` names the package `shipid.study` or its commands."""
     return isinstance(node.value, ast.Name) and node.value.id in ("shipid", "cli")
+
+
+def test_every_file_of_a_log_is_part_of_the_study(tmp_path: Path) -> None:
+    """A folder of runs, and a further file beside the log: kept results are not taken for those of changed ones."""
+    units = {"north": "m", "east": "m", "psi": "rad", "u": "m/s", "v": "m/s", "r": "rad/s"}
+    columns = "[columns]\n" + "".join(f'{name} = {{ from = "{name}", unit = "{units[name]}" }}\n' for name in units)
+    clock = '[clock]\nfrom = "t"\nunit = "s"\n'
+    further = '[file.gps]\npath = "gps.csv"\n[file.gps.clock]\nfrom = "t"\nunit = "s"\n'
+    for name, text in (("runs", f'[source]\nruns = "*.csv"\n{clock}{columns}'), ("two", f"{clock}{columns}{further}")):
+        (tmp_path / f"{name}.toml").write_text(f'name = "{name}"\nvessel = "a ship"\n{text}')
+    (tmp_path / "logs").mkdir()
+    for file in ("logs/a.csv", "logs/b.csv", "log.csv", "gps.csv"):
+        (tmp_path / file).write_text("t,n,e,h\n0,0,0,0\n")
+    for name, log, changed in (("runs", "logs", "logs/b.csv"), ("two", "log.csv", "gps.csv")):
+        data = Data(mapping=f"{name}.toml", log=log)
+        before = _sources(data, tmp_path / "study.toml")
+        (tmp_path / changed).write_text("t,n,e,h\n0,0,1,0\n")
+        assert before.keys() == {"mapping", "log"}
+        assert before != _sources(data, tmp_path / "study.toml")
