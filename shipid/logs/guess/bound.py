@@ -6,18 +6,18 @@ such as a tunnel thruster, is taken as stopped where the log does not have it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
-from shipid.logs.guess.words import parts_of, side_of, words_of_side
+from shipid.logs.guess.words import numbered, parts_of, side_of, words_of_side
 from shipid.physics.signals import is_command, is_shaft, row_of, signal_of
 from shipid.simulation.approach import Controls
 from shipid.vessel.load import Vessel
 
 PLACES = ("port", "starboard", "bow", "stern")
 OPPOSITE = {"port": "starboard", "starboard": "port"}
-GUESSED = 0.4  # confidence of a tunnel thruster whose name says no unit
+GUESSED = 0.4  # confidence of a tunnel thruster whose name says no unit, and of a side that no name says
 
 
 def name_commands(state: State, vessel: Vessel) -> None:
@@ -37,7 +37,7 @@ def name_commands(state: State, vessel: Vessel) -> None:
         drafted = [one for one in state.suggestions if is_command(one.name) and signal_of(one.name) == signal]
         for name, one in _pairs(state, wanted, drafted, idle, vessel):
             components.setdefault(one.name.partition(".")[0], name.partition(".")[0])
-            named.append(replace(one, name=name))
+            named.append(_with_sign(state, replace(one, name=name), {} if controls.differential else controls.helm))
         missing = [name for name in wanted if name not in {one.name for one in named}]
         named += [stopped for name in missing for stopped in _missing(state, name, idle, vessel)]
     used = {one.source for one in named}
@@ -63,25 +63,147 @@ def _drop_guesses(state: State, signals: set[str]) -> None:
 def _pairs(
     state: State, wanted: Sequence[str], drafted: Sequence[Suggestion], idle: set[str], vessel: Vessel
 ) -> Iterator[tuple[str, Suggestion]]:
-    """Yield each command of the vessel with the column for it: that of its side, or the only one."""
-    main = [one for one in drafted if _place(one.name) not in ("bow", "stern")]
+    """Yield each command of the vessel with the column for it.
+
+    That whose name says the command; then that of its side or end; then the one with its number. A column feeds several
+    commands only where no other column is left for them.
+    """
+    found = {name: one for name in wanted for one in drafted if state.command_of(one.source) == name}
+    said = list(found.values())
+    for group in _alike(wanted, idle, vessel):
+        left = [one for one in drafted if one not in said]
+        tunnel = group[0] in idle or _place(group[0]) in ("bow", "stern")
+        missing = [name for name in group if name not in found]
+        found |= _of_group(state, missing, left, tunnel, vessel)
+        if not tunnel:
+            found |= _as_the_other_side(state, [name for name in group if name not in found], drafted, vessel)
+    yield from ((name, found[name]) for name in wanted if name in found)
+
+
+def _alike(wanted: Sequence[str], idle: set[str], vessel: Vessel) -> list[list[str]]:
+    """Commands of the screws that drive or the angles that turn; and those of the tunnels at each end."""
+    groups: dict[str, list[str]] = {}
     for name in wanted:
         place = _place(name) or _side(name, vessel)
-        if name in idle or place in ("bow", "stern"):
-            alike = [one for one in drafted if _place(one.name) == place and one not in main]
-        else:
-            alike = [one for one in main if _place(one.name) == place] or [one for one in main if not _place(one.name)]
-            if not alike and place in OPPOSITE and main:
-                alike = [one for one in main if _place(one.name) == OPPOSITE[place]]
-                state.ask((signal_of(name),), f"is {name} as {alike[0].source!r}? The log has no column of that side")
-            if not alike and not place and (len(wanted) == 1 or len(main) == 1):
-                alike = main
-        if alike:
-            if len(alike) > 1 and len(wanted) < len(alike):
-                rest = ", ".join(repr(one.source) for one in alike[1:])
-                sources = tuple(one.source for one in alike)
-                state.find("several columns for one command", sources, 0.6, f"{name} is {sources[0]!r}, not {rest}")
-            yield name, alike[0]
+        tunnel = name in idle or place in ("bow", "stern")
+        groups.setdefault(f"tunnel {place}" if tunnel else "", []).append(name)
+    return list(groups.values())
+
+
+def _of_group(
+    state: State, names: Sequence[str], drafted: Sequence[Suggestion], tunnel: bool, vessel: Vessel
+) -> dict[str, Suggestion]:
+    """Columns for the commands of a group, of those that are left."""
+    if not names:
+        return {}
+    places = {name: _place(name) or _side(name, vessel) for name in names}
+    if tunnel:
+        columns = [one for one in drafted if places[names[0]] and _place(one.name) == places[names[0]]]
+        return _in_order(state, names, columns)
+    columns = [one for one in drafted if _place(one.name) not in ("bow", "stern")]
+    found: dict[str, Suggestion] = {}
+    for side in OPPOSITE:
+        found |= _in_order(
+            state,
+            [name for name in names if places[name] == side],
+            [one for one in columns if _place(one.name) == side],
+        )
+    left = [one for one in columns if not _place(one.name)]
+    missing = [name for name in names if name not in found]
+    if len(left) == 1 or len(missing) == 1:
+        found |= _in_order(state, missing, left)
+    elif len(left) > 1:
+        found |= _by_number(state, missing, left, vessel)
+    alone = [name for name in names if name not in found and not places[name]]
+    if alone and columns and (len(names) == 1 or len(columns) == 1):
+        found |= _in_order(state, alone, columns)
+    return found
+
+
+def _as_the_other_side(
+    state: State, names: Sequence[str], drafted: Sequence[Suggestion], vessel: Vessel
+) -> dict[str, Suggestion]:
+    """Columns of the other side for commands of a side that the log does not have, each with a question."""
+    found: dict[str, Suggestion] = {}
+    for name in names:
+        place = _place(name) or _side(name, vessel)
+        other = [one for one in drafted if _place(one.name) == OPPOSITE.get(place, "none")]
+        if other:
+            state.ask((signal_of(name),), f"is {name} as {other[0].source!r}? The log has no column of that side")
+            found[name] = other[0]
+    return found
+
+
+def _in_order(state: State, names: Sequence[str], columns: Sequence[Suggestion]) -> dict[str, Suggestion]:
+    """One column for each command where there are as many; one column for all of them; else the first ones."""
+    if not names or not columns:
+        return {}
+    sources = tuple(one.source for one in columns)
+    if len(columns) == 1:
+        return dict.fromkeys(names, columns[0])
+    if len(names) == 1:
+        rest = ", ".join(map(repr, sources[1:]))
+        sentence = f"{names[0]} is {sources[0]!r}, not {rest}"
+        state.find("several columns for one command", sources, 0.6, sentence)
+        return {names[0]: columns[0]}
+    by_number = _with_numbers(names, columns)
+    return by_number or _asked(state, names, columns, "Their names do not say which is which")
+
+
+def _asked(state: State, names: Sequence[str], columns: Sequence[Suggestion], why: str) -> dict[str, Suggestion]:
+    """Commands with columns one by one, as a guess, and the question whether it is so."""
+    pairs = {
+        name: replace(one, confidence=min(one.confidence, GUESSED)) for name, one in zip(names, columns, strict=False)
+    }
+    said = ", ".join(f"{name} as {one.source!r}" for name, one in pairs.items())
+    state.ask((signal_of(names[0]),), f"is {said}? {why}")
+    return pairs
+
+
+def _with_numbers(names: Sequence[str], columns: Sequence[Suggestion]) -> dict[str, Suggestion]:
+    """Commands whose components have numbers with the columns of the same numbers; none where one lacks it."""
+    by_number = {numbered(one.source) or 1: one for one in reversed(columns)}
+    numbers = {name: numbered(name.partition(".")[0]) or 1 for name in names}
+    told = len(set(numbers.values())) == len(names) and len(by_number) == len(columns)
+    return (
+        {name: by_number[n] for name, n in numbers.items()} if told and set(numbers.values()) <= set(by_number) else {}
+    )
+
+
+def _by_number(
+    state: State, names: Sequence[str], columns: Sequence[Suggestion], vessel: Vessel
+) -> dict[str, Suggestion]:
+    """Columns that differ by a number alone: for components with numbers, else from starboard to port, and asked.
+
+    IEC 61162-1 gives odd numbers to starboard, even ones to port.
+    """
+    sides = [_place(name) or _side(name, vessel) for name in names]
+    if _with_numbers(names, columns) or not {"port", "starboard"} <= set(sides):
+        return _in_order(state, names, columns)
+    across = sorted(
+        names, key=lambda name: -_y(name, vessel) if _y(name, vessel) else -1.0 * (_place(name) == "starboard")
+    )
+    ordered = sorted(columns, key=lambda one: numbered(one.source) or 1)
+    return _asked(state, across, ordered, "Numbers are taken from starboard to port")
+
+
+def _with_sign(state: State, one: Suggestion, helm: Mapping[str, float]) -> Suggestion:
+    """The column of an angle with the sign that turns the vessel as the log says; an azimuth forward turns as no other.
+
+    helm : angle command -> sign that turns the vessel to starboard.
+    """
+    seen, right = state.turning.get(one.source), helm.get(one.name)
+    if seen is None or right is None or (seen != right) == ("sign" in one.extra):
+        return one
+    kind = "wrong sign of rudder"
+    state.findings[:] = [each for each in state.findings if (each.kind, each.columns) != (kind, (one.source,))]
+    extra = {key: value for key, value in one.extra.items() if key != "sign"}
+    if seen != right:
+        extra["sign"] = -1
+        sides = ("starboard", "port") if seen > 0 else ("port", "starboard")
+        sentence = f"positive {one.source!r} turns to {sides[0]}; {one.name} of the vessel to {sides[1]}"
+        state.find(kind, (one.source,), one.confidence, sentence)
+    return replace(one, extra=extra)
 
 
 def _take_tunnels(state: State, names: Sequence[str]) -> None:
@@ -125,9 +247,14 @@ def _place(name: str) -> str:
     return place if place in PLACES else ""
 
 
+def _y(name: str, vessel: Vessel) -> float:
+    """Distance [m] of the component of a command to starboard of the centre line, 0 where the document has none."""
+    return vessel.parameters.get(f"thruster.{name.partition('.')[0]}.y", 0.0)
+
+
 def _side(name: str, vessel: Vessel) -> str:
     """Side on which the vessel has the component of a command; empty on the centre line."""
-    y = vessel.parameters.get(f"thruster.{name.partition('.')[0]}.y", 0.0)
+    y = _y(name, vessel)
     return "port" if y < 0 else "starboard" if y > 0 else ""
 
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.logs.guess.evidence import Complex, Windows, effect
-from shipid.logs.guess.words import fits, is_order, parts_of, units_in
+from shipid.logs.guess.words import fits, how_much_says, is_order, parts_of, side_of, units_in
 from shipid.logs.mapping import UNITS
 from shipid.logs.repairs import INPUTS
-from shipid.physics.signals import SIGNALS
+from shipid.physics.signals import SIGNALS, signal_of
 
 UNIT_WORDS = {
     "kn": r"kn|kts?|knots?",
@@ -166,6 +166,8 @@ class State:
     spikes : column -> rows that leave it and come back at once, and the least by how much; `columns` have none of them.
     scaled : column -> factor by which `columns` has it already, and why. units : column -> unit of the log, where
     `columns` has it in another.
+    commands : names of those of the vessel that the log is of, where it is known.
+    turning : column that steers -> sign with which a positive value turns the ship to starboard, where that is seen.
     position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
@@ -182,6 +184,8 @@ class State:
     suggestions: list[Suggestion] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
     questions: list[Question] = field(default_factory=list)
+    commands: tuple[str, ...] = ()
+    turning: dict[str, float] = field(default_factory=dict)
     position: Complex | None = None
     psi: Array | None = None
     r: Array | None = None
@@ -192,6 +196,26 @@ class State:
         """Return the t value of the effect of an order (N,) on the yaw rate r (N,) [rad/s], in parts of usual turns."""
         span = float(np.median(self.t[self.chosen.last] - self.t[self.chosen.first]))
         return effect(self.t, r, order, PART * span)
+
+    def command_of(self, name: str) -> str:
+        """Return the command of the vessel whose component and signal the name of a column says; empty if none does."""
+        found = {
+            command: how_much_says(name, command)
+            for command in self.commands
+            if unit_of_another(name, signal_of(command)) is None
+        }
+        most = max(found.values(), default=0)
+        best = [command for command, count in found.items() if count == most]
+        return best[0] if most and len(best) == 1 else ""
+
+    def side_of(self, name: str) -> str | None:
+        """Return the side or place in the name of a column; L and R are sides where the log has both."""
+        parts = parts_of(name)
+        for letter, other, side in (("l", "r", "port"), ("r", "l", "starboard")):
+            twin = tuple(other if part == letter else part for part in parts)
+            if letter in parts and any(parts_of(column) == twin for column in self.columns):
+                return side
+        return side_of(name)
 
     def free(self) -> list[str]:
         """Return the columns that have no meaning yet."""

@@ -29,6 +29,7 @@ from shipid.logs.guess.stuck import find_stuck
 from shipid.logs.guess.unused import reasons
 from shipid.logs.guess.wind import choose_wind
 from shipid.physics.signals import named
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 
@@ -87,6 +88,7 @@ def guess(
     columns = evidence.filled(sniffed.t, sniffed.columns.items())
     spiky = take_spikes(sniffed.t, columns)
     state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), len(source.files) > 1, spiky)
+    state.commands = () if vessel is None else dynamics(vessel).commands
     numbering = tuple(
         name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])
     )

@@ -11,9 +11,9 @@ from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import SEEN, State, unit_in_name
 from shipid.logs.guess.twins import choose_twins, twins
-from shipid.logs.guess.words import fits, is_electrical, is_order, parts_of, side_of, units_in
+from shipid.logs.guess.words import fits, is_electrical, is_order, numbered, parts_of, units_in
 from shipid.logs.mapping import to_si
-from shipid.physics.signals import SIGNALS, is_command, is_shaft, named, steers
+from shipid.physics.signals import SIGNALS, is_command, is_shaft, named, signal_of, steers
 
 AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name has no side
 SCREW = SIGNALS["n"].component  # of a shaft speed or pitch without a side: that of the azimuth unit where there is one
@@ -75,6 +75,7 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
             else:
                 followed = 0.0
         if abs(effect) > SEEN:
+            state.turning[name] = float(np.sign(effect))
             confidence = 0.95 if by_name else 0.55
             # sides to which it turns the ship, and to which it does not
             sides = ("starboard", "port") if effect > 0 else ("port", "starboard")
@@ -91,10 +92,12 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
             if not share:
                 extra.pop("sign", None)
                 state.findings[:] = [one for one in state.findings if one.columns != (name,)]
-        component = side_of(name) or SIGNALS[signal].component
-        if signal == "delta" and side_of(name):
-            component = f"{side_of(name)}_rudder"
-        state.suggest(unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+        side = state.side_of(name)
+        component = side or SIGNALS[signal].component
+        if signal == "delta" and side:
+            component = f"{side}_rudder"
+        command = state.command_of(name) or unique(f"{component}.{signal}", used)
+        state.suggest(command, name, unit, confidence, why, **extra)
     return azimuth
 
 
@@ -159,19 +162,29 @@ def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
     """Return the columns whose names fit one of the signals best, and the signal: measured ones rather than orders."""
     orders: dict[str, tuple[float, str]] = {}
     for signal in signals:
+        said = [name for name in state.free() if signal_of(state.command_of(name)) == signal]
+        for name in said:
+            orders[name] = (1.0, signal)
         for name in state.called(signal):
             score = fits(name)[signal]
             others = max((value for meaning, value in fits(name).items() if meaning not in signals), default=0.0)
-            if score >= others and score > orders.get(name, (0.0, ""))[0] and np.ptp(state.columns[name]) >= 0:
+            if (
+                not state.command_of(name)
+                and score >= others
+                and score > orders.get(name, (0.0, ""))[0]
+                and np.ptp(state.columns[name]) >= 0
+            ):
                 orders[name] = (score, signal)
-    groups: dict[tuple[str | None, str], list[str]] = {}
+    groups: dict[tuple[str | int | None, str], list[str]] = {}
+    sides = {name: state.side_of(name) for name in orders}
     for name in sorted(orders, key=lambda one: (is_order(one), -orders[one][0])):
-        number = next((part for part in reversed(parts_of(name)) if part.isdigit()), None)
-        groups.setdefault((side_of(name) or number, orders[name][1]), []).append(name)
+        side, number = sides[name], numbered(name)
+        both = f"{side} {number}" if side and number and state.commands else side or number
+        groups.setdefault((state.command_of(name) or both, orders[name][1]), []).append(name)
     chosen = []
-    sided = any(side is not None and side not in TUNNELS for side, _ in groups)
-    for (side, signal), names in groups.items():
-        if side is None and sided and is_order(names[0]):
+    sided = any(place is not None and not str(place).startswith(TUNNELS) for place, _ in groups)
+    for (place, signal), names in groups.items():
+        if place is None and sided and is_order(names[0]):
             continue
         kept = names[:1]
         if len(names) > 1:
@@ -195,10 +208,10 @@ def _held(values: Array) -> float:
 
 def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
     for signal in (signal for signal in named("command") if not steers(signal)):
-        for name, _ in sorted(_named(state, [signal]), key=lambda one: side_of(one[0]) in TUNNELS):
+        for name, _ in sorted(_named(state, [signal]), key=lambda one: state.side_of(one[0]) in TUNNELS):
             usual = SIGNALS[signal].component
             fallback = AZIMUTH if azimuth and usual == SCREW else usual
-            component = side_of(name) or fallback
+            component = state.side_of(name) or fallback
             if SIGNALS[signal].shaft:
                 tunnel = component in TUNNELS and not is_electrical(name)
                 unit, confidence, why, extra = (_tunnel_unit if tunnel else _shaft_unit)(state, name)
@@ -206,7 +219,8 @@ def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
                 written = unit_in_name(name, SIGNALS[signal].unit)
                 unit, confidence, extra = likely_unit(state, name, signal), 0.9 if written else 0.7, {}
                 why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
-            state.suggest(unique(f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+            command = state.command_of(name) or unique(f"{component}.{signal}", used)
+            state.suggest(command, name, unit, confidence, why, **extra)
 
 
 def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:

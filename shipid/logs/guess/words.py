@@ -395,6 +395,28 @@ def words_of_side(side: str) -> frozenset[str]:
     return frozenset(SIDE_WORDS[side].split("|"))
 
 
+def how_much_says(name: str, command: str) -> int:
+    """Return how many parts of the component of a command a name has that says its signal, too; 0 where it does not.
+
+    `rpm_bow_aft` says `bow_aft.n` with two parts, and `bow.n` with one.
+    """
+    component, _, signal = command.rpartition(".")
+    said, parts = set(parts_of(component)), [part for part in parts_of(name) if part not in UNIT_PARTS - {signal}]
+    if not said or not said <= set(parts):
+        return 0
+    left = [part for part in parts if part not in said]
+    if any(part.isdigit() for part in left):  # one of several
+        return 0
+    rest = [part for part in left if part not in SOURCES | ORDERS]
+    known = rest == [signal] or fits(" ".join(left) if rest else name).get(signal, 0.0) >= LEAST
+    return len(said) if known else 0
+
+
+def numbered(name: str) -> int | None:
+    """Return the last number among the parts of a name; None if there is none."""
+    return next((int(part) for part in reversed(parts_of(name)) if part.isdigit()), None)
+
+
 @cache
 def fits(name: str) -> dict[str, float]:
     """Return how well a name fits each meaning, 0 to 1: `{"psi": 1.0}`; the empty meaning is a column of no use.

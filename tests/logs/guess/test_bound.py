@@ -9,6 +9,8 @@ from shipid.logs.guess.bound import name_commands
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.commands import choose_commands
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
+from shipid.logs.guess.words import numbered
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.template import Particulars, first_guess
 from tests.logs.simulated import si_log, state_with_pose
@@ -25,7 +27,7 @@ def vessel(**known: object) -> Vessel:
 
 def drafted(columns: dict[str, np.ndarray], ship: Vessel) -> tuple[State, dict[str, str]]:
     state = state_with_pose(columns)
-    state.r = R
+    state.r, state.commands = R, dynamics(ship).commands
     outputs = reserve_outputs(state)
     choose_commands(state)
     suggest_outputs(state, outputs)
@@ -115,3 +117,100 @@ def test_two_screws_under_any_names_take_their_own_columns(components: tuple[str
         assert [question.sentence for question in state.questions] == [
             f"which column is {name}.n? {ship.name} needs it" for name in components
         ]
+
+
+def fleet(screws: dict[str, float], rudders: dict[str, float], tunnels: tuple[str, ...] = ()) -> Vessel:
+    """A ship with such screws and rudders, name -> place to starboard [m], and tunnels at the bow."""
+    whole = vessel(shafts=2, tunnel_thruster=True).document
+    screw, rudder, tunnel = (whole["thruster"][name] for name in ("port", "port_rudder", "bow"))
+    thrusters = {name: {**screw, "y": y} for name, y in screws.items()}
+    behind = dict(zip(rudders, list(screws) * 2, strict=False))
+    thrusters |= {name: {**rudder, "y": y, "behind": behind[name]} for name, y in rudders.items()}
+    thrusters |= {name: {**tunnel, "x": tunnel["x"] - 3.0 * number} for number, name in enumerate(tunnels)}
+    return Vessel({**whole, "thruster": thrusters}, "made.toml")
+
+
+SHIPS = {
+    "twin": fleet({"port": -2.0, "starboard": 2.0}, {"port_rudder": -2.0, "starboard_rudder": 2.0}),
+    "numbers": fleet({"m1": 2.0, "m2": -2.0}, {"r1": 2.0, "r2": -2.0}),
+    "four": fleet({"po": -4.0, "pi": -2.0, "si": 2.0, "so": 4.0}, {"pr": -2.0, "sr": 2.0}),
+    "tunnels": fleet(
+        {"port": -2.0, "starboard": 2.0}, {"port_rudder": -2.0, "starboard_rudder": 2.0}, ("bow", "bow_aft")
+    ),
+}
+SAYINGS = {
+    "the name of shipid": lambda component, signal: f"{component}.{signal}",
+    "with its unit": lambda component, signal: f"{component}.{signal} [{'rpm' if signal == 'n' else 'deg'}]",
+    "behind": lambda component, signal: f"{'rpm' if signal == 'n' else 'angle delta'} {component}",
+    "amid": lambda component, signal: f"{signal}_{component}_{'rpm' if signal == 'n' else 'deg'}",
+}
+
+
+@pytest.mark.parametrize("ship", SHIPS)
+@pytest.mark.parametrize("saying", SAYINGS)
+@pytest.mark.parametrize("seed", range(4))
+def test_a_name_that_says_the_component_is_taken_for_it(ship: str, saying: str, seed: int) -> None:
+    """In any order of the columns, none for two components, and nothing is asked about which is which."""
+    commands, random = dynamics(SHIPS[ship]).commands, np.random.default_rng(seed)
+    said = {name: SAYINGS[saying](*name.split(".")) for name in commands}
+    columns = {
+        said[name]: (RUDDER if name.endswith("delta") else RPM) * random.uniform(0.7, 1.2)
+        + random.normal(0, 0.3, len(R))
+        for name in random.permutation(commands).tolist()
+    }
+    state, names = drafted(columns, SHIPS[ship])
+    assert names == said
+    assert not any("which is which" in one.sentence or "which column" in one.sentence for one in state.questions)
+    assert "several columns for one command" not in {one.kind for one in state.findings}
+
+
+@pytest.mark.parametrize(
+    ("ship", "columns", "expected"),
+    [
+        ("twin", ("RPM 1", "RPM 2"), {"starboard.n": "RPM 1", "port.n": "RPM 2"}),
+        ("twin", ("rpm", "rpm_2"), {"starboard.n": "rpm", "port.n": "rpm_2"}),  # of NMEA 0183
+        ("twin", ("n_l", "n_r"), {"port.n": "n_l", "starboard.n": "n_r"}),
+        ("twin", ("RPM L", "RPM R"), {"port.n": "RPM L", "starboard.n": "RPM R"}),
+        ("numbers", ("rpm2", "rpm1"), {"m1.n": "rpm1", "m2.n": "rpm2"}),
+        (
+            "four",
+            ("rpm 1", "rpm 2", "rpm 3", "rpm 4"),
+            dict(zip(("so.n", "si.n", "pi.n", "po.n"), ("rpm 1", "rpm 2", "rpm 3", "rpm 4"), strict=True)),
+        ),
+        (
+            "tunnels",
+            ("bow thruster 1 [rpm]", "bow thruster 2 [rpm]"),
+            {"bow.n": "bow thruster 1 [rpm]", "bow_aft.n": "bow thruster 2 [rpm]"},
+        ),
+    ],
+)
+def test_sides_letters_and_numbers_take_a_column_each(
+    ship: str, columns: tuple[str, ...], expected: dict[str, str]
+) -> None:
+    """Numbers count from starboard, and that is asked."""
+    random = np.random.default_rng(1)
+    rudders = {name: RUDDER for name in dynamics(SHIPS[ship]).commands if name.endswith("delta")}
+    values = {name: RPM * random.uniform(0.7, 1.2) for name in columns}
+    state, names = drafted(rudders | values, SHIPS[ship])
+    assert {name: source for name, source in names.items() if source in columns} == expected
+    by_number = ship != "numbers" and any(numbered(name) for name in columns)
+    assert any("?" in one.sentence and columns[0] in one.sentence for one in state.questions) == (
+        by_number and "L" not in columns[0]
+    )
+
+
+@pytest.mark.parametrize("turns", [1.0, -1.0])
+@pytest.mark.parametrize("x", [-10.0, 9.0])
+def test_the_sign_of_an_azimuth_unit_is_that_of_its_place(x: float, turns: float) -> None:
+    """A unit forward of the origin turns the ship the other way; only a log against the vessel has its sign changed."""
+    document = vessel(propulsor="azimuth").document
+    units = {
+        name: {**block, "x": x} if name in ("port", "starboard") else block
+        for name, block in document["thruster"].items()
+    }
+    ship = Vessel({**document, "thruster": units}, "made.toml")
+    right = -1.0 if x > 0 else 1.0  # of ALPHA, which is of units aft
+    state, _ = drafted({"azimuth port": right * turns * ALPHA, "azimuth stbd": right * turns * ALPHA, "rpm": RPM}, ship)
+    signs = {one.name: one.extra.get("sign", 1) for one in state.suggestions if one.name.endswith("alpha")}
+    assert signs == dict.fromkeys(("port.alpha", "starboard.alpha"), turns)
+    assert ("wrong sign of rudder" in {one.kind for one in state.findings}) == (turns < 0)
