@@ -21,11 +21,12 @@ AMIDSHIPS = 0.2  # of the time of the turn that a pull-out's helm is amidships
 STRAIGHT = 0.25  # of the greatest yaw rate, up to which a ship goes straight
 
 
-def record_of(columns: Mapping[str, Array]) -> Record:
+def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = None) -> Record:
     """Record of one run from the columns of a dataset.
 
-    The helm is the mean of the angle commands that move. Each has the sign that turns the ship to starboard: the sign
-    of the sum of angle times change of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start.
+    The helm is the mean of the angle commands that move. Each has the sign that turns the ship to starboard: that in
+    `helm`, angle command -> +1 or -1, where the vessel is known; else the sign of the sum of angle times change of yaw
+    rate. The shaft is the mean of the shaft speeds that are not 0 at the start.
 
     Raises
     ------
@@ -35,9 +36,9 @@ def record_of(columns: Mapping[str, Array]) -> Record:
     if missing is not None:
         raise DataError("missing column", path=missing)
     states = {name: np.asarray(columns[name], dtype=float) for name in STATES}
-    angles = [np.asarray(values, dtype=float) for values in _commands(columns, steers)]
-    shafts = [np.asarray(values, dtype=float) for values in _commands(columns, is_shaft)]
-    helms = [sign * angle for angle in angles if (sign := _sense(angle, states["r"]))]
+    angles, shafts = _commands(columns, steers), list(_commands(columns, is_shaft).values())
+    known = {name: _sense(angle, states["r"]) for name, angle in angles.items()} if helm is None else helm
+    helms = [sign * angle for name, angle in angles.items() if (sign := known.get(name, 0.0)) and angle.any()]
     running = [shaft for shaft in shafts if shaft[0] != 0]
     return Record(
         **states,
@@ -46,8 +47,10 @@ def record_of(columns: Mapping[str, Array]) -> Record:
     )
 
 
-def _commands(columns: Mapping[str, Array], wanted: Callable[[str], bool]) -> list[Array]:
-    return [values for name, values in columns.items() if is_command(name) and wanted(name)]
+def _commands(columns: Mapping[str, Array], wanted: Callable[[str], bool]) -> dict[str, Array]:
+    return {
+        name: np.asarray(values, dtype=float) for name, values in columns.items() if is_command(name) and wanted(name)
+    }
 
 
 def _sense(angle: Array, r: Array) -> float:

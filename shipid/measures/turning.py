@@ -48,7 +48,11 @@ def turning(record: Record) -> Measures:
     ahead, aside = record.along(start)
     before = float(np.interp(start, t, record.speed)) if moving else NAN
     passed = {angle: crossing(t, turned, angle * DEGREE, start) for angle in (90, 180, 270, 360)}
-    why = {angle: f"the heading changes by less than {angle} deg" for angle in passed}
+    against = turned.min(initial=0.0) <= -90 * DEGREE
+    why = {
+        angle: "the ship turns against her helm" if against else f"the heading changes by less than {angle} deg"
+        for angle in passed
+    }
     measures.add("execute", start, "s", STILL)
     measures.add("helm", helm if helm else NAN, "rad", STILL)
     measures.add("approach_speed", before, "m/s", STILL)
@@ -59,7 +63,7 @@ def turning(record: Record) -> Measures:
     measures.add("greatest_transfer", _greatest(t, side * aside, start, passed[270]), "m", why[270])
     for angle in (90, 180, 360):
         measures.add(f"time_to_{angle}", passed[angle] - start, "s", why[angle])
-    _steady(record, side, turned, passed[180], before, measures)
+    _steady(record, side, turned, passed[180], before, measures, why[360])
     return measures
 
 
@@ -67,17 +71,19 @@ def _greatest(t: Array, values: Array, start: float, end: float) -> float:
     return extreme(t, values, start, end)[1] if np.isfinite(end) else NAN
 
 
-def _steady(record: Record, side: float, turned: Array, beyond: float, before: float, measures: Measures) -> None:
+def _steady(
+    record: Record, side: float, turned: Array, beyond: float, before: float, measures: Measures, why: str
+) -> None:
     """Add the measures of the steady turn: means over the last 180 deg of heading, after the first 180 deg.
 
-    The turn is steady if the last two quarter turns differ by at most 5 % in time.
+    The turn is steady if the last two quarter turns differ by at most 5 % in time. why : of a turn that is none.
     """
     t, end = record.t, float(record.t[-1])
     first, middle = (
         crossing(t, turned, turned[-1] - angle * DEGREE, float(t[0])) if np.isfinite(beyond) else NAN
         for angle in (180, 90)
     )
-    rate, why = NAN, "the heading changes by less than 360 deg"
+    rate = NAN
     if first >= beyond:
         quarters = np.array([middle - first, end - middle])
         steady = abs(quarters[1] / quarters[0] - 1) <= STEADY

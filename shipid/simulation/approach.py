@@ -23,11 +23,8 @@ from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 
-PROBE_SPEED, PROBE_SHAFT, PROBE_HELM = (
-    1.0,
-    1.0,
-    0.1,
-)  # m/s, rev/s, rad: values at which the effect of commands is tested
+PROBE_SHAFT, PROBE_HELM = 1.0, 0.1  # rev/s, rad: values at which the effect of commands is tested
+PROBE_FROUDE = 0.3  # greatest Froude number of that test, of a ship that nothing holds back
 NOTHING = 1e-12  # m/s^2, rad/s^2
 CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach of a small ship
 PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose speed settles over some 20
@@ -100,9 +97,10 @@ class Controls:
         ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if is_shaft(name)}
         drives = tuple(name for name, rates in ahead.items() if rates[0] - idle[0] > NOTHING)
         running = dict.fromkeys(drives, PROBE_SHAFT)
-        straight = acceleration(vessel, PROBE_SPEED, running)
+        speed = min(_balanced(vessel, running), PROBE_FROUDE * float(np.sqrt(GRAVITY * _length(vessel))))
+        straight = acceleration(vessel, speed, running)
         turned = {
-            name: acceleration(vessel, PROBE_SPEED, {**running, name: PROBE_HELM})[2] - straight[2]
+            name: acceleration(vessel, speed, {**running, name: PROBE_HELM})[2] - straight[2]
             for name in commands
             if steers(name)
         }
@@ -175,7 +173,9 @@ def steady(controls: Controls, n: Array, *, step: float, method: Method, engine:
     ShipidError : it diverges, is steady neither after an hour nor after 200 ship lengths, or turns with the helm
         amidships (`NotStraight`).
     """
-    asked = _Asked(dynamics(controls.vessel), tuple(controls.vessel.parameters.values()), _length(controls), controls)
+    asked = _Asked(
+        dynamics(controls.vessel), tuple(controls.vessel.parameters.values()), _length(controls.vessel), controls
+    )
     known = _steady(asked, tuple(map(float, n)), step, method, engine, held)
     copies = (
         {name: values.copy() for name, values in part.items()} for part in (known.state, known.memory, known.helm)
@@ -261,23 +261,28 @@ def _course(controls: Controls, n: Array) -> dict[str, Array]:
     effects = [KEEPING * helm_effect(controls, shaft, speed) for shaft, speed in zip(n, speeds, strict=True)]
     if min(effects) <= 0:
         raise ShipidError(f"the helm of {controls.vessel.name} does not turn it at {60 * n.min():g} rpm")
-    return {"course": np.zeros(len(n)), "omega": 2 * speeds / _length(controls), "effect": np.array(effects)}
+    return {"course": np.zeros(len(n)), "omega": 2 * speeds / _length(controls.vessel), "effect": np.array(effects)}
 
 
-def _length(controls: Controls) -> float:
+def _length(vessel: Vessel) -> float:
     """Length between perpendiculars [m], of a ship without one a usual length."""
-    return float(controls.vessel.document.get("particulars", {}).get("L_pp", LENGTH))
+    return float(vessel.document.get("particulars", {}).get("L_pp", LENGTH))
 
 
 def _speed(controls: Controls, n: float) -> float:
     """Speed ahead [m/s] at which the surge acceleration is 0, at shaft speed n [rev/s] and helm amidships."""
     orders = {name: float(order[0]) for name, order in controls.orders(np.full(1, n), np.zeros(1)).items()}
+    return _balanced(controls.vessel, orders)
+
+
+def _balanced(vessel: Vessel, orders: Mapping[str, float]) -> float:
+    """Speed ahead [m/s] at which the surge acceleration is 0 with these commands, the others neutral."""
     low, high = 0.0, 0.1
-    while high < FASTEST and acceleration(controls.vessel, high, orders)[0] > 0:
+    while high < FASTEST and acceleration(vessel, high, orders)[0] > 0:
         low, high = high, 2 * high
     for _ in range(30):
         middle = (low + high) / 2
-        low, high = (middle, high) if acceleration(controls.vessel, middle, orders)[0] > 0 else (low, middle)
+        low, high = (middle, high) if acceleration(vessel, middle, orders)[0] > 0 else (low, middle)
     return high
 
 

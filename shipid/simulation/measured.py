@@ -17,7 +17,7 @@ from shipid.measures.record import Record
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import Levels, levels, rate_levels
 from shipid.report.manoeuvre import ManoeuvreContent
-from shipid.simulation.approach import NotStraight
+from shipid.simulation.approach import Controls, NotStraight
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import Standard, length_of, standard
 from shipid.units import RPM
@@ -107,7 +107,8 @@ def measure_all(
 
 def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
     """The measures of one log."""
-    record = record_of({str(column): frame[column].to_numpy() for column in frame if column != "run"})
+    columns = {str(column): frame[column].to_numpy() for column in frame if column != "run"}
+    record = record_of(columns, Controls(vessel).helm)
     measures, length = MEASURES[chosen.kind](record), length_of(vessel)
     judged = criterion_rows(criteria(chosen.kind, measures, length))
     return Measured(vessel, chosen, frame, record, measure_rows(measures, length), judged)

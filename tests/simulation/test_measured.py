@@ -3,7 +3,8 @@ import pytest
 
 from shipid.errors import ShipidError
 from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
-from shipid.vessel.load import load_vessel
+from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.template import Particulars, first_guess
 
 
 @pytest.mark.parametrize("name", ["zigzag", "spiral"])
@@ -32,3 +33,24 @@ def test_a_ship_that_does_not_go_straight_gets_a_helmsman():
     rest = measure_standard(lame, "turning", (20,), approach="rest", duration=60.0)
     assert rest.record.u[0] == 0
     assert approached(rest.standard).startswith("from rest")
+
+
+@pytest.mark.parametrize("length", [1.0, 1.5, 6.0, 30.0])
+@pytest.mark.parametrize("propulsor", ["azimuth", "rudder"])
+def test_a_ship_of_any_size_turns_to_the_side_that_is_asked(length: float, propulsor: str) -> None:
+    """What helm does is tested where the ship is in balance: 1 m/s at 1 rev/s is no speed of a screw of 5 cm."""
+    known = {} if propulsor == "rudder" else {"propulsor": propulsor}
+    ship = first_guess(Particulars(length, 0.27 * length, 0.08 * length, 0.6, **known), "b", "b.toml").vessel
+    for side, sign in (("starboard", 1.0), ("port", -1.0)):
+        turned = measure_standard(ship, "turning", 35.0, side=side)
+        assert sign * turned.frame["psi"].iloc[-1] > np.pi
+        assert all(row["verdict"] != "not judged" for row in turned.criteria)
+
+
+def test_a_ship_that_turns_against_her_helm_is_not_judged() -> None:
+    document = first_guess(Particulars(24.0, 7.0, 3.0, 0.6, propulsor="azimuth"), "tug", "tug.toml").vessel.document
+    units = {name: {**block, "x": 6.0} for name, block in document["thruster"].items()}
+    turned = measure_standard(Vessel({**document, "thruster": units}, "tug.toml"), "turning", 35.0, speed=5.0)
+    assert turned.frame["psi"].iloc[-1] < -np.pi
+    assert {row["verdict"] for row in turned.criteria} == {"not judged"}
+    assert all("against her helm" in row["note"] for row in turned.criteria)
