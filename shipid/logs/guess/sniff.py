@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import itertools
 import re
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -284,8 +286,14 @@ def _is_units(row: list[str]) -> bool:
 
 
 def cells(line: str, separator: str) -> list[str]:
-    """Split a line of text into cells."""
-    return line.split() if separator == "whitespace" else [cell.strip().strip('"') for cell in line.split(separator)]
+    """Split a line of text into cells; a separator between quotes is part of a cell."""
+    if separator == "whitespace":
+        return line.split()
+    row = line.split(separator)
+    if '"' in line:
+        with suppress(csv.Error):  # a line with a NUL
+            row = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    return [cell.strip().strip('"') for cell in row]
 
 
 def _number_share(row: list[str], decimal: str) -> float:

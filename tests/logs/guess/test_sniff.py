@@ -289,6 +289,18 @@ def log_of(tmp_path: Path, lines: list[str], name: str = "log.csv") -> Path:
     return file
 
 
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_a_separator_between_quotes_is_part_of_a_name(separator: str, tmp_path: Path) -> None:
+    """Such a header was taken for no header, and columns were called by their numbers."""
+    names = ["time", f"Rudder angle [deg{separator} + port]", f"x{separator} y", "n"]
+    rows = "".join(f"{t}{separator}{t % 7}{separator}1.5{separator}{t * t}\n" for t in range(50))
+    header = separator.join(f'"{name}"' if separator in name else name for name in names)
+    (tmp_path / "log.csv").write_text(f"{header}\n{rows}")
+    sniffed = sniff(tmp_path / "log.csv")
+    assert list(sniffed.columns) == names[1:]
+    assert "header" not in sniffed.form
+
+
 def test_rows_that_repeat_the_row_before_are_dropped_and_reported(tmp_path: Path) -> None:
     rows = [f"{0.2 * k:.1f},{np.sin(k):.3f},{np.cos(k):.3f}" for k in range(60)]
     twice = sorted(rows + rows[7:9], key=lambda row: float(row.split(",")[0]))
