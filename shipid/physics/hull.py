@@ -92,7 +92,8 @@ def mmg(
 
     X = 1/2 rho L T U^2 (-R_0 + X_vv v'^2 + ...), N with L^2 T; v' = v / U, r' = r L / U at the origin (amidships). The
     resistance opposes the motion along the ship: with its full value for drift angles below 45 deg, and k_astern times
-    that when she goes astern. U [m/s] is the instantaneous speed through the water with a floor of 0.01 m/s.
+    that when she goes astern. U [m/s] is the instantaneous speed through the water, rounded off at 0.01 m/s: the root
+    of u^2 + v^2 + 0.01^2.
     """
     U = ca.sqrt(nu_r[0] ** 2 + nu_r[1] ** 2 + SPEED_FLOOR**2)
     ahead = ca.fmin(ca.fmax(nu_r[0] / (ca.fabs(nu_r[1]) + SPEED_FLOOR), -1), 1)

@@ -90,7 +90,9 @@ def measure_all(
         for name, angles, side in wanted:
             n = chosen[0].manoeuvre.n_rpm * RPM if chosen else None
             chosen.append(standard(vessel, name, angles, side=side, approach=given, n=n, **how))
-        runs = [one.manoeuvre.model_copy(update={"name": str(number)}) for number, one in enumerate(chosen)]
+        runs = [
+            one.manoeuvre.model_copy(update={"name": f"{one.kind}-{number + 1}"}) for number, one in enumerate(chosen)
+        ]
         try:
             log = perform(vessel, runs, step=chosen[0].step, interval=chosen[0].interval, engine=engine)
         except NotStraight:

@@ -176,7 +176,9 @@ def _together(
     )
     if path.diverged.any():
         worst = batch.names[int(np.argmax(path.diverged[0]))]
-        raise ShipidError(f"{vessel.name} diverges in {worst}: take a smaller step than {how['step']:g} s")
+        raise ShipidError(
+            f"{vessel.name} diverges in {worst}: take a smaller step than {how['step']:g} s, or mend what drives her"
+        )
     moments = np.arange(batch.rows) * every
     felt = {name: values[np.minimum(moments, len(values) - 1)] for name, values in weather.items()}
     log = logged(path, model.state)
