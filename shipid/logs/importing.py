@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from collections.abc import Mapping as PlainMapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -124,14 +125,15 @@ def import_log(
             path="source.sha256",
         )
     logs = runs_of(mapping.source, source)
-    parts = [_imported(mapping, log, off, progress) for log in logs.values()]
+    each = [(run, _imported(mapping, log, table, off)) for run, log, table in _tables(mapping, logs, progress)]
+    parts, alone = [part for _, part in each], mapping.source.runs is not None or len(each) > 1
     rows = parts[0].rows
     metadata = {
         "vessel": mapping.vessel,
         "source": {**mapping.source.model_dump(exclude_defaults=True), "log": source.name, "sha256": digest},
         "mapping": {"name": mapping.name, "digest": mapping.digest},
         "rows": sum(part.read for part in parts),
-        "clock": "shared" if mapping.source.runs is None else "run",
+        "clock": "run" if alone else "shared",
         "units": units_of(rows.columns),
         "flags": list(FLAGS),
         "repairs": _added([part.records for part in parts]),
@@ -140,13 +142,12 @@ def import_log(
         metadata["origin"] = dict(zip(("latitude", "longitude"), parts[0].origin, strict=True))
     kinds = {segment.run: segment.manoeuvre for segment in mapping.segment if segment.manoeuvre is not None}
     if mapping.parts is not None:
-        runs = [piece for run, part in zip(logs, parts, strict=True) for piece in _parted(part, run)]
-        frame = pd.concat(runs, ignore_index=True)
+        frame = pd.concat(_distinct(piece for run, part in each for piece in _parted(part, run)), ignore_index=True)
     elif mapping.source.runs is None:
         segments = mapping.segment or (_whole(rows, mapping, source),)
         frame = _cut(rows, segments, to_si(mapping.clock.unit, "t"), source)
     else:
-        frame = pd.concat([_named(part.rows, run) for run, part in zip(logs, parts, strict=True)], ignore_index=True)
+        frame = pd.concat([_named(part.rows, run) for run, part in each], ignore_index=True)
     kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in set(frame["run"])}
     metadata |= {"manoeuvres": kinds} if kinds else {}
     dataset = Dataset(frame, metadata)
@@ -199,8 +200,44 @@ def sha256_of(file: Path) -> str:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
 
 
-def _imported(mapping: Mapping, file: Path, off: tuple[str, ...], progress: Progress | None) -> Imported:
-    rows, first, read, begins = _columns(mapping, file, progress)
+def _tables(
+    mapping: Mapping, logs: PlainMapping[str, Path], progress: Progress | None
+) -> Iterator[tuple[str, Path, pd.DataFrame]]:
+    """Yield name, file and rows of each log; those of each run separately where the clock begins again with a run."""
+    here = {column.source for column in mapping.columns.values() if not column.file}
+    here |= {mapping.clock.date} if mapping.clock.date is not None else set()
+    here |= {mapping.parts.source} if mapping.parts is not None and mapping.parts.source is not None else set()
+    whole_rows = mapping.clock.repeated == "drop" and mapping.clock.every is not None  # compared in all columns
+    for run, file in logs.items():
+        log = read_table(file, mapping.format, mapping.clock.source, () if whole_rows else here, progress)
+        first = 0
+        for end in [*_restarts(log, mapping, file), len(log)]:
+            part = log.iloc[first:end].reset_index(drop=True) if first or end < len(log) else log
+            part.attrs = {} if first else log.attrs
+            yield run, file, part
+            first = end
+
+
+def _restarts(log: pd.DataFrame, mapping: Mapping, file: Path) -> list[int]:
+    """Rows of a log at which a run begins with another clock; none where time goes back within a run, too."""
+    if mapping.parts is None or mapping.parts.source is None or mapping.file:
+        return []
+    t, texts = _times(log, mapping.clock, mapping.format, file, "clock"), _texts(log, mapping.parts.source, file)
+    changed = np.append(False, texts[1:] != texts[:-1])
+    back = np.append(False, np.diff(t) < 0)
+    return np.flatnonzero(changed).tolist() if back.any() and not (back & ~changed).any() else []
+
+
+def _texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_]:
+    """The column that says the run, as texts (N,); whole numbers without a point."""
+    column = _column(log, source, file, "parts.from").ffill().bfill()
+    if pd.api.types.is_float_dtype(column.dtype) and (column == column.round()).all():
+        column = column.astype("int64")
+    return np.asarray(column.astype(str).str.strip().to_numpy(dtype=object))
+
+
+def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, ...]) -> Imported:
+    rows, first, read, begins = _columns(mapping, file, log)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
     early = [repair for repair in mapping.repair if isinstance(repair, Despike | Scale) and repair.of_inputs]
     others = [repair for repair in mapping.repair if repair not in [*wrapping, *early]]
@@ -250,18 +287,10 @@ def _added(parts: list[Records]) -> Records:
     return list(total.values())
 
 
-def _columns(
-    mapping: Mapping, file: Path, progress: Progress | None = None
-) -> tuple[pd.DataFrame, Records, int, Begins]:
+def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFrame, Records, int, Begins]:
     """Columns `t`, those of the mapping in SI units, NaN where a value is missing, and `flags` = 0; begins of runs."""
-    here = {column.source for column in mapping.columns.values() if not column.file}
-    here |= {mapping.clock.date} if mapping.clock.date is not None else set()
-    here |= {mapping.parts.source} if mapping.parts is not None and mapping.parts.source is not None else set()
-    drop = mapping.clock.repeated == "drop"
-    whole_rows = drop and mapping.clock.every is not None  # compared in all columns
-    log = read_table(file, mapping.format, mapping.clock.source, () if whole_rows else here, progress)
     records = _passed_over(log)
-    if drop:
+    if mapping.clock.repeated == "drop":
         log, more = _once(log, mapping.clock, mapping.format, file)
         records += more
     t = _instants(log, mapping.clock, mapping.format, file, "clock")
@@ -327,10 +356,7 @@ def _begins(log: pd.DataFrame, t: NDArray[np.float64], parts: Parts, file: Path)
     new = np.append(True, np.diff(t) > (np.inf if parts.pause is None else parts.pause))
     if parts.source is None:
         return [(float(t[row]), str(number)) for number, row in enumerate(np.flatnonzero(new), 1)]
-    column = _column(log, parts.source, file, "parts.from").ffill().bfill()
-    if pd.api.types.is_float_dtype(column.dtype) and (column == column.round()).all():
-        column = column.astype("int64")
-    texts = column.astype(str).str.strip().to_numpy(dtype=object)
+    texts = _texts(log, parts.source, file)
     new |= np.append(True, texts[1:] != texts[:-1])
     begins: Begins = []
     for row in np.flatnonzero(new):
@@ -794,6 +820,19 @@ def _parted(log: Imported, name: str) -> Iterator[pd.DataFrame]:
         rows = log.rows.loc[number == index]
         if len(rows) > 1:
             yield _named(rows.reset_index(drop=True), f"{name} {run}")
+
+
+def _distinct(runs: Iterable[pd.DataFrame]) -> Iterator[pd.DataFrame]:
+    """Yield runs with a number after a name that was there already."""
+    seen: Counter[str] = Counter()
+    for rows in runs:
+        name = str(rows["run"].iloc[0])
+        seen[name] += 1
+        yield (
+            rows
+            if seen[name] == 1
+            else rows.assign(run=pd.Series(f"{name} ({seen[name]})", index=rows.index, dtype="str"))
+        )
 
 
 def _named(rows: pd.DataFrame, run: str) -> pd.DataFrame:

@@ -87,7 +87,8 @@ def guess(
     sniffed = source.sniffed
     columns = evidence.filled(sniffed.t, sniffed.columns.items())
     spiky = take_spikes(sniffed.t, columns)
-    state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), len(source.files) > 1, spiky)
+    joined = len(source.files) > 1 or bool(sniffed.runs)
+    state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), joined, spiky)
     state.commands = () if vessel is None else dynamics(vessel).commands
     numbering = tuple(
         name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])

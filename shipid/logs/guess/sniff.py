@@ -8,7 +8,7 @@ import itertools
 import re
 from collections import Counter
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,7 @@ from shipid.logs.readers import (
 
 Rows = NDArray[np.bool_]
 SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looked at in its head and that many blocks
+LONG = 1e4  # rows between two runs that have a clock each
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
 SENTINELS = tuple(sign * value for value in (99.0, 999.0, 9999.0, 99999.0, 999999.0, 999.9, 9999.9) for sign in (-1, 1))
 LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
@@ -84,7 +85,8 @@ class Sniffed:
     """An unknown log as numbers: how it is written, its clock and all other columns, NaN where a value is missing.
 
     `form` holds the keys of [format] and `clock` those of [clock]; `t` [s] rises; `notes` are sentences on columns
-    that were left out. `seams` counts the places where the rows of a large log were not read.
+    that were left out. `seams` counts the places where rows of a large log were not read, or runs begin. `runs` has the
+    column that says the run, and the number of runs, where the clock begins again with each; `t` goes on then.
     """
 
     form: dict[str, Any]
@@ -93,6 +95,7 @@ class Sniffed:
     columns: dict[str, Array]
     notes: tuple[str, ...]
     seams: int = 0
+    runs: dict[str, int] = field(default_factory=dict)
 
     @property
     def scattered(self) -> bool:
@@ -144,7 +147,8 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         if missing:
             form["missing"] = [*model.missing, *missing]
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
-    clock, t, once = _clock_once(table, columns, file)
+    runs, since = _restarts(table, columns)
+    clock, t, once = _clock_once(table, columns if since is None else columns | since, file)
     columns = {name: values[once] for name, values in columns.items()}
     named = {clock["from"], clock.get("date")}
     notes += tuple(f"column {name!r} holds words, not numbers" for name in words if name and name not in named)
@@ -154,7 +158,9 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     form.pop("ragged", None) if form.get("ragged") == "refuse" else None
     if not once.all():
         notes += ("rows that repeat the row before are left out",)
-    return Sniffed(form, clock, t, kept, notes + empty, BLOCKS if sampled else 0)
+    kept = {name: values for name, values in kept.items() if name not in runs}
+    seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
+    return Sniffed(form, clock, t, kept, notes + empty, seams, runs)
 
 
 def _sample(file: Path, encoding: str, size: int) -> str:
@@ -350,6 +356,24 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
             texts |= dict.fromkeys(_called(table, name)[hit].astype(str).str.strip())
             values[hit] = np.nan
     return list(texts)
+
+
+def _restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, int], dict[str, Array] | None]:
+    """Return the column that says the run with the number of runs, and the clock, where it begins again with each.
+
+    The clock goes on from run to run then, after a time of `LONG` rows.
+    """
+    for name in filter(is_clock, columns):
+        steps = np.diff(columns[name])
+        if not np.isfinite(columns[name]).all() or not np.any(steps < 0) or _again(columns[name]):
+            continue
+        for run in (str(run) for run in table.columns if str(run) and is_run(str(run))):
+            texts = _called(table, run).astype(str).str.strip().to_numpy(dtype=object)
+            changed = texts[1:] != texts[:-1]
+            if np.all(changed[steps < 0]) and np.mean(changed) < 0.1:
+                length = float(np.ptp(columns[name])) + LONG * float(np.median(steps))
+                return {run: 1 + int(changed.sum())}, {name: columns[name] + np.append(0, np.cumsum(changed)) * length}
+    return {}, None
 
 
 def _clock_once(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array, Rows]:

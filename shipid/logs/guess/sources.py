@@ -88,6 +88,9 @@ def _parts(logs: dict[Path, Sniffed], *, by_pause: bool) -> tuple[dict[str, Any]
     steps part the runs, too.
     """
     first = next(iter(logs.values()))
+    begun = [log.runs for log in logs.values() if log.runs]
+    if begun:
+        return {"from": next(iter(begun[0]))}, sum(sum(log.runs.values()) or 1 for log in logs.values())
     told = [name for name in first.columns if is_run(name) and all(_is_held(name, log) for log in logs.values())]
     column = next((name for name in told if any(np.ptp(log.columns[name]) > 0 for log in logs.values())), None)
     steps = [np.diff(log.t) for file, log in logs.items() if file.stat().st_size <= SAMPLE] if by_pause else []
@@ -189,4 +192,5 @@ def _joined(logs: list[Sniffed]) -> Sniffed:
     if missing:
         form["missing"] = list(missing)
     notes = tuple(dict.fromkeys(note for log in logs for note in log.notes))
-    return replace(first, form=form, clock=clock, t=np.concatenate(t), columns=columns, notes=notes)
+    seams = sum(log.seams for log in chosen) + len(chosen) - 1
+    return replace(first, form=form, clock=clock, t=np.concatenate(t), columns=columns, notes=notes, seams=seams)

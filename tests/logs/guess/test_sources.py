@@ -118,3 +118,41 @@ def test_a_jump_within_one_of_many_files_makes_no_repair_by_their_joined_clock(t
         assert (found[0].repair is None) == (count > 1)
     begin, end = found[0].repair["intervals"][0]
     assert begin <= jumped["time"].iloc[500] <= end, "by the clock of the file, which does not begin at 0"
+
+
+@pytest.mark.parametrize("names", [("M001", "M002", "M003"), (1, 2, 3), ("out", "home", "out")])
+@pytest.mark.parametrize("unit", ["s", "ms"])
+def test_a_clock_that_begins_again_with_each_run_is_as_a_file_for_each(
+    names: tuple[object, ...], unit: str, tmp_path: Path
+) -> None:
+    """The same rows in SI units, and every run on a clock from its start."""
+    clock = {"s": "time", "ms": "time [ms]"}[unit]
+    pieces = []
+    for number, start in enumerate((240, 1000, 1800)):
+        part = LOG.iloc[start : start + 500].copy()
+        part["time"] = (part["time"] - part["time"].iloc[0]) * (1000 if unit == "ms" else 1)
+        pieces.append(part.rename(columns={"time": clock}))
+        (tmp_path / "each").mkdir(exist_ok=True)
+        pieces[-1].to_csv(tmp_path / "each" / f"{number}.csv", index=False)
+    file = tmp_path / "all.csv"
+    pd.concat([part.assign(run=name) for part, name in zip(pieces, names, strict=True)]).to_csv(file, index=False)
+    found = guess(file)
+    assert found.source.parts == {"from": "run"}
+    assert found.source.held == 3
+    assert "holes in time" not in found.kinds
+    dataset = import_log(read_mapping(write_new(draft_mapping(found), tmp_path / "draft.toml")), file)
+    expected = ("all out", "all home", "all out (2)") if names[0] == "out" else tuple(f"all {name}" for name in names)
+    assert dataset.runs == list(expected)
+    assert dataset.metadata["clock"] == "run"
+    apart = guess(tmp_path / "each")
+    each = import_log(read_mapping(write_new(draft_mapping(apart), tmp_path / "apart.toml")), tmp_path / "each")
+    assert [column.name for column in found.columns] == [column.name for column in apart.columns]
+    pd.testing.assert_frame_equal(dataset.frame.drop(columns="run"), each.frame.drop(columns="run"))
+
+
+def test_time_that_goes_back_within_a_run_is_refused(tmp_path: Path) -> None:
+    rows = pd.concat([LOG.iloc[240:740].assign(run="a"), LOG.iloc[1000:1500].assign(run="b")], ignore_index=True)
+    rows.loc[900, "time"] -= 100.0
+    rows.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=r"goes back .* in row 901"):
+        guess(tmp_path / "log.csv")
