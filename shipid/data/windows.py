@@ -365,6 +365,12 @@ def gaps(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]
     return spans
 
 
+def longest_gap(spans: Mapping[str, Iterable[tuple[float, float]]]) -> str:
+    """The longest of some times without rows, in words."""
+    length, start, run = max((end - start, start, run) for run, times in spans.items() for start, end in times)
+    return f"the longest {length:.3g} s after t = {start:g} s of {run!r}"
+
+
 def reach_over(windows: Windows, spans: Mapping[str, Iterable[tuple[float, float]]]) -> Mask:
     """Windows (S,) that see a part of the spans (start, end) [s] of their run, pasts and futures included."""
     seen = np.zeros(len(windows), dtype=bool)

@@ -17,6 +17,7 @@ from shipid import document as documents
 from shipid.arguments import function_or_none, names_of, number, of_class
 from shipid.data.dataset import Dataset, apart_from
 from shipid.data.outputs import common_outputs, compare_outputs
+from shipid.data.windows import gaps, longest_gap
 from shipid.document import short_names
 from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.files import write_new
@@ -286,6 +287,7 @@ def run_identification(
             *solution.warnings,
             *filter(None, (late_fit(solution, dataset, judged),)),
             *unmeasured(vessel, dataset, fitted, settings),
+            *unrecorded(dataset, fitted, settings),
             *_warnings(solution, judged, pairs),
             *_left(solution, curves),
         )
@@ -589,6 +591,18 @@ def unmeasured(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: 
         return []
     current = "; --nuisance current=0.2 gives each run a current" if "V_c" in lacking else ""
     return [f"not in the log, taken as 0: {', '.join(lacking)}: the estimates make up for what they do{current}"]
+
+
+def unrecorded(dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
+    """A warning if the runs to fit hold times without rows, over which predictions go on with the last orders."""
+    spans = gaps(dataset.select(runs), settings.step)
+    if not spans:
+        return []
+    count = sum(map(len, spans.values()))
+    return [
+        f"{count} {plural(count, 'time')} without rows, {longest_gap(spans)}: orders are held and weather is "
+        "interpolated there; set max_gap in [clock] of the mapping and import again"
+    ]
 
 
 def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:

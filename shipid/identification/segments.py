@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.data.checks import GAP
 from shipid.data.dataset import Dataset, clock_slack, sample, stretches
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, choices
@@ -122,9 +123,11 @@ def _cut(
     commands = {name: columns[name] for name in dynamics(vessel).commands}
     memory = memory_along(vessel, commands, grid) or {}
     result = []
-    for first in range(0, count, each):
-        last = min(first + each, count)
-        if last - first < least:
+    empty = _without_rows(t, grid, step)
+    for start in range(0, count, each):
+        last = min(start + each, count)
+        first = start + int(np.argmin(empty[start : last + 1]))  # a state between far rows is no beginning
+        if last - first < least or empty[first]:
             continue
         here = slice(first, last + 1)
         past = np.clip(first - 1 - np.arange(lags), 0, None)
@@ -139,6 +142,15 @@ def _cut(
             )
         )
     return result
+
+
+def _without_rows(t: NDArray[Any], grid: Array, step: float) -> NDArray[np.bool_]:
+    """Instants (N,) of a grid inside a time without rows, as `shipid.data.windows.gaps` counts them."""
+    intervals = np.diff(t)
+    limit = max(step, GAP * float(np.median(intervals))) + clock_slack(t)
+    before = np.clip(np.searchsorted(t, grid + clock_slack(t), side="right") - 1, 0, len(intervals) - 1)
+    inside = (grid > t[before] + clock_slack(t)) & (grid < t[before + 1] - clock_slack(t))
+    return np.asarray(inside & (intervals[before] > limit))
 
 
 def _check_step(vessel: Vessel, rows: Mapping[str, NDArray[Any]], step: float) -> None:

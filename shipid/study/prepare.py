@@ -20,6 +20,7 @@ from shipid.data.windows import (
     Windows,
     cut_windows,
     gaps,
+    longest_gap,
     nested_runs,
     part_folds,
     reach_over,
@@ -160,12 +161,10 @@ def over_gaps(dataset: Dataset, windows: Windows) -> list[str]:
     over = reach_over(windows, spans)
     if not over.any():
         return []
-    seen = [(end - start, start, run) for run in np.unique(windows.run[over]).tolist() for start, end in spans[run]]
-    length, start, run = max(seen, key=lambda gap: gap[0])
+    longest = longest_gap({run: spans[run] for run in np.unique(windows.run[over]).tolist()})
     return [
-        f"{int(over.sum())} of {len(windows)} windows hold a time without rows, the longest {length:.3g} s after "
-        f"t = {start:g} s of {run!r}: path and motion are only interpolated there; set max_gap in [clock] of the "
-        "mapping and import again"
+        f"{int(over.sum())} of {len(windows)} windows hold a time without rows, {longest}: path and motion are only "
+        "interpolated there; set max_gap in [clock] of the mapping and import again"
     ]
 
 

@@ -33,6 +33,7 @@ from shipid.identification.outcome import (
     residual_level,
     residual_spacing,
     unmeasured,
+    unrecorded,
     without_shared,
 )
 from shipid.identification.reach import Reach, beyond, of_log, reach_of
@@ -245,7 +246,7 @@ def compare_structures(
         runs=fitted,
         test=tested,
         digest=digest,
-        shared=(*shared, *unmeasured(vessel, dataset, fitted, settings)),
+        shared=(*shared, *unmeasured(vessel, dataset, fitted, settings), *unrecorded(dataset, fitted, settings)),
         ahead=length,
         level=level,
         errors=every,

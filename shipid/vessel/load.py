@@ -479,7 +479,11 @@ def _check_units(vessel: Vessel) -> None:
 
 
 def _check_inertia(vessel: Vessel) -> None:
-    """DocumentError if mass plus added mass is not positive definite in the degrees of freedom of the vessel."""
+    """DocumentError if a moment of inertia is missing, or mass plus added mass is not positive definite."""
+    for row, name in ((3, "I_x"), (4, "I_y")):
+        if row in vessel.axes and not vessel.document["inertia"].get(name):
+            message = f"missing: {len(vessel.axes)} degrees of freedom need it"
+            raise DocumentError(message, file=vessel.file, path=f"inertia.{name}")
     M = vessel._masses
     if np.any(np.linalg.eigvalsh(M + M.swapaxes(1, 2))[:, 0] <= 0):
         remedy = (

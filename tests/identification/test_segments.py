@@ -123,3 +123,16 @@ def test_actuators_lag_as_in_each_run() -> None:
             worst.append(np.abs(predict(fit, np.ones(fit.num_factors), np.zeros((2, 0))).r).max())
     assert min(worst[:2]) > 1e-3
     assert max(worst[2:]) < 1e-6
+
+
+def test_no_segment_begins_between_far_rows() -> None:
+    """A state between the two rows at the ends of a time without rows is no initial state."""
+    data = trials(SHIP, runs=1, steps=60)
+    t = data.frame["t"]
+    gap = Dataset(data.frame[(t < 20.5) | (t > 45.5)], data.metadata)
+    whole, cut = (cut_segments(SHIP, one, one.runs, 1.0, 20.0) for one in (data, gap))
+    assert [(one.t[0], one.t[-1]) for one in whole] == [(0.0, 20.0), (20.0, 40.0), (40.0, 60.0)]
+    assert [(one.t[0], one.t[-1]) for one in cut] == [(0.0, 20.0), (20.0, 40.0), (46.0, 60.0)]
+    assert all(one.measured[0] for one in cut)
+    coarse = Dataset(data.frame[t % 2 == 0], data.metadata)  # rows of 2 s: steps of 1 s begin between near rows, too
+    assert [one.t[0] for one in cut_segments(SHIP, coarse, coarse.runs, 1.0, 15.0)] == [0.0, 15.0, 30.0, 45.0]

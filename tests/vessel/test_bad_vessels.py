@@ -45,7 +45,7 @@ BROKEN = {
     "no-strips": ("hull.crossflow.strips", "must be at least 1"),
     "half-a-strip": ("hull.crossflow.strips", "must be a whole number"),
     "five-degrees-of-freedom": ("dof", "3, 4 or 6"),
-    "six-degrees-without-inertia": ("inertia", "need I_x"),
+    "six-degrees-without-inertia": ("inertia.I_x", "missing: 6 degrees of freedom need it"),
     "two-components-of-one-name": ("thruster.wind", "choose another"),
     "dot-in-a-name": ("thruster", "use letters, digits, _ and -"),
     "thruster-is-a-number": ("thruster.stern", "must be a table with a `kind`"),
