@@ -108,14 +108,15 @@ def _draft(
 ) -> None:
     from shipid.files import check_new, write_new
     from shipid.logs.guess.columns import guess
-    from shipid.logs.guess.draft import draft_mapping
+    from shipid.logs.guess.draft import NOT_YET, draft_mapping
     from shipid.schemas import with_schema
     from shipid.vessel.load import load_vessel
 
     guessed = guess(log, names, load_vessel(vessel) if vessel else None, frame)
     file = out or Path(f"{guessed.file.resolve().stem}.toml")
     check_new(file, "mapping")
-    write_new(with_schema(draft_mapping(guessed), file, "mapping"), file)
+    text = draft_mapping(guessed)
+    write_new(with_schema(text, file, "mapping"), file)
     columns = [
         {"column": c.name, "from": c.source, "unit": c.unit, "sure": c.confidence, "why": c.evidence}
         for c in guessed.columns
@@ -139,6 +140,8 @@ def _draft(
     answer.rows("unused", unused, table(["not used", "because"], guessed.unused.items()) if unused else None)
     questions = [question.sentence for question in guessed.questions]
     answer.say("\n".join(f"? {question}" for question in questions), questions=questions)
+    faults = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(NOT_YET)]
+    answer.say("\n".join(faults), faults=faults)
     answer.say(f"draft -> {file}: read it before you import with it", file=file)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -198,11 +199,15 @@ class State:
         return effect(self.t, r, order, PART * span)
 
     def command_of(self, name: str) -> str:
-        """Return the command of the vessel whose component and signal the name of a column says; empty if none does."""
+        """Return the command of the vessel whose component and signal the name of a column says; empty if none does.
+
+        Nor where the vessel has one command of this signal alone: then it is that, whatever the name.
+        """
+        several = Counter(map(signal_of, self.commands))
         found = {
             command: how_much_says(name, command)
             for command in self.commands
-            if unit_of_another(name, signal_of(command)) is None
+            if several[signal_of(command)] > 1 and unit_of_another(name, signal_of(command)) is None
         }
         most = max(found.values(), default=0)
         best = [command for command, count in found.items() if count == most]

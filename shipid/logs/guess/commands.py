@@ -96,8 +96,7 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
         component = side or SIGNALS[signal].component
         if signal == "delta" and side:
             component = f"{side}_rudder"
-        command = state.command_of(name) or unique(f"{component}.{signal}", used)
-        state.suggest(command, name, unit, confidence, why, **extra)
+        state.suggest(_command(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
     return azimuth
 
 
@@ -219,8 +218,7 @@ def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
                 written = unit_in_name(name, SIGNALS[signal].unit)
                 unit, confidence, extra = likely_unit(state, name, signal), 0.9 if written else 0.7, {}
                 why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
-            command = state.command_of(name) or unique(f"{component}.{signal}", used)
-            state.suggest(command, name, unit, confidence, why, **extra)
+            state.suggest(_command(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
 
 
 def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
@@ -313,8 +311,19 @@ def likely_unit(state: State, name: str, signal: str) -> str:
     return row.read_in if large or (row.shaft and re.search(row.read_in, name.lower())) else row.unit
 
 
+def _command(state: State, column: str, usual: str, used: dict[str, int]) -> str:
+    """Return the command that a column orders: that of the vessel which its name says, else the usual one."""
+    said = state.command_of(column)
+    if said:
+        return said
+    for one in filter(None, map(state.command_of, state.columns)):
+        used.setdefault(one, 1)
+    return unique(usual, used)
+
+
 def unique(name: str, used: dict[str, int]) -> str:
     """Return the name of a column, with a number after its component where it is used already."""
     used[name] = used.get(name, 0) + 1
     component, _, signal = name.partition(".")
-    return name if used[name] == 1 else f"{component}_{used[name]}.{signal}"
+    new = name if used[name] == 1 else f"{component}_{used[name]}.{signal}"
+    return unique(name, used) if new != name and new in used else new

@@ -19,6 +19,7 @@ from shipid.logs.importing import import_log, sha256_of
 from shipid.logs.mapping import Mapping, Segment, degrees_of, is_date, is_dated, read_mapping, to_si
 from shipid.logs.readers import LARGE, date_of
 
+NOT_YET = "# Cannot be imported as it is: "
 ENABLED = 0.8  # a repair less sure than this is drafted switched off
 ORDER = ("wrap_interpolation", "break", "despike", "latency", "scale", "heading_offset", "lever_arm")
 NOISE = {"position": 1.0, "heading_deg": 0.5, "acceleration": 0.05, "angular_acceleration_deg": 0.2}
@@ -53,7 +54,7 @@ def draft_mapping(guess: Guess, manoeuvres: bool = True) -> str:
         segments = segment_log(_read(text), guess.file)
     except ShipidError as error:
         place = f"{error.file}: " if guess.source.pattern is not None and error.file else ""
-        return text + f"\n# Cannot be imported as it is: {place}{error.path or ''}: {error.message}\n"
+        return text + f"\n{NOT_YET}{place}{error.path or ''}: {error.message}\n"
     return text + segments_text(segments, guess.sniffed.clock.get("unit", "s"))
 
 

@@ -214,3 +214,13 @@ def test_the_sign_of_an_azimuth_unit_is_that_of_its_place(x: float, turns: float
     signs = {one.name: one.extra.get("sign", 1) for one in state.suggestions if one.name.endswith("alpha")}
     assert signs == dict.fromkeys(("port.alpha", "starboard.alpha"), turns)
     assert ("wrong sign of rudder" in {one.kind for one in state.findings}) == (turns < 0)
+
+
+@pytest.mark.parametrize(
+    "pair", [("Rudder", "Helm"), ("Helm", "Rudder"), ("Ruder", "Rudder order"), ("RSA", "Rudder demand")]
+)
+@pytest.mark.parametrize("ship", [None, "twin"])
+def test_no_command_has_two_columns(pair: tuple[str, str], ship: str | None) -> None:
+    state, _ = drafted({pair[0]: RUDDER, pair[1]: RUDDER * 1.01, "rpm": RPM}, SHIPS[ship] if ship else vessel())
+    names = [one.name for one in state.suggestions]
+    assert len(names) == len(set(names))
