@@ -452,7 +452,10 @@ def fit(
         left_out = np.full_like(windows.future, np.nan)
         for training, judged in refit_folds(windows, refits, seed):
             part = windows.select(judged)
-            other = fit(method, physics, windows.select(training), commands=commands, seed=seed)
+            try:
+                other = fit(method, physics, windows.select(training), commands=commands, seed=seed)
+            except DataError:  # too little is left to train: the runs that it leaves out have no errors
+                continue
             left_out[:, judged] = part.future - other.predict(part.instants(known=commands == "known"))
     bands, reason = bands_of(left_out, windows, limits, kinds)
     if bands is None:

@@ -427,8 +427,11 @@ def part_folds(windows: Windows) -> list[tuple[NDArray[np.int64], NDArray[np.int
         if all(len(training) for training, _ in folds):
             return folds
     (run,) = windows.spans
-    length = (windows.num_past + windows.horizon) * windows.step
-    raise DataError(f"run {run!r} is too short to train and validate with windows of {length:g} s: shorten the horizon")
+    length, span = (windows.num_past + windows.horizon) * windows.step, float(windows.end.max() - windows.begin.min())
+    raise DataError(
+        f"the {len(windows)} windows of run {run!r} span {span:g} s, too short to train and validate with windows of "
+        f"{length:g} s, which takes more than {3 * length:g} s: shorten the horizon, or raise prediction.samples if set"
+    )
 
 
 def run_folds(

@@ -504,8 +504,8 @@ def _missed_before(known: Known, first: int, delays: int) -> Value:
     }
     parameters = body.input("parameters", len(names.parameters))
     alone_, _ = _free(body, known, known.equations, parameters, at)
-    true, predicted = SX.sym("true", 3), SX.sym("predicted", 3)
-    block = formula("missing", [("true", true), ("predicted", predicted)], (true - predicted) / known.physics.step)
+    seen, predicted = SX.sym("seen", 3), SX.sym("predicted", 3)
+    block = formula("missing", [("seen", seen), ("predicted", predicted)], (seen - predicted) / known.physics.step)
     body.finish(body.call(block, after, alone_))
     later = [known.of("past", MOTIONS, first + k) for k in range(1, delays)]
     each = [

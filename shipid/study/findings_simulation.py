@@ -120,6 +120,8 @@ def read_grid(results: Results, metric: Metric) -> Grid | str:
     assert claims is not None
     if not results.complete:
         return results.missing
+    if NO_MODEL not in set(cells["model"]):
+        return f"the method {results.plan.judged!r} is not run without physics"
     failed = set(cells["model"][cells["status"] != "ok"])
     if NO_MODEL in failed:
         return "pure data-driven has no result in every cell"

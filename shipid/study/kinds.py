@@ -23,16 +23,16 @@ ALIKE = 0.25  # spread of the helm over its size in a zigzag
 LEAST_HELD, SHORTEST = 0.03, 3  # of the time of the run, and rows: a level
 
 
-def kinds_of(dataset: Dataset, runs: Container[str] | None = None) -> dict[str, str]:
+def kinds_of(dataset: Dataset, runs: Container[str] | None = None, test: Container[str] = ()) -> dict[str, str]:
     """Run -> kind of manoeuvre: as the mapping says, else as the words in its name say, else by orders and motion.
 
-    runs : those wanted; all by default. The usual speeds come from all runs.
+    runs : those wanted; all by default. test : runs of the test; the usual speeds come from all others.
     """
     stretches: dict[str, list[pd.DataFrame]] = {}
     for run, rows in pieces(dataset):
         stretches.setdefault(run, []).append(rows)
     declared = dataset.metadata.get("manoeuvres", {})
-    frame = dataset.frame
+    frame = dataset.frame[[run not in test for run in dataset.frame["run"]]]
     shafts = [name for name in dataset.commands if is_shaft(name)]
     speeds = pd.Series(np.hypot(frame["u"].to_numpy(), frame["v"].to_numpy()))
     speed = float(speeds.groupby(frame["run"].to_numpy()).mean().median())

@@ -452,7 +452,9 @@ class Plan:
     def judged(self) -> str:
         """Name of the method that findings and the answer speak of."""
         named = self.study.claims.method if self.study.claims else None
-        return named or next((way.name for way in self.methods if way.method.compensates), self.methods[0].name)
+        learning = [way for way in self.methods if way.method.compensates]
+        physics = [way for way in learning if way.foundations != (NO_MODEL,)]
+        return named or next((way.name for way in (*physics, *learning)), self.methods[0].name)
 
     @property
     def plain(self) -> str | None:

@@ -237,7 +237,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         test_paths={name: pair[1] for name, pair in paths.items()},
         notes=tuple(dict.fromkeys(notes)),
         estimates=estimates,
-        kinds=kinds_of(dataset),
+        kinds=kinds_of(dataset, test=test.spans),
     )
 
 

@@ -23,6 +23,7 @@ from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.engines import check_device
 from shipid.engine.native import engine
+from shipid.errors import DataError
 from shipid.files import make_folder, read_json, write_json
 from shipid.hybrid.compensator import shared_units
 from shipid.hybrid.device import use_threads, vectors
@@ -398,7 +399,10 @@ def refitted(
             mine = [name for name, other in pairs if other.name == way.name]
             if not mine:
                 continue
-            again = _fitted(plan, inside, batch, rest, known, replace(way, foundations=tuple(mine)), device, None)
+            try:
+                again = _fitted(plan, inside, batch, rest, known, replace(way, foundations=tuple(mine)), device, None)
+            except DataError:  # too little is left to train: the runs that it leaves out have no errors
+                continue
             for name in mine:
                 one, result, (errors, seconds) = known[name], again[name], left_out[name, way.name]
                 left_out[name, way.name] = errors, seconds + result.seconds + one.seconds

@@ -227,3 +227,14 @@ def test_a_method_without_errors_on_runs_left_out_says_which_key_gives_them(tiny
     ((sentence, _),) = bands.answer(without)
     assert sentence.startswith("No band is promised: its errors on runs left out need")
     assert "`bands.refits`" in sentence
+
+
+def test_a_refit_that_has_too_little_to_train_leaves_its_runs_without_errors(tmp_path: Path) -> None:
+    """Before, it ended the whole study: two of three runs leave one, whose windows cannot be parted in time."""
+    step = {"name": "step", "kind": "one-step", "trials": 1, "units": 8}
+    changes = {"method": [step], "grid.N_D": [3], "truth.duration": 12.0, "bands.refits": 2}
+    plan = tiny_plan(tmp_path, changes)
+    run_here(plan, tmp_path / "run")
+    results = read_results(tmp_path / "run")
+    assert (results.cells["status"] == "ok").all()
+    assert all(results.no_band[cell] for cell in results.cells["cell"])

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from shipid.study.findings import CLAIMS, findings
 from shipid.study.findings_bands import CLAIMS as BANDS
-from shipid.study.results import Results
+from shipid.study.results import Results, read_results
 from tests.study.byhand import RIVALS, grid
+from tests.study.tiny import run_here, tiny_plan
 
 RUNS = 8  # test manoeuvres, all alike but for a tenth
 
@@ -108,3 +110,18 @@ def test_numbers_are_those_of_the_evidence(made: Any) -> None:
     assert numbers["R2"] == {"H inaccurate / A accurate": pytest.approx(1.05)}
     assert numbers["R3"] == {"gap before [m]": pytest.approx(4.0), "gap after [m]": pytest.approx(1.1)}
     assert numbers["R4"] == {"share of steps where it is worst": 1.0}
+
+
+def test_a_judged_method_that_is_never_without_physics_leaves_those_of_a_growing_N_D_undecided(tmp_path: Path) -> None:
+    """Before, a traceback after the whole computation."""
+    small = {"kind": "path-drawn", "trials": 1, "units": 8, "terms": 4}
+    methods = [
+        {"name": "both", "families": ["right", "wrong"], **small},
+        {"name": "pure", "families": ["none"], **small},
+    ]
+    plan = tiny_plan(tmp_path, {"method": methods, "claims": {"moderate": "right", "high": "wrong"}})
+    run_here(plan, tmp_path / "run")
+    found = [one for one in findings(read_results(tmp_path / "run")) if one["id"].startswith("S")]
+    assert len(found) == 7
+    assert {one["verdict"] for one in found} == {"undecided"}
+    assert all("'both' is not run without physics" in one["evidence"] for one in found)

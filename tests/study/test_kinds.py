@@ -68,3 +68,14 @@ def test_every_kind_reaches_the_test() -> None:
         index=[f"run {number}" for number in range(12)],
     )
     assert set(frame.loc[typical_runs(frame), "kind"]) == {"zigzag", RANDOM, COASTING}
+
+
+def test_the_motion_of_the_test_says_nothing_of_other_runs() -> None:
+    """What is slow is slow beside the runs that train: a kind in training may not hang on the test."""
+    t = np.arange(60.0)
+    for fast in (1.0, 12.0):
+        speeds = {"a": 4.0, "b": 1.0, "c": 4.0, "test": fast, "more": fast, "last": fast}
+        runs = {name: {"u": u, "port.n": 2.0, "starboard.n": 2.0} for name, u in speeds.items()}
+        known = kinds_of(logged(runs, t), test={"test", "more", "last"})
+        assert known["b"] == LOW_SPEED
+        assert known["a"] == known["c"] != LOW_SPEED

@@ -440,3 +440,11 @@ def test_every_file_of_a_log_is_part_of_the_study(tmp_path: Path) -> None:
         (tmp_path / changed).write_text("t,n,e,h\n0,0,1,0\n")
         assert before.keys() == {"mapping", "log"}
         assert before != _sources(data, tmp_path / "study.toml")
+
+
+def test_the_judged_method_is_the_first_that_learns_beside_physics(tmp_path: Path) -> None:
+    drawn = {"kind": "path-drawn", "trials": 1, "units": 8, "terms": 4}
+    alone = {"name": "plain", "families": ["none"], **drawn}
+    still = {"name": "still", "kind": "alone"}
+    both = tiny_plan(tmp_path, {"method": [alone, {"name": "drawn", **drawn}]})
+    assert (both.judged, tiny_plan(tmp_path, {"method": [alone, still]}).judged) == ("drawn", "plain")
