@@ -34,10 +34,12 @@ def replay(
     from math import degrees
 
     from shipid.data.dataset import read_dataset
+    from shipid.data.windows import gaps_in_words
     from shipid.files import check_table, write_table
     from shipid.identification.free_run import free_runs, unfelt
     from shipid.identification.late import late_commands
     from shipid.identification.outcome import pick_runs
+    from shipid.identification.segments import too_short
     from shipid.identification.settings import Identify
     from shipid.report.replay import REPLAYED, ReplayContent, write_replay
     from shipid.version import __version__
@@ -52,9 +54,12 @@ def replay(
         check_table(csv)
     ship, log = load_vessel(vessel), read_dataset(dataset)
     chosen, _ = pick_runs(log, runs or ())
+    short = too_short(log, chosen, step, ahead)
+    chosen = tuple(run for run in chosen if run not in short) or chosen
     settings = Identify(parameters=[next(iter(ship.parameters))], step=step, horizon=0.0, commands=commands)
     replayed = free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
     zero = unfelt(ship, log, settings, chosen)
+    holes = gaps_in_words(log.select(chosen), step)
     late = late_commands(ship, log, chosen) if commands == "held" else None
     rows = [
         [row["run"], *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"]))]
@@ -83,6 +88,12 @@ def replay(
         answer.say(assumed=zero, late=None if late is None else late.words)
         if zero:
             answer.say(f"not in the log, taken as 0: {', '.join(zero)}")
+        left_out = [run for run in short if run not in chosen]
+        answer.say(left_out=left_out, gaps=holes)
+        if left_out:
+            answer.say(f"too short, left out: {', '.join(left_out)}")
+        if holes:
+            answer.say(f"{holes}: orders are held there")
         if late is not None:
             answer.say(f"{late.words}: the turns are late; compare with --commands between")
         answer.rows("errors", replayed.errors.drop(columns="model"), table(heads, rows))

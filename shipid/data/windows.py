@@ -23,6 +23,7 @@ from shipid.data.dataset import (
     shares_clock,
 )
 from shipid.errors import DataError
+from shipid.units import plural
 
 Mask = NDArray[np.bool_]
 Commands = Literal["held", "known"]
@@ -369,6 +370,23 @@ def longest_gap(spans: Mapping[str, Iterable[tuple[float, float]]]) -> str:
     """The longest of some times without rows, in words."""
     length, start, run = max((end - start, start, run) for run, times in spans.items() for start, end in times)
     return f"the longest {length:.3g} s after t = {start:g} s of {run!r}"
+
+
+def gaps_in_words(dataset: Dataset, least: float) -> str:
+    """How many times without rows the runs have, and the longest; empty where they have none. least : as of `gaps`."""
+    spans = gaps(dataset, least)
+    count = sum(map(len, spans.values()))
+    return f"{count} {plural(count, 'time')} without rows, {longest_gap(spans)}" if count else ""
+
+
+def without_rows(t: Array, instants: Array, least: float) -> NDArray[np.bool_]:
+    """Whether instants [s], any shape, lie in a time without rows of one stretch at t (N,). least : as of `gaps`."""
+    steps, slack = np.diff(t), clock_slack(t)
+    if not len(steps):
+        return np.zeros(np.shape(instants), dtype=bool)
+    row = np.clip(np.searchsorted(t, instants + slack, side="right") - 1, 0, len(steps) - 1)
+    inside = (instants > t[row] + slack) & (instants < t[row + 1] - slack)
+    return np.asarray(inside & (steps[row] > max(least, GAP * float(np.median(steps))) + slack))
 
 
 def reach_over(windows: Windows, spans: Mapping[str, Iterable[tuple[float, float]]]) -> Mask:

@@ -17,7 +17,7 @@ from shipid import document as documents
 from shipid.arguments import function_or_none, names_of, number, of_class
 from shipid.data.dataset import Dataset, apart_from
 from shipid.data.outputs import common_outputs, compare_outputs
-from shipid.data.windows import gaps, longest_gap
+from shipid.data.windows import gaps_in_words
 from shipid.document import short_names
 from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.files import write_new
@@ -595,14 +595,9 @@ def unmeasured(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: 
 
 def unrecorded(dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
     """A warning if the runs to fit hold times without rows, over which predictions go on with the last orders."""
-    spans = gaps(dataset.select(runs), settings.step)
-    if not spans:
-        return []
-    count = sum(map(len, spans.values()))
-    return [
-        f"{count} {plural(count, 'time')} without rows, {longest_gap(spans)}: orders are held and weather is "
-        "interpolated there; set max_gap in [clock] of the mapping and import again"
-    ]
+    words = gaps_in_words(dataset.select(runs), settings.step)
+    remedy = "orders are held and weather is interpolated there; set max_gap in [clock] of the mapping and import again"
+    return [f"{words}: {remedy}"] if words else []
 
 
 def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.checks import GAP
-from shipid.data.dataset import Dataset, clock_slack, sample, stretches
+from shipid.data.dataset import Dataset, clock_slack, pieces, sample, stretches
+from shipid.data.windows import without_rows
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, choices
 from shipid.identification.late import Changes, between_rows
@@ -90,11 +90,24 @@ def cut_segments(
             result += _cut(vessels.get(run, vessel), rows, list(runs).index(run), step, horizon, lags, commands)
     without = next((run for i, run in enumerate(runs) if not any(segment.run == i for segment in result)), None)
     if without is not None:
-        wanted = max(LEAST_STEPS * step, horizon / 2)
+        wanted = _least(step, horizon)
         half = f", half of {horizon:g} s" if horizon and wanted == horizon / 2 else ""
         message = f"{without!r} has no unbroken stretch of {wanted:g} s{half}: predict less far, or leave it out"
         raise DataError(message, path="runs")
     return sorted(result, key=lambda segment: segment.run)
+
+
+def too_short(dataset: Dataset, runs: Sequence[str], step: float, horizon: float) -> list[str]:
+    """Runs without a stretch that is long enough for a prediction; arguments as of `cut_segments`."""
+    spans = dict.fromkeys(runs, 0.0)
+    for run, rows in pieces(dataset.select(runs)):
+        spans[run] = max(spans[run], float(rows["t"].iloc[-1] - rows["t"].iloc[0]))
+    return [run for run, span in spans.items() if int(span / step + 1e-6) < _least(step, horizon) / step]
+
+
+def _least(step: float, horizon: float) -> float:
+    """Shortest time [s] that is predicted: two steps, or half a horizon."""
+    return max(LEAST_STEPS * step, round(horizon / step) * step / 2 if horizon else 0.0)
 
 
 def _cut(
@@ -109,7 +122,7 @@ def _cut(
     t = rows["t"]
     count = int((t[-1] - t[0]) / step + 1e-6) if len(t) > 1 else 0
     each = round(horizon / step) if horizon else max(count, 1)
-    least = max(LEAST_STEPS, each / 2 if horizon else 0)
+    least = _least(step, horizon) / step
     if count < least:
         return []
     grid = t[0] + step * np.arange(count + 1)
@@ -123,7 +136,7 @@ def _cut(
     commands = {name: columns[name] for name in dynamics(vessel).commands}
     memory = memory_along(vessel, commands, grid) or {}
     result = []
-    empty = _without_rows(t, grid, step)
+    empty = without_rows(t, grid, step)
     for start in range(0, count, each):
         last = min(start + each, count)
         first = start + int(np.argmin(empty[start : last + 1]))  # a state between far rows is no beginning
@@ -142,15 +155,6 @@ def _cut(
             )
         )
     return result
-
-
-def _without_rows(t: NDArray[Any], grid: Array, step: float) -> NDArray[np.bool_]:
-    """Instants (N,) of a grid inside a time without rows, as `shipid.data.windows.gaps` counts them."""
-    intervals = np.diff(t)
-    limit = max(step, GAP * float(np.median(intervals))) + clock_slack(t)
-    before = np.clip(np.searchsorted(t, grid + clock_slack(t), side="right") - 1, 0, len(intervals) - 1)
-    inside = (grid > t[before] + clock_slack(t)) & (grid < t[before + 1] - clock_slack(t))
-    return np.asarray(inside & (intervals[before] > limit))
 
 
 def _check_step(vessel: Vessel, rows: Mapping[str, NDArray[Any]], step: float) -> None:

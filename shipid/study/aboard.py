@@ -12,7 +12,15 @@ import pandas as pd
 
 from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
-from shipid.data.windows import Instants, from_frame, past_of, to_frame, travelled
+from shipid.data.windows import (
+    Instants,
+    from_frame,
+    gaps_in_words,
+    past_of,
+    to_frame,
+    travelled,
+    without_rows,
+)
 from shipid.errors import DataError
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Bands, Region, at_level
@@ -46,7 +54,7 @@ class Played:
     assumed : what the vessel feels and the log does not hold; it is 0.
     plan : whether orders were taken as held where the predictor knows a plan.
     band : what was asked of the band; None: none was asked. bands : of the predictor, where it has some.
-    track : run, t [s], north, east [m] as measured, for a page.
+    track : run, t [s], north, east [m] as measured, for a page. gaps : times without rows, in words.
     """
 
     instants: pd.DataFrame
@@ -59,6 +67,7 @@ class Played:
     band: Band | None = None
     bands: Bands | None = None
     track: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=TRACK))
+    gaps: str = ""
 
 
 def play(
@@ -104,7 +113,7 @@ def play(
     missing = () if vessel is None else tuple(assumed(vessel, names))
     return Played(
         pd.DataFrame(rows), pd.concat(paths, ignore_index=True), step, predictor.physics.horizon, skipped, missing,
-        predictor.commands == "known", band, predictor.bands, dataset.frame[TRACK],
+        predictor.commands == "known", band, predictor.bands, dataset.frame[TRACK], gaps_in_words(dataset, step),
     )  # fmt: skip
 
 
@@ -195,7 +204,7 @@ def _judged(
     for prefix, path in (("", predicted), ("physics_", alone)):
         table[f"{prefix}north"], table[f"{prefix}east"] = from_frame(path[:, 0], path[:, 1], *origin)
     later = t[i] + ahead
-    there = later <= t[-1] + clock_slack(t)
+    there = (later <= t[-1] + clock_slack(t)) & ~without_rows(t, later, physics.step)
     missed = np.full((physics.horizon, 2), np.nan)
     if there.any():
         missed[there] = true_path(rows, i, later[there], physics.path) - predicted[there]
@@ -237,6 +246,8 @@ def summary(played: Played) -> list[str]:
     ]
     if played.assumed:
         lines.append(f"not in the log, taken as 0: {', '.join(played.assumed)}")
+    if played.gaps:
+        lines.append(f"{played.gaps}: no errors there, and a past over one of them is interpolated")
     if played.plan:
         lines.append("the plan was: orders stay as they are, since at sea later orders are not known")
     latency = 1e3 * instants["latency"].to_numpy()

@@ -10,7 +10,7 @@ import pandas as pd
 
 from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, clock_slack, in_force, pieces, read_dataset, sample
-from shipid.data.windows import Instants, from_frame, future_of, past_of
+from shipid.data.windows import Instants, from_frame, future_of, gaps_in_words, past_of, without_rows
 from shipid.errors import DataError, ResultError, choices
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region, adapted, adaptive, factor
@@ -70,6 +70,7 @@ def predict_log(
     if frame.empty:
         raise DataError(_too_short(predictor), file=log)
     write_table(out, frame)
+    frame.attrs["gaps"] = gaps_in_words(dataset, predictor.physics.step)
     return frame, float(frame["outside"].mean())
 
 
@@ -165,7 +166,8 @@ def _along(
 def _later(rows: pd.DataFrame, instants: Array, predicted: Array, region: Region, physics: Physics) -> Array:
     """Greatest reach (S,) over the horizon of the paths that the log holds later; not a number where it ends before."""
     t, horizon = rows["t"].to_numpy(), physics.horizon * physics.step
-    whole = instants + horizon <= t[-1] + clock_slack(t)
+    grid = instants + physics.step * np.arange(physics.horizon + 1)[:, None]
+    whole = (instants + horizon <= t[-1] + clock_slack(t)) & ~without_rows(t, grid, physics.step).any(axis=0)
     reach = np.full(len(instants), np.nan)
     if whole.any():
         future = future_of(rows, instants[whole], physics.horizon, physics.step, physics.path)

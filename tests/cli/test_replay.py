@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
-from shipid.data.dataset import Dataset, write_dataset
+from shipid.data.dataset import Dataset, read_dataset, write_dataset
 from shipid.errors import ShipidError
 from shipid.report import replay
 from shipid.simulation.manoeuvre import Zigzag
@@ -130,3 +130,21 @@ def test_commands_that_come_late_are_said_and_may_change_between_the_rows(tmp_pa
         late = "rows are 1 s apart and commands count from their row, 0.5 s late on average"
         assert said["late"] == (late if commands == "held" else None)
     assert errors["between"] < 0.6 * errors["held"]
+
+
+def test_a_run_of_one_row_is_left_out_and_times_without_rows_are_named(log: Path, tmp_path: Path) -> None:
+    whole = read_dataset(log)
+    frame, first = whole.frame, whole.runs[0]
+    gap = frame[(frame["run"] != first) | (frame["t"] < 20) | (frame["t"] > 25)]
+    one = frame[frame["run"] == whole.runs[1]].iloc[:1].assign(run="single")
+    file = write_dataset(Dataset(pd.concat([gap, one], ignore_index=True), whole.metadata), tmp_path / "some.parquet")
+    result = CliRunner().invoke(app, ["replay", SHIP, str(file), "--out", str(tmp_path / "page.html")])
+    assert result.exit_code == 0, result.output
+    assert "too short, left out: single" in result.output
+    assert (
+        f"1 time without rows, the longest 5.2 s after t = 19.9 s of {first!r}: orders are held there" in result.output
+    )
+    alone = write_dataset(Dataset(one, whole.metadata), tmp_path / "one.parquet")
+    refused = CliRunner().invoke(app, ["replay", SHIP, str(alone)])
+    assert isinstance(refused.exception, ShipidError)
+    assert "'single' has no unbroken stretch" in str(refused.exception)

@@ -217,3 +217,24 @@ def test_alarms_are_at_the_times_that_the_log_has():
     assert aboard._spans(rows) == ["  a: from 2022-05-19 10:00:00 to 2022-05-19 10:00:05 UTC"]
     early = rows.assign(t=[36000.0, 36005.5, 36010.0])
     assert aboard._spans(early) == ["  a: from 36000 to 36005.5 s"]
+
+
+def test_where_the_log_has_no_rows_there_is_no_error(banded, tmp_path):
+    """Nor is a path over it counted by the band; before, errors were those to a straight line over the gap."""
+    whole, file = log(), banded[1]
+    gap = whole[(whole["t"] <= 100) | (whole["t"] >= 150)].reset_index(drop=True)
+    (tmp_path / "gap").mkdir()
+    first, second = (play(file, saved(f, d), level=0.5) for f, d in ((whole, tmp_path), (gap, tmp_path / "gap")))
+    before = second.instants["t"] <= 100
+    inside = second.points["t"] + second.points["ahead"]
+    inside = (inside > 100) & (inside < 150)
+    assert inside.any()
+    assert second.points.loc[inside, "error"].isna().all()
+    early = second.points["t"] <= 100
+    same = first.points[first.points["t"] <= 100].reset_index(drop=True)
+    pd.testing.assert_series_equal(
+        second.points.loc[early & ~inside, "error"], same.loc[(early & ~inside)[early], "error"]
+    )
+    assert second.instants.loc[before & (second.instants["t"] > 80), "reach"].isna().all()
+    assert (first.gaps, second.gaps) == ("", "1 time without rows, the longest 50 s after t = 100 s of 'a'")
+    assert any(second.gaps in line for line in summary(second))
