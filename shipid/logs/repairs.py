@@ -23,6 +23,7 @@ INPUTS = {"latitude": "rad", "longitude": "rad", "speed": "m/s", "course": "rad"
 """Columns of a mapping that become others: position on the Earth north and east, speed and course over ground u, v."""
 Mask = NDArray[np.bool_]
 Interval = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
+FEWEST_AT_END = 3  # rows in half a window, from which spikes at the end of a stretch are looked for
 
 
 class Strict(BaseModel):
@@ -145,8 +146,9 @@ def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
 def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
     """Replace x where |x - median(x over the window)| > threshold by interpolation of the rest.
 
-    Windows are whole and do not reach over a break: the median of half a window is biased for a moving ship. Missing
-    values in them are interpolated for the median.
+    Windows are whole and do not reach over a break: the median of half a window is biased for a moving ship. In the
+    half window at each end of a stretch a line through the whole window there takes its place, where it fits the rest.
+    Missing values in them are interpolated for the median.
     """
     t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
     width = 2 * round(repair.window / 2 / float(np.median(np.diff(t)))) + 1
@@ -154,12 +156,27 @@ def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
     healed = {}
     for name in repair.columns:
         pieces = rows[name].interpolate(limit_area="inside").groupby(stretch)
-        median = pieces.transform(lambda piece: piece.rolling(width, center=True, min_periods=width).median())
+        median = pieces.transform(lambda piece: _expected(piece, width, repair.threshold))
         spikes = (rows[name] - median).abs().to_numpy() > repair.threshold
         healed[name] = interpolate_at(t, rows[name].to_numpy(), spikes)
         touched |= spikes
         count += int(spikes.sum())
     return Outcome(rows.assign(**healed), touched, count, f"median of {width} rows")
+
+
+def _expected(piece: pd.Series[float], width: int, threshold: float) -> pd.Series[float]:
+    """The median over whole windows of a stretch; in half a window at its ends a robust line, unless it fits badly."""
+    median = piece.rolling(width, center=True, min_periods=width).median()
+    half, values = width // 2, piece.to_numpy()
+    for window, end in ((slice(0, width), slice(0, half)), (slice(-width, None), slice(-half, None))):
+        x, k = values[window], np.arange(width)
+        if len(x) < width or half < FEWEST_AT_END or not np.isfinite(x).all():
+            continue
+        slope = np.median(x[half:] - x[: half + 1]) / half
+        line = np.median(x - slope * k) + slope * k
+        if np.quantile(np.abs(x - line), 0.75) < threshold / 4:
+            median.iloc[end] = line[end]
+    return median
 
 
 def scale(rows: pd.DataFrame, repair: Scale) -> Outcome:

@@ -10,7 +10,7 @@ import pytest
 from shipid.data.dataset import BREAK, Dataset, flag_bit, pieces
 from shipid.errors import DataError, DocumentError
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.repairs import FLAGS, Latency, apply_repairs
+from shipid.logs.repairs import FLAGS, Despike, Latency, apply_repairs, despike
 from tests.logs.conftest import as_log, turning
 
 T = np.arange(0.0, 240.0, 0.5)
@@ -208,3 +208,20 @@ def test_a_speed_over_ground_is_mended_before_it_becomes_u_and_v(tmp_path: Path)
     mapping.write_text(text + repair.format('["speed", "u"]'))
     with pytest.raises(DocumentError, match=r"repair.0.columns: 'u' is made of columns .* two repairs"):
         read_mapping(mapping)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_spike_at_an_end_is_replaced_and_nothing_else_is(seed: int) -> None:
+    """A ship on a drawn track; spikes in the first and last half window, at the very ends, and in the middle."""
+    random = np.random.default_rng(seed)
+    t = np.arange(300) * 0.5
+    psi = random.uniform(0, 6) + random.uniform(0.1, 0.6) * np.sin(t / random.uniform(15, 60))
+    north = np.cumsum(random.uniform(1, 9) * np.cos(psi)) * 0.5 + random.normal(0, 0.1, len(t))
+    wild = np.unique([random.integers(0, 9), 150, 299 - random.integers(0, 9)])
+    spoilt = north.copy()
+    spoilt[wild] += random.choice([-1, 1], len(wild)) * random.uniform(150, 900, len(wild))
+    rows = pd.DataFrame({"t": t, "north": spoilt, "flags": np.zeros(len(t), dtype=np.int64)})
+    repair = Despike(kind="despike", reason="drawn", columns=("north",), window=10.0, threshold=60.0)
+    outcome = despike(rows, repair)
+    assert np.flatnonzero(outcome.touched).tolist() == wild.tolist()
+    assert np.abs(outcome.rows["north"] - north).max() < 10

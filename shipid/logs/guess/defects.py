@@ -23,9 +23,31 @@ FEW = 4  # times that a sentence names
 MEASURED = ("speed", "u", "v", "r")
 LEVELS, BESIDE = 30, 3  # values that a signal has at least; of them beside a limit
 PILE, ABOVE, RETURNS = 0.03, 4.0, 3  # of the rows, at a limit; times as many as beside it; visits
+HELD_SHARE, HELD_ROWS = 0.2, 60  # of the rows; repeats in a row that are no rest
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 STREAM = 0.5  # of the misfit of positions and velocities: less is no current
+
+
+def _held_positions(state: State) -> None:
+    """Report a position that repeats for some rows, again and again, while the heading or the yaw rate goes on."""
+    places = [one.source for one in state.suggestions if one.name in POSITIONS]
+    others = [one.source for one in state.suggestions if one.name in ("psi", "r")]
+    if len(places) < 2 or not others:
+        return
+    same, going = ([np.diff(state.columns[name]) == 0 for name in names] for names in (places, others))
+    held = np.all(same, axis=0) & ~np.all(going, axis=0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(int), [0]]))).reshape(-1, 2)
+    lengths = edges[:, 1] - edges[:, 0]  # rows that repeat the one before; long stays are those of a ship at rest
+    some = lengths[lengths <= HELD_ROWS]
+    share = float(some.sum()) / len(held)
+    if share > HELD_SHARE:
+        late = float(np.mean(some)) / 2 * float(np.median(np.diff(state.t)))
+        sentence = (
+            f"in {100 * share:.0f} % of the rows the position repeats the row before while the heading goes on: a "
+            f"slower receiver was held, on average {late:.2g} s late; leave these cells empty and set max_gap"
+        )
+        state.find("held positions", tuple(places), 0.9, sentence)
 
 
 def defects_of_rows(state: State, sniffed: Sniffed) -> None:
@@ -44,6 +66,7 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
                 f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated"
             )
             state.find("interpolated from a slower log", tuple(moving), 0.9, sentence)
+    _held_positions(state)
     for column in state.suggestions:
         values = state.columns[column.source]
         if is_shaft(column.name):

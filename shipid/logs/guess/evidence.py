@@ -313,6 +313,15 @@ def spikes(values: Array) -> NDArray[np.bool_]:
     than the signal steps there from row to row; the rows before and after agree. An angle that counts from 0 again, and
     a signal with more than one such row in fifty, has none.
     """
+    result = _spikes(values)
+    for turn in TURNS:
+        if result.any() and 0.9 * turn < np.ptp(values) <= 1.02 * turn:  # an angle that crosses its 0 for a row?
+            result &= _spikes(np.unwrap(values, period=turn))
+    return result
+
+
+def _spikes(values: Array) -> NDArray[np.bool_]:
+    """Rows (N,) that leave a signal, were it no angle."""
     none = np.zeros(len(values), dtype=bool)
     low, high = np.percentile(values, [0.5, 99.5])
     if len(values) < 50 or not high > low:

@@ -117,3 +117,13 @@ def test_what_was_not_looked_at_is_no_hole(tmp_path: Path, monkeypatch: pytest.M
     assert "holes in time" not in seen.kinds
     with_a_hole = CLEAN.drop(CLEAN.index[20:60])  # in the head, which is read
     assert "holes in time" in guessed(tmp_path, with_a_hole).kinds
+
+
+@pytest.mark.parametrize("every", [1, 2, 5, 20])
+def test_a_slower_receiver_that_was_held_is_named(every: int, tmp_path: Path) -> None:
+    log = as_bridge(si_log()).round(4)
+    place = np.arange(len(log)) // every * every
+    log[["N", "E"]] = log[["N", "E"]].to_numpy()[place]
+    log[["time", "N", "E", "psi", "r", "rudder", "rpm"]].to_csv(tmp_path / "log.csv", index=False)
+    found = [one for one in guess(tmp_path / "log.csv").findings if one.kind == "held positions"]
+    assert len(found) == (every > 1)

@@ -216,3 +216,16 @@ def test_what_a_ship_does_after_a_long_stay_is_no_spike() -> None:
         assert not evidence.spikes(signal).any()
     absent = np.where(np.isin(t, [500.0, 15_000.0]), 511.0, north)
     np.testing.assert_array_equal(np.flatnonzero(evidence.spikes(absent)), [500, 15_000])
+
+
+@pytest.mark.parametrize("seed", range(300))
+def test_a_heading_that_crosses_north_for_a_row_has_no_spike(seed: int) -> None:
+    """Fast small craft, rows far apart; and a row far off is one, as an angle and as a length."""
+    random = np.random.default_rng(seed)
+    t = np.arange(240.0)
+    size, period, middle = random.uniform(20, 40), random.uniform(6, 30), random.uniform(-40, 40)
+    heading = middle + size * np.sin(2 * np.pi * t / period + random.uniform(0, 7))
+    assert not evidence.spikes(np.round(heading % 360, 1)).any()
+    slow = np.round((middle + 100 + 20 * np.sin(t / 40)) % 360, 1)
+    slow[100] = (slow[100] + 120) % 360
+    assert np.flatnonzero(evidence.spikes(slow)).tolist() == [100]
