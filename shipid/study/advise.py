@@ -171,7 +171,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     known = known[known["A"] > 0]  # an exact model has no error that could be left
     if len(known):
         left = known["H"] / known["A"]
-        share = f"{left.min():.0%}" + (f" to {left.max():.0%}" if len(known) > 1 else "")
+        share = " to ".join(dict.fromkeys((f"{left.min():.0%}", f"{left.max():.0%}")))
         text = (
             f"Compensation with {runs(largest)} leaves {share} of the error of physics "
             f"alone (over {len(known)} {plural(len(known), 'model')})."
