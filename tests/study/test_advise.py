@@ -35,7 +35,7 @@ def test_best_model_and_its_worth_in_runs(made: Any) -> None:
     runs = 30 * 2 ** (np.log(4.0 / 1.5) / np.log(4.0 / 1.25))
     assert "How many runs? With 10 runs, good (best in validation) has 1.50 m mean error" in advice
     assert f"without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
-    assert "leaves 25% to 25% of the error of physics alone (over 2 models)" in advice
+    assert "leaves 25% of the error of physics alone (over 2 models)" in advice
     assert "Keeping u, v and r constant gives 10.0 m: at 60 runs every model beats it." in advice
     assert "with 60 runs 1 of 2 physics models does better than no physics; bad does worse." in advice
 
