@@ -28,11 +28,11 @@ from numpy.typing import NDArray
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, choices
 from shipid.identification.settings import SIGNALS
-from shipid.simulation.approach import Controls, NotStraight
+from shipid.simulation.approach import FROUDE, Controls, NotStraight
 from shipid.simulation.log import aboard, horizontal
 from shipid.simulation.manoeuvre import Approached, Excitation
 from shipid.simulation.perform import perform
-from shipid.simulation.standard import FROUDE, length_of, shaft_speed, standard
+from shipid.simulation.standard import length_of, shaft_speed, standard
 from shipid.units import GRAVITY, RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel

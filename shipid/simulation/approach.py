@@ -24,7 +24,8 @@ from shipid.vessel.load import Vessel
 Array = NDArray[np.float64]
 
 PROBE_SHAFT, PROBE_HELM = 1.0, 0.1  # rev/s, rad: values at which the effect of commands is tested
-PROBE_FROUDE = 0.3  # greatest Froude number of that test, of a ship that nothing holds back
+FROUDE = 0.2  # of the service speed of a ship whose document gives none
+MOST_SHAFT, HALVINGS = 100.0, 60  # rev/s; of the interval of a shaft speed
 NOTHING = 1e-12  # m/s^2, rad/s^2
 CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach of a small ship
 PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose speed settles over some 20
@@ -64,12 +65,12 @@ class Controls:
     @property
     def drives(self) -> tuple[str, ...]:
         """Shaft speeds that push the vessel ahead."""
-        return self._effects[0]
+        return self._driving[0]
 
     @property
     def helm(self) -> Mapping[str, float]:
         """Angle command -> sign that turns the ship to starboard."""
-        if not self._effects[1]:
+        if not self._turning:
             what = ": a manoeuvre needs that of a rudder or an azimuth unit"
             if self.differential:
                 what = (
@@ -78,38 +79,50 @@ class Controls:
                 )
             message = f"no angle command turns {self.vessel.name}{what}"
             raise DocumentError(message, file=self.vessel.file, path="thruster")
-        return self._effects[1]
+        return self._turning
 
     @property
     def differential(self) -> bool:
         """Whether no angle turns the vessel, but the difference of two shafts that drive it ahead does."""
-        return not self._effects[1] and {1.0, -1.0} <= set(self._effects[2])
+        return not self._turning and {1.0, -1.0} <= set(self._driving[1])
 
     @cached_property
-    def _effects(self) -> tuple[tuple[str, ...], Mapping[str, float], tuple[float, ...]]:
-        vessel, commands = self.vessel, self.commands
+    def _driving(self) -> tuple[tuple[str, ...], tuple[float, ...]]:
+        """Shaft speeds that push the vessel ahead, and the sides to which those that turn her, too, turn her."""
+        vessel = self.vessel
         idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
         if not np.isfinite(idle).all():
             weather = ", ".join(dynamics(vessel).environment)
             zeros = f" and {weather} 0, as where nobody gives them" if weather else ""
             message = f"the forces on {vessel.name} are not finite at rest, with commands neutral{zeros}"
             raise DocumentError(f"{message}: mend the term or its numbers", file=vessel.file)
-        ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in commands if is_shaft(name)}
+        ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in self.commands if is_shaft(name)}
         drives = tuple(name for name, rates in ahead.items() if rates[0] - idle[0] > NOTHING)
-        running = dict.fromkeys(drives, PROBE_SHAFT)
-        speed = min(_balanced(vessel, running), PROBE_FROUDE * float(np.sqrt(GRAVITY * _length(vessel))))
-        straight = acceleration(vessel, speed, running)
-        turned = {
-            name: acceleration(vessel, speed, {**running, name: PROBE_HELM})[2] - straight[2]
-            for name in commands
-            if steers(name)
-        }
-        helm = {name: float(np.sign(change)) for name, change in turned.items() if abs(change) > NOTHING}
         if not drives:
             message = f"no command drives {vessel.name} ahead: a manoeuvre needs a shaft speed `n`"
             raise DocumentError(message, file=vessel.file, path="thruster")
         yaw = [ahead[name][2] - idle[2] for name in drives]
-        return drives, helm, tuple(float(np.sign(change)) for change in yaw if abs(change) > NOTHING)
+        return drives, tuple(float(np.sign(change)) for change in yaw if abs(change) > NOTHING)
+
+    @cached_property
+    def _turning(self) -> Mapping[str, float]:
+        """Angle command -> sign that turns the ship to starboard, about her service speed.
+
+        At another ratio of speed and shaft speed the polynomials of a screw, or a hull about that speed, may not hold.
+        """
+        speed = service_speed(self.vessel)
+        n = balanced_shaft(self, speed)
+        if n is None:  # nothing drives her so fast, or nothing holds her back
+            n = PROBE_SHAFT
+            speed = min(_balanced(self.vessel, self.ahead(n)), speed)
+        running = self.ahead(n)
+        straight = acceleration(self.vessel, speed, running)
+        turned = {
+            name: acceleration(self.vessel, speed, {**running, name: PROBE_HELM})[2] - straight[2]
+            for name in self.commands
+            if steers(name)
+        }
+        return {name: float(np.sign(change)) for name, change in turned.items() if abs(change) > NOTHING}
 
     def ahead(self, n: float) -> dict[str, float]:
         """Every command on a straight course: the shafts that drive her at n [rev/s], all else neutral."""
@@ -144,6 +157,29 @@ def helm_effect(controls: Controls, n: float, u: float) -> float:
         for given in ((np.full(1, n), np.full(1, angle)) for angle in (0.0, PROBE_HELM))
     ]
     return float(yaw[1] - yaw[0]) / PROBE_HELM
+
+
+def service_speed(vessel: Vessel) -> float:
+    """Service speed U_0 of the document [m/s]; that of a Froude number of 0.2 if it gives none."""
+    given = vessel.document.get("particulars", {}).get("U_0")
+    return float(given or FROUDE * np.sqrt(GRAVITY * _length(vessel)))
+
+
+def balanced_shaft(controls: Controls, speed: float) -> float | None:
+    """Shaft speed [rev/s] at which a ship straight ahead at a speed [m/s] keeps it; None if there is none."""
+
+    def surplus(n: float) -> float:
+        return float(acceleration(controls.vessel, speed, controls.ahead(n))[0])
+
+    low, high = 0.0, 1.0
+    while surplus(high) < 0:
+        low, high = high, 2 * high
+        if high > MOST_SHAFT:
+            return None
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if surplus(middle) < 0 else (low, middle)
+    return high
 
 
 class NotStraight(ShipidError):

@@ -11,7 +11,7 @@ import numpy as np
 from shipid.arguments import number, numbers, of_class
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import ShipidError, choices
-from shipid.simulation.approach import Controls, acceleration
+from shipid.simulation.approach import Controls, balanced_shaft, service_speed
 from shipid.simulation.manoeuvre import (
     HELMS,
     RATES,
@@ -23,15 +23,13 @@ from shipid.simulation.manoeuvre import (
     TurningCircle,
     Zigzag,
 )
-from shipid.units import GRAVITY, RPM, plural
+from shipid.units import RPM, plural
 from shipid.vessel.load import Vessel
 
 Side = Literal["starboard", "port"]
-FROUDE = 0.2  # default speed: U = 0.2 sqrt(g L)
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
 LEAST_STEPS, MOST_STEPS = 10, 1e7  # steps for a ship length, and of a manoeuvre
 MOST_HELM, MOST_HEADING = 90.0, 180.0  # deg; the first angle of a reverse spiral is a rate in deg/s
-HALVINGS, MOST_RPM = 60, 6000.0
 APPROACHES = ("steady", "helmsman", "rest")
 ROUND = ("turning", "pull-out", "spiral", "reverse-spiral")
 # in ship lengths at the approach speed: log before the execute, and duration of each kind
@@ -136,15 +134,6 @@ def length_of(vessel: Vessel) -> float | None:
     return None if length is None else float(length)
 
 
-def service_speed(vessel: Vessel) -> float:
-    """Service speed U_0 of the document [m/s]; that of a Froude number of 0.2 if it gives none.
-
-    The vessel must have a length.
-    """
-    given = vessel.document["particulars"].get("U_0")
-    return float(FROUDE * np.sqrt(GRAVITY * vessel.document["particulars"]["L_pp"]) if given is None else given)
-
-
 def shaft_speed(controls: Controls, speed: float) -> float:
     """Shaft speed [rev/s] at which the ship goes straight ahead in calm water at a steady speed [m/s].
 
@@ -156,20 +145,12 @@ def shaft_speed(controls: Controls, speed: float) -> float:
         words = f"the speed of the approach must be above 0 and at most {SPEED_LIMIT:g} m/s"
         raise ShipidError(f"{speed:g} m/s: {words}", path="--speed")
 
-    def surplus(n: float) -> float:
-        return float(acceleration(controls.vessel, speed, controls.ahead(n))[0])
-
-    low, high = 0.0, 1.0
-    while surplus(high) < 0:
-        low, high = high, 2 * high
-        if high > MOST_RPM * RPM:
-            raise ShipidError(
-                f"no shaft speed drives {controls.vessel.name} at {speed:g} m/s: give a lower speed", path="--speed"
-            )
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if surplus(middle) < 0 else (low, middle)
-    return high
+    n = balanced_shaft(controls, speed)
+    if n is None:
+        raise ShipidError(
+            f"no shaft speed drives {controls.vessel.name} at {speed:g} m/s: give a lower speed", path="--speed"
+        )
+    return n
 
 
 def _title(name: str, manoeuvre: Approached) -> str:

@@ -24,9 +24,9 @@ from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.physics import assumed, check_columns
 from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
-from shipid.simulation.approach import Controls
+from shipid.simulation.approach import Controls, service_speed
 from shipid.simulation.manoeuvre import order_keys
-from shipid.simulation.standard import length_of, service_speed, shaft_speed
+from shipid.simulation.standard import length_of, shaft_speed
 from shipid.study.first_look import Look, first_look
 from shipid.study.plan import NO_MODEL, Plan, build_plan
 from shipid.study.prepare import all_windows, obtain, over_gaps, partition, prepare
