@@ -277,3 +277,18 @@ def test_commands_in_force_have_the_integral_of_those_that_hold(seed: int) -> No
     same = (held == held[0]).all(axis=0)
     assert 0.2 < same.mean() < 1
     np.testing.assert_array_equal(found["port.n"][same], held[0][same])
+
+
+def test_rows_are_numbered_anew() -> None:
+    """Runs that pandas joined have the numbers of each; what looks rows up by them finds one."""
+    joined = as_dataset(turning(T), turning(T, r=-0.02))
+    again = Dataset(joined.frame.set_index(np.tile(np.arange(len(T)), 2)), joined.metadata)
+    assert again.frame.index.tolist() == list(range(2 * len(T)))
+    assert again.digest == joined.digest
+
+
+def test_the_digest_changes_with_the_flags_and_the_clock() -> None:
+    """They decide where runs are broken and which moments two runs share."""
+    frame = as_dataset(turning(T)).frame
+    kinds = [{"flags": ["break"]}, {"flags": ["despike"]}, {"flags": ["break"], "clock": "run"}]
+    assert len({Dataset(frame, metadata).digest for metadata in kinds}) == 3

@@ -389,3 +389,20 @@ def test_autocorrelation_of_what_is_known() -> None:
     rho = autocorrelation(runs)
     assert rho[0] == 1
     assert np.allclose(rho[1:6], 0.8 ** np.arange(1, 6), atol=0.03)
+
+
+def test_a_profile_keeps_the_ranges_of_the_other_factors(
+    identified: Identified, log: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before, they were free in a profile, so that it held a better fit than one within the ranges."""
+    seen: list[Identify] = []
+
+    def fitted(vessel: Vessel, data: Dataset, runs: object, asked: Identify, **given: object) -> Solution:
+        seen.append(asked)
+        return identify(vessel, data, runs, asked, **given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(outcome, "identify", fitted)
+    outcome._profile(FEW[0], log, identified.solution, identified.statistics)
+    assert len(seen) > 2
+    assert all(asked.ranges == identified.solution.settings.ranges for asked in seen)
+    assert all(asked.bounds[FEW[0]][0] == asked.bounds[FEW[0]][1] for asked in seen)

@@ -9,11 +9,14 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset, pieces, read_dataset, write_dataset
+from shipid.data.windows import cut_windows
 from shipid.errors import DataError
 from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.features import Memory
+from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer, observe
-from shipid.predictor import Predictor
+from shipid.predictor import Predictor, fit
 from shipid.study import aboard, apply
 from shipid.study.aboard import play, summary, write
 from shipid.vessel.load import load_vessel
@@ -238,3 +241,18 @@ def test_where_the_log_has_no_rows_there_is_no_error(banded, tmp_path):
     assert second.instants.loc[before & (second.instants["t"] > 80), "reach"].isna().all()
     assert (first.gaps, second.gaps) == ("", "1 time without rows, the longest 50 s after t = 100 s of 'a'")
     assert any(second.gaps in line for line in summary(second))
+
+
+def test_a_heading_that_wraps_changes_no_prediction():
+    """Aboard and along a log: a change of heading over so long is that of the ship, wherever the compass begins."""
+    frame = log(rows=120)
+    frame["psi"] += 6.2 + np.linspace(0.0, 1.0, len(frame))
+    wrapped = frame.assign(psi=frame["psi"] % (2 * np.pi))
+    assert np.abs(np.diff(wrapped["psi"])).max() > 6
+    data, turned = (Dataset(one, {"clock": "run", "flags": []}) for one in (frame, wrapped))
+    windows = cut_windows(data, horizon=4, step=STEP, interval=5.0, past=4)
+    method = PathDrawn(trials=1, units=8, terms=2, memory=Memory(turned=(20.0,)))
+    fitted = fit(method, Physics(None, 4, STEP), windows)
+    tables = [apply._along(fitted, one, run, rows, None) for one in (data, turned) for run, rows in pieces(one)]
+    for name in ("cooperative_north", "cooperative_east"):
+        np.testing.assert_allclose(tables[1][name], tables[0][name], atol=1e-6)
