@@ -360,8 +360,7 @@ def gaps(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]
         steps = np.diff(t)
         if not len(steps):
             continue
-        limit = max(least, GAP * float(np.median(steps))) + clock_slack(t)
-        for k in np.flatnonzero(steps > limit):
+        for k in np.flatnonzero(steps > _longest_step(t, least)):
             spans.setdefault(run, []).append((float(t[k]), float(t[k + 1])))
     return spans
 
@@ -386,7 +385,12 @@ def without_rows(t: Array, instants: Array, least: float) -> NDArray[np.bool_]:
         return np.zeros(np.shape(instants), dtype=bool)
     row = np.clip(np.searchsorted(t, instants + slack, side="right") - 1, 0, len(steps) - 1)
     inside = (instants > t[row] + slack) & (instants < t[row + 1] - slack)
-    return np.asarray(inside & (steps[row] > max(least, GAP * float(np.median(steps))) + slack))
+    return np.asarray(inside & (steps[row] > _longest_step(t, least)))
+
+
+def _longest_step(t: Array, least: float) -> float:
+    """Longest time [s] between two rows of a stretch at t (N,) that is no time without rows."""
+    return max(least, GAP * float(np.median(np.diff(t)))) + clock_slack(t)
 
 
 def reach_over(windows: Windows, spans: Mapping[str, Iterable[tuple[float, float]]]) -> Mask:

@@ -358,11 +358,7 @@ def _begins(log: pd.DataFrame, t: NDArray[np.float64], parts: Parts, file: Path)
         return [(float(t[row]), str(number)) for number, row in enumerate(np.flatnonzero(new), 1)]
     texts = _texts(log, parts.source, file)
     new |= np.append(True, texts[1:] != texts[:-1])
-    begins: Begins = []
-    for row in np.flatnonzero(new):
-        same = sum(name.rpartition(" (")[0] == texts[row] or name == texts[row] for _, name in begins)
-        begins.append((float(t[row]), f"{texts[row]} ({same + 1})" if same else str(texts[row])))
-    return begins
+    return [(float(t[row]), str(texts[row])) for row in np.flatnonzero(new)]
 
 
 def _passed_over(table: pd.DataFrame) -> Records:

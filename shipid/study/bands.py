@@ -113,7 +113,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
     of a ship whose kind of manoeuvre is not given. By time ahead: share of the positions at that step alone.
     """
     level, test, rows = results.plan.level, results.test, []
-    kinds = kinds_of(results.dataset, test.spans, test.spans)
+    kinds = kinds_of(results.dataset, test.spans, test=test.spans)
     kind = np.array([kinds[str(run)] for run in test.run])
     speed = np.hypot(test.columns["u"], test.columns["v"])
     edges = np.quantile(speed, np.linspace(0, 1, SPEEDS + 1))
@@ -175,7 +175,7 @@ def worst_frame(results: Results) -> pd.DataFrame:
     Columns: model, run, kind, coverage, reach (the greatest error over its band, 1 is the border)).
     """
     test, rows = results.test, []
-    kinds = kinds_of(results.dataset, test.spans, test.spans)
+    kinds = kinds_of(results.dataset, test.spans, test=test.spans)
     places = {run: test.run == run for run in test.spans}
     for row, region, errors in _largest(results):
         reach = region.reach(errors).max(axis=0)

@@ -273,7 +273,7 @@ def kinds_frame(results: Results) -> pd.DataFrame:
 
     At the largest N_D; over the seeds that have a result. `all` are the test runs of every kind, if there are several.
     """
-    known = kinds_of(results.dataset, results.test.spans, results.test.spans)
+    known = kinds_of(results.dataset, results.test.spans, test=results.test.spans)
     kinds = np.array([known.get(str(run), "") for run in results.test.run])
     errors: dict[tuple[str, str, int], list[np.ndarray]] = {("naive", "naive", 0): [results.naive]}
     for model, path in results.physics.items():

@@ -84,7 +84,7 @@ def _alike(wanted: Sequence[str], idle: set[str], vessel: Vessel) -> list[list[s
     """Commands of the screws that drive or the angles that turn; and those of the tunnels at each end."""
     groups: dict[str, list[str]] = {}
     for name in wanted:
-        place = _place(name) or _side(name, vessel)
+        place = _where(name, vessel)
         tunnel = name in idle or place in ("bow", "stern")
         groups.setdefault(f"tunnel {place}" if tunnel else "", []).append(name)
     return list(groups.values())
@@ -96,7 +96,7 @@ def _of_group(
     """Columns for the commands of a group, of those that are left."""
     if not names:
         return {}
-    places = {name: _place(name) or _side(name, vessel) for name in names}
+    places = {name: _where(name, vessel) for name in names}
     if tunnel:
         columns = [one for one in drafted if places[names[0]] and _place(one.name) == places[names[0]]]
         return _in_order(state, names, columns)
@@ -126,7 +126,7 @@ def _as_the_other_side(
     """Columns of the other side for commands of a side that the log does not have, each with a question."""
     found: dict[str, Suggestion] = {}
     for name in names:
-        place = _place(name) or _side(name, vessel)
+        place = _where(name, vessel)
         other = [one for one in drafted if _place(one.name) == OPPOSITE.get(place, "none")]
         if other:
             state.ask((signal_of(name),), f"is {name} as {other[0].source!r}? The log has no column of that side")
@@ -177,7 +177,7 @@ def _by_number(
 
     IEC 61162-1 gives odd numbers to starboard, even ones to port.
     """
-    sides = [_place(name) or _side(name, vessel) for name in names]
+    sides = [_where(name, vessel) for name in names]
     if _with_numbers(names, columns) or not {"port", "starboard"} <= set(sides):
         return _in_order(state, names, columns)
     across = sorted(
@@ -250,6 +250,11 @@ def _place(name: str) -> str:
 def _y(name: str, vessel: Vessel) -> float:
     """Distance [m] of the component of a command to starboard of the centre line, 0 where the document has none."""
     return vessel.parameters.get(f"thruster.{name.partition('.')[0]}.y", 0.0)
+
+
+def _where(name: str, vessel: Vessel) -> str:
+    """Side or end that the name of a command says, else the side on which the vessel has it; empty where neither."""
+    return _place(name) or _side(name, vessel)
 
 
 def _side(name: str, vessel: Vessel) -> str:
