@@ -1,4 +1,4 @@
-"""The rules of version 0.2, to measure what today's replaced: seeds were the evidence, "confirmed" if all agreed.
+"""The rules before version 0.2, to measure what today's replaced: seeds were the evidence, "confirmed" if all agreed.
 
 A condition on mean errors was confirmed if it held for the mean over seeds and for every seed, undecided if only for
 the mean, else refuted; with one seed nothing was ever undecided.

@@ -12,12 +12,12 @@ from tests.benchmarks import by_seeds
 from tests.study.made_up import CASES, FULL_SCALE, Size, grids, rivals, roughness, rule
 
 SIZES = {"20 manoeuvres, 1 seed": Size(), "20 manoeuvres, 5 seeds": Size(seeds=5), "7 manoeuvres, 3 seeds": Size(7, 3)}
-NEW = ("B1",)  # not in version 0.2
+NEW = ("B1",)  # not before version 0.2
 Rule = Callable[[np.random.Generator, Size, float], Verdict]
 
 
 def before(case: str) -> Rule:
-    """Return the verdict that the rule of version 0.2 gives on a table drawn for a claim."""
+    """Return the verdict that the rule before version 0.2 gives on a table drawn for a claim."""
 
     def judge(rng: np.random.Generator, size: Size, effect: float) -> Verdict:
         if case in FULL_SCALE:

@@ -252,7 +252,7 @@ def _content(models: list[Model], sizes: list[int], seeds: int, runs: list[str],
                 "note": ["dropped", "interpolated over 0.5 s"],
             }
         ),
-        provenance={"shipid": "0.1.0", "study digest": "09f6a2c1d4e5b7a8", "seed": "0", "wall time": "2 h 10 min"},
+        provenance={"shipid": "0.2.0", "study digest": "09f6a2c1d4e5b7a8", "seed": "0", "wall time": "2 h 10 min"},
         study_document='question = "How much?"\n\n[recipe]\ntrials = 50 # a < b & c\n',
         command="shipid study run simulation",
         frames={
