@@ -18,11 +18,14 @@ from shipid.identification.residuals import build
 from shipid.identification.segments import LEAST_STEPS, ShootingSegment
 from shipid.identification.sensitivities import COLUMNS
 from shipid.identification.settings import ENVIRONMENT, Identify, overrides
+from shipid.simulation.log import aboard, horizontal
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 CHANNELS = ("north", "east", "psi", "u", "v", "r")
+LEANING = ("phi", "theta", "w", "q")
+"""States by which velocities along the ship's own axes differ from those of a log, which are horizontal."""
 MOST_STEPS = 1e7  # of all runs together
 MEASURED, ALL = "measured", "all"
 """The log among the models of a series, and all runs together among the runs of a table of errors."""
@@ -120,9 +123,13 @@ def _predicted(
         rows = [np.minimum(np.arange(longest), segment.num_steps - 1) for segment in segments]
         return np.array([column(segment, name)[row] for segment, row in zip(segments, rows, strict=True)]).T
 
+    start = {
+        name: np.array([column(segment, name)[0] for segment in segments]) for name in (*model.state, *model.hidden)
+    }
+    beside = tuple(name for name in LEANING if name in model.state)
     path = rollout(
         vessel,
-        {name: np.array([column(segment, name)[0] for segment in segments]) for name in (*model.state, *model.hidden)},
+        start | aboard(start),
         {name: held(name) for name in model.commands},
         {name: held(name) for name in model.environment},
         step=settings.step,
@@ -130,13 +137,17 @@ def _predicted(
         method=settings.method,
         parameters=values,
         memory={name: np.array([segment.memory[name][0] for segment in segments]) for name in model.memory},
-        keep=CHANNELS,
+        keep=(*CHANNELS, *beside),
     )
+    channels = {name: path[name] for name in (*CHANNELS, *beside)}
+    with np.errstate(all="ignore"):  # a path that diverges
+        channels |= horizontal(channels)
+    moved = np.stack([channels[name] for name in CHANNELS], axis=-1)  # (N + 1, models, S, channels), as a log has them
     result = {}
     for piece, segment in enumerate(segments):
         result[0, piece] = np.array([column(segment, name) for name in CHANNELS]).T
         for number in range(len(values)):
-            states = path.states[: segment.num_steps + 1, number, piece]  # what follows belongs to no log
+            states = moved[: segment.num_steps + 1, number, piece]  # what follows belongs to no log
             failed = path.diverged[number, piece] and not _is_sound(states)
             result[number + 1, piece] = np.full_like(states, np.nan) if failed else states
     return result

@@ -35,6 +35,16 @@ def test_a_piece_begins_where_the_actuators_are() -> None:
     assert errors[["u", "v", "r", "position"]].to_numpy().max() < 1e-6
 
 
+@pytest.mark.parametrize("length", [0.0, 7.0])
+def test_a_ship_that_heels_reproduces_her_horizontal_log(length: float) -> None:
+    """A log's u, v and r are horizontal, the states of a ship with 4 degrees of freedom are along her own axes."""
+    ship = variety()["roll"]
+    data = trials(ship, runs=2, steps=30)
+    assert np.abs(data.frame["phi"]).max() > 0.02
+    errors = free_runs({"true": ship}, data, data.runs, SETTINGS, length=length).errors
+    assert errors[["u", "v", "r", "position"]].to_numpy().max() < 1e-9
+
+
 def test_errors_are_root_mean_squares_of_the_series() -> None:
     result = free_runs({"other": OTHER}, DATA, DATA.runs, SETTINGS)
     log, other = (result.series[result.series["model"] == name].set_index(["run", "t"]) for name in (MEASURED, "other"))
