@@ -502,9 +502,9 @@ def _measured(
 
 
 def residual_spacing(solution: Solution) -> float:
-    """Time between residuals of one signal [s]."""
-    selected = (np.array(solution.signals) == solution.signals[0]) & (solution.clusters == solution.clusters[0])
-    steps = np.diff(solution.times[selected])
+    """Median time between residuals of one signal within a run [s], over all runs."""
+    selected = np.array(solution.signals) == solution.signals[0]
+    steps = np.diff(solution.times[selected])[np.diff(solution.clusters[selected]) == 0]
     return float(np.median(steps)) if len(steps) else solution.settings.step
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
@@ -22,6 +23,7 @@ from shipid.identification.outcome import (
     Identified,
     pick_runs,
     read_settings,
+    residual_spacing,
     run_identification,
     write_patch,
 )
@@ -406,3 +408,11 @@ def test_a_profile_keeps_the_ranges_of_the_other_factors(
     assert len(seen) > 2
     assert all(asked.ranges == identified.solution.settings.ranges for asked in seen)
     assert all(asked.bounds[FEW[0]][0] == asked.bounds[FEW[0]][1] for asked in seen)
+
+
+def test_the_time_between_residuals_is_that_of_most_rows_whatever_the_order_of_the_runs() -> None:
+    """A run with rows 5 s apart beside one with rows 1 s apart: correlation times [s] are those of the many rows."""
+    fine, coarse = (rows for _, rows in trials(SHIP, runs=2, steps=60).frame.groupby("run"))
+    for runs in ((fine, coarse[::5]), (coarse[::5], fine)):
+        data = Dataset(pd.concat(runs, ignore_index=True), {"clock": "run", "flags": []})
+        assert residual_spacing(identify(SHIP, data, data.runs, settings())) == 1.0
