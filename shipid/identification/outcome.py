@@ -621,9 +621,11 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
     horizon = solution.settings.horizon
     if coloured:
         longest = max(coloured.values())
+        begun = "initial_state" in solution.settings.widths
+        starts = "" if begun else ", or predictions begin at noisy rows (compare with --nuisance initial_state)"
         warnings.append(
             f"residuals of {listed(list(coloured))} are correlated over {digits(longest)} s: the model, or "
-            "the wind and current data, are incomplete"
+            f"the wind and current data, are incomplete{starts}"
         )
         if 0 < horizon < LONG * longest:
             longer = f"{digits(LONG * longest)} s, or " if LONG * longest < _longest(solution) else ""

@@ -416,3 +416,15 @@ def test_the_time_between_residuals_is_that_of_most_rows_whatever_the_order_of_t
     for runs in ((fine, coarse[::5]), (coarse[::5], fine)):
         data = Dataset(pd.concat(runs, ignore_index=True), {"clock": "run", "flags": []})
         assert residual_spacing(identify(SHIP, data, data.runs, settings())) == 1.0
+
+
+@pytest.mark.usefixtures("one_manoeuvre")
+def test_noisy_starts_are_named_as_a_cause_of_correlated_residuals_unless_they_are_free() -> None:
+    """Short predictions from noisy rows remember the error of their start."""
+    data = noisy(trials(SHIP, runs=6, steps=60))
+    said = [
+        " ".join(run_identification(SHIP, data, settings(horizon=10, nuisance=nuisance)).warnings)
+        for nuisance in ([], ["initial_state"])
+    ]
+    assert "begin at noisy rows (compare with --nuisance initial_state)" in said[0]
+    assert "correlated" not in said[1]
