@@ -342,7 +342,11 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
 
 
 def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
-    """Return the texts that stand for a missing value, and set them to NaN: far beyond all other values of a column."""
+    """Return the texts that stand for a missing value, and set them to NaN: far beyond all other values of a column.
+
+    A shaft that makes 98 and 99 rpm, or stands and then makes 99, has no missing value: such a number must be twice as
+    large as all others of its sign, and one of three digits says nothing beside zeros alone.
+    """
     texts: dict[str, None] = {}
     for name, values in columns.items():
         for value in SENTINELS:
@@ -351,7 +355,9 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
             if not hit.any() or len(others) < 2:
                 continue
             low, high = float(others.min()), float(others.max())
-            if low - (high - low) <= value <= high + (high - low):
+            if low - max(high - low, -low) <= value <= high + max(high - low, high):
+                continue
+            if low == high == 0.0 and 0.0 < value < 1000.0:
                 continue
             texts |= dict.fromkeys(_called(table, name)[hit].astype(str).str.strip())
             values[hit] = np.nan

@@ -342,6 +342,15 @@ def test_a_speed_of_999_rpm_is_no_missing_value(tmp_path: Path) -> None:
     assert "missing" not in sniff(log_of(tmp_path, ["time,rpm", *rows])).form
 
 
+@pytest.mark.parametrize("others", [(98,), (0,), (60, 99), (0, 55)])
+def test_a_shaft_speed_of_99_rpm_is_no_missing_value(others: tuple[int, ...], tmp_path: Path) -> None:
+    """Before, every row of 99 was taken out where the rest was 98, or stood."""
+    speeds = np.repeat([*others, 99], 40)
+    sniffed = sniff(log_of(tmp_path, ["time,heading,rpm", *(f"{k},{k % 360}.5,{n}" for k, n in enumerate(speeds))]))
+    assert "missing" not in sniffed.form
+    assert sniffed.columns["rpm"].tolist() == speeds.tolist()
+
+
 def test_one_name_over_a_date_and_a_time(tmp_path: Path) -> None:
     lines = ["  time            east  north", "  -                 m      m"]
     lines += [f"2023-11-12 08:17:{k:02d}.5  {k}  {2 * k}" for k in range(30)]
