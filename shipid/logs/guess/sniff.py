@@ -77,7 +77,11 @@ _UNIT = re.compile(
     r"(deg|°|grad)/(s|sec|min)|dps|rad/s(ec)?|rpm|rps|1/(s|min)|u/min|min-1|s-1|hz|n|kn|nm|knm|kw|w|%|pct|percent|bar|v|a|°c|c|"
     r"l/h|kg/h|t|t/h|m/s2|m/s\^2|m/s²|-|utc|iso|\[-\]|)[\])]?$"
 )
-_WORDS_FOR_NOTHING = ("", "nan", "null", "none", "n/a", "na", "-", "--")
+_NOTHING = re.compile(
+    r"[-–—*.?_/# ]*|#?n[/.]?a\.?|null|none|nil|-?nan(\(ind\))?|[+-]?inf(inity)?|-?1\.#(ind|q?nan|inf)\d*|no ?data|"
+    r"missing"
+)
+"""What logs write in a cell without a value, in lower case."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +147,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         notes = tuple(f"{name!r} is {table.attrs['other'][name]}" for name in table.attrs.get("to save anew", ()))
     columns, words = _numbers(table, form.get("decimal", "."))
     if isinstance(model, TextFormat):
-        missing = _sentinels(table, columns)
+        missing = [*_words_for_nothing(table, columns, model), *_sentinels(table, columns)]
         if missing:
             form["missing"] = [*model.missing, *missing]
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
@@ -304,9 +308,7 @@ def cells(line: str, separator: str) -> list[str]:
 
 def _number_share(row: list[str], decimal: str) -> float:
     """Return the share of cells that are numbers; empty cells are not counted."""
-    cells = [
-        cell.replace(",", ".") if decimal == "," else cell for cell in row if cell.lower() not in _WORDS_FOR_NOTHING
-    ]
+    cells = [cell.replace(",", ".") if decimal == "," else cell for cell in row if not _NOTHING.fullmatch(cell.lower())]
     return sum(map(_is_number, cells)) / len(cells) if cells else 0.0
 
 
@@ -339,6 +341,14 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
         elif name and name not in columns:
             columns[name] = values
     return columns, words
+
+
+def _words_for_nothing(table: pd.DataFrame, columns: dict[str, Array], form: TextFormat) -> list[str]:
+    """Return the texts in columns of numbers that say that there is no value, such as `---` or `N/A`."""
+    texts: dict[str, None] = {}
+    for name, values in columns.items():
+        texts |= dict.fromkeys(_called(table, name)[np.isnan(values)].dropna().astype(str).str.strip().unique())
+    return [text for text in texts if text not in form.missing and _NOTHING.fullmatch(text.lower())]
 
 
 def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
@@ -609,7 +619,7 @@ def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
         return ""
     row = int(np.argmax(~np.isfinite(values)))
     text = str(_called(table, name).iloc[row]).strip()
-    if text.lower() in _WORDS_FOR_NOTHING:
+    if _NOTHING.fullmatch(text.lower()):
         return ""
     what = "a leap second" if re.search(r":60(\D|$)", text) else "a comment" if text[:1] in "#%/;" else "no time"
     return f"holds {text[:40]!r} in row {row + 1}, {what}: remove the line"

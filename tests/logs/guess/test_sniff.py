@@ -337,6 +337,17 @@ def test_a_number_for_missing_values_is_reported_and_not_taken(tmp_path: Path, w
     assert np.nanmax(np.abs(sniffed.columns["heading"])) <= 360
 
 
+@pytest.mark.parametrize("word", ["---", "N/A", "#N/A", "NULL", "None", "***", "--.-", "-1.#IND", "inf", "-nan"])
+def test_a_word_for_nothing_is_declared_as_a_missing_value(tmp_path: Path, word: str) -> None:
+    """Before, the draft could not be imported: this word is no number."""
+    rows = [f"{k};{str(np.sin(k)).replace('.', ',')};{k % 360}" for k in range(80)]
+    rows[40] = f"40;{word};{word}"
+    sniffed = sniff(log_of(tmp_path, ["time;x;heading", *rows]))
+    assert sniffed.form["missing"] == ["", "nan", "NaN", word]
+    assert f"{word!r} stands for a value that is missing" in sniffed.notes
+    assert all(np.flatnonzero(np.isnan(values)).tolist() == [40] for values in sniffed.columns.values())
+
+
 def test_a_speed_of_999_rpm_is_no_missing_value(tmp_path: Path) -> None:
     rows = [f"{k},{600 + 5 * k}" for k in range(80)] + ["80,999"]
     assert "missing" not in sniff(log_of(tmp_path, ["time,rpm", *rows])).form
