@@ -166,7 +166,8 @@ class State:
     joined : whether t runs over several files, so that it is the clock of none of them.
     spikes : column -> rows that leave it and come back at once, and the least by how much; `columns` have none of them.
     scaled : column -> factor by which `columns` has it already, and why. units : column -> unit of the log, where
-    `columns` has it in another.
+    `columns` has it in another. sides : letters, N, S, E or W, that columns beside positions hold. negated : columns
+    whose sign `columns` has turned.
     commands : names of those of the vessel that the log is of, where it is known.
     turning : column that steers -> sign with which a positive value turns the ship to starboard, where that is seen.
     position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
@@ -181,6 +182,8 @@ class State:
     spikes: dict[str, tuple[NDArray[np.intp], float]] = field(default_factory=dict)
     scaled: dict[str, tuple[float, str]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    sides: frozenset[str] = frozenset()
+    negated: set[str] = field(default_factory=set)
     taken: set[str] = field(default_factory=set)
     suggestions: list[Suggestion] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
@@ -271,8 +274,15 @@ class State:
             factor, what = self.scaled[source]
             extra["factor"] = float(f"{factor * extra.get('factor', 1.0):.9g}")
             why = f"{why}; {what}"
+        if source in self.negated:
+            extra["sign"] = -extra.get("sign", 1)
         unit = self.units.get(source, unit)
         self.suggestions.append(Suggestion(name, source, unit, round(confidence, 2), why, extra))
+
+    def negate(self, source: str) -> None:
+        """Turn the sign of a column, here and in the draft."""
+        self.columns[source] = -self.columns[source]
+        self.negated ^= {source}
 
     def find(
         self,

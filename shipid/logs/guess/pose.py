@@ -313,7 +313,7 @@ def plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
 
 def _take(state: State, best: Pose, sure: list[str]) -> None:
     """Take a hypothesis: decide sign, origin and frame of the heading, and ask where nothing decides."""
-    best = _other_way(state, best)
+    best = _other_way(state, _signed(state, best))
     north, east, heading, unit = best.north, best.east, best.heading, best.unit
     turn = 2 * np.pi / to_si(unit, "psi")
     psi, false = evidence.heal(state.columns[heading], turn, state.t)
@@ -393,6 +393,38 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     state.position = np.conj(place) if best.east_sign < 0 else place
     state.psi = sign * angle + np.radians(offset)
     state.chosen = evidence.windows(state.t, evidence.lively(state.t, state.psi, state.chosen))
+
+
+def _signed(state: State, best: Pose) -> Pose:
+    """Return the hypothesis with the sign of latitude and longitude with which a compass agrees with the track.
+
+    A ship in the west whose longitude has no sign seems to turn the other way, and one in the south goes astern, too.
+    """
+    mirrored = abs(best.mirrored) > abs(best.same)
+    phase = abs(float(np.angle(best.mirrored if mirrored else best.same)))
+    if not best.on_globe or not _is_compass(best.heading) or best.misfit > POOR:
+        return best
+    turned: tuple[str, ...] = ()
+    if mirrored:
+        turned = (best.east,) if phase < np.pi / 4 else (best.north,) if phase > 3 * np.pi / 4 else ()
+    elif phase > 3 * np.pi / 4:
+        turned = (best.north, best.east)
+    unsigned = all(state.columns[name].min() >= 0 or name in state.negated for name in turned)
+    agreements = sorted((abs(best.same), abs(best.mirrored)))
+    if not turned or not unsigned or (mirrored and (1.0 - agreements[1]) * MIRROR > 1.0 - agreements[0]):
+        return best
+    ways = {best.north: ("south", "north"), best.east: ("west", "east")}
+    names = " and ".join(f"{name!r} to {ways[name][name in state.negated]}" for name in turned)
+    for name in turned:
+        state.negate(name)
+    sentence = f"course and heading agree only if the log counts {names}"
+    state.find("sign of a position", turned, agreements[1], sentence)
+    state.ask(("latitude", "longitude", "psi"), f"does the log count {names}? Else {best.heading!r} counts otherwise")
+    same, other = (best.mirrored, best.same) if mirrored else (best.same, best.mirrored)
+    if mirrored:
+        way = 1.0 if turned == (best.east,) else -1.0
+        return replace(best, same=way * np.conj(same), mirrored=way * np.conj(other))
+    return replace(best, same=-same, mirrored=-other)
 
 
 def _other_way(state: State, best: Pose) -> Pose:

@@ -40,6 +40,7 @@ def take_scales(state: State) -> None:
     for north, east in pairs[:1]:
         both = np.abs(state.columns[north]), np.abs(state.columns[east])
         if both[0].max() <= 90 and both[1].max() <= 360:
+            _take_sides(state, north, east)
             continue
         if all(np.all(one % 1 == 0) and one.max() > 1e6 for one in both) and _on_globe(both, FINE):
             for name in (north, east):
@@ -49,9 +50,24 @@ def take_scales(state: State) -> None:
                 state.columns[name] = degrees_of(state.columns[name])
                 state.spikes.pop(name, None)
                 state.units[name] = "ddmm"
-            if min(state.columns[north].min(), state.columns[east].min()) >= 0:
+            _take_sides(state, north, east)
+            lettered = state.sides & {"N", "S"} and state.sides & {"E", "W"}
+            if not lettered and min(state.columns[north].min(), state.columns[east].min()) >= 0:
                 words = f"do {north!r} and {east!r}, degrees and minutes without a sign, count to north and east? "
                 state.ask(("latitude", "longitude"), f"{words}If they are S or W, write sign = -1")
+
+
+def _take_sides(state: State, north: str, east: str) -> None:
+    """Turn the sign of a latitude of S or a longitude of W, which a column of letters says; ask where it changes."""
+    for name, plus, minus in ((north, "N", "S"), (east, "E", "W")):
+        if minus not in state.sides or state.columns[name].min() < 0:
+            continue
+        if plus in state.sides:
+            words = f"{name!r} is {plus} in some rows and {minus} in others, as columns of letters say"
+            state.ask(("latitude", "longitude"), f"{words}: write it as a number with a sign")
+            continue
+        state.negate(name)
+        state.find("sign of a position", (name,), 0.95, f"{name!r} has no sign, and a column of letters says {minus}")
 
 
 def _scale(state: State, name: str, factor: float, why: str) -> None:

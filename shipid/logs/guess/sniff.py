@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.foreign import foreign
-from shipid.logs.guess.words import is_run, parts_of, units_in
+from shipid.logs.guess.words import fits, is_run, parts_of, units_in
 from shipid.logs.importing import even_clock, repeated_rows, rounding_of
 from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, since_midnight
 from shipid.logs.readers import (
@@ -90,7 +90,8 @@ class Sniffed:
 
     `form` holds the keys of [format] and `clock` those of [clock]; `t` [s] rises; `notes` are sentences on columns
     that were left out. `seams` counts the places where rows of a large log were not read, or runs begin. `runs` has the
-    column that says the run, and the number of runs, where the clock begins again with each; `t` goes on then.
+    column that says the run, and the number of runs, where the clock begins again with each; `t` goes on then. `sides`
+    are the letters, N, S, E or W, that columns beside positions hold.
     """
 
     form: dict[str, Any]
@@ -100,6 +101,7 @@ class Sniffed:
     notes: tuple[str, ...]
     seams: int = 0
     runs: dict[str, int] = field(default_factory=dict)
+    sides: frozenset[str] = frozenset()
 
     @property
     def scattered(self) -> bool:
@@ -164,7 +166,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         notes += ("rows that repeat the row before are left out",)
     kept = {name: values for name, values in kept.items() if name not in runs}
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
-    return Sniffed(form, clock, t, kept, notes + empty, seams, runs)
+    return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words))
 
 
 def _sample(file: Path, encoding: str, size: int) -> str:
@@ -341,6 +343,24 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
         elif name and name not in columns:
             columns[name] = values
     return columns, words
+
+
+def _sides(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
+    """Return the letters of the columns that hold a side of the Earth alone: N or S, E or W.
+
+    Such a column is beside that of a position, or is called so: the letters of another say a status.
+    """
+    letters: set[str] = set()
+    names = list(map(str, table.columns))
+    for index, name in enumerate(names):
+        held = (
+            set() if name not in words else {*_called(table, name).dropna().astype(str).str.strip().str.upper()} - {""}
+        )
+        for meaning, both in (("latitude", "NS"), ("longitude", "EW")):
+            near = any(meaning in fits(one) for one in names[max(0, index - 1) : index + 2])
+            if held and held <= set(both) and (near or both.lower() in re.sub("[^a-z]", "", name.lower())):
+                letters |= held
+    return frozenset(letters)
 
 
 def _words_for_nothing(table: pd.DataFrame, columns: dict[str, Array], form: TextFormat) -> list[str]:

@@ -193,4 +193,6 @@ def _joined(logs: list[Sniffed]) -> Sniffed:
         form["missing"] = list(missing)
     notes = tuple(dict.fromkeys(note for log in logs for note in log.notes))
     seams = sum(log.seams for log in chosen) + len(chosen) - 1
-    return replace(first, form=form, clock=clock, t=np.concatenate(t), columns=columns, notes=notes, seams=seams)
+    sides = frozenset[str]().union(*(log.sides for log in logs))
+    joined = replace(first, form=form, clock=clock, t=np.concatenate(t), columns=columns, notes=notes, seams=seams)
+    return replace(joined, sides=sides)

@@ -91,6 +91,38 @@ def test_positions_of_receivers_are_degrees(how: str, tmp_path: Path) -> None:
     assert ("without a sign" in asked(proposal)) == (how == "ddmm")
 
 
+@pytest.mark.parametrize("letters", [True, False], ids=["letters", "no letters"])
+@pytest.mark.parametrize("unit", ["deg", "ddmm"])
+@pytest.mark.parametrize("sides", ["SE", "NW", "SW"])
+def test_the_side_of_a_position_without_a_sign_is_found(sides: str, unit: str, letters: bool, tmp_path: Path) -> None:
+    """Before, the heading, the yaw rate and the rudder counted to port, or the heading was half a turn off."""
+    lat, lon = (2 * 63.44 - LAT if "S" in sides else LAT), (2 * 10.40 - LON if "W" in sides else LON)
+    if unit == "ddmm":
+        lat, lon = ((x // 1 * 100 + x % 1 * 60).round(6) for x in (lat, lon))
+    frame = on_globe(lat, lon)
+    if letters:
+        frame.insert(list(frame).index("lat") + 1, "N/S", sides[0])
+        frame.insert(list(frame).index("lon") + 1, "E/W", sides[1])
+    proposal, dataset = drafted(frame, tmp_path)
+    run = dataset.frame
+    for name in ("north", "east"):
+        np.testing.assert_allclose(run[name] - run[name][0], LOG[name] - LOG[name][0], atol=1.0, err_msg=name)
+    assert turned(dataset).max() < np.radians(0.3)
+    assert run["rudder.delta"].to_numpy() == pytest.approx(-LOG["alpha"].to_numpy(), abs=1e-6)
+    assert "sign of a position" in proposal.kinds
+    assert ("does the log count" in asked(proposal)) == (not letters)
+
+
+def test_letters_of_a_status_are_no_side_of_the_earth(tmp_path: Path) -> None:
+    frame = on_globe(LAT, LON).assign(quality="W")
+    frame.insert(1, "mode", "S")
+    proposal, dataset = drafted(frame, tmp_path)
+    assert "does the log count 'lon' to east?" in asked(
+        proposal
+    )  # the letter beside it misleads, and the motion shows it
+    assert turned(dataset).max() < np.radians(0.3)
+
+
 def test_latitude_and_longitude_changed_round_are_found(tmp_path: Path) -> None:
     proposal, dataset = drafted(on_globe(LON.round(7), LAT.round(7)), tmp_path)
     assert "latitude and longitude swapped" in proposal.kinds
