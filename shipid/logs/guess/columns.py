@@ -18,7 +18,13 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
 from shipid.logs.guess.clues import Finding, Question, State, Suggestion
 from shipid.logs.guess.commands import choose_commands, likely_unit
-from shipid.logs.guess.defects import defects_of_motion, defects_of_rows, defects_of_spikes, take_spikes
+from shipid.logs.guess.defects import (
+    defects_of_motion,
+    defects_of_rows,
+    defects_of_spikes,
+    take_lost_fixes,
+    take_spikes,
+)
 from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import Frame, choose_pose
@@ -98,6 +104,7 @@ def guess(
     if source.parts:
         _runs(state, source)
     take_scales(state)
+    take_lost_fixes(state)
     if len(state.chosen.first) < 5:
         rows = f"{len(sniffed.t)} rows over {sniffed.t[-1] - sniffed.t[0]:.3g} s are too few for a draft"
         clock = f"is {sniffed.clock['from']!r} the clock, in {sniffed.clock['unit']}?"

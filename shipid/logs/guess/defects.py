@@ -26,6 +26,7 @@ PILE, ABOVE, RETURNS = 0.03, 4.0, 3  # of the rows, at a limit; times as many as
 HELD_SHARE, HELD_ROWS = 0.2, 60  # of the rows; repeats in a row that are no rest
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
+NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
 STREAM = 0.5  # of the misfit of positions and velocities: less is no current
 
 
@@ -213,7 +214,12 @@ def _find_late(state: State, what: str, against: str, delay: float, explained: f
 def _jumps(state: State, path: Complex) -> None:
     assert state.position is not None
     unit = to_si(state.clock_unit, "t")
-    places = evidence.jumps(state.t, state.position, path)
+    lost = [span for one in state.findings if one.kind == "no fix" and one.repair for span in one.repair["intervals"]]
+    places = [
+        place
+        for place in evidence.jumps(state.t, state.position, path)
+        if not any(unit * start <= place[1] and place[0] <= unit * end for start, end in lost)
+    ]
     stay = [place for place in places if place[2] > 5.0]
     spikes = [place for place in places if place[2] <= 5.0]
     repair: dict[str, Any]
@@ -261,6 +267,27 @@ def _times(state: State, rows: NDArray[np.intp]) -> str:
         return f"in {count} of the files"
     words = ", ".join(when(state, float(state.t[row])) for row in rows[:FEW])
     return f"near {words}" if len(rows) <= FEW else f"in {count}, the first near {words}"
+
+
+def take_lost_fixes(state: State) -> None:
+    """Interpolate, in place, positions of 0 N 0 E far from all others, as receivers write them without a fix."""
+    pairs = [(a, b) for a in state.called("latitude") for b in state.called("longitude") if a != b]
+    for north, east in pairs[:1]:
+        values = state.columns[north], state.columns[east]
+        lost = (values[0] == 0.0) & (values[1] == 0.0)
+        if not 0 < lost.mean() < LOST or np.hypot(*(one[~lost] for one in values)).min() < NO_PLACE:
+            continue
+        for name, one in zip((north, east), values, strict=True):
+            state.columns[name] = np.interp(state.t, state.t[~lost], one[~lost])
+        step, unit = float(np.median(np.diff(state.t))), to_si(state.clock_unit, "t")
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], lost.astype(int), [0]]))).reshape(-1, 2)
+        t = np.concatenate([[state.t[0] - step], state.t, [state.t[-1] + step]])
+        breaks = [[t[first] / unit, t[end + 1] / unit] for first, end in edges]
+        sentence = f"{north!r} and {east!r} are 0 {_times(state, edges[:, 0])}: the receiver had no fix"
+        if state.joined:
+            state.ask(("latitude", "longitude"), f"{sentence}. Leave these cells empty, and draft again")
+        repair = None if state.joined else {"kind": "break", "intervals": breaks}
+        state.find("no fix", (north, east), 0.95, sentence, repair)
 
 
 def take_spikes(t: Array, columns: dict[str, Array]) -> dict[str, tuple[NDArray[np.intp], float]]:

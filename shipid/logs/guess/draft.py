@@ -140,16 +140,16 @@ def _head(guess: Guess) -> Iterator[str]:
 
 
 def _origin(guess: Guess) -> Iterator[str]:
-    """Yield the [origin] that the files of all runs share."""
-    if guess.source.pattern is not None and guess.column("latitude") is not None:
-        yield "\n[origin]    # the first position, of all runs"
-        for key in ("latitude", "longitude"):
-            column = guess.column(key)
-            assert column is not None
-            values = guess.sniffed.columns[column.source]
-            first = values[np.isfinite(values)][:1]
+    """Yield the [origin] that the files of all runs share, and that of a log whose first position may be none."""
+    columns = [column for key in ("latitude", "longitude") if (column := guess.column(key)) is not None]
+    if columns and (guess.source.pattern is not None or "no fix" in guess.kinds):
+        yield f"\n[origin]    # the first position{', of all runs' if guess.source.pattern is not None else ''}"
+        places = [guess.sniffed.columns[column.source] for column in columns]
+        known = np.isfinite(places).all(axis=0) & np.any(np.array(places) != 0.0, axis=0)
+        for column, values in zip(columns, places, strict=True):
+            first = values[known][:1]
             first = degrees_of(first) if column.unit == "ddmm" else first * column.extra.get("factor", 1.0)
-            yield from _lines({key: round(column.extra.get("sign", 1) * float(first[0]), 7)})
+            yield from _lines({column.name: round(column.extra.get("sign", 1) * float(first[0]), 7)})
 
 
 def _columns(guess: Guess) -> Iterator[str]:

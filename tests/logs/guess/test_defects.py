@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from pymap3d import ned2geodetic
 
 from shipid.logs.guess import sniff
 from shipid.logs.guess.columns import Guess, guess
@@ -127,3 +128,22 @@ def test_a_slower_receiver_that_was_held_is_named(every: int, tmp_path: Path) ->
     log[["time", "N", "E", "psi", "r", "rudder", "rpm"]].to_csv(tmp_path / "log.csv", index=False)
     found = [one for one in guess(tmp_path / "log.csv").findings if one.kind == "held positions"]
     assert len(found) == (every > 1)
+
+
+@pytest.mark.parametrize("rows", [slice(0, 30), slice(600, 640), slice(-20, None)], ids=["begin", "middle", "end"])
+def test_positions_of_0_north_0_east_are_no_fix(rows: slice, tmp_path: Path) -> None:
+    """Before, heading, yaw rate and rudder were drafted to port, and the shaft in other units."""
+    log = si_log()
+    lat, lon, _ = ned2geodetic(log["north"], log["east"], 0.0, 63.44, 10.40, 0.0)
+    frame = CLEAN.drop(columns=["N", "E"]).assign(lat=lat.round(7), lon=lon.round(7))
+    frame.loc[frame.index[rows], ["lat", "lon"]] = 0.0
+    proposal = guessed(tmp_path, frame)
+    assert proposal.kinds == {"no fix"}
+    (tmp_path / "draft.toml").write_text(draft_mapping(proposal))
+    whole = read_mapping(tmp_path / "draft.toml").model_copy(update={"segment": ()})
+    dataset = import_log(whole, tmp_path / "log.csv").frame
+    kept = log["t"].isin(dataset["t"]).to_numpy()
+    assert kept.sum() == len(log) - len(frame.index[rows])
+    for name in ("north", "east"):
+        off = dataset[name].to_numpy() - log[name].to_numpy()[kept]
+        assert np.ptp(off) < 1.0, "centimetres of rounding, and a plane that touches the Earth elsewhere"
