@@ -30,6 +30,7 @@ SHARES = {
     ("shares of 1", "norm", "normalised", "normalized", "-1..1", "-1...1", "-1 to 1", "p.u.", "pu"): 1.0,
 }
 """Words for a share of the largest value -> what that value is in it."""
+UNDER_WAY, NEARLY_ALWAYS = 0.3, 0.9  # of the usual way in a window; share of these windows
 NEAR = 15.0  # times from that: a unit further off is doubted
 
 
@@ -214,11 +215,25 @@ def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
             if SIGNALS[signal].shaft:
                 tunnel = component in TUNNELS and not is_electrical(name)
                 unit, confidence, why, extra = (_tunnel_unit if tunnel else _shaft_unit)(state, name)
+                if not tunnel and not azimuth and _runs_astern(state, name):
+                    extra = {**extra, "sign": -1}
+                    sentence = f"{name!r} is negative while the ship goes ahead; here ahead is positive"
+                    state.find("wrong sign of the shaft", (name,), 0.9, sentence)
             else:
                 written = unit_in_name(name, SIGNALS[signal].unit)
                 unit, confidence, extra = likely_unit(state, name, signal), 0.9 if written else 0.7, {}
                 why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
             state.suggest(_command(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+
+
+def _runs_astern(state: State, name: str) -> bool:
+    """Whether a shaft speed is negative nearly always when the ship goes ahead: one that counts the other way."""
+    if state.psi is None or state.position is None:
+        return False
+    middle = (state.chosen.first + state.chosen.last) // 2
+    ahead = (state.chosen.change(state.position) * np.exp(-1j * state.psi[middle])).real
+    fast = ahead > UNDER_WAY * float(np.percentile(np.abs(ahead), 90))
+    return bool(fast.any() and np.mean(state.columns[name][middle[fast]] < 0) > NEARLY_ALWAYS)
 
 
 def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:

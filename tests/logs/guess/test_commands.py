@@ -86,6 +86,19 @@ def test_the_unit_of_a_shaft(name: str, values: np.ndarray, unit: str, asked: bo
     assert {finding.kind for finding in state.findings} == kinds
 
 
+def test_a_shaft_that_counts_the_other_way_has_its_sign() -> None:
+    """Before, the shaft of a left-handed screw ran astern while the ship went ahead, without a word."""
+    state = chosen({"rudder": RUDDER, "rpm_port": RPM, "rpm_stbd": -RPM})
+    assert described(state)["port.n"] == ("rpm_port", "rpm", 1)
+    assert described(state)["starboard.n"] == ("rpm_stbd", "rpm", -1)
+    assert [finding.columns for finding in state.findings] == [("rpm_stbd",)]
+
+
+def test_a_screw_that_stops_the_ship_keeps_its_sign() -> None:
+    state = chosen({"rudder": RUDDER, "rpm": np.where(np.arange(len(T)) < 0.6 * len(T), RPM, -RPM)})
+    assert described(state)["propeller.n"] == ("rpm", "rpm", 1)
+
+
 def test_small_rudder_angles_do_not_make_a_slow_shaft() -> None:
     """A ship that turns a twentieth as fast at a twentieth of the angle has the same shaft speed, in the same unit."""
     for share in (1.0, 0.05):
