@@ -27,6 +27,7 @@ from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, true_steps
 from shipid.hybrid.trials import best_of, diverged, ridges_of, row_of, sound, used
 from shipid.hybrid.units import solve
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -117,6 +118,9 @@ class LearnedForce(Searched):
         assert case.physics.vessel is not None
         if "learned" in case.physics.vessel.document.get("hull", {}):
             raise DataError("the vessel has a learned force already: take the block out", path=BLOCK)
+        if drawn := dynamics(case.physics.vessel).drawn:
+            remedy = "take a base that extends the vessel, with `off = true` in that block"
+            raise DataError(f"{drawn[0].path} is a sum over drawn waves, which has no gradient: {remedy}")
         measured = replace(
             case, physics=replace(case.physics, observer=None)
         )  # single steps start from measured states

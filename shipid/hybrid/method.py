@@ -141,12 +141,14 @@ class Fitted:
     left_out : errors (T, S, 2) [m], true less predicted, on the windows of the task, by models that saw the run of the
         window neither in training nor in the choice of hyperparameters; not numbers where there are none. None where
         the method has them only from further fits: `refits` of `shipid.predictor.fit`.
+    sentence : why nothing could be fitted, where the windows do not suffice; else empty.
     """
 
     corrector: Corrector | None
     trials: list[dict[str, Any]]
     seconds: float
     left_out: Array | None = None
+    sentence: str = ""
 
 
 class Method(Checked, BaseModel, ABC):

@@ -343,7 +343,8 @@ def _cell(
     errors, seconds = left_out.get((name, way.name), (None, 0.0))
     row |= {"seconds": result.seconds + one.seconds + seconds, "trials": result.trials}
     if result.corrector is None:
-        return store.Cell({**row, **_failed(one.sentence or "no training converged")}, None, None)
+        why = result.sentence or one.sentence or "no training converged"
+        return store.Cell({**row, **_failed(why)}, None, None)
     predictor = _predictor(plan, prepared, one.foundation, way, batch, result.corrector, windows)
     if one.foundation.family not in plan.fitted and result.left_out is not None:
         errors = result.left_out  # fair: numbers and observer were not taken from these runs
@@ -399,14 +400,11 @@ def refitted(
             mine = [name for name, other in pairs if other.name == way.name]
             if not mine:
                 continue
-            try:
-                again = _fitted(plan, inside, batch, rest, known, replace(way, foundations=tuple(mine)), device, None)
-            except DataError:  # too little is left to train: the runs that it leaves out have no errors
-                continue
+            again = _fitted(plan, inside, batch, rest, known, replace(way, foundations=tuple(mine)), device, None)
             for name in mine:
                 one, result, (errors, seconds) = known[name], again[name], left_out[name, way.name]
                 left_out[name, way.name] = errors, seconds + result.seconds + one.seconds
-                if result.corrector is None:
+                if result.corrector is None:  # too little is left to train: the runs that it leaves out have no errors
                     continue
                 predictor = _predictor(plan, inside, one.foundation, way, batch, result.corrector, rest)
                 instants = instants_of(plan, predictor.vessel, inside.data, part, one.estimates)
@@ -424,10 +422,27 @@ def _fitted(
     device: str,
     journal: Journal | None,
 ) -> dict[str, Fitted]:
-    """Results of one method for the foundations that it meets."""
+    """Results of one method for the foundations that it meets; no corrector where it cannot learn from these runs."""
     mine = {name: known[name] for name in way.foundations}
+    try:
+        return way.method.fit(_task(plan, prepared, batch, windows, mine, way, device, journal))
+    except DataError as error:
+        return {name: Fitted(None, [], 0.0, sentence=error.message) for name in mine}
+
+
+def _task(
+    plan: Plan,
+    prepared: Prepared,
+    batch: Batch,
+    windows: Windows,
+    mine: Mapping[str, Prediction],
+    way: Way,
+    device: str,
+    journal: Journal | None,
+) -> Task:
+    """What one method is fitted to: the foundations that it meets."""
     cases = {name: Case(_physics(plan, one.foundation), one.paths) for name, one in mine.items()}
-    task = Task(
+    return Task(
         cases=cases,
         windows=windows,
         folds=prepared.folds(plan, batch, windows, way.method.validation) if way.method.compensates else (),
@@ -444,7 +459,6 @@ def _fitted(
         journal=journal,
         cells={name: batch.cell(name, way.name) for name in mine},
     )
-    return way.method.fit(task)
 
 
 def _physics(plan: Plan, foundation: Foundation) -> Physics:

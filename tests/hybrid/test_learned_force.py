@@ -102,6 +102,11 @@ def test_a_vessel_that_has_one_is_refused(windows: Windows) -> None:
     assert caught.value.path == BLOCK
 
 
+def test_a_vessel_in_drawn_waves_is_refused(windows: Windows) -> None:
+    with pytest.raises(DataError, match=r"waves\.first_order is a sum over drawn waves, which has no gradient: take"):
+        LearnedForce(**CHEAP).fit(task(windows, replace(WRONG, vessel=load_vessel("gunnerus-28.9-6dof"))))
+
+
 def test_no_more_windows_than_asked_for(windows: Windows) -> None:
     """Of many training windows some are drawn by the seed: fewer windows, other numbers, the same bounds."""
     few = LearnedForce(**{**CHEAP, "iterations": 2}, ridge=0.1, samples=6)

@@ -24,6 +24,7 @@ from shipid.predictor import Predictor
 from shipid.study import run, seals, store
 from shipid.study.check import check_folder
 from shipid.study.claims import Claims
+from shipid.study.contents import write_pages
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.results import provenance_words, read_results
@@ -339,6 +340,20 @@ def test_a_training_that_fails_is_a_value(tmp_path: Path, monkeypatch: pytest.Mo
     assert rows.loc["wrong-1", "H"].isna().all()
     assert set(rows.drop("wrong-1")["status"]) == {"ok"}
     assert len(read_results(tmp_path / "run").paths) == 6
+
+
+def test_runs_too_short_to_learn_from_are_a_value(tmp_path: Path) -> None:
+    """Two runs of one window each: without one of them no input varies. Larger amounts keep their results."""
+    method = {"name": "trained", "kind": "path-trained", "trials": 1, "epochs": 2, "units": 4, "layers": 1}
+    changes = {"prediction.samples": 1, "grid.N_D": [2, 6], "bands.refits": 2, "method": [method]}
+    run_here(tiny_plan(tmp_path, changes), tmp_path / "run")
+    rows = store.read_rows(tmp_path / "run").set_index("N_D")
+    assert set(rows.loc[2, "status"]) == {"failed"}
+    assert all(words.startswith("none of u, v, r, port.n") for words in rows.loc[2, "sentence"])
+    assert set(rows.loc[6, "status"]) == {"ok"}
+    run_here(tiny_plan(tmp_path, {**changes, "grid.N_D": [2]}), tmp_path / "nothing")
+    write_pages(tmp_path / "nothing")
+    assert "no cell with physics has a result" in (tmp_path / "nothing" / "answer.txt").read_text().lower()
 
 
 def test_absent_device_is_one_line(tmp_path: Path) -> None:
