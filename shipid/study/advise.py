@@ -7,7 +7,7 @@ prefers at the largest amount of data, never the one with the lowest error on th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,7 @@ from shipid.units import plural
 
 MANY = 3  # methods that learn: their comparison is what the study asks
 SHOWN = 5  # models that a sentence lists
+BEST = "best in validation"
 
 
 def by_model(results: Results) -> pd.DataFrame:
@@ -65,11 +66,15 @@ def best_model(results: Results) -> str | None:
 
 @dataclass(frozen=True)
 class Sides:
-    """Names of models that are shown to be better than a rival, shown to be worse, and the others."""
+    """Names of models that are shown to be better than a rival, shown to be worse, and the others.
+
+    left_out : how many are not compared, since another cell of theirs has no result.
+    """
 
     better: list[str]
     worse: list[str]
     open: list[str]
+    left_out: int = 0
 
 
 @dataclass(frozen=True)
@@ -117,7 +122,7 @@ class Case:
     def sides(self, models: Sequence[str], differences: Contrasts) -> Sides:
         """Models that are better (above 0) and worse; by sign alone where there are too few test manoeuvres."""
         if too_few(self.table.runs):
-            above, below = differences.mean > 0, differences.mean <= 0
+            above, below = differences.mean > 0, differences.mean < 0
         else:
             above, below = shown(differences.above), shown(differences.below)
         pairs = list(zip(models, above, below, strict=True))
@@ -161,7 +166,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
         sentences.append((good, chart))
     if len(pure) and case.smallest < largest:
         sentences.append((_enough_runs(case), chart))
-    sentences.append((_headline(case), "gain"))
+    sentences.append((_headline(case, any(BEST in text for text, _ in sentences)), "gain"))
     if len(learning) > 1:
         spoken = f"The study has {len(learning)} methods that learn from data; the other sentences speak of "
         sentences.append((f"{spoken}{results.plan.judged!r}, the one that the study judges by.", "cells"))
@@ -212,16 +217,17 @@ def _good_enough(case: Case) -> str:
     for amount, sides in every.items():
         limit = break_even(case.table, case.fixed, case.place(amount))
         if not sides.better and not sides.worse:
-            parts.append(f"with {runs(amount)} the test cannot tell {_any(len(sides.open))} from no physics")
+            parts.append(f"the test cannot tell {_any(len(sides.open))} from no physics")
         elif limit is None:
-            parts.append(f"with {runs(amount)} {_uncrossed(case, sides)}")
+            parts.append(_uncrossed(case, sides))
         else:
-            parts.append(f"with {runs(amount)} {_limit(limit)}")
+            parts.append(_limit(limit))
             limits = True
     begins = f"How good must the physics be, {_ahead(case.results)} ahead? " if limits else ""
-    if not limits and len(parts) == 2 and len({part.partition("runs ")[2] or part for part in parts}) == 1:
-        parts = [f"with {case.smallest} or {parts[1].removeprefix('with ')}"]
-    return f"{begins}{parts[0][0].upper()}{'; '.join(parts)[1:]}."
+    if not limits and len(parts) == 2 and parts[0] == parts[1]:
+        return f"With {case.smallest} or {runs(case.largest)} {parts[0]}."
+    each = "; ".join(f"with {runs(amount)} {part}" for amount, part in zip(every, parts, strict=True))
+    return f"{begins}{each[0].upper()}{each[1:]}."
 
 
 def _uncrossed(case: Case, sides: Sides) -> str:
@@ -238,16 +244,18 @@ def _any(count: int) -> str:
 def _limit(estimate: Estimate) -> str:
     """Up to which error A physics pays, in words."""
     least, most = estimate.limits
-    if estimate.above:
-        low = f" [at least {_length(estimate.low)}]" if np.isfinite(estimate.low) and estimate.low < most else ""
-        return f"physics pays even with an error A of {metres(most)}, the worst tried{low}"
-    if estimate.below:
-        high = f" [at most {_length(estimate.high)}]" if np.isfinite(estimate.high) and estimate.high > least else ""
-        return f"physics does not pay even with an error A of {metres(least)}, the best tried{high}"
     bounds = ""
     if np.isfinite(estimate.low):
         low = f"under {_length(least)}" if estimate.low <= least else _length(estimate.low)
         bounds = f" [{low}, {f'over {_length(most)}' if estimate.high >= most else _length(estimate.high)}]"
+    if estimate.above:
+        low = f" [at least {_length(estimate.low)}]" if np.isfinite(estimate.low) and estimate.low < most else ""
+        low = bounds if estimate.unknown else low
+        return f"physics pays even with an error A of {metres(most)}, the worst tried{low}"
+    if estimate.below:
+        high = f" [at most {_length(estimate.high)}]" if np.isfinite(estimate.high) and estimate.high > least else ""
+        high = bounds if estimate.unknown else high
+        return f"physics does not pay even with an error A of {metres(least)}, the best tried{high}"
     return f"physics pays if its error A is below about {_length(estimate.value)} m{bounds}"
 
 
@@ -261,7 +269,8 @@ def _against_none(case: Case, amount: int) -> Sides:
     models = [str(name) for name in case.at(amount)["model"] if name in case.table.H]
     if not models:
         return Sides([], [], [])
-    return case.sides(models, case.table.against(NO_MODEL, models, case.place(amount)))
+    sides = case.sides(models, case.table.against(NO_MODEL, models, case.place(amount)))
+    return replace(sides, left_out=len(case.at(amount)) - len(models))
 
 
 def _enough_runs(case: Case) -> str:
@@ -270,19 +279,17 @@ def _enough_runs(case: Case) -> str:
     first = case.rows[(case.rows["model"] == best) & (case.rows["N_D"] == fewest)]
     if first.empty:
         return f"{best} has no result at {runs(fewest)}, so its worth in runs is unknown."
-    begins = f"How many runs? With {runs(fewest)}, {best} (best in validation) has {case.H(best, fewest)} mean error"
-    if best not in case.table.H or NO_MODEL not in case.table.H:
-        return f"{begins}; without physics not every cell has a result, so its worth in runs is unknown."
+    begins = f"How many runs? With {runs(fewest)}, {best} ({BEST}) has {case.H(best, fewest)} mean error"
+    if missing := [name for name in (NO_MODEL, best) if name not in case.table.H]:
+        where = "without physics" if missing[0] == NO_MODEL else f"of {best}"
+        return f"{begins}; {where} not every cell has a result, so its worth in runs is unknown."
     estimate = runs_without_physics(case.table, best, case.place(fewest))
     bounds = (
         f" [{_count(estimate.low, estimate)}, {_count(estimate.high, estimate)}]" if np.isfinite(estimate.low) else ""
     )
     if estimate.above:
-        least = (
-            f" [at least {estimate.low:.0f}]"
-            if np.isfinite(estimate.low) and not estimate.low >= estimate.limits[1]
-            else ""
-        )
+        known = np.isfinite(estimate.low) and not estimate.low >= estimate.limits[1]
+        least = (bounds if estimate.unknown else f" [at least {estimate.low:.0f}]") if known else ""
         text = f"without physics {runs(largest)} are not enough for that{least}: they give {case.H(NO_MODEL, largest)}"
     elif estimate.below:
         text = f"without physics the same {runs(fewest)} do as well{bounds}, {case.H(NO_MODEL, fewest)}"
@@ -299,11 +306,14 @@ def _count(value: float, estimate: Estimate) -> str:
     return f"{value:.0f} or fewer" if value <= estimate.limits[0] else f"{value:.0f}"
 
 
-def _headline(case: Case) -> str:
-    """Error of the model with the lowest validation loss at the largest amount of data."""
+def _headline(case: Case, introduced: bool) -> str:
+    """Error of the model with the lowest validation loss at the largest amount of data.
+
+    introduced : whether a sentence before has said that this model is the best in validation.
+    """
     rows = case.at(case.largest).set_index("model")
     alone, worst = float(str(rows.at[case.best, "A"])), float(str(rows.at[case.best, "H_90"]))
-    chosen = "" if case.smallest < case.largest else "best in validation; "
+    chosen = "" if introduced else f"{BEST}; "
     text = (
         f"With {runs(case.largest)}, {case.best} ({chosen}{metres(alone)} mean error alone) "
         f"predicts {_ahead(case.results)} ahead with {case.H(case.best, case.largest)} mean error; "
@@ -343,7 +353,8 @@ def _counted(sides: Sides, rival: str) -> str:
     """Which models are better than a rival and which are worse, as one sentence."""
     count = len(sides.better) + len(sides.worse) + len(sides.open)
     if len(sides.better) == count:
-        return f"every physics model with a result does better than {rival}"
+        where = " in every cell" if sides.left_out else ""
+        return f"every physics model with a result{where} does better than {rival}"
     verb = "do" if len(sides.better) > 1 else "does"  # none does
     parts = [f"{len(sides.better) or 'none'} of {count} physics models {verb} better than {rival}"]
     if sides.worse:
@@ -368,7 +379,7 @@ def _alone(case: Case) -> list[str]:
         parts.append(f"It is not shown that compensation helps {named(sides.open)}.")
     accuracy = {model: case.table.mean(model, ALONE) for model in models}
     first = min(models, key=accuracy.__getitem__)
-    if parts and accuracy[first] <= min(case.table.mean(model, place) for model in models):
+    if parts and accuracy[first] < case.at(case.largest)["H"].min():
         parts[-1] = parts[-1][:-1] + f"; {first} alone has {metres(accuracy[first])}, less than any compensated model."
     return parts
 
@@ -405,7 +416,10 @@ def _floor(case: Case) -> str:
     training = np.array([table.mean(model, place) for model in models]) * table.noise[place]
     sides = case.sides(models, contrasts(still - errors, table.counts, training))
     if len(sides.better) == len(models):
-        return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} every model beats it."
+        whole = "" if len(models) == len(rows) else " with a result in every cell"
+        return (
+            f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} every model{whole} beats it."
+        )
     parts = []
     if sides.worse:
         parts.append(f"{named(sides.worse)} {plural(len(sides.worse), 'is', 'are')} worse")

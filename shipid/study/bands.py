@@ -157,9 +157,13 @@ def answer(results: Results) -> list[tuple[str, str]]:
         return [(f"No band is promised: {reasons[0].removeprefix(NO_BAND)}.", "cells")] if len(reasons) else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
     share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
-    sentence = f"Bands of {level:.0%} held {share:.0%} of the whole test paths (mean of {len(top)} models with "
-    sentence += f"{int(top['N_D'].iloc[0])} runs; 95 % interval of one {low:.0%} to {high:.0%}); their mean radius is "
-    sentence += f"{metres(top['width'].min())} to {metres(top['width'].max())}."
+    radius = " to ".join(dict.fromkeys((metres(top["width"].min()), metres(top["width"].max()))))
+    amount = int(top["N_D"].iloc[0])
+    mean = f"mean of {len(top)} models with {amount} runs; 95 % interval of one" if len(top) > 1 else ""
+    spread = f"{mean or f'with {amount} runs; 95 % interval'} {low:.0%} to {high:.0%}"
+    sentence = (
+        f"Bands of {level:.0%} held {share:.0%} of the whole test paths ({spread}); their mean radius is {radius}."
+    )
     sentences = [(sentence, "coverage")]
     groups = groups_frame(results)
     few = sorted(set(groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]))

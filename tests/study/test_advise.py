@@ -11,8 +11,9 @@ import pytest
 
 from shipid.report.section import declared
 from shipid.report.sections import SECTIONS
-from shipid.study.advise import answer, best_model, by_model
+from shipid.study.advise import _limit, answer, best_model, by_model
 from shipid.study.results import Results
+from shipid.study.worth import Estimate
 from tests.study.byhand import grid
 
 
@@ -91,9 +92,28 @@ def test_what_holds_at_both_ends_is_said_once(made: Any) -> None:
     assert advice.startswith(f"{first} 6.00 m.\n")
 
 
+def test_what_holds_with_one_run_and_with_more_is_said_once(made: Any) -> None:
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}, (1, 30))))
+    assert advice.startswith("With 1 or 30 runs every physics model with a result does better than no physics, even")
+
+
 def test_a_tie_is_no_help(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 3.0), "bad": (2.0, 2.0), "none": (4.0, 3.0)})))
     assert "with 30 runs every physics model" not in advice
+
+
+def test_a_tie_is_no_harm(made: Any) -> None:
+    """`bad` has 6 m alone and compensated, and so has constant motion."""
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (7.0, 6.0), "none": (9.0, 8.0)}), naive=6.0))
+    assert "harms" not in advice
+    assert "It is not shown that compensation helps bad." in advice
+    assert "at 30 runs pure data-driven is worse, and bad is not shown to beat it." in advice
+
+
+def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
+    methods = [{"name": "drawn", "kind": "path-drawn", "families": ["good", "bad"]}]
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0)}), changes={"method": methods}))
+    assert "With 30 runs, good (best in validation; 2.00 m mean error alone)" in advice
 
 
 def test_data_that_did_not_help_is_reported(made: Any) -> None:
@@ -136,6 +156,20 @@ def test_how_good_physics_must_be(made: Any) -> None:
     assert "With 10 runs physics does not pay even with an error A of 1.00 m, the best tried" in advice
 
 
+def test_an_interval_of_everything_is_no_bound() -> None:
+    """A value at one end of what the study covers, with an interval that reaches to the other."""
+    assert _limit(Estimate(9.0, 2.0, 9.0, (2.0, 9.0))).endswith("9.00 m, the worst tried [under 2.0, over 9.0]")
+    assert _limit(Estimate(2.0, 2.0, 9.0, (2.0, 9.0))).endswith("2.00 m, the best tried [under 2.0, over 9.0]")
+    assert _limit(Estimate(9.0, 3.0, 9.0, (2.0, 9.0))).endswith("the worst tried [at least 3.0]")
+
+
+def test_runs_that_are_not_enough_may_still_be_too_many(made: Any) -> None:
+    """`none` with 30 runs has about what `good` has with 10: the test cannot tell which has less."""
+    H = grid({"good": (2.0, 1.0), "bad": (3.0, 2.0), "none": (2.1, 2.05)})
+    advice = text(made(H, runs=8))
+    assert "without physics 30 runs are not enough for that [10 or fewer, over 30]: they give 2.05 m" in advice
+
+
 def test_what_the_test_cannot_decide_is_reported_once(made: Any) -> None:
     H = {"good": (1.5, 1.0), "bad": (1.5, 1.0), "none": (1.5, 1.0)}
     advice = text(made(grid(H), runs=8))
@@ -170,6 +204,9 @@ def test_identified_models_are_not_best_in_validation(made: Any) -> None:
     results = made(H, alone=alone, changes={"family": family})
     advice = text(results)
     assert best_model(results) == "good"
+    harmed = grid({"good": (3.0, 2.5), "bad": (3.0, 2.2), "fitted": (0.8, 0.7), "none": (9.0, 4.0)})
+    said = text(made(harmed, alone=alone, changes={"family": family}))
+    assert "Compensation harms good." in said, "2 m alone, but `fitted` has less"
     assert "so they cannot be called best in validation: fitted has 0.70 m with 30 runs." in advice
 
 
@@ -207,6 +244,21 @@ def test_failed_cells_are_reported_and_not_counted(made: Any) -> None:
     assert "1 of 6 cells has no result (bad: no training converged)" in advice
     assert "every physics model with a result does better than no physics" in advice
     assert "(over 1 model)" in advice
+
+
+def test_every_model_leaves_out_none_without_saying_so(made: Any) -> None:
+    """`bad` is worse than `none` at 10 runs and `worst` than constant motion at 30; each failed at the other amount."""
+    alone = {"good": 2.0, "bad": 6.0, "worst": 9.0}
+    H = {"good": (1.5, 1.0), "bad": (12.0, None), "worst": (None, 11.0), "none": (9.0, 4.0)}
+    advice = text(made(grid(H), alone=alone))
+    assert "With 10 or 30 runs every physics model with a result in every cell does better than no physics" in advice
+    assert "at 30 runs every model with a result in every cell beats it" in advice
+
+
+def test_what_is_not_known_of_the_best_model_is_said_of_it(made: Any) -> None:
+    H = {"good": (1.5, None, 1.0), "bad": (3.0, 2.0, 1.5), "none": (9.0, 4.0, 2.0)}
+    advice = text(made(grid(H, (10, 20, 30))))
+    assert "good (best in validation) has 1.50 m mean error; of good not every cell has a result" in advice
 
 
 def test_nothing_is_claimed_against_a_missing_data_driven_model(made: Any) -> None:

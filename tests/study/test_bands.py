@@ -21,6 +21,7 @@ from shipid.study.compare import compare_bands
 from shipid.study.findings import findings
 from shipid.study.plan import read_plan
 from shipid.study.results import Results, border, read_results
+from shipid.study.verdict import metres
 from tests.study.tiny import run_here, tiny_plan
 
 LEVEL = 0.8  # the tiny study has 6 runs at most
@@ -98,6 +99,13 @@ def test_frames_agree_with_the_cells(results: Results) -> None:
     assert (groups["low"] <= groups["coverage"] + 1e-9).all()
     assert set(worst["run"]) == set(results.test.spans)
     assert bands.answer(results)[0][0].startswith("Bands of 80% held ")
+
+
+def test_one_model_has_one_radius(results: Results) -> None:
+    row = results.cells.dropna(subset="width").sort_values("N_D").iloc[-1]
+    ((sentence, _), *_) = bands.answer(replace(results, bands={row["cell"]: results.bands[row["cell"]]}))
+    assert f"of the whole test paths (with {row['N_D']} runs; 95 % interval " in sentence
+    assert sentence.endswith(f"their mean radius is {metres(row['width'])}.")
 
 
 def test_findings_say_what_the_cells_hold(results: Results) -> None:
