@@ -71,7 +71,7 @@ def findings(results: Results) -> list[Finding]:
     verdicts += simulation_findings(results) if claims.moderate is not None else []
     roles = (claims.accurate, claims.inaccurate) if claims.moderate is None else (claims.moderate, claims.high)
     physics = [one.name for role in roles for one in results.plan.foundations if one.family == role]
-    return [*verdicts, *band_findings(results, physics)] if verdicts else []
+    return [*verdicts, *band_findings(results, physics, rivals=claims.moderate is None)] if verdicts else []
 
 
 def _full_scale(results: Results, claims: Claims) -> list[Finding]:

@@ -50,15 +50,19 @@ SHORT = 0.05  # B2: a share that lies so far below its level is a broken promise
 class Widths:
     """What B1 compares: widths in place of H, at the amounts of data at which every model has a band.
 
-    physics : models with physics, the accurate one first where there are two.
+    physics : models with physics. rivals : whether they are the accurate and the inaccurate model, in this order.
     """
 
     table: ErrorTable
     physics: tuple[str, ...]
+    rivals: bool = False
 
 
-def band_findings(results: Results, physics: Sequence[str]) -> list[Finding]:
-    """Verdicts on B1 and B2 for models with physics (none of them sees the test); undecided where none has a band."""
+def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[Finding]:
+    """Verdicts on B1 and B2 for models with physics (none of them sees the test); undecided where none has a band.
+
+    rivals : as in `Widths`.
+    """
     if not results.complete:
         return undecided(CLAIMS, results.missing)
     level, run = results.plan.level, results.test.run
@@ -74,7 +78,7 @@ def band_findings(results: Results, physics: Sequence[str]) -> list[Finding]:
     cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin([*sound, NO_MODEL])]
     held = {name: [bands[cell][1] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
     shares = [float(np.mean(held[name])) for name in sound]
-    first = narrower(Widths(replace(table, A={name: table.A[name] for name in sound}), sound))
+    first = narrower(Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals))
     first["evidence"] += f"; these bands hold {min(shares):.0%} to {max(shares):.0%} of whole paths"
     second = kept_promise(np.mean([one for ones in held.values() for one in ones], axis=0), run, level)
     note = too_few(table.runs)
@@ -86,7 +90,7 @@ def narrower(widths: Widths) -> Finding:
     """Verdict on B1, without the shares that the bands hold."""
     table, models = widths.table, widths.physics
     last = len(table.amounts) - 1
-    if len(models) == 2:
+    if widths.rivals:
         good, bad = models
         wider = table.compare([[(1.0, bad, last), (-1.0, good, last)]])
         evidence = (

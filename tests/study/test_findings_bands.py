@@ -40,7 +40,7 @@ def test_of_two_models_the_less_accurate_has_the_wider_band(bad: float, expected
     size = Size(runs=20, amounts=(5, 20))
     widths = {"good": np.array([2.0, 1.0]), "bad": bad * np.array([2.0, 1.0])}
     drawn = table(np.random.default_rng(1), size, {"good": 1.0, "bad": 2.0}, widths)
-    finding = narrower(Widths(drawn, ("good", "bad")))
+    finding = narrower(Widths(drawn, ("good", "bad"), rivals=True))
     assert finding["verdict"] == expected
     assert finding["numbers"]["ratio of widths"] == pytest.approx(bad, rel=0.3)
 
@@ -52,3 +52,12 @@ def test_fewer_models_than_an_order_needs_decide_nothing() -> None:
         np.random.default_rng(1), size, dict.fromkeys(names, 1.0), dict.fromkeys(names, np.ones(len(size.amounts)))
     )
     assert narrower(Widths(drawn, names))["verdict"] == "undecided"
+
+
+def test_two_members_of_families_are_no_order() -> None:
+    """Which of a moderate and a high member is the more accurate is seen from A alone, and two are too few."""
+    widths = {"moderate": np.array([4.0, 2.0]), "high": np.array([2.0, 1.0])}
+    drawn = table(np.random.default_rng(1), Size(runs=20, amounts=(5, 20)), {"moderate": 2.0, "high": 1.0}, widths)
+    finding = narrower(Widths(drawn, ("moderate", "high")))
+    assert finding["verdict"] == "undecided"
+    assert finding["evidence"] == "2 models with physics, a trend needs 5"
