@@ -37,7 +37,7 @@ def _within(method: Searched, name: str, share: float) -> float:
     if name in method.LINEAR:
         return low + share * (high - low)
     value = exp(log(low) + share * (log(high) - log(low)))
-    return float(min(max(round(value), ceil(low)), floor(high))) if name in method.COUNTS else value
+    return min(max(round(value), ceil(low)), floor(high)) if name in method.COUNTS else value
 
 
 def ridges_of(ridge: float | tuple[float, float], count: int) -> list[float]:

@@ -8,7 +8,7 @@ import pytest
 from pydantic import PositiveInt
 
 from shipid.hybrid.alone import Unchanged
-from shipid.hybrid.journal import distributions, frozen
+from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Fitted
 from shipid.hybrid.modules import Modules
 from shipid.hybrid.one_step import OneStep
@@ -53,17 +53,18 @@ class Counting(Searched):
         return {name: diverged(self, points_of(self)) for name in task.targets}
 
 
-def test_counts_are_whole_and_linear_settings_evenly_spread():
-    """And the journal takes every trial."""
+def test_counts_are_whole_and_linear_settings_evenly_spread(tmp_path):
+    """And the journal gives every trial back to the digit, whole numbers as such."""
     method = Counting()
     points = list(points_of(method))
     neighbours = {point["neighbours"] for point in points}
     assert {2.0, 3.0} <= neighbours <= {float(number) for number in range(2, 21)}
     for name, middle in (("share", 0.5), ("width", 10.0)):
         assert np.mean([point[name] < middle for point in points]) == pytest.approx(0.5, abs=0.05)
-    for number, point in enumerate(points):
-        row = row_of(number, point, 1.0, 0.0)
-        assert frozen(row, distributions(method.space())).params == pytest.approx(point)
+    rows = [row_of(number, point, 1.0, 0.0) for number, point in enumerate(points)]
+    Journal(tmp_path / "trials.log").add({"a": rows}, method.space())
+    kept = Journal(tmp_path / "trials.log").rows("a")
+    assert [repr(row["params"]) for row in kept] == [repr(point) for point in points]
 
 
 def test_trials_fill_their_ranges_and_ridges_go_from_low_to_high():
