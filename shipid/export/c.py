@@ -26,7 +26,7 @@ from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
-ROWS_A_STEP = 8  # rows of a recorder that are kept for each step of the past
+PARTS_OF_STEP = 8  # of three rows within such a part of a step a recorder keeps the first and the last
 GAP = 3.0  # steps: after a longer pause a recorder begins anew
 SPEED_LIMIT = 100.0  # m/s and rad/s: a faster state has diverged
 WORDS = frozenset(
@@ -366,8 +366,8 @@ class PredictorParts:
 
     @property
     def capacity(self) -> int:
-        """Rows that a recorder keeps."""
-        return ROWS_A_STEP * self.model.layout.num_past + 4
+        """Rows that a recorder keeps: two for each part of a step, however often rows come."""
+        return 2 * PARTS_OF_STEP * self.model.layout.num_past + 4
 
     @property
     def filters(self) -> Bank | None:
@@ -516,7 +516,8 @@ void {name}_init({name} *self);
  * {GAP * physics.step:g} s the past begins anew. The heading may wrap, and so may angles of
  * thrusters and rudders: 350 deg is -10 deg. Between stops that are less than a turn apart the angle within them is
  * taken, so a jump is real. A unit that turns all round goes on by the shortest way. The first row is taken by the turn
- * that training had. Rows closer than {physics.step / ROWS_A_STEP:g} s replace each other in the past. */
+ * that training had. Rows may come as often as they like: of three within {physics.step / PARTS_OF_STEP:g} s the past
+ * keeps the first and the last. */
 int {name}_record({name} *self, double t, const {name}_real *row);
 
 /* Path from the newest row: {name}_HORIZON pairs x, y. planned: {name}_HORIZON rows of commands in force, each the
@@ -775,7 +776,7 @@ double {name}_factor(double miss, double level, int kind)
         kept[{n + 3}] = kept[{u}] * M(sin)(kept[{psi}]) + kept[{v}] * M(cos)(kept[{psi}]);
         kept[{n}] = last[{n}] + half * (last[{n + 2}] + kept[{n + 2}]);
         kept[{n + 1}] = last[{n + 1}] + half * (last[{n + 3}] + kept[{n + 3}]);
-{actuators}{go_filters}        if (self->count > 1 && t - self->t[(newest + {cap - 1}) % {cap}] < {step / ROWS_A_STEP * (1 - 1e-6)!r})
+{actuators}{go_filters}        if (self->count > 1 && t - self->t[(newest + {cap - 1}) % {cap}] < {step / PARTS_OF_STEP * (1 - 1e-6)!r})
             --self->count; /* the newest row came so soon that this one replaces it */
     }} else {{
         self->first = 0;
@@ -889,7 +890,7 @@ double {name}_factor(double miss, double level, int kind)
         static const int holds[{len(places)}] = {{{_whole(held)}}};
         const real *newest_row = self->rows[newest];
         const real c = M(cos)(newest_row[{psi}]), s = M(sin)(newest_row[{psi}]);
-        const double slack = {1e-3 * step / ROWS_A_STEP!r}, t = self->t[newest];
+        const double slack = {1e-3 * step / PARTS_OF_STEP!r}, t = self->t[newest];
         int k, j = 0;
         if (t - {names.num_past * step!r} < self->t[self->first] - slack) return {name}_NO_PAST;
         for (k = 0; k < {names.num_past}; ++k) {{

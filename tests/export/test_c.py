@@ -266,6 +266,31 @@ def test_a_row_just_after_an_instant_of_the_past_is_not_taken_for_it(tmp_path):
     np.testing.assert_allclose(path, expected, rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("interval", [0.01, 0.07, 0.1])
+def test_rows_may_come_as_often_as_they_like(interval, tmp_path):
+    """Before, a past of three steps and more was never long enough where rows came ten times in a step."""
+    strange = drawn("path-drawn", 7, vessel="gunnerus-28.9")
+    corrector, physics = strange.predictor.corrector, Physics(variety()["gunnerus-28.9"], 3, 1.0)
+    slow = log_of(physics.vessel, 16, np.random.default_rng(1), 1.0).frame
+    t = slow["t"].iloc[0] + interval * np.arange(round(13 / interval))
+    log = pd.DataFrame({**sample(slow, t), "t": t, "run": "a"})
+    inputs = type(corrector.inputs)(corrector.inputs.commands, Memory(history=(1.0, 10.0), error=(10.0,)))
+    instants = Instants(sample(log, t[-1:]), past_of(log, t[-1:], 10, 1.0, "position"))
+    table = inputs.table(physics, instants)
+    network = network_of(np.random.default_rng(2), list(table), table, 3, 2, False)
+    exported = model(Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}), {"u": (-9.0, 9.0)}))
+    files = predictor_files(exported, "odd", Precision())
+    kept, path = np.zeros(_size_of_struct(files, tmp_path) + 64, dtype=np.uint8), np.zeros((3, 2))
+    loaded = library(files, tmp_path)
+    loaded.odd_init(pointer(kept))
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    for at, row in zip(t, log[list(order)].to_numpy(dtype=float), strict=True):
+        assert loaded.odd_record(pointer(kept), at, pointer(np.ascontiguousarray(row))) == 0
+    assert loaded.odd_predict(pointer(kept), None, pointer(path)) == 0
+    np.testing.assert_allclose(path, exported.predictor.predict(instants)[:, 0], rtol=0, atol=1e-9)
+
+
 def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
     """As in Python: the observer is that of the physics, to which the method adds its force afterwards."""
     vessel = variety()["gunnerus-28.9"]
