@@ -10,6 +10,7 @@ from shipid.files import TEMPORARY, read_json
 from shipid.study import claims, seals, store
 from shipid.study.plan import Plan
 from shipid.study.seals import Fault
+from shipid.units import plural
 
 WORDS = {
     "missing": "missing: `shipid study resume` computes it again",
@@ -50,12 +51,14 @@ def _checked(folder: Path, plan: Plan, part: str = "") -> Checked:
     if plan.parts:
         return Checked(lines, faults)
     done = sum(len(unit.pairs) for unit in store.finished(folder, plan.units))
-    lines.append(f"{part}{': ' if part else ''}{done} of {plan.cells} cells finished, {len(faults)} faults")
+    count = f"{len(faults)} {plural(len(faults), 'fault')}"
+    lines.append(f"{part}{': ' if part else ''}{done} of {plan.cells} cells finished, {count}")
     if held := claims.held(folder):
         lines.append(f"at work, or ended without giving back: {', '.join(held)}")
     left = [place for place in folder.rglob(f"{TEMPORARY}*") if place.is_dir()]
     if left:
-        lines.append(f"{len(left)} temporary folders of runs that were killed: the next run removes them")
+        folders = f"{len(left)} {plural(len(left), 'temporary folder')}"
+        lines.append(f"{folders} of killed runs: the next run removes {plural(len(left), 'it', 'them')}")
     sessions = read_json(folder / store.PROVENANCE).get("sessions", [])
     for before, after in pairwise(sessions):
         lines.append(f"computed in parts: {'; '.join(store.differences(before, after))}")

@@ -30,7 +30,12 @@ def test_every_fault_is_a_line(tiny_run: Path, tmp_path: Path) -> None:
     check = check_folder(folder)
     assert sorted(fault.kind for fault in check.faults) == ["damaged", "missing"]
     text = "\n".join(check.lines)
-    for words in ("computes it again", "2 faults", "1 temporary folder", "computed in parts: shipid was"):
+    for words in (
+        "computes it again",
+        "2 faults",
+        "1 temporary folder of killed runs: the next run removes it",
+        "computed in parts: shipid was",
+    ):
         assert words in text
 
 

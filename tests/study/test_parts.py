@@ -160,4 +160,4 @@ def test_a_check_looks_through_every_part(four: tuple[Plan, Path], tmp_path: Pat
     damaged = check_folder(tmp_path / "run")
     assert len(damaged.faults) == 1
     assert "held-1: not begun" in damaged.lines
-    assert any(line.startswith("known-2: ") and line.endswith("1 faults") for line in damaged.lines)
+    assert any(line.startswith("known-2: ") and line.endswith(" 1 fault") for line in damaged.lines)
