@@ -22,6 +22,7 @@ from shipid.errors import ShipidError
 from tests.study.tiny import TINY, without_workers
 
 ROOT = Path(__file__).parents[1]
+QUICK = f'"{shipid.read_plan("quick").folder}"'  # as a page of the documentation names it
 
 
 def test_the_wheel_takes_models_and_studies_along() -> None:
@@ -128,8 +129,8 @@ def test_cells_of_the_documentation_are_read(tiny_run: Path, tmp_path: Path, mon
     monkeypatch.chdir(tmp_path)
     space: dict[str, Any] = {}
     text = blocks("python.md")[2]
-    assert '"results/quick-fa97027d"' in text
-    exec(text.replace('"results/quick-fa97027d"', repr(str(tiny_run))), space)
+    assert QUICK in text
+    exec(text.replace(QUICK, repr(str(tiny_run))), space)
     assert len(space["cells"]) == 8
 
 
@@ -163,7 +164,7 @@ def test_results_of_the_how_to_become_a_table_and_a_figure(
     tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    exec(blocks("howto.md")[1].replace('"results/quick-fa97027d"', repr(str(tiny_run))), {})
+    exec(blocks("howto.md")[1].replace(QUICK, repr(str(tiny_run))), {})
     assert Path("gain.html").is_file()
 
 
@@ -171,6 +172,14 @@ def test_results_of_the_how_to_become_a_table_and_a_figure(
 def test_a_block_that_is_copied_alone_knows_its_names(page: str) -> None:
     for block in blocks(page):
         assert "shipid." not in block or "import shipid" in block or "from shipid" in block, block
+
+
+def test_folders_of_quick_in_the_documentation_are_those_that_the_command_makes() -> None:
+    """A reader copies these lines: another digest would be a folder that is not there."""
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    text = "".join(page.read_text(encoding="utf-8") for page in pages)
+    any_run = {"results/quick-1a2b3c4d"}  # stands for any digest
+    assert set(re.findall(r"results/quick-[0-9a-f]{8}", text)) - any_run == {QUICK.strip('"')}
 
 
 def test_frames_of_the_documentation_are_drawn() -> None:
