@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from shipid.logs.workbook import is_workbook
+
 ENOUGH = 4096  # first bytes that tell
 UNPACK = "unpack it"
 SHEET = "save its sheet as CSV (one header line, one row for each time)"
@@ -26,13 +28,15 @@ class Foreign:
 
 
 FOREIGN = (
-    Foreign(rb"PK\x03\x04.{26}mimetypeapplication/vnd\.oasis", "an OpenDocument sheet (.ods)", SHEET),
-    Foreign(rb"PK\x03\x04.{0,4000}?(?:\[Content_Types\]\.xml|xl/)", "an Excel workbook (.xlsx)", SHEET),
     Foreign(
         rb"PK\x03\x04.{26}[^/\0]{1,80}\.npy", "arrays of NumPy (.npz)", "write them as columns of a CSV or Parquet file"
     ),
     Foreign(rb"PK\x03\x04", "a ZIP archive", UNPACK),
-    Foreign(rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook (.xls)", SHEET),
+    Foreign(
+        rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",
+        "an old Excel workbook (.xls)",
+        "save it as .xlsx, or its sheet as CSV",
+    ),
     Foreign(rb"\x1f\x8b", "packed by gzip", UNPACK),
     Foreign(rb"BZh[1-9]1AY&SY", "packed by bzip2", UNPACK),
     Foreign(rb"\xfd7zXZ\0", "packed by xz", UNPACK),
@@ -82,4 +86,6 @@ FOREIGN = (
 def foreign(head: bytes) -> Foreign | None:
     """Return what kind of file begins with these bytes, where it is one that no reader reads; else None."""
     start = head[:ENOUGH].removeprefix(b"\xef\xbb\xbf")
+    if is_workbook(start):
+        return None
     return next((one for one in FOREIGN if re.match(one.starts, start, re.DOTALL | re.IGNORECASE)), None)

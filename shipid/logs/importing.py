@@ -46,6 +46,7 @@ from shipid.logs.mapping import (
 from shipid.logs.readers import (
     Format,
     Progress,
+    TableFormat,
     TextFormat,
     dated,
     hour_twice,
@@ -587,7 +588,7 @@ def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str
             message = f"{numbers[infinite[0]]} is no number (column {source!r}; {len(infinite)} such rows)"
             raise DataError(message, file=file, path=f"row {infinite[0] + 1}")
         return numbers
-    read = form if isinstance(form, TextFormat) else TextFormat()
+    read = form if isinstance(form, TableFormat) else TextFormat()
     text = column.fillna("").astype(str).str.strip()
     missing = text.isin(read.missing)
     plain = text.str.replace(",", ".", regex=False) if read.decimal == "," else text

@@ -1,4 +1,4 @@
-"""Readers: a log as a table of columns named as in the log, from text, Parquet, MATLAB or NMEA 0183.
+"""Readers: a log as a table of columns named as in the log, from text, a sheet, Parquet, MATLAB or NMEA 0183.
 
 A reader is a row of `READERS`: the options of its format, a function that reads, and one that recognises a file. Values
 are returned as written, as text or numbers; the mapping gives units and meaning.
@@ -27,6 +27,7 @@ from shipid.data.dataset import DATED, Array
 from shipid.errors import DataError
 from shipid.logs.foreign import ENOUGH, foreign
 from shipid.logs.repairs import Strict
+from shipid.logs.workbook import SEPARATOR, is_workbook, sheet_text, sheets_of
 from shipid.units import KNOT
 
 DAY, HALF_DAY = 86400.0, 43200.0  # s
@@ -62,18 +63,31 @@ class Format(Strict):
     kind: str = "text"
 
 
-class TextFormat(Format):
-    """Text with one separator; `names`, or `header = false` and the numbers 1, 2, ..., where it has no header line."""
+class TableFormat(Format):
+    """Keys of a table of text; `names`, or `header = false` and the numbers 1, 2, ..., where it has no header line."""
 
-    separator: str = Field(default=",", min_length=1)  # one character, or "whitespace"
     decimal: Literal[".", ","] = "."
-    encoding: str = "utf-8"
     skip_rows: int = Field(default=0, ge=0)
-    comment: str | None = Field(default=None, min_length=1, max_length=1)
     header: bool = True
     names: tuple[str, ...] | None = Field(default=None, min_length=1)
     missing: tuple[str, ...] = ("", "nan", "NaN")
     ragged: Literal["refuse", "drop"] = "refuse"  # lines with more or fewer cells than the header, or its names again
+
+    def text(self) -> TextFormat:
+        """Return how the lines of the table are read."""
+        return TextFormat(separator=SEPARATOR, **{name: getattr(self, name) for name in TableFormat.model_fields})
+
+
+class TextFormat(TableFormat):
+    """Text with one separator."""
+
+    separator: str = Field(default=",", min_length=1)  # one character, or "whitespace"
+    encoding: str = "utf-8"
+    comment: str | None = Field(default=None, min_length=1, max_length=1)
+
+    def text(self) -> TextFormat:
+        """Return this format."""
+        return self
 
     @field_validator("separator")
     @classmethod
@@ -91,6 +105,12 @@ class TextFormat(Format):
             return codecs.lookup(encoding).name
         except (LookupError, UnicodeError):
             raise ValueError("no such encoding of text; for example utf-8, cp1252, latin-1, utf-16") from None
+
+
+class SheetFormat(TableFormat):
+    """A sheet of a workbook (.xlsx, .ods): that of this name, or the one with most cells."""
+
+    sheet: str | None = None
 
 
 class ParquetFormat(Format):
@@ -550,6 +570,12 @@ def _refuse_foreign(file: Path) -> None:
         raise DataError(other.sentence, file=file, path="format.kind")
 
 
+def _sheet(file: Path, form: SheetFormat, _: str) -> pd.DataFrame:
+    _refuse_foreign(file)
+    name = sheets_of(file)[0] if form.sheet is None else form.sheet
+    return parse_text(io.StringIO(sheet_text(file, name)), form.text(), file)
+
+
 def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:
     _refuse_foreign(file)
     try:
@@ -835,6 +861,10 @@ class Reader:
     scattered: bool = False
 
 
+def _is_sheet(_: Path, head: bytes) -> dict[str, Any] | None:
+    return {"kind": "sheet"} if is_workbook(head[:ENOUGH]) else None
+
+
 def _is_parquet(_: Path, head: bytes) -> dict[str, Any] | None:
     return {"kind": "parquet"} if head.startswith(b"PAR1") else None
 
@@ -857,6 +887,7 @@ def _is_nmea(_: Path, head: bytes) -> dict[str, Any] | None:
 
 READERS: dict[str, Reader] = {
     "text": Reader(TextFormat, _text),  # no signature: a guess takes every other file for text
+    "sheet": Reader(SheetFormat, _sheet, _is_sheet),
     "parquet": Reader(ParquetFormat, _parquet, _is_parquet),
     "mat": Reader(MatFormat, _mat, _is_mat),
     "nmea": Reader(NmeaFormat, _nmea, _is_nmea, scattered=True),

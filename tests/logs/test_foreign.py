@@ -28,7 +28,7 @@ def zipped(**files: bytes) -> bytes:
     held = io.BytesIO()
     with zipfile.ZipFile(held, "w") as archive:
         for name, content in files.items():
-            archive.writestr(name.replace("__", "/"), content)
+            archive.writestr(name, content)
     return held.getvalue()
 
 
@@ -47,12 +47,8 @@ def saved(write: str) -> bytes:
     return held.getvalue()
 
 
-SHEET = zipped(**{"[Content_Types].xml": b"<x/>", "xl__workbook.xml": b"<x/>", "xl__worksheets__sheet1.xml": b"<x/>"})
-OPEN = zipped(mimetype=b"application/vnd.oasis.opendocument.spreadsheet", **{"content.xml": b"<x/>"})
 FILES = {
-    "log.xlsx": (SHEET, "Excel workbook", "save its sheet as CSV"),
-    "log.ods": (OPEN, "OpenDocument", "save its sheet as CSV"),
-    "log.xls": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + BINARY, "old Excel workbook", "save its sheet as CSV"),
+    "log.xls": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + BINARY, "old Excel workbook", "save it as .xlsx"),
     "page.xls": (TABLE.to_html().encode(), "a page", "save its sheet as CSV"),
     "log.csv.gz": (gzip.compress(TEXT), "packed by gzip", "unpack it"),
     "log.zip": (zipped(**{"log.csv": TEXT}), "a ZIP archive", "unpack it"),

@@ -80,7 +80,7 @@ def guess(
 
     Parameters
     ----------
-    path : text, Parquet, MATLAB or NMEA 0183; a folder or a glob of such files, one run each.
+    path : text, a workbook, Parquet, MATLAB or NMEA 0183; a folder or a glob of such files, one run each.
     names : of the columns of a text log that has no header.
     vessel : whose names the commands take, and whose length says which speeds are possible.
     frame : of x, y and the heading, where a person knows it.

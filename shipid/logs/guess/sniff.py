@@ -30,6 +30,8 @@ from shipid.logs.readers import (
     NEXT_DAY,
     READERS,
     TIME_OF_DAY,
+    SheetFormat,
+    TableFormat,
     TextFormat,
     dated,
     hour_twice,
@@ -40,6 +42,7 @@ from shipid.logs.readers import (
     seconds,
     widest,
 )
+from shipid.logs.workbook import SEPARATOR, sheet_text, sheets_of
 
 Rows = NDArray[np.bool_]
 SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looked at in its head and that many blocks
@@ -125,14 +128,17 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     if not head[:200_000].strip():
         raise DataError("the file is empty", file=file)
     form = _format(head[:200_000], file, names)
-    model = READERS[form.get("kind", "text")].options.model_validate(form)
     notes: tuple[str, ...] = ()
     sampled = False
+    if form.get("kind") == "sheet":
+        form, lines, notes = _sheet(file, names)
+    model = READERS[form.get("kind", "text")].options.model_validate(form)
     if isinstance(model, TextFormat):
         widest(head, model.separator, file)
         sampled = size > SAMPLE
-        tolerant = model.model_copy(update={"ragged": "drop"})
-        table = parse_text(io.StringIO(_sample(file, model.encoding, size)), tolerant, file)
+        lines = _sample(file, model.encoding, size)
+    if isinstance(model, TableFormat):
+        table = parse_text(io.StringIO(lines), model.text().model_copy(update={"ragged": "drop"}), file)
         if sampled:
             notes = (f"{len(table)} rows from {BLOCKS + 1} places of {size / 1e6:.0f} MB were looked at",)
         ragged = table.attrs["ragged"]
@@ -148,7 +154,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         table = read_table(file, model, "time")
         notes = tuple(f"{name!r} is {table.attrs['other'][name]}" for name in table.attrs.get("to save anew", ()))
     columns, words = _numbers(table, form.get("decimal", "."))
-    if isinstance(model, TextFormat):
+    if isinstance(model, TableFormat):
         missing = [*_words_for_nothing(table, columns, model), *_sentinels(table, columns)]
         if missing:
             form["missing"] = [*model.missing, *missing]
@@ -199,6 +205,17 @@ def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
     return _text_format(head.decode(encoding, "ignore").splitlines()[:LOOKED_AT], encoding, file, names)
 
 
+def _sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], str, tuple[str, ...]]:
+    """Keys of [format] of a workbook, the lines of its largest sheet, and what is said of the others."""
+    sheet, *others = sheets_of(file)
+    lines = sheet_text(file, sheet)
+    layout = _text_format(lines.splitlines()[:LOOKED_AT], "utf-8", file, names, (SEPARATOR,))
+    keys = {key: value for key, value in layout.items() if key in SheetFormat.model_fields}
+    notes = (f"of the workbook the sheet {sheet!r} is read, not {', '.join(map(repr, others))}",) if others else ()
+    named = {"sheet": sheet} if others else {}  # each run of a folder may have a sheet of another name
+    return {"kind": "sheet"} | named | keys, lines, notes
+
+
 def _encoding(head: bytes, file: Path) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
@@ -214,10 +231,12 @@ def _encoding(head: bytes, file: Path) -> str:
     return "latin-1"
 
 
-def _text_format(lines: list[str], encoding: str, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
+def _text_format(
+    lines: list[str], encoding: str, file: Path, names: tuple[str, ...], separators: tuple[str, ...] = SEPARATORS
+) -> dict[str, Any]:
     """Return the separator and decimal sign that give most numbers in lines of equal length; the header is above."""
     best: tuple[float, str, str] = (0.0, "", "")
-    for separator in SEPARATORS:
+    for separator in separators:
         rows = [cells(line, separator) for line in lines if line.strip()]
         width, count = Counter(len(row) for row in rows).most_common(1)[0]
         for decimal in (".", ",") if separator != "," else (".",):
@@ -363,7 +382,7 @@ def _sides(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
     return frozenset(letters)
 
 
-def _words_for_nothing(table: pd.DataFrame, columns: dict[str, Array], form: TextFormat) -> list[str]:
+def _words_for_nothing(table: pd.DataFrame, columns: dict[str, Array], form: TableFormat) -> list[str]:
     """Return the texts in columns of numbers that say that there is no value, such as `---` or `N/A`."""
     texts: dict[str, None] = {}
     for name, values in columns.items():

@@ -18,7 +18,7 @@ from shipid.logs.guess.words import is_run
 from shipid.logs.importing import run_of
 from shipid.logs.kinds import declared_kind
 
-ENDINGS = (".csv", ".txt", ".dat", ".log", ".tsv", ".asc", ".parquet", ".mat", ".nmea")
+ENDINGS = (".csv", ".txt", ".dat", ".log", ".tsv", ".asc", ".xlsx", ".ods", ".parquet", ".mat", ".nmea")
 PAUSE, MOST = 1e4, 24  # s between two files; files that decide, spread over all
 STOPPED, FEWEST, HELD = 20.0, 10.0, 10  # usual steps, and s, of a pause between two runs; rows of a run
 
