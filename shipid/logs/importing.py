@@ -243,7 +243,7 @@ def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, .
     early = [repair for repair in mapping.repair if isinstance(repair, Despike | Scale) and repair.of_inputs]
     others = [repair for repair in mapping.repair if repair not in [*wrapping, *early]]
     rows, records = apply_repairs(rows, wrapping, off, file)
-    rows = _unwrapped(rows, mapping.columns, file)
+    rows = _unwrapped(rows, mapping, file)
     rows, mended = apply_repairs(rows, early, off, file)
     records += mended
     rows, origin = _projected(rows, mapping, file) if "latitude" in rows else (rows, None)
@@ -323,11 +323,11 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
         channels[name] = (times - column.latency if column.latency else times, values)
     read = len(log)
     if mapping.resamples:
+        gap = mapping.clock.max_gap or np.inf
         for name, (times, values) in channels.items():  # afterwards the jump is not seen: it is between two instants
             if mapping.columns[name].interpolation != "angle":
-                _check_wraps(times, values, name, mapping.columns[name], file)
+                _check_wraps(times, values, name, mapping.columns[name], gap, file)
         t = _common_clock(channels, t, mapping.clock.step, file)
-        gap = mapping.clock.max_gap or np.inf
         how = {name: _interpolation(name, column) for name, column in mapping.columns.items()}
         columns = {name: _brought(t, *channels[name], how[name], gap) for name in channels}
         notes = [(name, f"{how[name]}, latency {column.latency:g} s") for name, column in mapping.columns.items()]
@@ -616,11 +616,11 @@ def _grouped(text: pd.Series[Any]) -> int | None:
     return int(np.argmax(pointed)) if pointed.any() and groups[pointed].all() else None
 
 
-def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column], file: Path) -> pd.DataFrame:
+def _unwrapped(rows: pd.DataFrame, mapping: Mapping, file: Path) -> pd.DataFrame:
     """Unwrap angles, and turn winds "from" into "towards"; DataError for a jump of one that does not wrap."""
     turned: dict[str, NDArray[np.float64]] = {}
-    for name, column in columns.items():
-        _check_wraps(rows["t"].to_numpy(), rows[name].to_numpy(), name, column, file)
+    for name, column in mapping.columns.items():
+        _check_wraps(rows["t"].to_numpy(), rows[name].to_numpy(), name, column, mapping.clock.max_gap or 0.0, file)
         if column.direction != "from" and not column.wrap:
             continue
         values = rows[name].to_numpy().copy()
@@ -638,10 +638,11 @@ def _unwrapped(rows: pd.DataFrame, columns: dict[str, Column], file: Path) -> pd
     return rows.assign(**turned)
 
 
-def _check_wraps(t: Array, values: Array, name: str, column: Column, file: Path) -> None:
-    """Raise DataError where an angle jumps by a whole turn from row to row: the mean of 359 and 1 deg is 180.
+def _check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: float, file: Path) -> None:
+    """Raise DataError where an angle jumps by a whole turn: the mean of 359 and 1 deg is 180.
 
-    An order is not interpolated, but a gear that follows it would go the whole turn back.
+    It does so from row to row, or over a gap of at most `max_gap` [s], which will be interpolated. An order is not
+    interpolated, but a gear that follows it would go the whole turn back.
     """
     row = row_of(name)
     ordered = row is not None and row.angle and is_command(name)
@@ -650,7 +651,7 @@ def _check_wraps(t: Array, values: Array, name: str, column: Column, file: Path)
     known = np.isfinite(values)
     times = t[known]
     steps, jumps = np.diff(times), np.diff(values[known])
-    near = steps < NEAR * np.median(steps) if len(steps) else steps > 0
+    near = (steps < NEAR * np.median(steps)) | (steps <= max_gap + clock_slack(t)) if len(steps) else steps > 0
     places = np.flatnonzero(near & _is_turn(jumps))
     if len(places):
         count = "once" if len(places) == 1 else f"{len(places)} times, first"

@@ -141,6 +141,25 @@ def test_a_heading_that_counts_from_0_again_is_refused_without_wrap(plain_mappin
     np.testing.assert_allclose(imported(straight, plain, tmp_path).frame["psi"], straight["psi"], atol=1e-9)
 
 
+def test_a_heading_that_counts_from_0_again_within_a_gap_that_is_filled_is_refused_without_wrap(
+    plain_mapping: Write, tmp_path: Path
+) -> None:
+    """Filled evenly, it would go through half a turn in the gap; a longer gap breaks the run and is no harm."""
+    file = as_log(turning(T), tmp_path / "log.csv")
+    log = pd.read_csv(file)
+    first = int(np.argmax(np.abs(np.diff(log["heading"])) > 300.0))
+    log.loc[first - 8 : first + 8, "heading"] = np.nan
+    log.to_csv(file, index=False)
+    mapping = plain_mapping("", ("wrap = true", "wrap = false"))
+    written = mapping.read_text()
+    step = float(T[1] - T[0])
+    mapping.write_text(written.replace('from = "time"', f'from = "time"\nmax_gap = {18 * step}'))
+    with pytest.raises(DataError, match=r"columns.psi: .* jumps by a whole turn, once at .* s: write wrap = true"):
+        import_log(read_mapping(mapping), file)
+    mapping.write_text(written.replace('from = "time"', f'from = "time"\nmax_gap = {17 * step}'))
+    assert len(import_log(read_mapping(mapping), file).frame) == len(T) - 17
+
+
 def test_an_order_that_counts_from_0_again_is_refused_without_wrap(plain_mapping: Write, tmp_path: Path) -> None:
     """The unit of the vessel would turn by 358 deg, the unit of the ship by 2."""
     alpha = 0.02 * (T - 20.0)
