@@ -273,7 +273,8 @@ def run_identification(
             raise ShipidError("every parameter is at a bound, fixed or dropped: free more parameters, or widen bounds")
         _go_on(held)
         judged = statistics(LinearFit.of(solution))
-        curves = tuple(_profile(path, dataset, solution, judged) for path in profiles)
+        determined = [path for path in profiles if path in judged.collinearity.paths]
+        curves = tuple(_profile(path, dataset, solution, judged) for path in determined)
         pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
         pairs = free(pair)
         _go_on(held)
@@ -290,6 +291,11 @@ def run_identification(
             *unrecorded(dataset, fitted, settings),
             *_warnings(solution, judged, pairs),
             *_left(solution, curves),
+            *(
+                f"no profile of {path}: it is at a bound, fixed or dropped"
+                for path in profiles
+                if path not in determined
+            ),
         )
         warnings += tuple(filter(None, (verdict(vessel, path, solution.values) for path in solution.values)))
         outputs = _outputs(pair, dataset, fitted)
@@ -569,8 +575,6 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
         return (again.objective if again.status == "ok" else float("inf")), again.factors
 
     free = judged.collinearity.paths
-    if path not in free:
-        raise DataError(f"{path!r} is at a bound: it has no profile", path="profile")
     return profile(
         path,
         solution.factors,

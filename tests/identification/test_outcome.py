@@ -428,3 +428,12 @@ def test_noisy_starts_are_named_as_a_cause_of_correlated_residuals_unless_they_a
     ]
     assert "begin at noisy rows (compare with --nuisance initial_state)" in said[0]
     assert "correlated" not in said[1]
+
+
+@pytest.mark.usefixtures("one_manoeuvre")
+def test_a_profile_of_a_factor_that_ends_at_a_bound_is_left_out_and_the_fit_stays() -> None:
+    """Nobody knows before the fit which factor will end at a bound."""
+    bounds = {FEW[0]: (1.6, 2.0)}  # the true factor is 1 / 0.7
+    result = run_identification(off(), trials(SHIP, runs=2), settings(bounds=bounds), profiles=FEW[:2])
+    assert [curve.path for curve in result.profiles] == FEW[1:2]
+    assert f"no profile of {FEW[0]}: it is at a bound, fixed or dropped" in result.warnings
