@@ -363,7 +363,10 @@ def _covariances(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]
     result["sandwich"] = sandwich(fit, basis, fit.clusters, "sandwich", "runs")
     if not any(covariance.trusted for covariance in result.values()):
         length = BLOCK * max(colour.memory for colour in colours.values())
-        result["blocks"] = sandwich(fit, basis, blocks(fit, length), "blocks", f"stretches of {length:.0f} samples")
+        clusters, what = blocks(fit, length), f"stretches of {length:.0f} samples"
+        if len(np.unique(clusters)) == len(np.unique(fit.clusters)):
+            what = f"runs, too short to be cut into {what}"
+        result["blocks"] = sandwich(fit, basis, clusters, "blocks", what)
     return result
 
 

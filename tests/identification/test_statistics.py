@@ -46,6 +46,13 @@ def test_which_form_is_chosen() -> None:
     assert "mislead" in statistics(few).covariances["sandwich"].reason
 
 
+def test_runs_too_short_for_stretches_are_not_called_stretches() -> None:
+    """Residuals that remember 30 samples would need stretches of 300; the runs have 100 and stay whole."""
+    short = statistics(fitted(design(3, 100, 3), noise(np.random.default_rng(0), 3, 100, 0.95), *labels(3, 100)))
+    assert short.covariances["blocks"].reason.startswith("3 runs, too short to be cut into stretches of ")
+    np.testing.assert_allclose(short.covariances["blocks"].matrix, short.covariances["sandwich"].matrix)
+
+
 def test_fisher_is_the_textbook_formula() -> None:
     """One signal, no prior: s^2 (J^T J)^-1, n - p degrees of freedom."""
     rows = np.array(NAMES) == "u"
