@@ -43,6 +43,8 @@ DAY_OF = (
 """A date without a time."""
 ORDINAL = r"^(\d{4})[-:/ ](\d{3})[-:/ T](\d\d:\d\d:\d\d(?:\.\d+)?)Z?$"
 """A date with the day of the year: 2024-135 08:00:00, 2024:135:08:00:00.5."""
+COMPACT = r"^(\d{8})[-_ ]?(\d{6})(?:\.?(\d{1,9}))?$"
+"""A date and a time of day in one number, or nearly: 20240514080000, 20240514080000.5, 20240514_080000."""
 ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
 """The end of a date in ISO 8601 that says its zone."""
 DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y")
@@ -182,6 +184,8 @@ def seconds(dates: pd.Series[Any]) -> Array:
         dates = dates.astype(object)
     if pd.api.types.is_timedelta64_dtype(dates.dtype):
         return np.array(dates.dt.total_seconds(), dtype=np.float64)
+    if pd.api.types.is_numeric_dtype(dates.dtype) and in_one_number(dates.to_numpy(dtype=np.float64, na_value=np.nan)):
+        dates = dates.map(lambda one: f"{one:.16g}")
     if pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object:
         texts = dates.dropna().astype(str).str.strip()
         if texts.str.contains(",", regex=False).any():
@@ -192,6 +196,10 @@ def seconds(dates: pd.Series[Any]) -> Array:
         if len(texts) and ordinal.notna().all(axis=None):
             joined = ordinal[0] + " " + ordinal[1] + " " + ordinal[2]
             return _since_1970(_moments(joined, "%Y %j %H:%M:%S").reindex(dates.index))
+        compact = texts.str.extract(COMPACT)
+        if len(texts) and compact[[0, 1]].notna().all(axis=None):
+            joined = compact[0] + " " + compact[1] + "." + compact[2].fillna("0")
+            return _since_1970(_moments(joined, "%Y%m%d %H%M%S.%f").reindex(dates.index))
         written = ways_of(texts)
         if written:
             moments = min((_moments(texts, one) for one in written), key=_unlikely)
@@ -199,6 +207,15 @@ def seconds(dates: pd.Series[Any]) -> Array:
         zoned = texts.str.contains(ZONE)
         dates = (texts[zoned] if zoned.any() else texts).reindex(dates.index)
     return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))
+
+
+def in_one_number(values: Array) -> bool:
+    """Whether numbers (N,) are dates and times of day, as 20240514080000 is: year, month, day, hour, minute, second."""
+    if not len(values) or not np.all((values > 1.9e13) & (values < 2.1e13)):
+        return False
+    fields = ((values // 10.0**place % 100).astype(int) for place in (8, 6, 4, 2, 0))
+    limits = ((1, 12), (1, 31), (0, 23), (0, 59), (0, 60))
+    return all(bool(np.all((one >= low) & (one <= high))) for one, (low, high) in zip(fields, limits, strict=True))
 
 
 def ways_of(texts: pd.Series[Any]) -> list[str]:

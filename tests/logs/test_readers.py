@@ -181,6 +181,9 @@ def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
         ("%y/%m/%d %H:%M:%S.%f", True),
         ("%d/%m/%Y, %H:%M:%S.%f", True),
         ("%m/%d/%Y, %I:%M:%S.%f %p", True),
+        ("%Y%m%d%H%M%S.%f", True),
+        ("%Y%m%d%H%M%S%f", True),
+        ("%Y%m%d_%H%M%S.%f", True),
         ("%H:%M:%S.%f", False),
         ("%I:%M:%S.%f %p", False),
     ],
@@ -190,6 +193,13 @@ def test_dates_as_they_are_written(style: str, unix: bool) -> None:
     moments = pd.Timestamp("2022-10-26T23:59:30.5") + pd.to_timedelta(T, "s")
     times = seconds(pd.Series(moments.strftime(style)))
     np.testing.assert_allclose(times, T + (1666828770.5 if unix else 86370.5), atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["int64", "float64"])
+def test_dates_in_one_number(kind: str) -> None:
+    moments = pd.Timestamp("2022-10-26T23:59:30") + pd.to_timedelta(np.arange(90), "s")
+    times = seconds(pd.Series(moments.strftime("%Y%m%d%H%M%S").astype("int64").astype(kind)))
+    assert times.tolist() == (1666828770 + np.arange(90)).tolist()
 
 
 TWICE = {

@@ -35,6 +35,7 @@ from shipid.logs.readers import (
     TextFormat,
     dated,
     hour_twice,
+    in_one_number,
     moment_of,
     parse_text,
     read_table,
@@ -500,8 +501,7 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
     rounded = [name for name in called or unnamed if name in finite and name not in rising]
     for name in [*candidates[:1], *rounded] if candidates and candidates[0] in called else [*rounded, *candidates[:1]]:
-        unit = _unit_of_clock(name, finite[name])
-        t = clock_seconds(finite[name], unit)
+        unit, t = _read_clock(table, name, finite[name], file)
         rises = bool(np.all(np.diff(t) > 0))  # after midnight, too
         rate = _rate(t) if not rises or _is_coarse(t) else None
         if rate is not None:
@@ -509,8 +509,8 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         if rises:
             return {"from": name, "unit": unit}, t
     if rising:
-        unit = _unit_of_clock(rising[0], finite[rising[0]])
-        return {"from": rising[0], "unit": unit}, clock_seconds(finite[rising[0]], unit)
+        unit, t = _read_clock(table, rising[0], finite[rising[0]], file)
+        return {"from": rising[0], "unit": unit}, t
     first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
     fault = f"{called[0]!r} {_unread(table, called[0], first) or _fault(first)}" if called else "none rises"
     fault = fault if called else "none rises from row to row"
@@ -541,6 +541,17 @@ def _looks_dated(column: pd.Series[Any]) -> bool:
     texts = column.dropna().astype(str).head(20)
     dated = texts.str.fullmatch(rf"{TIME_OF_DAY}|\d{{4}}-\d\d-\d\d[T ].*|(?:{DAY_OF}),? .*")
     return bool(len(texts) and dated.all())
+
+
+def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tuple[str, Array]:
+    """Return the unit of a clock of numbers, and its times [s]."""
+    if in_one_number(values):
+        return "date", seconds(_called(table, name))
+    if values.min() > 1e9 and _is_time_of_day(values % 1e6):
+        message = f"{name!r} is a date and a time of day in one number, {values[0]:.15g}: write 2024-05-14 08:00:00"
+        raise DataError(f"no column can be the clock: {message}", file=file)
+    unit = _unit_of_clock(name, values)
+    return unit, clock_seconds(values, unit)
 
 
 def _unit_of_clock(name: str, values: Array) -> str:

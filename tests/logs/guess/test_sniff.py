@@ -111,6 +111,31 @@ def test_the_unit_of_the_clock(clock: object, unit: str, t: np.ndarray, tmp_path
     np.testing.assert_allclose(sniffed.t, t, atol=1e-6)
 
 
+@pytest.mark.parametrize("step", [0.2, 1.0, 10.0])
+@pytest.mark.parametrize("stored", ["csv", "parquet"])
+def test_a_date_and_a_time_in_one_number_are_no_seconds(step: float, stored: str, tmp_path: Path) -> None:
+    """Before, every minute had a hole of 41 s."""
+    t = step * np.arange(900)
+    moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(t, "s")
+    numbers = moments.strftime("%Y%m%d%H%M%S.%f").str[:-4]
+    log = pd.DataFrame({"time": numbers, "N": t, "psi": t})
+    if stored == "csv":
+        log.to_csv(tmp_path / "log", index=False)
+    else:
+        log.assign(time=numbers.astype(float)).to_parquet(tmp_path / "log")
+    sniffed = sniff(tmp_path / "log")
+    assert sniffed.clock == {"from": "time", "unit": "date"}
+    np.testing.assert_allclose(sniffed.t, t + pd.Timestamp("2024-05-14 08:13:20").timestamp(), atol=5e-3)
+
+
+def test_a_date_without_a_century_in_one_number_is_refused(tmp_path: Path) -> None:
+    moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(np.arange(200), "s")
+    log = pd.DataFrame({"time": moments.strftime("%d%m%y%H%M%S"), "N": 1.0, "psi": 2.0})
+    log.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match="'time' is a date and a time of day in one number, 140524081320: write 2024"):
+        sniff(tmp_path / "log.csv")
+
+
 @pytest.mark.parametrize("name", ["utc", "time", "t"])
 @pytest.mark.parametrize("step", [0.2, 1.0, 10.0])
 def test_hours_minutes_and_seconds_in_one_number_are_no_seconds(name: str, step: float, tmp_path: Path) -> None:
