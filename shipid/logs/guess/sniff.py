@@ -49,6 +49,7 @@ Rows = NDArray[np.bool_]
 SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looked at in its head and that many blocks
 LONG = 1e4  # rows between two runs that have a clock each
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
+MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a comment
 SENTINELS = tuple(sign * value for value in (99.0, 999.0, 9999.0, 99999.0, 999999.0, 999.9, 9999.9) for sign in (-1, 1))
 LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
 REPEATED = 0.05  # share of the rows that may repeat the row before, at most
@@ -261,9 +262,14 @@ def _text_format(
     form: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
     if names:
         return form | {"skip_rows": data, "names": list(names)}
+    words = {i: line.split() for i, line in enumerate(lines[:data])}
+    marked = [i for i, some in words.items() if some and some[0] in MARKS]  # a header as a comment, as NumPy writes it
+    for i in marked:
+        blanks = len(words[i]) == width + 1 and rows[i][0] not in MARKS  # between names, and not between numbers
+        rows[i] = words[i][1:] if blanks else rows[i][rows[i][0] in MARKS :]
     above = [i for i in range(data - 1, -1, -1) if any(rows[i])][:2]
     if above and separator == "whitespace" and len(rows[above[0]]) > width:
-        joined = cells(re.sub(r"\s+(?=[\[(])", "", lines[above[0]]), separator)
+        joined = cells(re.sub(r"\s+(?=[\[(])", "", lines[above[0]]), separator)[above[0] in marked :]
         if len(joined) == width:  # blanks before units
             return form | {"skip_rows": data, "names": _distinct(joined)}
     heads = [i for i in above if width - 1 <= len(rows[i]) <= width]
@@ -281,6 +287,8 @@ def _text_format(
         while joined and not joined[-1]:
             joined.pop()
         return form | {"skip_rows": data, "names": _distinct(joined)}
+    if heads and heads[0] == above[0] and heads[0] in marked and rows[heads[0]] != cells(lines[heads[0]], separator):
+        return form | {"skip_rows": data, "names": _distinct([*rows[heads[0]], ""][:width])}
     if heads and heads[0] == above[0]:
         return form | {"skip_rows": heads[0]}
     return form | {"skip_rows": data, "header": False}

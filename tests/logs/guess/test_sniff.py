@@ -38,6 +38,23 @@ def text(
             "s,m,deg\n".join(text().split("\n", 1)).replace("psis", "psi\ns"),
             {"skip_rows": 2, "names": ["time [s]", "N [m]", "psi [deg]"]},
         ),
+        (
+            text(" ", above="# by numpy.savetxt\n# time N psi\n", header=False),
+            {"separator": "whitespace", "skip_rows": 2, "names": ["time", "N", "psi"]},
+        ),
+        (
+            text("\t", above="%\ttime\tN\tpsi\n%\ts\tm\tdeg\n", header=False),
+            {"skip_rows": 2, "names": ["time [s]", "N [m]", "psi [deg]"]},
+        ),
+        (
+            text("\t", above="% time N psi\n% s m deg\n", header=False),
+            {"skip_rows": 2, "names": ["time [s]", "N [m]", "psi [deg]"]},
+        ),
+        (text(above="# time,N,psi\n", header=False), {"skip_rows": 0}),
+        (
+            text(" ", above="# time [s] N [m] psi [deg]\n", header=False),
+            {"skip_rows": 1, "names": ["time[s]", "N[m]", "psi[deg]"]},
+        ),
     ],
 )
 def test_a_text_log_is_recognised(content: str, form: dict[str, object], tmp_path: Path) -> None:
