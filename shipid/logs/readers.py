@@ -43,6 +43,8 @@ DAY_OF = (
 """A date without a time."""
 ORDINAL = r"^(\d{4})[-:/ ](\d{3})[-:/ T](\d\d:\d\d:\d\d(?:\.\d+)?)Z?$"
 """A date with the day of the year: 2024-135 08:00:00, 2024:135:08:00:00.5."""
+UTC_BEHIND = r"\s+(?:UTC|GMT)$"
+"""The end of a date that says in letters that it has no other zone."""
 COMPACT = r"^(\d{8})[-_ ]?(\d{6})(?:\.?(\d{1,9}))?$"
 """A date and a time of day in one number, or nearly: 20240514080000, 20240514080000.5, 20240514_080000."""
 ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
@@ -190,6 +192,9 @@ def seconds(dates: pd.Series[Any]) -> Array:
         texts = dates.dropna().astype(str).str.strip()
         if texts.str.contains(",", regex=False).any():
             texts = texts.str.replace(r",\s+", " ", regex=True).str.replace(",", ".")
+        if len(texts) and texts.str.contains(UTC_BEHIND).all():
+            texts = texts.str.replace(UTC_BEHIND, "", regex=True)
+            dates = texts.reindex(dates.index)
         if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
             return _since_midnight(dates)
         ordinal = texts.str.extract(ORDINAL)

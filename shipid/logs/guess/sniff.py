@@ -520,6 +520,8 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         unit, t = _read_clock(table, rising[0], finite[rising[0]], file)
         return {"from": rising[0], "unit": unit}, t
     first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
+    if called and called[0] in finite:
+        first = clock_seconds(first, _unit_of_clock(called[0], first))
     fault = f"{called[0]!r} {_unread(table, called[0], first) or _fault(first)}" if called else "none rises"
     fault = fault if called else "none rises from row to row"
     raise DataError(f"no column can be the clock: {fault}", file=file)
@@ -672,15 +674,22 @@ def _counts(values: Array) -> bool:
 
 
 def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
-    """Say which text in a clock is no time; empty where a cell is empty, or where none is a time."""
-    if not np.isfinite(values).any() or np.isfinite(values).all():
+    """Say which text in a clock is no time; empty where a cell is empty."""
+    wrong = ~np.isfinite(values)
+    if not wrong.any():
         return ""
-    row = int(np.argmax(~np.isfinite(values)))
+    row = int(np.argmax(wrong))
     text = str(_called(table, name).iloc[row]).strip()
     if _NOTHING.fullmatch(text.lower()):
         return ""
+    begin = f"holds {text[:40]!r} in row {row + 1}"
+    if re.fullmatch(r"\d{1,3}([,.' \u00a0]\d{3})+([.,]\d*)?", text):
+        return f"{begin}: take the mark of thousands out of the log"
+    if wrong.all():
+        return f"{begin}, no number, date or time of day that can be read: write dates as 2024-05-14 08:00:00"
     what = "a leap second" if re.search(r":60(\D|$)", text) else "a comment" if text[:1] in "#%/;" else "no time"
-    return f"holds {text[:40]!r} in row {row + 1}, {what}: remove the line"
+    lines = "the line" if wrong.sum() == 1 else f"the {wrong.sum()} such lines"
+    return f"{begin}, {what}: remove {lines}"
 
 
 def _fault(values: Array) -> str:

@@ -484,6 +484,25 @@ def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -
     assert words in caught.value.message
 
 
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        (
+            [f"14/05/2024 08.{k // 60:02}.{k % 60:02}" for k in range(90)],
+            "holds '14/05/2024 08.00.00' in row 1, no number",
+        ),
+        ([f'"{k:,.1f}"' for k in range(980, 1070)], "'1,000.0' in row 21: take the mark of thousands out of the log"),
+        ([str(k) if k % 9 != 8 else "late" for k in range(90)], "'late' in row 9, no time: remove the 10 such lines"),
+        ([str((k + 604_755) % 604_800 * 1000) for k in range(90)], "goes back from 604799 s to 0 s in row 46"),
+    ],
+)
+def test_a_clock_that_cannot_be_read_says_its_text(times: list[str], words: str, tmp_path: Path) -> None:
+    lines = ["GPS time [ms],north,heading", *(f"{time},{200 - k},{k % 7}" for k, time in enumerate(times))]
+    with pytest.raises(DataError, match="no column can be the clock: 'GPS time") as caught:
+        sniff(log_of(tmp_path, lines))
+    assert words in caught.value.message
+
+
 def test_the_header_again_and_lines_of_words_are_left_out(tmp_path: Path) -> None:
     lines = ["time,north,heading", *(f"{k},{2 * k},0.1" for k in range(60))]
     file = log_of(tmp_path, [*lines[:20], "# zigzag", *lines[20:40], lines[0], *lines[40:]])
