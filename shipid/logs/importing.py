@@ -327,8 +327,9 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
         for name, (times, values) in channels.items():  # afterwards the jump is not seen: it is between two instants
             if mapping.columns[name].interpolation != "angle":
                 _check_wraps(times, values, name, mapping.columns[name], gap, file)
-        t = _common_clock(channels, t, mapping.clock.step, file)
         how = {name: _interpolation(name, column) for name, column in mapping.columns.items()}
+        held = {name for name in channels if how[name] == "previous"}
+        t = _common_clock(channels, held, t, mapping.clock.step, file)
         columns = {name: _brought(t, *channels[name], how[name], gap) for name in channels}
         notes = [(name, f"{how[name]}, latency {column.latency:g} s") for name, column in mapping.columns.items()]
         records += [{"kind": "resampled", "column": name, "count": len(t), "note": note} for name, note in notes]
@@ -512,9 +513,12 @@ def rounding_of(t: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _common_clock(
-    channels: dict[str, Channel], t: NDArray[np.float64], step: float | None, file: Path
+    channels: dict[str, Channel], held: set[str], t: NDArray[np.float64], step: float | None, file: Path
 ) -> NDArray[np.float64]:
-    """Return the instants [s] that every channel covers: `step` [s] apart, or the instants of the log."""
+    """Return the instants [s] that every channel covers: `step` [s] apart, or the instants of the log.
+
+    Those in `held` hold their last value to the last row, whether it has a value or not.
+    """
     spans = {name: times[np.isfinite(values)] for name, (times, values) in channels.items()}
     empty = [name for name, times in spans.items() if not len(times)]
     if empty:
@@ -523,6 +527,7 @@ def _common_clock(
             file=file,
             path=f"columns.{empty[0]}.from",
         )
+    spans |= {name: np.append(spans[name], channels[name][0][-1]) for name in held}
     first, last = max(times[0] for times in spans.values()), min(times[-1] for times in spans.values())
     slack = clock_slack(t)
     if step is not None:
@@ -772,7 +777,13 @@ def _close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[
         records.append({"kind": "interpolated", "column": name, "count": int(short.sum()), "note": note})
     kept = t[~removed] if removed.any() else t
     if len(kept) < 2:
-        raise DataError("every row has a gap longer than max_gap", file=file, path="clock.max_gap")
+        long = {
+            name: int((values.isna() & removed).sum()) for name, values in rows.drop(columns=["t", "flags"]).items()
+        }
+        worst = str(max(long, key=long.__getitem__))
+        message = f"every row has a gap longer than max_gap, {long[worst]} rows of {worst!r} for one"
+        message += ": orders written only where they change are held with [clock] step" * is_command(worst)
+        raise DataError(message, file=file, path="clock.max_gap")
     if longest < np.median(np.diff(t)):
         message = f"{max_gap:g} s is shorter than the step of the log, {np.median(np.diff(t)):g} s"
         raise DataError(message, file=file, path="clock.max_gap")

@@ -18,8 +18,10 @@ from shipid.logs.guess.columns import Guess
 from shipid.logs.importing import import_log, sha256_of
 from shipid.logs.mapping import Mapping, Segment, degrees_of, is_date, is_dated, read_mapping, to_si
 from shipid.logs.readers import LARGE, date_of
+from shipid.physics.signals import is_command
 
 NOT_YET = "# Cannot be imported as it is: "
+SPARSE = 0.5  # of the rows, without a value of an order: it is written where it changes
 ENABLED = 0.8  # a repair less sure than this is drafted switched off
 ORDER = ("wrap_interpolation", "break", "despike", "latency", "scale", "heading_offset", "lever_arm")
 NOISE = {"position": 1.0, "heading_deg": 0.5, "acceleration": 0.05, "angular_acceleration_deg": 0.2}
@@ -133,10 +135,20 @@ def _head(guess: Guess) -> Iterator[str]:
     first = guess.columns[0].source
     steps = np.diff(guess.sniffed.t[np.isfinite(guess.sniffed.columns[first])] if scattered else guess.sniffed.t)
     usual = float(np.median(steps))
+    longest = max(3.0, 5 * usual)
+    sparse = [column.source for column in guess.columns if is_command(column.name) and _sparse(guess, column, longest)]
+    if sparse and not scattered:
+        yield f"step = {usual:g}    # s: {', '.join(map(repr, sparse))} has values where it changes: held in between"
     if scattered:
         yield f"step = {usual:g}    # s: each kind of sentence has other instants; this is the step of the position"
     if scattered or guess.kinds & {"holes in time", "missing values"}:
-        yield f"max_gap = {max(3.0, 5 * usual):g}    # s: missing for less: interpolated, for more: the run breaks"
+        yield f"max_gap = {longest:g}    # s: missing for less: interpolated, for more: the run breaks"
+
+
+def _sparse(guess: Guess, column: Suggestion, longest: float) -> bool:
+    """Whether an order is written only where it changes: it lacks most values, some for longer than `longest` [s]."""
+    known = np.isfinite(guess.sniffed.columns[column.source])
+    return bool(known.mean() < 1.0 - SPARSE and np.diff(guess.sniffed.t[known]).max(initial=0.0) > longest)
 
 
 def _origin(guess: Guess) -> Iterator[str]:

@@ -49,6 +49,24 @@ def test_the_draft_mends_what_was_broken(tmp_path: Path) -> None:
     assert np.corrcoef(dataset.frame["rudder.delta"], dataset.frame["r"])[0, 1] > 0.8
 
 
+def test_orders_that_are_written_where_they_change_are_held(tmp_path: Path) -> None:
+    """Before, the draft could not be imported: every row had a gap longer than max_gap."""
+    log = as_bridge(si_log()).round({"rudder": 1, "rpm": 0})
+    written = log.assign(**{name: log[name].where(log[name].diff() != 0) for name in ("rudder", "rpm")})
+    written.to_csv(tmp_path / "log.csv", index=False)
+    text = draft_mapping(guess(tmp_path / "log.csv"), manoeuvres=False)
+    (tmp_path / "draft.toml").write_text(text)
+    frame = import_log(read_mapping(tmp_path / "draft.toml"), tmp_path / "log.csv").frame
+    assert len(frame) == len(log)
+    np.testing.assert_allclose(np.degrees(frame["rudder.delta"]), log["rudder"], atol=1e-9)
+    np.testing.assert_allclose(60 * frame["propeller.n"], log["rpm"], atol=1e-9)
+    written.assign(rpm=written["rpm"][:1]).to_csv(tmp_path / "log.csv", index=False)
+    lines = [line for line in text.split("\n") if not line.startswith(("step", "sha256"))]
+    (tmp_path / "other.toml").write_text("\n".join(lines))
+    with pytest.raises(DataError, match=r"rows of 'propeller\.n' for one: orders .* are held with \[clock\] step"):
+        import_log(read_mapping(tmp_path / "other.toml"), tmp_path / "log.csv")
+
+
 def test_segments_are_the_schedule(tmp_path: Path) -> None:
     """Turnings and the zigzag begin with their first order, less the lead, and end with their last."""
     as_bridge(si_log()).to_csv(tmp_path / "trial.csv", index=False)
