@@ -36,7 +36,7 @@ UNIT_WORDS = {
     "cm": r"cm|centimet(er|re)s?",
     "mm": r"mm|millimet(er|re)s?",
     "ft": r"ft|feet|foot",
-    "nmi": r"nmi|nautical miles?",
+    "nmi": r"nmi|nm|nautical miles?",
     "N": r"n|newtons?",
     "kN": r"kn|kilo ?newtons?",
     "N m": r"n[ .*·]?m|newton ?met(er|re)s?",
@@ -167,7 +167,7 @@ class State:
     spikes : column -> rows that leave it and come back at once, and the least by how much; `columns` have none of them.
     scaled : column -> factor by which `columns` has it already, and why. units : column -> unit of the log, where
     `columns` has it in another. sides : letters, N, S, E or W, that columns beside positions hold. negated : columns
-    whose sign `columns` has turned.
+    whose sign `columns` has turned. words : columns that hold words, with their first.
     commands : names of those of the vessel that the log is of, where it is known.
     turning : column that steers -> sign with which a positive value turns the ship to starboard, where that is seen.
     position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
@@ -184,6 +184,7 @@ class State:
     units: dict[str, str] = field(default_factory=dict)
     sides: frozenset[str] = frozenset()
     negated: set[str] = field(default_factory=set)
+    words: dict[str, str] = field(default_factory=dict)
     taken: set[str] = field(default_factory=set)
     suggestions: list[Suggestion] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)

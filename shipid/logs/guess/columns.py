@@ -95,7 +95,7 @@ def guess(
     spiky = take_spikes(sniffed.t, columns)
     joined = len(source.files) > 1 or bool(sniffed.runs)
     state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), joined, spiky)
-    state.sides = sniffed.sides
+    state.sides, state.words = sniffed.sides, sniffed.words
     state.commands = () if vessel is None else dynamics(vessel).commands
     numbering = tuple(
         name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])

@@ -161,6 +161,7 @@ def _origin(guess: Guess) -> Iterator[str]:
         for column, values in zip(columns, places, strict=True):
             first = values[known][:1]
             first = degrees_of(first) if column.unit == "ddmm" else first * column.extra.get("factor", 1.0)
+            first = np.degrees(first) if column.unit == "rad" else first
             yield from _lines({column.name: round(column.extra.get("sign", 1) * float(first[0]), 7)})
 
 

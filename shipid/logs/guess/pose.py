@@ -81,7 +81,12 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
             best = wide
     if best is None or (best.misfit > POOR and (not pairs or not headings)):
         missing = "position (north and east, or latitude and longitude)" if not pairs else "heading"
-        raise DataError(f"no column can be the {missing}: name the columns with --names, or map by hand", file=file)
+        asked = ("latitude", "longitude", "north", "east", "x", "y") if not pairs else ("psi",)
+        name = next((name for name in state.words if any(fits(name).get(one, 0.0) > 0.9 for one in asked)), None)
+        remedy = "name the columns with --names, or map by hand"
+        if name is not None:
+            remedy = f"{name!r} holds {state.words[name][:40]!r}, no number: write it as a number with a sign"
+        raise DataError(f"no column can be the {missing}: {remedy}", file=file)
     if best.misfit > POOR and not state.numbered:
         state.ask(
             ("psi", "north", "east"),

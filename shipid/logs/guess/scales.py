@@ -11,9 +11,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from shipid.data.dataset import Array
-from shipid.logs.guess.clues import State
+from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.words import fits, units_in
 from shipid.logs.mapping import degrees_of
+from shipid.units import DEGREE
 
 TURNS = {400.0: "gon", 3600.0: "tenths of a degree", 36000.0: "hundredths of a degree", 6400.0: "mils"}
 """A whole turn in other numbers -> what they are."""
@@ -38,6 +39,11 @@ def take_scales(state: State) -> None:
                 _scale(state, name, 360.0 / turn, f"a whole turn is {turn:g}: {TURNS[turn]}")
     pairs = [(a, b) for a in state.called("latitude") for b in state.called("longitude")]
     for north, east in pairs[:1]:
+        if {unit_in_name(name, "rad") for name in (north, east)} == {"rad"}:
+            for name in (north, east):
+                _scale(state, name, 1.0 / DEGREE, "")
+                state.scaled.pop(name)  # the unit says it
+                state.units[name] = "rad"
         both = np.abs(state.columns[north]), np.abs(state.columns[east])
         if both[0].max() <= 90 and both[1].max() <= 360:
             _take_sides(state, north, east)

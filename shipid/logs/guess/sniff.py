@@ -96,7 +96,7 @@ class Sniffed:
     `form` holds the keys of [format] and `clock` those of [clock]; `t` [s] rises; `notes` are sentences on columns
     that were left out. `seams` counts the places where rows of a large log were not read, or runs begin. `runs` has the
     column that says the run, and the number of runs, where the clock begins again with each; `t` goes on then. `sides`
-    are the letters, N, S, E or W, that columns beside positions hold.
+    are the letters, N, S, E or W, that columns beside positions hold. `words` are columns of words, with their first.
     """
 
     form: dict[str, Any]
@@ -107,6 +107,7 @@ class Sniffed:
     seams: int = 0
     runs: dict[str, int] = field(default_factory=dict)
     sides: frozenset[str] = frozenset()
+    words: dict[str, str] = field(default_factory=dict)
 
     @property
     def scattered(self) -> bool:
@@ -174,7 +175,10 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         notes += ("rows that repeat the row before are left out",)
     kept = {name: values for name, values in kept.items() if name not in runs}
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
-    return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words))
+    first = {
+        name: next((text for text in _called(table, name).dropna().astype(str) if text.strip()), "") for name in words
+    }
+    return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), first)
 
 
 def _sample(file: Path, encoding: str, size: int) -> str:

@@ -52,6 +52,7 @@ def test_named_columns_in_degrees_or_radians() -> None:
         (("x_ft", "y_ft"), "ft", 0.3048),
         (("Northing km", "Easting km"), "km", 1000.0),
         (("north_mm", "east_mm"), "mm", 0.001),
+        (("North [NM]", "East [NM]"), "nmi", 1852.0),
         (("North [m]", "East [m]"), "m", 1.0),
         (("North [ft]", "East"), "m", 1.0),
     ],

@@ -78,6 +78,24 @@ def test_a_unit_in_the_name_decides_where_a_heading_never_jumps(tmp_path: Path) 
     assert turned(dataset).max() < np.radians(0.3)
 
 
+def test_a_position_in_radians_is_read_as_its_name_says(tmp_path: Path) -> None:
+    """Before, it was drafted in degrees."""
+    frame = on_globe(LAT, LON).drop(columns=["lat", "lon"])
+    frame["Latitude [rad]"], frame["Longitude [rad]"] = np.radians(LAT).round(9), np.radians(LON).round(9)
+    proposal, dataset = drafted(frame, tmp_path)
+    assert proposal.kinds == set()
+    run = dataset.frame
+    for name in ("north", "east"):
+        np.testing.assert_allclose(run[name] - run[name][0], LOG[name] - LOG[name][0], atol=1.0, err_msg=name)
+
+
+@pytest.mark.parametrize("text", ["63°26.4'N", "63.44 N"])
+def test_a_position_of_words_is_named_with_its_text(text: str, tmp_path: Path) -> None:
+    frame = on_globe(LAT, LON).assign(lat=text, lon=text.replace("N", "E"))
+    with pytest.raises(DataError, match=r"no column can be the position.*: 'lat' holds .*63.*N.*, no number"):
+        drafted(frame, tmp_path)
+
+
 @pytest.mark.parametrize("how", ["1e-7", "ddmm"])
 def test_positions_of_receivers_are_degrees(how: str, tmp_path: Path) -> None:
     if how == "1e-7":
