@@ -175,10 +175,9 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         notes += ("rows that repeat the row before are left out",)
     kept = {name: values for name, values in kept.items() if name not in runs}
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
-    first = {
-        name: next((text for text in _called(table, name).dropna().astype(str) if text.strip()), "") for name in words
-    }
-    return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), first)
+    texts = {name: _called(table, name).dropna().astype(str).str.strip() for name in words}
+    says = {name: next(filter(None, column), "") for name, column in texts.items()}
+    return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), says)
 
 
 def _sample(file: Path, encoding: str, size: int) -> str:
