@@ -241,10 +241,11 @@ def _text_format(
 ) -> dict[str, Any]:
     """Return the separator and decimal sign that give most numbers in lines of equal length; the header is above."""
     best: tuple[float, str, str] = (0.0, "", "")
+    quoted = any('"' in line for line in lines)  # between quotes a decimal comma separates nothing
     for separator in separators:
         rows = [cells(line, separator) for line in lines if line.strip()]
         width, count = Counter(len(row) for row in rows).most_common(1)[0]
-        for decimal in (".", ",") if separator != "," else (".",):
+        for decimal in (".", ",") if separator != "," or quoted else (".",):
             share = float(np.mean([_number_share(row, decimal) for row in rows if len(row) == width]))
             score = share * count / len(rows) * (width > 1) * (1 + width / 1000)
             score *= 0.97 if separator == "whitespace" else 1.0  # names may have blanks

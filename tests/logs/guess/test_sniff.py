@@ -33,6 +33,10 @@ def text(
         (text(";"), {"separator": ";", "decimal": "."}),
         (text(";", ","), {"separator": ";", "decimal": ","}),
         (text("\t"), {"separator": "\t"}),
+        (
+            "\n".join(",".join(f'"{cell}"' for cell in line.split(";")) for line in text(";", ",").splitlines()),
+            {"separator": ",", "decimal": ","},
+        ),
         (text(above="Trial of the ship\nof last May\n"), {"separator": ",", "skip_rows": 2}),
         (
             "s,m,deg\n".join(text().split("\n", 1)).replace("psis", "psi\ns"),
