@@ -52,8 +52,8 @@ def verdicts(frame: pd.DataFrame) -> list[str]:
 
 
 def _verdict(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
-    """The best method at an amount of data; only the first says over what."""
-    whole = mine[mine.failed.eq(0)].sort_values("H", kind="stable")
+    """The best method at an amount of data, of those that have every cell; only the first says over what."""
+    whole = mine[mine.missing.eq(0)].sort_values("H", kind="stable")
     if whole.empty:
         return f"with N_D = {N_D} no method has a result in every cell with physics"
     best = whole.iloc[0]
@@ -62,7 +62,9 @@ def _verdict(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
     if best.method != best.reference and math.isfinite(best.low):
         text += f" (its difference to {best.reference} is {_bracket(best.difference, best.low, best.high)})"
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in mine[mine.failed.gt(0)].itertuples()]
-    return text + (f", without a result: {listed(failed)}" if failed else "")
+    text += f", without a result: {listed(failed)}" if failed else ""
+    partly = [str(row.method) for row in mine[mine.missing.gt(mine.failed)].itertuples()]
+    return text + (f", not on every model: {listed(partly)}" if partly else "")
 
 
 def _bracket(value: float, low: float, high: float) -> str:

@@ -19,7 +19,7 @@ EVERY = "with physics"  # all families but pure data-driven
 CONFIDENCE = 0.95
 LEAST = 3  # worlds from which an interval over worlds is given
 COLUMNS = [
-    *("condition", "family", "N_D", "method", "cells", "failed"),
+    *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
     *("H", "H_low", "H_high", "H_90", "end", "seconds", "trials"),
     *("reference", "pairs", "difference", "low", "high", "runs", "better"),
     *("worlds", "least", "greatest", "world_low", "world_high"),
@@ -71,22 +71,26 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     """Compare methods by condition, family and N_D; cells as of `method_cells`, of one or several worlds.
 
     H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
-    the others. `H_low`, `H_high`: 95 % interval of H over test runs, without what another training would give; not a
-    number with fewer than five. `difference` is H less that of the method `reference` over the `pairs` of cells in
-    which both have one, every cell with the same weight, with a 95 % interval `low`, `high` as of `contrasts`, over
-    test runs: all windows and cells of a run, in its world, are drawn together. `better` counts test runs with a lower
-    error. `least`, `greatest`: the difference by world; `world_low`, `world_high`: Student's 95 % interval over worlds,
-    from three on. The family `with physics` is all of them but `none`.
+    the others, and `missing` also the cells of other methods that this one does not have, since it does not run on
+    their model: means of methods are over the same cells where both have 0. `H_low`, `H_high`: 95 % interval of H over
+    test runs, without what another training would give; not a number with fewer than five. `difference` is H less that
+    of the method `reference` over the `pairs` of cells in which both have one, every cell with the same weight, with a
+    95 % interval `low`, `high` as of `contrasts`, over test runs: all windows and cells of a run, in its world, are
+    drawn together. `better` counts test runs with a lower error. `least`, `greatest`: the difference by world;
+    `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. The family `with physics` is all of
+    them but `none`.
     """
     frames = [cells, cells[cells["family"] != NO_MODEL].assign(family=EVERY)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
     rows = []
     for (condition, family, N_D), group in every.groupby(["condition", "family", "N_D"], sort=False):
         theirs = _by_key(group[group["method"] == reference])
+        every_cell = len(group.drop_duplicates(["world", "foundation", "seed"]))
         for method, mine in group.groupby("method", sort=False):
             good = mine[mine["status"] == "ok"]
             row: dict[str, Any] = {"condition": condition, "family": family, "N_D": N_D, "method": method}
-            row |= {"cells": len(mine), "failed": len(mine) - len(good), "reference": reference}
+            row |= {"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)}
+            row["reference"] = reference
             row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
             row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
             errors = _by_key(mine)

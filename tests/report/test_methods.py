@@ -25,7 +25,7 @@ def frame(seed: int, conditions: tuple[str, ...] = ("calm", "rough"), failing: b
                     difference = 0.0 if method == "a" else H - 3
                     failed = {"c": 1 if failing else 0, "lost": 4}.get(method, 0)
                     rows.append(
-                        dict(zip(COLUMNS, [condition, family, N_D, method, 4, failed, H, 0.9 * H, 1.2 * H,
+                        dict(zip(COLUMNS, [condition, family, N_D, method, 4, failed, failed, H, 0.9 * H, 1.2 * H,
                                  2 * H, 1.7 * H, 2.0, 8.0, "a",
                              4 - failed, difference, difference - 0.5, difference + 0.4, 9, 5, 2, difference - 0.1,
                              difference + 0.1, np.nan, np.nan], strict=True))
@@ -47,6 +47,15 @@ def test_the_sentences_name_the_least_error_among_methods_that_never_failed() ->
             mine = rows[rows.condition.eq(condition) & rows.family.eq(EVERY) & rows.N_D.eq(N_D) & rows.failed.eq(0)]
             assert f"with N_D = {N_D} {mine.loc[mine.H.idxmin()].method} errs least" in sentence
         assert sentence.count("c (1 of 4) and lost (4 of 4)") == 2
+
+
+def test_a_method_that_does_not_run_on_every_model_is_not_the_best() -> None:
+    """Its mean is over other cells: on the best model alone any method errs little."""
+    rows = frame(1, ("",), failing=False)
+    rows.loc[rows.method.eq("b"), ["cells", "missing", "H"]] = [1, 3, 0.01]
+    (sentence,) = verdicts(rows)
+    assert "b errs least" not in sentence
+    assert sentence.count(", not on every model: b") == 2
 
 
 @pytest.mark.parametrize("conditions", [("",), ("calm", "rough")])

@@ -107,6 +107,9 @@ def test_a_failed_cell_is_counted_and_not_averaged() -> None:
     assert (one.failed, one.cells, one.pairs) == (1, 4, 3)
     assert np.isfinite([one.H, one.difference, one.low, one.high]).all()
     assert row(compared(made, "drawn"), "drawn").failed == 0
+    assert (one.missing, row(compared(made, "drawn"), "drawn").missing) == (1, 0)
+    apart = row(compared(made.drop(worst), "drawn"))
+    assert (apart.failed, apart.cells, apart.missing) == (0, 3, 1), "the method does not run on this model"
     every = made.assign(status=np.where(made.method.eq("other"), "failed", made.status))
     lost = row(compared(every, "drawn"))
     assert lost.failed == lost.cells
