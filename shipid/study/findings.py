@@ -5,7 +5,8 @@ S1-S7 are: "shown" means a 95 % interval free of 0.
 
 R1 : both models have H below A.
 R2 : H of the inaccurate model is less than 10 % above A of the accurate one.
-R3 : the models differ less in H than in A: both A gap - H gap and A gap + H gap, with their signs, are above 0.
+R3 : the models differ less in H than in A: both A gap - H gap and A gap + H gap are above 0, where a gap is the error
+    of the model with the larger A less that of the other.
 R4 : at every step ahead pure data-driven has a larger error than every other predictor, physics alone included; refuted
     if one of them is worse over the whole horizon.
 """
@@ -91,9 +92,10 @@ def judged(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs
     table, good, bad = rivals.table, rivals.good, rivals.bad
     place = len(table.amounts) - 1
     gains = table.compare([[(1.0, model, ALONE), (-1.0, model, place)] for model in (good, bad)])
-    gap = [(1.0, bad, ALONE), (-1.0, good, ALONE)]
+    less, more = sorted((good, bad), key=lambda model: table.mean(model, ALONE))  # the roles say nothing of the test
+    gap = [(1.0, more, ALONE), (-1.0, less, ALONE)]
     about = table.compare([[(1 + ABOUT, good, ALONE), (-1.0, bad, place)], [(1.0, good, ALONE), (-1.0, bad, place)]])
-    gaps = table.compare([[*gap, (sign, bad, place), (-sign, good, place)] for sign in (-1.0, 1.0)])
+    gaps = table.compare([[*gap, (sign, more, place), (-sign, less, place)] for sign in (-1.0, 1.0)])
     before, after = (abs(table.mean(bad, at) - table.mean(good, at)) for at in (ALONE, place))
     narrower = gaps.mean[0] < gaps.mean[1]  # the one that counts: the gap of H has the sign of that of A, or not
     share, worst, worst_of_all = _worst(rivals)

@@ -47,6 +47,15 @@ def test_refuted(made: Any, H: tuple[float, float, float], refuted: set[str]) ->
     assert {verdict for key, verdict in by_claim.items() if key not in refuted} == {"confirmed"}
 
 
+def test_a_gap_shrinks_whichever_model_has_the_larger_error(made: Any) -> None:
+    """The `accurate` model errs more in this test: 6 m and 2 m alone; 1.5 m and 1.4 m, 1 m and 5.5 m, compensated."""
+    alone = {"good": 6.0, "bad": 2.0}
+    shrunk = {one["id"]: one for one in findings(made(one(1.5, 1.4, 9.0), alone=alone, runs=RUNS))}["R3"]
+    assert shrunk["verdict"] == "confirmed"
+    assert shrunk["evidence"].startswith("gap 4.00 m before, 0.10 m after: 3.90 m [3.")
+    assert verdicts(made(one(1.0, 5.5, 9.0), alone=alone, runs=RUNS))["R3"] == "refuted"
+
+
 def test_what_another_training_could_turn_round_is_undecided(made: Any) -> None:
     """1 % below its physics in each of eight manoeuvres; networks differ by 3 % from training to training."""
     assert verdicts(made(one(1.98, 1.9, 9.0), runs=RUNS))["R1"] == "undecided"
