@@ -18,7 +18,7 @@ from shipid.study.error_table import ALONE, PLAIN, ErrorTable, error_table
 from shipid.study.evidence import Contrasts, contrasts
 from shipid.study.plan import NO_MODEL, Plan
 from shipid.study.results import Results, judged_cells, naive_summary
-from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, too_few
+from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, span, too_few
 from shipid.study.worth import FEWEST_MODELS, Estimate, break_even, runs_without_physics
 from shipid.units import plural
 
@@ -176,7 +176,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     known = known[known["A"] > 0]  # an exact model has no error that could be left
     if len(known):
         left = known["H"] / known["A"]
-        share = " to ".join(dict.fromkeys((f"{left.min():.0%}", f"{left.max():.0%}")))
+        share = span(f"{left.min():.0%}", f"{left.max():.0%}")
         text = (
             f"Compensation with {runs(largest)} leaves {share} of the error of physics "
             f"alone (over {len(known)} {plural(len(known), 'model')})."

@@ -15,7 +15,7 @@ from shipid.hybrid.bands import Region
 from shipid.predictor import NO_BAND
 from shipid.study.kinds import kinds_of
 from shipid.study.results import Results
-from shipid.study.verdict import metres
+from shipid.study.verdict import metres, span
 
 Array = np.ndarray
 SHOWN = (0.5, 0.8, 0.9, 0.95)
@@ -157,7 +157,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
         return [(f"No band is promised: {reasons[0].removeprefix(NO_BAND)}.", "cells")] if len(reasons) else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
     share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
-    radius = " to ".join(dict.fromkeys((metres(top["width"].min()), metres(top["width"].max()))))
+    radius = span(metres(top["width"].min()), metres(top["width"].max()))
     amount = int(top["N_D"].iloc[0])
     mean = f"mean of {len(top)} models with {amount} runs; 95 % interval of one" if len(top) > 1 else ""
     spread = f"{mean or f'with {amount} runs; 95 % interval'} {low:.0%} to {high:.0%}"

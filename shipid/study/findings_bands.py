@@ -32,6 +32,7 @@ from shipid.study.verdict import (
     measured,
     metres,
     some,
+    span,
     too_few,
     undecided,
     verdict,
@@ -79,7 +80,7 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     held = {name: [bands[cell][1] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
     shares = [float(np.mean(held[name])) for name in sound]
     first = narrower(Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals))
-    first["evidence"] += f"; these bands hold {min(shares):.0%} to {max(shares):.0%} of whole paths"
+    first["evidence"] += f"; these bands hold {span(f'{min(shares):.0%}', f'{max(shares):.0%}')} of whole paths"
     second = kept_promise(np.mean([one for ones in held.values() for one in ones], axis=0), run, level)
     note = too_few(table.runs)
     few = f"; {note}" if note else ""
@@ -111,7 +112,7 @@ def narrower(widths: Widths) -> Finding:
     ends = [f"{measured(slopes, k)} at N_D = {table.amounts[k]}" for k in sorted({0, last})]
     evidence = (
         f"for twice the A the mean radius rises by {' and by '.join(ends)}; rank correlation of width and A "
-        f"{min(rises):.2f} to {max(rises):.2f} over N_D ({len(A)} models)"
+        f"{span(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D ({len(A)} models)"
     )
     numbers = {"least rank correlation of width and A": min(rises)}
     numbers |= {f"rise for twice the A at N_D = {table.amounts[last]} [m]": float(slopes.mean[last])}

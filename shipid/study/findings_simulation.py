@@ -49,6 +49,7 @@ from shipid.study.verdict import (
     named,
     shown,
     some,
+    span,
     too_few,
     undecided,
     verdict,
@@ -227,8 +228,8 @@ def _S3(grid: Grid) -> Finding:
     rises = [rank_correlation(A, values) for values in H]
     evidence = (
         f"for twice the A, H rises by {measured(slopes, 0)} at N_D = {grid.amounts[0]} and by {measured(slopes, last)} "
-        f"at {grid.amounts[last]}, {measured(slopes, len(each))} less; rank correlation of H and A {min(rises):.2f} to "
-        f"{max(rises):.2f} over N_D ({len(A)} models)"
+        f"at {grid.amounts[last]}, {measured(slopes, len(each))} less; rank correlation of H and A "
+        f"{span(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D ({len(A)} models)"
     )
     numbers = {
         "least rank correlation of H and A": min(rises),

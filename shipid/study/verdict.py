@@ -79,6 +79,11 @@ def measured(differences: Contrasts, index: int) -> str:
     )
 
 
+def span(*numbers: str) -> str:
+    """Return `least to greatest`, or the one number that both are written as."""
+    return " to ".join(dict.fromkeys(numbers))
+
+
 def manoeuvres(count: int) -> str:
     """Return `1 test manoeuvre`, `20 test manoeuvres`, ..."""
     return f"{count} {plural(count, 'test manoeuvre')}"

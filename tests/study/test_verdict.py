@@ -13,6 +13,7 @@ from shipid.study.verdict import (
     runs,
     shown,
     some,
+    span,
     too_few,
     undecided,
     verdict,
@@ -56,6 +57,11 @@ def test_numbers_in_words() -> None:
     assert runs(1) == "1 run"
     assert too_few(1) == "1 test manoeuvre gives no interval, 5 would"
     assert too_few(5) == ""
+
+
+def test_a_range_of_one_number_is_that_number() -> None:
+    assert span(metres(0.5), metres(2.0)) == "0.50 m to 2.00 m"
+    assert span("85%", "85%") == "85%"
 
 
 def test_undecided_claims_keep_their_words_and_say_why() -> None:
