@@ -51,9 +51,14 @@ class Region:
         return radius
 
     def reach(self, errors: Array) -> Array:
-        """How far errors (T, S, 2) [m] from the predicted path reach, (T, S): 1 at the border of the region."""
+        """How far errors (T, S, 2) [m] from the predicted path reach, (T, S): 1 at the border of the region.
+
+        No error reaches 0, also in the region without extent of a predictor that never erred.
+        """
         along, across = turned(errors, self.ahead)
-        return lengths(np.stack([along / self.along, across / self.across], axis=-1))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            parts = np.stack([along / self.along, across / self.across], axis=-1)
+        return lengths(np.where(np.stack([along, across], axis=-1) == 0, 0.0, parts))
 
     def holds(self, errors: Array) -> NDArray[np.bool_]:
         """Whether the whole path, with errors (T, S, 2) [m], lies in its band, (S,)."""

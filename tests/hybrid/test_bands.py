@@ -114,6 +114,15 @@ def test_a_region_is_an_ellipse_along_the_track() -> None:
     assert region.scaled(2.001).holds(errors).all()
 
 
+def test_a_predictor_that_never_erred_has_a_band_of_its_path_alone() -> None:
+    nothing = np.zeros((2, 3))
+    region = Region(np.tile([1.0, 0.0], (2, 3, 1)), nothing, nothing)
+    errors = np.zeros((2, 3, 2))
+    errors[1, 2] = [0.0, 1e-3]
+    assert region.holds(errors).tolist() == [True, True, False]
+    assert region.reach(errors)[:, :2].max() == 0
+
+
 def test_tracks_are_unit_vectors_even_at_rest() -> None:
     paths = np.random.default_rng(0).normal(size=(HORIZON, 5, 2)).cumsum(axis=0)
     paths[:, 2] = 0.0

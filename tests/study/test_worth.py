@@ -74,6 +74,17 @@ def test_more_data_that_harm_take_nothing_back() -> None:
     assert worth.value == pytest.approx(20.0)
 
 
+def test_exact_physics_pays_and_no_data_replace_it() -> None:
+    exact = {"m0": 0.0, "m1": 1.0, "m2": 2.0, "m3": 3.0}
+    H = {name: (value, value / 2) for name, value in exact.items()}
+    errors = table(exact, {**H, "none": (9.0, 4.0)}, (10, 30))
+    limit = break_even(errors, list(exact), 0)
+    assert limit is not None
+    assert limit.above
+    assert runs_without_physics(errors, "m0", 0).above
+    assert runs_without_physics(table(exact, {**H, "none": (9.0, 0.0)}, (10, 30)), "m0", 0).value == 30
+
+
 def test_one_manoeuvre_has_no_interval() -> None:
     worth = runs_without_physics(table(A, {"m0": [2.0, 1.0], "none": [4.0, 1.0]}, (10, 40), runs=1), "m0", 0)
     assert np.isnan([worth.low, worth.high]).all()
