@@ -29,7 +29,8 @@ from shipid.physics.signals import SIGNALS, neutral
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
-BINARIES = {("Linux", "x86_64"): "linux64", ("Darwin", "x86_64"): "darwin64"}
+BINARIES = {("Linux", "x86_64"): ("linux64", ".so"), ("Darwin", "x86_64"): ("darwin64", ".dylib")}
+"""System and processor -> folder of the binary in an FMU, and how its name ends."""
 _BAND = {
     "along": ("m", "half axis along the predicted track"),
     "across": ("m", "half axis across the predicted track"),
@@ -187,8 +188,8 @@ def write_fmu(unit: Packed, file: Path, *, binary: bool = True) -> list[str]:
             for name in (f"{unit.files.name}.c", f"{unit.files.name}.h"):
                 (Path(folder) / name).write_text(texts[f"sources/{name}"], encoding="utf-8")
             built = _compiled(Path(folder), unit.files.name)
-            archive.write(built, f"binaries/{place}/{unit.identifier}.so")
-    return [] if place is None else [place]
+            archive.write(built, f"binaries/{place[0]}/{unit.identifier}{place[1]}")
+    return [] if place is None else [place[0]]
 
 
 def _compiled(folder: Path, name: str) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import resource
 import subprocess
 import sys
@@ -82,6 +83,20 @@ def test_no_name_collides_with_those_of_the_source(predictor, name, tmp_path):
     title = c_name(name)
     for unit in (predictor_unit(model(predictor), title), vessel_unit(variety()["actuators"], title, "rk4")):
         assert write_fmu(unit, tmp_path / "a.fmu")  # compiled
+
+
+@pytest.mark.parametrize(
+    ("system", "file"), [("Linux", "linux64/ship.so"), ("Darwin", "darwin64/ship.dylib"), ("Windows", None)]
+)
+def test_a_binary_has_the_name_that_importers_load(system, file, tmp_path, monkeypatch):
+    """Before, that for a Mac ended in .so, and no importer there found it."""
+    compiler()
+    monkeypatch.setattr(platform, "system", lambda: system)
+    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
+    write_fmu(vessel_unit(load_vessel("otter"), "ship", "rk4"), tmp_path / "ship.fmu")
+    with zipfile.ZipFile(tmp_path / "ship.fmu") as archive:
+        binaries = [name for name in archive.namelist() if name.startswith("binaries/")]
+    assert binaries == ([] if file is None else [f"binaries/{file}"])
 
 
 @pytest.mark.slow
