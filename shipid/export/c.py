@@ -28,6 +28,10 @@ from shipid.vessel.load import Vessel
 Array = np.ndarray
 PARTS_OF_STEP = 8  # of three rows within such a part of a step a recorder keeps the first and the last
 GAP = 3.0  # steps: after a longer pause a recorder begins anew
+NEARBY = [  # of the header in single precision
+    "Single precision: give north and east from a point nearby. In coordinates of a map, such as 7,000,000 m, the next",
+    "number is 0.5 m away.",
+]
 SPEED_LIMIT = 100.0  # m/s and rad/s: a faster state has diverged
 WORDS = frozenset(
     """
@@ -193,6 +197,7 @@ class VesselParts:
                     "axes; then the hidden states of terms and the positions of actuators that lag behind their orders. Names and",
                     "units of every entry, in order, are in the tables below. Directions of wind and current are towards.",
                     "Not in this file: waves that a simulated truth draws, a screening of inputs, a helmsman.",
+                    *(NEARBY if self.precision.single else []),
                     "No memory is allocated and nothing is kept between calls.",
                 ]
             )
@@ -456,6 +461,7 @@ class PredictorParts:
                     "",
                     "SI units, radians, revolutions per second; directions of wind and current are towards. Path: x ahead and y to",
                     "starboard [m] in body axes frozen at the instant of prediction. What is not measured is 0.",
+                    *(NEARBY if self.precision.single else []),
                     *self._promise(),
                     *(
                         [f"Alarm for the first {predictor.run_up:g} s: the observer settles."]

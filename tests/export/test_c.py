@@ -482,6 +482,19 @@ def test_single_precision_is_near(tmp_path):
     assert np.abs(computed - expected).max() < 1e-4 * np.abs(expected).max()
 
 
+def test_the_header_in_single_precision_warns_of_coordinates_of_a_map():
+    """The path of a boat of 1.2 m was 6 cm off after 4 s at a northing of 7,034 km, and 1 um near the origin."""
+    assert np.spacing(np.float32(7e6)) == 0.5
+    exported = model(Predictor(Physics(load_vessel("mariner"), 6, 5.0), "alone", Unchanged({}), {}))
+    for single in (False, True):
+        precision = Precision(single=single)
+        for files in (
+            predictor_files(exported, "m", precision),
+            vessel_files(load_vessel("mariner"), "m", "rk4", precision),
+        ):
+            assert ("from a point nearby" in files.texts["m.h"]) == single
+
+
 def test_names_are_those_of_c():
     assert c_name("moderate-3+drawn-N0030-s0") == "moderate_3_drawn_n0030_s0"
     assert c_name("33.9 m") == "m_33_9_m"
