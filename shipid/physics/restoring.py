@@ -24,7 +24,7 @@ def hydrostatic(
     """Wrench (6) of linear restoring: C_33 = rho g A_wp, C_35 = -x_F C_33, C_44 and C_55 = rho g nabla GM.
 
     A_wp waterplane area; x_F centre of flotation forward of the origin; nabla displaced volume; GM_T, GM_L
-    metacentric heights, the longitudinal one about the centre of buoyancy. Heave and trim are zero at rest.
+    metacentric heights, the longitudinal one for trim about the origin. Heave and trim are zero at rest.
     """
     z, phi, theta = eta[2], eta[3], eta[4]
     stiffness, weight = rho * g * A_wp, rho * g * nabla

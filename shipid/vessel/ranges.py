@@ -5,6 +5,7 @@ A vessel that is meant so names the number in `unusual`, a list of dotted paths 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,7 +23,14 @@ LEAST_BLOCK = 0.05
 # Judgement, far from ships: SOLAS asks 65 deg of helm in 28 s, which is 0.18 rad in sqrt(L / g) of a ship of 200 m.
 FASTEST, SLOWEST = 4.0, 100.0  # rad in sqrt(L / g); lag over sqrt(L / g)
 NEAR = 0.05  # ship lengths by which positions of rudder and screw may disagree: those of publications do
+ALONG = 10.0  # deg from the bow: a wind from there is a head wind
 TURN = 6.2832  # rad: a table of angles in degrees goes further
+_OF_RUDDER = {
+    "x_H": "its force on the hull acts on the same side",
+    "ell_R": "the lever of the flow across it has the same sign",
+}
+_SIDES = {"port": -1, "left": -1, "starboard": 1, "right": 1}  # words in names of units
+_SHARES = {"t_P": "a thrust deduction", "t_R": "a deduction of the rudder's drag", "w_P0": "a wake"}
 
 
 @dataclass(frozen=True)
@@ -114,7 +122,9 @@ def contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> t
     """Dotted path of the first number that contradicts another one, and a sentence; None where none does.
 
     A rudder that is `behind` a screw is aft of it and on its side; its force on the hull acts where the rudder is, aft
-    or forward; steering gear of this size is not so fast or slow; a block coefficient is one.
+    or forward, and so does the flow across it; steering gear of this size is not so fast or slow; a block coefficient
+    is one; shares are below 1; a unit is on the side of its name; wind drives a ship where it goes; a ship at rest
+    stays upright, and displaces her mass.
     """
     meant = document.get(UNUSUAL, [])
     for path, sentence in _contradictions(document, values):
@@ -135,16 +145,62 @@ def _contradictions(document: Mapping[str, Any], values: Mapping[str, float]) ->
             yield path, f"{value:g} rad/s: expected {most}, 4 rad in sqrt(L / g); is it in deg/s?"
         if ".actuator." in path and path.endswith(".T") and value > SLOWEST * time:
             yield path, f"{value:g} s: expected at most {SLOWEST * time:.3g} s, 100 sqrt(L / g)"
-        if path.endswith(".x_H"):
-            x = values.get(f"{path.rpartition('.')[0]}.x", 0.0)
-            if x * value < 0:
-                yield (
-                    path,
-                    f"{value:g} m, the rudder at x = {x:g} m: its force on the hull acts on the same side",
-                )
+        yield from _of_block(path, value, values)
     for name, unit in document.get("thruster", {}).items():
         if isinstance(unit, Mapping) and isinstance(unit.get("behind"), str):
             yield from _wrong_place(name, unit["behind"], values, NEAR * length)
+    yield from _against_the_wind(values)
+    yield from _unstable(document, values)
+
+
+def _of_block(path: str, value: float, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """A number of a thruster that contradicts another one of it, its name, or what the number means."""
+    block, _, key = path.rpartition(".")
+    if key == "x":
+        for other, words in _OF_RUDDER.items():
+            if values.get(f"{block}.{other}", 0.0) * value < 0:
+                yield f"{block}.{other}", f"{values[f'{block}.{other}']:g} m, the rudder at x = {value:g} m: {words}"
+    if key == "y":
+        sides = [word for word in re.split("[_-]", block.rpartition(".")[2].lower()) if word in _SIDES]
+        if len(sides) == 1 and _SIDES[sides[0]] * value < 0:
+            yield path, f"{value:g} m, and the name says {sides[0]}: y counts to starboard from the centre line"
+    if key in _SHARES and value >= 1:
+        yield path, f"{value:g}: expected {_SHARES[key]} below 1; is it in per cent?"
+    if key == "J_max" and value <= (least := values.get(f"{block}.J_min", -1.0)):
+        yield path, f"{value:g}: expected more than J_min, {least:g}"
+
+
+def _against_the_wind(values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """Coefficients of the wind in the signs of another convention."""
+    for end in ("bow", "stern"):
+        if values.get(path := f"wind.C_Dl_{end}", 0.0) < 0:
+            yield path, f"{values[path]:g}: expected a drag, above 0"
+    gamma = [(value, path.rpartition(".")[2]) for path, value in values.items() if path.startswith("wind.gamma_deg.")]
+    if not gamma:
+        return
+    (first, head), (_, beam) = (min(gamma, key=lambda one: abs(one[0] - of)) for of in (0.0, 90.0))
+    if abs(first) < ALONG and values[f"wind.C_X.{head}"] > 0:
+        words = f"{values[f'wind.C_X.{head}']:g} at {first:g} deg: a head wind drives her astern, C_X < 0"
+        yield f"wind.C_X.{head}", f"{words}; angles count from the bow"
+    if values[f"wind.C_Y.{beam}"] < 0:
+        words = f"{values[f'wind.C_Y.{beam}']:g}: expected C_Y > 0, the angles are those of wind from port"
+        yield f"wind.C_Y.{beam}", f"{words}, which drives her to starboard"
+
+
+def _unstable(document: Mapping[str, Any], values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """Restoring that lets a ship at rest trim over, and a volume that is not that of her mass."""
+    for path in ("restoring.hydrostatic.nabla", "hull.bis_derivatives.nabla"):
+        rho = values.get("constants.rho", WATER)
+        if path in values and not 0.5 <= values[path] * rho / values["inertia.m"] <= 2:
+            volume = values["inertia.m"] / rho
+            yield path, f"{values[path]:g} m^3: expected about m / rho, {volume:.3g} m^3, half to twice that"
+    names = (f"restoring.hydrostatic.{name}" for name in ("A_wp", "x_F", "nabla", "GM_L"))
+    A_wp, x_F, nabla, GM_L = (values.get(name, 0.0) for name in names)
+    if document.get("dof") == 6 and nabla and A_wp * x_F**2 >= nabla * GM_L:
+        words = (
+            f"{GM_L:g} m: she trims over at rest, expected more than A_wp x_F^2 / nabla, {A_wp * x_F**2 / nabla:.3g} m"
+        )
+        yield "restoring.hydrostatic.GM_L", words
 
 
 def _wrong_place(name: str, screw: str, values: Mapping[str, float], near: float) -> Iterator[tuple[str, str]]:
