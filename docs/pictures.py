@@ -53,7 +53,12 @@ def svg(figure: go.Figure) -> str:
     match = re.search(r"<pre>([^<]*)</pre>", answer)
     if match is None:
         raise ShipidError("the browser did not draw the figure")
-    return re.sub(r"(\d+\.\d\d)\d+", r"\1", unquote(match[1])) + "\n"  # a hundredth of a pixel is enough
+    return light(unquote(match[1])) + "\n"
+
+
+def light(picture: str) -> str:
+    """An SVG with coordinates to a hundredth of a pixel, which is enough; numbers of its text stay as they are."""
+    return re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\d+\.\d\d)\d+", r"\1", tag[0]), picture)
 
 
 def pictures(run: Path) -> Iterator[tuple[str, go.Figure]]:

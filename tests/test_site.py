@@ -106,6 +106,13 @@ def test_a_notebook_is_stored_with_its_figures_and_light(file: Path) -> None:
     assert file.stat().st_size < 300_000
 
 
+def test_numbers_that_a_picture_shows_are_not_cut() -> None:
+    light = load(DOCS / "pictures.py").light
+    assert (
+        light('<path d="M1.23456,2"/><text x="0.999">0.696</text>') == '<path d="M1.23,2"/><text x="0.99">0.696</text>'
+    )
+
+
 def test_the_font_of_the_equations_is_the_one_that_is_declared() -> None:
     font = hashlib.sha256((DOCS / "_static" / "math.woff2").read_bytes()).hexdigest()
     assert font in (DOCS / "_static" / "README.md").read_text(encoding="utf-8")
