@@ -52,6 +52,7 @@ FIGURES: dict[str, Callable[[Any], Figure | None]] = {
 """Name of a function of `shipid.figures` -> what draws it from the content of a page."""
 
 WIDTH, MARGIN, GAP = 900, 130, 70  # of a figure; height of what is around its panels, and between two of them [px]
+BESIDE = 1.25  # of the width of the panels: a legend or a scale right of names that are right of the panel
 
 
 def standalone(name: str, content: object, chosen: Sequence[object] = (), *, dark: bool = False) -> go.Figure:
@@ -179,7 +180,14 @@ def _titled(figure: go.Figure, record: Figure) -> go.Figure:
         showlegend=bool(record.chips),
     )
     figure.layout.margin.t = 76
+    if any(_is_beside(note) for note in figure.layout.annotations):
+        figure.layout.legend.x = BESIDE
     return figure
+
+
+def _is_beside(note: Any) -> bool:
+    """Whether an annotation is right of its panel, where plotly puts the legend: a name of a row, or of a line."""
+    return note.xanchor == "left" and ((note.xref == "paper" and note.x == 1) or note.axref == "pixel")
 
 
 def _entry(chip: Chip) -> go.Scatter:
@@ -215,7 +223,7 @@ def _bar(scale: Scale) -> go.Scatter:
             "len": 0.7,
             "y": 0,
             "yanchor": "bottom",
-            "x": 1.25,
+            "x": BESIDE,
         },
     }
     return go.Scatter(x=[None, None], y=[None, None], mode="markers", marker=marker, showlegend=False, hoverinfo="skip")

@@ -49,6 +49,14 @@ def test_panels_lie_below_each_other(simulation):
     assert domains[-1][1] <= 1 + 1e-9
 
 
+@pytest.mark.parametrize("name", ["error_map", "error_over_horizon"])
+def test_a_legend_lies_right_of_names_that_are_right_of_the_panel(simulation, name):
+    made = standalone(name, simulation)
+    assert any(note.xanchor == "left" for note in made.layout.annotations)
+    assert made.layout.legend.x == 1.25
+    assert standalone("gain", simulation).layout.legend.x is None
+
+
 def test_nothing_to_draw_is_a_sentence(full_scale):
     with pytest.raises(ShipidError, match="error_map: there is nothing to draw"):
         standalone("error_map", full_scale)
