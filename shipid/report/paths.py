@@ -27,7 +27,7 @@ MOST_PATHS = 2400  # in all: with their bands about 0.7 MB of the page
 PIXELS = 1000  # a window is drawn about half as large
 HOW = (
     "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
-    "where the ship truly was at the end. The pale band is the true path. "
+    "where the ship truly was at the end. The pale broad line is the true path. "
 )
 
 
@@ -92,7 +92,8 @@ def snapshots(content: ReportContent) -> Figure | None:
         where = f"{names[run]}, t = {window.t:g} s"
         title, chosen = (
             "One window, more and more data",
-            f"{where}: the window of middle physics error. All panels share their axes; physics alone may leave them.",
+            f"{where}: the window of middle physics error. All panels share their axes; physics alone and bands may "
+            "leave them.",
         )
         windows = [
             FixedWindow(f"{name or where}, N_D = {c}", run, instant, i, name)
@@ -178,8 +179,8 @@ def window_data(content: ReportContent) -> dict[str, Any]:
 def fixed_data(panels: Sequence[FixedWindow], data: dict[str, Any]) -> list[dict[str, Any]]:
     """What page.js needs for panels that show a window of `window_data`: indices and lines.
 
-    Panels of one window share their axes, so that they can be compared; these reach over the true path and what was
-    compensated or learned, and physics alone may leave them.
+    Panels of one window share their axes, so that they can be compared; these reach over the true path, the ship at
+    both of its ends and what was compensated or learned. Physics alone and bands may leave them.
     """
     together = {i for i, line in enumerate(data["lines"]) if "source:cooperative" in line["keys"]}
     result = []
@@ -195,15 +196,21 @@ def fixed_data(panels: Sequence[FixedWindow], data: dict[str, Any]) -> list[dict
         if len(same) > 1:
             models = {f"model:{other.model}" for other in same}
             shown = {i for i in together if not panel.model or models & set(data["lines"][i]["keys"])}
-            result[-1]["spans"] = _spans(shot, shown)
+            result[-1]["spans"] = _spans(shot, shown, data["outline"])
     return result
 
 
-def _spans(shot: dict[str, Any], lines: set[int]) -> list[list[float]]:
-    """Range of y, then of x [m] that holds the true path and those of some lines."""
-    spans = []
+def _spans(shot: dict[str, Any], lines: set[int], outline: Sequence[Sequence[float]]) -> list[list[float]]:
+    """Range of y, then of x [m] that holds the true path, the ship at both of its ends and the paths of some lines."""
+    spans, (ahead, aside), psi = [], outline, shot["psi"]
+    turned = (
+        [x * math.cos(psi) - y * math.sin(psi) for x, y in zip(ahead, aside, strict=True)],
+        [x * math.sin(psi) + y * math.cos(psi) for x, y in zip(ahead, aside, strict=True)],
+    )
     for place in (1, 0):
         paths = [shot["truth"][place], *(path[2 + place] for path in shot["paths"] if path[0] in lines)]
+        end = shot["truth"][place][-1] if shot["truth"][place] else None
+        paths += [outline[place], [end + value for value in turned[place]] if end is not None else []]
         values = [value for path in paths for value in path if value is not None]
         spans.append([min(values), max(values)])
     room = 0.06 * max(high - low for low, high in spans)

@@ -105,6 +105,22 @@ def test_panels_share_axes_and_show_one_model(simulation):
     assert low < min(truth[1]) <= max(truth[1]) < high
 
 
+def test_panels_that_share_axes_hold_the_ship_at_both_ends(simulation):
+    """A long ship that has turned round at the end of a short path."""
+    outline = np.array([[50.0, 0.0], [40.0, 8.0], [-50.0, 8.0], [-50.0, -8.0], [40.0, -8.0]])
+    shots = [replace(shot, outline=outline, psi_end=2.5) for shot in simulation.snapshots]
+    content = replace(simulation, snapshots=shots)
+    data = window_data(content)
+    for panel in fixed_data(snapshots(content).windows, data):
+        shot = data["runs"][panel["run"]][panel["instant"]]
+        end = np.array([shot["truth"][0][-1], shot["truth"][1][-1]])
+        turn = np.array([[np.cos(2.5), -np.sin(2.5)], [np.sin(2.5), np.cos(2.5)]])
+        hulls = np.vstack([outline, end + outline @ turn.T])
+        for (low, high), place in zip(panel["spans"], (1, 0), strict=True):
+            assert low < hulls[:, place].min()
+            assert hulls[:, place].max() < high
+
+
 def test_one_family_shows_all_its_models_in_one_row(simulation):
     kept = simulation.models.family.isin(["moderate", "none"])
     names = set(simulation.models.model[kept])
