@@ -209,7 +209,7 @@ def _lowest(frame: pd.DataFrame) -> str:
     if kinds.empty:
         return ""
     worst = kinds.sort_values("coverage").iloc[0]
-    text = f"Least is held for {worst.group} ({worst.model}): {_percent(worst.coverage)}."
+    text = f"Bands hold least at {worst.group} ({worst.model}): {_percent(worst.coverage)} of the paths."
     return f"{text} The band for this kind (--kind of shipid predict) holds its share." if worst.by == "kind" else text
 
 

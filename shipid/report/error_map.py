@@ -114,11 +114,11 @@ def cells_map(content: ReportContent, *, id: str, title: str, scale: str, how: s
     span = (float(means.H.min()), float(means.H.max()))
     good = [spot for spot in spots if math.isfinite(spot.H)]
     best, worst = min(good, key=lambda spot: spot.H), max(good, key=lambda spot: spot.H)
-    text = f"From {metres(best.H)} ({best.model}, N_D = {best.size}) to {metres(worst.H)} ({worst.model}, "
+    low, high = (f"{metres(spot.H)} ({spot.model}, N_D = {spot.size})" for spot in (best, worst))
     return Figure(
         id=id,
         title=title,
-        takeaway=f"{text}N_D = {worst.size}).",
+        takeaway=f"The {scale.partition(' [')[0]} goes from {low} to {high}.",
         how=how,
         alternative=f"Cells of {scale} for {counted(len(rows), 'model')} by A and N_D. The numbers are in a table.",
         height=HEIGHT,

@@ -182,7 +182,7 @@ def numbers(content: IdentificationContent) -> Table:
         ]
         for row in content.estimates.to_dict("records")
     ]
-    head = ["parameter", "unit", "base", "estimate", "standard error", "factor", "95 % of it", "identified"]
+    head = ["parameter", "unit", "base", "estimate", "standard error", "factor", "factor, 95 %", "identified"]
     return Table("numbers", "Every estimate", "", head, [False, False, *[True] * 5, False], rows)
 
 

@@ -223,7 +223,7 @@ def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
     correlations = {name: value for name, value in correlations.items() if math.isfinite(value)}
     if correlations:
         most = max(correlations, key=lambda name: abs(correlations[name]))
-        text += f"; {spoken(most)} is most correlated with it, rank correlation {fixed(correlations[most], 2)}"
+        text += f"; the error goes most with {spoken(most)}, rank correlation {fixed(correlations[most], 2)}"
     return f"{text}."
 
 

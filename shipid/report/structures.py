@@ -72,8 +72,8 @@ def structures(content: StructuresContent) -> Table:
         ]
         for row in _records(content.table)
     ]
-    head = ["structure", "numbers", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]", "more [m]", "95 % of it"]
-    head += ["test runs [m]", "not worse", "why missing"]
+    head = ["structure", "numbers", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]", "above the least [m]"]
+    head += ["95 % interval [m]", "test runs [m]", "not worse", "why missing"]
     length = f"of {content.ahead:g} s" if content.ahead else "as long as the runs"
     takeaway = "Means over runs of root mean square errors; intervals of differences are paired over runs."
     numeric = [False, *[True] * 8, False, False]

@@ -86,7 +86,7 @@ def test_the_rank_correlation_is_scipys_mean_over_cells():
 
 def test_takeaway_names_what_goes_with_the_error(simulation):
     correlation = importance(simulation.trials, "learning_rate")
-    text = f"learning rate is most correlated with it, rank correlation {correlation:.2f}.".replace("-", "−")
+    text = f"the error goes most with learning rate, rank correlation {correlation:.2f}.".replace("-", "−")
     assert text in search(simulation).takeaway
 
 
