@@ -63,7 +63,7 @@ __all__ = [
 ]
 
 
-def error_map(source: Source, view: Literal["map", "3-D bars"] = "map", *, dark: bool = False) -> go.Figure:
+def error_map(source: Source, view: Literal["map", "bars"] = "map", *, dark: bool = False) -> go.Figure:
     """H over the accuracy A of the physics and the amount of data N_D; needs several N_D and two physics models."""
     return standalone("error_map", content_of(source), [view], dark=dark)
 
@@ -130,7 +130,7 @@ def factors(source: Source, *, dark: bool = False) -> go.Figure:
 
 
 def tracks(source: Source, *, dark: bool = False) -> go.Figure:
-    """Map of the tracks of all runs, north up, coloured by training, validation and test."""
+    """Map of the tracks of all runs, north up; runs of the test in another colour than all others."""
     return standalone("tracks", content_of(source), dark=dark)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from pathlib import Path
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pandas as pd
@@ -32,6 +33,18 @@ def content(tiny_run: Path) -> ReportContent:
 
 def test_every_figure_of_the_report_has_a_function() -> None:
     assert set(figures.__all__) == {*FIGURES, "prediction"}
+
+
+def test_every_option_of_a_signature_is_one_of_the_figure(content: ReportContent) -> None:
+    """What a type checker takes is what the function takes."""
+    drawn = 0
+    for name in set(figures.__all__) - set(OTHERS):
+        function = getattr(figures, name)
+        for argument, kind in get_type_hints(function, vars(figures) | {"Source": object}).items():
+            for option in get_args(kind) if get_origin(kind) is Literal else ():
+                assert function(content, **{argument: option}).data, f"{name}: {argument} = {option!r}"
+                drawn += 1
+    assert drawn == 12
 
 
 def test_every_colour_of_dark_is_one_of_light() -> None:
