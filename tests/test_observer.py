@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any, Literal
 
 import casadi as ca
@@ -15,7 +17,7 @@ from scipy.linalg import expm
 
 from shipid import observer
 from shipid.data.causal import causal_columns, last_known
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Dataset, write_dataset
 from shipid.data.windows import Instants, Windows, cut_windows, from_frame
 from shipid.engine import samples
 from shipid.engine.native import compiler
@@ -490,3 +492,13 @@ def test_causal_columns_leaves_the_others() -> None:
         assert causal.frame[name].equals(data.frame[name])
     assert causal.metadata["causal"] == ["u", "v"]
     assert set(MEASURED) <= set(causal.frame)
+
+
+def test_the_example_of_the_documentation_runs(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[1] / "docs" / "observer.md").read_text(encoding="utf-8")
+    text = page.partition("```python\n")[2].partition("```")[0]
+    log = write_dataset(sea().data, tmp_path / "log.parquet")
+    names: dict[str, Any] = {}
+    exec(re.sub(r'"results/quick-[0-9a-f]*/dataset.parquet"', repr(str(log)), text), names)
+    assert names["paths"].shape == (30, len(names["windows"]), 2)
+    assert len(names["tried"]) > 1
