@@ -27,7 +27,7 @@ from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 PARTS_OF_STEP = 8  # of three rows within such a part of a step a recorder keeps the first and the last
-GAP = 3.0  # steps: after a longer pause a recorder begins anew
+GAP = 3.0  # steps, and shortest intervals of rows: after a longer pause a recorder begins anew
 NEARBY = [  # of the header in single precision
     "Single precision: give north and east from a point nearby. In coordinates of a map, such as 7,000,000 m, the next",
     "number is 0.5 m away.",
@@ -509,7 +509,7 @@ enum {{
 /* What is kept of the past. Make one, call {name}_init, and change `parameters` where the ship differs. */
 typedef struct {{
     {name}_real parameters[{max(1, len(names.parameters))}];
-    double t[{self.capacity}], begun; /* s; of the first row after a gap */
+    double t[{self.capacity}], begun, least; /* s; of the first row after a gap; shortest interval of rows */
     {name}_real rows[{self.capacity}][{len(self.row) + 4}];
     int first, count;
     {name}_real reached[{max(1, len(names.reached))}];
@@ -519,7 +519,8 @@ typedef struct {{
 void {name}_init({name} *self);
 
 /* Keep a row that was measured at t [s], entries as in {name}_row_names. Rows come in order; after a pause of more than
- * {GAP * physics.step:g} s the past begins anew. The heading may wrap, and so may angles of
+ * {GAP * physics.step:g} s and {
+            GAP:g} times the shortest interval so far the past begins anew. The heading may wrap, and so may angles of
  * thrusters and rudders: 350 deg is -10 deg. Between stops that are less than a turn apart the angle within them is
  * taken, so a jump is real. A unit that turns all round goes on by the shortest way. The first row is taken by the turn
  * that training had. Rows may come as often as they like: of three within {physics.step / PARTS_OF_STEP:g} s the past
@@ -771,7 +772,11 @@ double {name}_factor(double miss, double level, int kind)
     if (!isfinite(t)) return {name}_NOT_FINITE;
     for (i = 0; i < {n}; ++i) if (!isfinite(row[i])) return {name}_NOT_FINITE;
     if (self->count && !(t > self->t[newest])) return {name}_TIME;
-    if (self->count && t - self->t[newest] > {GAP * step!r}) self->count = 0;
+    if (self->count) {{
+        const double apart = t - self->t[newest];
+        if (apart > {GAP * step!r} && !(apart <= {GAP!r} * self->least)) self->count = 0;
+        if (!(self->least > 0 && self->least < apart)) self->least = apart;
+    }}
     memcpy(kept, row, {n} * sizeof *kept);
 {same_turn}    if (self->count) {{
         const real *last = self->rows[newest];

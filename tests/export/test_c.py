@@ -291,6 +291,33 @@ def test_rows_may_come_as_often_as_they_like(interval, tmp_path):
     np.testing.assert_allclose(path, exported.predictor.predict(instants)[:, 0], rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize(("pause", "kept_on"), [(1.0, True), (2.9, True), (3.2, False)])
+def test_rows_far_apart_for_the_steps_are_no_pauses(pause, kept_on, tmp_path):
+    """Rows four steps apart; before, each began anew, with its actuators at their orders."""
+    vessel = variety()["actuators"]
+    physics = Physics(vessel, 20, 0.25)
+    exported = model(Predictor(physics, "alone", Unchanged({}), {"u": (-9.0, 9.0)}))
+    log = log_of(vessel, 9, np.random.default_rng(5), 1.0).frame.iloc[:8]
+    t = np.arange(8.0)
+    t[7:] += pause - 1
+    names = dynamics(vessel).commands
+    first = 1 if kept_on else 7  # of the first interval nobody knows that it is the usual one
+    orders = {name: log[name].to_numpy()[first:] for name in names}
+    along = memory_along(vessel, orders, t[first:])
+    columns = {name: log[name].to_numpy()[-1:] for name in log if name not in ("run", "flags")}
+    expected = exported.predictor.predict(Instants(columns, hidden={k: values[-1:] for k, values in along.items()}))
+    files = predictor_files(exported, "odd", Precision())
+    kept, path = np.zeros(_size_of_struct(files, tmp_path) + 64, dtype=np.uint8), np.zeros((20, 2))
+    loaded = library(files, tmp_path)
+    loaded.odd_init(pointer(kept))
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    for at, row in zip(t, log[list(order)].to_numpy(dtype=float), strict=True):
+        assert loaded.odd_record(pointer(kept), at, pointer(np.ascontiguousarray(row))) == 0
+    assert loaded.odd_predict(pointer(kept), None, pointer(path)) == 0
+    np.testing.assert_allclose(path, expected[:, 0], rtol=0, atol=1e-11)
+
+
 def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
     """As in Python: the observer is that of the physics, to which the method adds its force afterwards."""
     vessel = variety()["gunnerus-28.9"]
