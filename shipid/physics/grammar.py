@@ -68,7 +68,8 @@ def monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES) -> Mo
     parts = re.fullmatch(monomial_names(alphabet, axes), name)
     if parts is None:
         start = f"one of {', '.join(axes)}, an underscore, then " if axes else ""
-        example = "Y_v|r|" if axes else "J|y|"
+        one, other = ("v", "r") if {"v", "r"} <= {*alphabet} else (alphabet[0], alphabet[-1])
+        example = f"{'Y_' if axes else ''}{one}|{other}|"
         raise ValueError(
             f"{name!r} is not a coefficient: {start}factors of {', '.join(alphabet)}, bare or as |x|, like {example!r}"
         )
@@ -206,6 +207,11 @@ def thrust_monomial(name: str) -> Monomial:
     return Monomial("", ()) if name == "1" else monomial(name, "Jyt", axes="")
 
 
+def advance_monomial(name: str) -> Monomial:
+    """Monomial of a coefficient of a screw behind a hull: factors J alone; `1` is the constant term."""
+    return Monomial("", ()) if name == "1" else monomial(name, "J", axes="")
+
+
 _MOTIONS, _OF_HULL = monomial_names((HEEL, *MOTIONS)), monomial_names(DEVIATIONS[:-1])
 _RUDDER_FLOW = rf"(?=(?:[^c]*c){{2}}[^c]*$){monomial_names(('beta', 'delta', 'c'))}"
 DERIVATIVES = Grammar(derivative, derivative_unit, _MOTIONS)
@@ -216,3 +222,4 @@ ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit, ACCELERATIONS)
 RUDDER_FLOWS = Grammar(rudder_flow, lambda _: "prime", _RUDDER_FLOW)
 CROSS_FLOWS = Grammar(cross_flow_monomial, lambda _: "prime", monomial_names("vr", axes=""))
 THRUST = Grammar(thrust_monomial, lambda _: "-", rf"1|{monomial_names('Jyt', axes='')}")
+ADVANCE = Grammar(advance_monomial, lambda _: "-", rf"1|{monomial_names('J', axes='')}")

@@ -9,7 +9,7 @@ import casadi as ca
 from casadi import SX
 
 from shipid.physics.frames import force_at, given, vector
-from shipid.physics.grammar import POSITIVE, THRUST
+from shipid.physics.grammar import ADVANCE, POSITIVE
 from shipid.physics.hull import SPEED_FLOOR
 from shipid.physics.thruster import SHAFT_FLOOR, polynomial
 from shipid.physics.wind import interpolate
@@ -107,10 +107,10 @@ def propeller(
     y: Annotated[SX | float, "m"] = 0.0,
     z: Annotated[SX | float, "m"] = 0.0,
     D_p: Annotated[SX, "m", POSITIVE],
-    K_T: Annotated[Mapping[str, SX], THRUST],
-    K_T_astern: Annotated[Mapping[str, SX] | None, THRUST] = None,
-    Y_astern: Annotated[Mapping[str, SX] | None, THRUST] = None,
-    N_astern: Annotated[Mapping[str, SX] | None, THRUST] = None,
+    K_T: Annotated[Mapping[str, SX], ADVANCE],
+    K_T_astern: Annotated[Mapping[str, SX] | None, ADVANCE] = None,
+    Y_astern: Annotated[Mapping[str, SX] | None, ADVANCE] = None,
+    N_astern: Annotated[Mapping[str, SX] | None, ADVANCE] = None,
     J_min: Annotated[SX | float, "-"] = -1.0,
     J_max: Annotated[SX | float, "-"] = 1.5,
     k_astern: Annotated[SX | float, "-"] = 1.0,
@@ -152,8 +152,8 @@ def propeller_thrust(
     x: Annotated[SX, "m"],
     y: Annotated[SX | float, "m"] = 0.0,
     D_p: Annotated[SX, "m", POSITIVE],
-    K_T: Annotated[Mapping[str, SX], THRUST],
-    K_T_astern: Annotated[Mapping[str, SX] | None, THRUST] = None,
+    K_T: Annotated[Mapping[str, SX], ADVANCE],
+    K_T_astern: Annotated[Mapping[str, SX] | None, ADVANCE] = None,
     J_min: Annotated[SX | float, "-"] = -1.0,
     J_max: Annotated[SX | float, "-"] = 1.5,
     k_astern: Annotated[SX | float, "-"] = 1.0,
@@ -178,7 +178,7 @@ def propeller_torque(
     x: Annotated[SX, "m"],
     y: Annotated[SX | float, "m"] = 0.0,
     D_p: Annotated[SX, "m", POSITIVE],
-    K_Q: Annotated[Mapping[str, SX] | None, THRUST] = None,
+    K_Q: Annotated[Mapping[str, SX] | None, ADVANCE] = None,
     J_min: Annotated[SX | float, "-"] = -1.0,
     J_max: Annotated[SX | float, "-"] = 1.5,
     w_P0: Annotated[SX, "-"],
@@ -207,8 +207,8 @@ def wash(
     x: Annotated[SX, "m"],
     y: Annotated[SX | float, "m"] = 0.0,
     D_p: Annotated[SX, "m", POSITIVE],
-    K_T: Annotated[Mapping[str, SX], THRUST],
-    K_T_astern: Annotated[Mapping[str, SX] | None, THRUST] = None,
+    K_T: Annotated[Mapping[str, SX], ADVANCE],
+    K_T_astern: Annotated[Mapping[str, SX] | None, ADVANCE] = None,
     J_min: Annotated[SX | float, "-"] = -1.0,
     J_max: Annotated[SX | float, "-"] = 1.5,
     k_astern: Annotated[SX | float, "-"] = 1.0,

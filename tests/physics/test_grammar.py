@@ -5,6 +5,8 @@ import pytest
 
 from shipid.physics.grammar import (
     ADDED_MASS,
+    ADVANCE,
+    CROSS_FLOWS,
     DERIVATIVES,
     PRIME_DERIVATIVES,
     THRUST,
@@ -126,3 +128,21 @@ def test_a_prime_derivative_is_distinguished_from_an_si_one() -> None:
     assert PRIME_DERIVATIVES.unit("Y_v") == "prime"
     with pytest.raises(ValueError, match="same monomial"):
         PRIME_DERIVATIVES.check(["Y_rv", "Y_vr"])
+
+
+@pytest.mark.parametrize(
+    ("grammar", "name", "example"), [(ADVANCE, "Jy", "J|J|"), (THRUST, "v", "J|t|"), (CROSS_FLOWS, "J", "v|r|")]
+)
+def test_the_example_of_a_message_has_factors_of_its_table(grammar, name, example):
+    with pytest.raises(ValueError, match="like") as caught:
+        grammar.check([name])
+    assert f"like '{example}'" in str(caught.value)
+    grammar.check([example])
+
+
+def test_a_screw_behind_a_hull_has_no_flow_across():
+    """Before, a factor y or t in its K_T was taken, and was 0."""
+    ADVANCE.check(["1", "J", "JJ", "J|J|"])
+    for name in ("y", "Jt", "|y|"):
+        with pytest.raises(ValueError, match="factors of J, bare"):
+            ADVANCE.check([name])
