@@ -395,7 +395,7 @@ static int kind_of(double value)
 typedef struct {{
     double values[NUM_REALS];
     int status;
-    {name} kept;
+    {name} kept, trial; /* the second for the path at the start: too large for the stack of a thread */
 }} Model;
 {_fmi(name, variables)}
 static void Model_init(Model *self)
@@ -426,9 +426,9 @@ static const char *predict_from(Model *self, {name} *kept, double t)
 /* The path at the start: from a copy, since the first step keeps this row. */
 static const char *Model_begin(Model *self, const unsigned char *set, double t)
 {{
-    {name} kept = self->kept;
     (void)set;
-    return predict_from(self, &kept, t);
+    self->trial = self->kept;
+    return predict_from(self, &self->trial, t);
 }}
 
 static const char *Model_step(Model *self, double t, double h)
@@ -529,6 +529,12 @@ static void free_memory(const fmi2CallbackFunctions *call, void *memory)
     else free(memory);
 }
 
+static fmi2Status say(const fmi2CallbackFunctions *call, const char *name, fmi2Status status, const char *text)
+{
+    if (call->logger) call->logger(call->componentEnvironment, name, status, "logStatusError", "%s", text);
+    return status;
+}
+
 static fmi2Status refuse(Instance *self, fmi2Status status, const char *format, ...)
 {
     char text[256];
@@ -536,9 +542,7 @@ static fmi2Status refuse(Instance *self, fmi2Status status, const char *format, 
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    if (self && self->call.logger)
-        self->call.logger(self->call.componentEnvironment, self->name, status, "logStatusError", "%s", text);
-    return status;
+    return self ? say(&self->call, self->name, status, text) : status;
 }
 
 FMI2_EXPORT const char *FMI2(fmi2GetTypesPlatform)(void);
@@ -560,23 +564,20 @@ FMI2_EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, 
 FMI2_EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2String given, fmi2String place,
     const fmi2CallbackFunctions *call, fmi2Boolean visible, fmi2Boolean logging)
 {
-    Instance *self, trial;
+    Instance *self;
     (void)place;
     (void)visible;
     if (!call) return 0;
-    memset(&trial, 0, sizeof trial);
-    trial.call = *call;
-    trial.name = (char *)identifier;
     if (type != fmi2CoSimulation) {
-        refuse(&trial, fmi2Error, "this FMU is for co-simulation");
+        say(call, identifier, fmi2Error, "this FMU is for co-simulation");
         return 0;
     }
     if (!given || strcmp(given, guid)) {
-        refuse(&trial, fmi2Error, "the guid is not that of this FMU");
+        say(call, identifier, fmi2Error, "the guid is not that of this FMU");
         return 0;
     }
     if (!name || !*name) {
-        refuse(&trial, fmi2Error, "an instance needs a name");
+        say(call, identifier, fmi2Error, "an instance needs a name");
         return 0;
     }
     self = (Instance *)get_memory(call, sizeof *self);

@@ -20,12 +20,13 @@ from shipid.export.c import c_name
 from shipid.export.fmu import predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.features import MOTIONS, Memory
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
 from tests.export.compiled import FLAGS, compiler
-from tests.export.strange import drawn
+from tests.export.strange import drawn, network_of
 
 SECONDS = 60.0
 
@@ -75,6 +76,24 @@ def test_the_sources_compile_without_a_warning(aboard, tmp_path):
         command = [compiler(), *FLAGS, *more, "-c", "path.c", "-o", "path.o"]
         result = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True)
         assert result.returncode == 0, result.stderr[:1000]
+
+
+def test_a_long_past_is_not_on_the_stack(tmp_path):
+    """A thread of a tool may have little: before, the path at the start took the whole recorder."""
+    strange = drawn("path-drawn", 7, vessel="gunnerus-28.9")
+    physics, corrector = Physics(load_vessel("gunnerus-28.9"), 3, 1.0), strange.predictor.corrector
+    inputs = type(corrector.inputs)(corrector.inputs.commands, Memory(history=(1.0, 60.0)))
+    names = (*MOTIONS, "psi", "x", "y", "V_w", "beta_w", *inputs.commands)
+    instants = Instants(strange.instants.columns, {name: np.zeros((60, 20)) for name in names})
+    table = inputs.table(physics, instants)
+    network = network_of(np.random.default_rng(2), list(table), table, 3, 2, False)
+    predictor = Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}))
+    write_fmu(predictor_unit(model(predictor), "path"), tmp_path / "path.fmu", binary=False)
+    with zipfile.ZipFile(tmp_path / "path.fmu") as archive:
+        archive.extractall(tmp_path)
+    command = [compiler(), *FLAGS, "-Wframe-larger-than=32768", "-c", "path.c", "-o", "path.o"]
+    result = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr[:1000]
 
 
 @pytest.mark.parametrize("name", ["model", "size_t", "kept", "instance", "predict", "linux", "x"])
