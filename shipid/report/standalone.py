@@ -187,7 +187,8 @@ def _titled(figure: go.Figure, record: Figure) -> go.Figure:
 
 def _is_beside(note: Any) -> bool:
     """Whether an annotation is right of its panel, where plotly puts the legend: a name of a row, or of a line."""
-    return note.xanchor == "left" and ((note.xref == "paper" and note.x == 1) or note.axref == "pixel")
+    right = (note.xref == "paper" and note.x == 1) or note.axref == "pixel"
+    return bool(right and note.xanchor == "left")
 
 
 def _entry(chip: Chip) -> go.Scatter:
