@@ -74,7 +74,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         repairs=parts.repairs_frame(results),
         provenance=parts.provenance_words(results),
         study_document=results.plan.text(),
-        command=parts.reproducing_command(results),
+        command=results.plan.command,
         best=results.plan.label(best, results.plan.judged) if (best := advise.best_model(results)) else "",
         frames=frames,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
@@ -506,11 +506,6 @@ def naive_summary(results: Results) -> dict[str, float]:
     """Mean, p90 and rms [m] of constant u, v, r on the test windows."""
     errors = summary(results.naive)
     return {"mean": errors["mean"], "p90": errors["p90"], "rms": errors["rms"]}
-
-
-def reproducing_command(results: Results) -> str:
-    """Return the command that computes these results again: the study by name if bundled, else its file; changes."""
-    return replace(results.plan, changes=results.provenance.get("changes", {})).command
 
 
 def _source_words(source: Any) -> str:

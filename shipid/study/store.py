@@ -152,7 +152,8 @@ def stored_plan(folder: Path) -> Plan:
     except DocumentError as error:
         raise _of_another_version(error, folder / VESSELS) from None
     try:
-        plan = build_plan(document, Path(provenance["file"]), vessels, provenance.get("sources", {}))
+        sources, changes = (provenance.get(key, {}) for key in ("sources", "changes"))
+        plan = build_plan(document, Path(provenance["file"]), vessels, sources, changes)
     except DocumentError as error:
         raise _of_another_version(error, folder / STUDY) from None
     if plan.digest != provenance["digest"]:
@@ -175,7 +176,8 @@ def _of_another_version(error: DocumentError, file: Path) -> ResultError:
 def _provenance(folder: Path) -> dict[str, Any]:
     """Read what says to which study a folder belongs; ResultError where it does not say so."""
     record = read_json(folder / PROVENANCE)
-    if not isinstance(record, dict) or not {"digest", "name", "file"} <= record.keys():
+    named = isinstance(record, dict) and {"digest", "name", "file"} <= record.keys()
+    if not isinstance(record, dict) or not named or not isinstance(record.get("changes", {}), dict):
         raise ResultError("damaged: run the study again into a new folder", file=folder / PROVENANCE)
     return record
 

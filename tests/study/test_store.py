@@ -15,8 +15,8 @@ import pytest
 from shipid.errors import ResultError
 from shipid.files import TEMPORARY, read_json, temporary_folder
 from shipid.study import seals, store
-from shipid.study.plan import Batch, Unit
-from tests.study.tiny import tiny_plan
+from shipid.study.plan import Batch, Unit, read_plan
+from tests.study.tiny import TINY, tiny_plan
 
 
 def test_a_folder_opens_again_for_the_same_study_alone(tmp_path: Path) -> None:
@@ -63,6 +63,17 @@ def test_a_study_changed_by_hand_is_refused(tmp_path: Path) -> None:
         store.stored_plan(folder)
     with pytest.raises(ResultError, match="not the folder of a run"):
         store.stored_plan(tmp_path)
+
+
+def test_a_stored_plan_knows_what_was_changed(tmp_path: Path) -> None:
+    """Of a study of several parts too: its page and its resumed parts name the command with all changes."""
+    changes = {"grid.N_D": [4], "repeat": {"seed": [0, 1]}}
+    plan = read_plan(TINY, changes)
+    store.open_folder(tmp_path / "run", plan)
+    stored = store.stored_plan(tmp_path / "run")
+    assert stored.command == plan.command
+    assert "--set 'grid.N_D=[4]'" in stored.command
+    assert [part.plan.command for part in stored.parts.values()] == [part.plan.command for part in plan.parts.values()]
 
 
 def test_a_link_to_an_empty_folder_is_a_place_for_a_run(tmp_path: Path) -> None:
