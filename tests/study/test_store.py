@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import ResultError
-from shipid.files import TEMPORARY, read_json, temporary_folder
+from shipid.files import TEMPORARY, read_json, temporary_folder, write_json
 from shipid.study import seals, store
 from shipid.study.plan import Batch, Unit, read_plan
 from tests.study.tiny import TINY, tiny_plan
@@ -74,6 +74,10 @@ def test_a_stored_plan_knows_what_was_changed(tmp_path: Path) -> None:
     assert stored.command == plan.command
     assert "--set 'grid.N_D=[4]'" in stored.command
     assert [part.plan.command for part in stored.parts.values()] == [part.plan.command for part in plan.parts.values()]
+    provenance = tmp_path / "run" / store.PROVENANCE
+    write_json(provenance, {**read_json(provenance), "changes": [3]})
+    with pytest.raises(ResultError, match="damaged: run the study again"):
+        store.stored_plan(tmp_path / "run")
 
 
 def test_a_link_to_an_empty_folder_is_a_place_for_a_run(tmp_path: Path) -> None:
