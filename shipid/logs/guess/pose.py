@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -82,7 +83,8 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
     if best is None or (best.misfit > POOR and (not pairs or not headings)):
         missing = "position (north and east, or latitude and longitude)" if not pairs else "heading"
         asked = ("latitude", "longitude", "north", "east", "x", "y") if not pairs else ("psi",)
-        name = next((name for name in state.words if any(fits(name).get(one, 0.0) > 0.9 for one in asked)), None)
+        numeric = [name for name, text in state.words.items() if re.search(r"\d", text)]
+        name = next((name for name in numeric if any(fits(name).get(one, 0.0) > 0.9 for one in asked)), None)
         remedy = "name the columns with --names, or map by hand"
         if name is not None:
             remedy = f"{name!r} holds {state.words[name][:40]!r}, no number: write it as a number with a sign"

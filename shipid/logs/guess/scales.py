@@ -25,6 +25,7 @@ WRITTEN = {
 }
 """A whole turn -> regular expression of how logs write its unit, in lower case."""
 ANGLES = ("psi", "course", "alpha", "beta_w")
+WHOLE = 0.1  # share of the rows that are whole numbers, at least: between them rows without a value were filled
 FINE = 1e-7  # deg, of whole numbers of a receiver
 CLOSE = 0.97  # share of a whole turn that a heading sweeps before it jumps: it has been all round
 
@@ -48,7 +49,7 @@ def take_scales(state: State) -> None:
         if both[0].max() <= 90 and both[1].max() <= 360:
             _take_sides(state, north, east)
             continue
-        if all(np.all(one % 1 == 0) and one.max() > 1e6 for one in both) and _on_globe(both, FINE):
+        if all(np.mean(one % 1 == 0) > WHOLE and one.max() > 1e6 for one in both) and _on_globe(both, FINE):
             for name in (north, east):
                 _scale(state, name, FINE, "whole numbers of 1e-7 deg")
         elif all(_is_ddmm(one) for one in both) and both[0].max() < 9000 and both[1].max() < 18000:
@@ -106,5 +107,5 @@ def _on_globe(both: Iterable[Array], factor: float) -> bool:
 
 
 def _is_ddmm(values: Array) -> bool:
-    """Whether numbers are degrees and minutes, as in 6326.4 for 63 deg 26.4 min."""
-    return bool(np.all(values % 100 < 60) and values.max() > 100)
+    """Whether numbers, too large for degrees, are degrees and minutes, as in 6326.4 for 63 deg 26.4 min."""
+    return bool(np.all(values % 100 < 60))

@@ -19,8 +19,8 @@ PHRASES: dict[str, str] = {
         "breedtegraad, breedte, geogr bredde, ligne latitude, latitude gps"
     ),
     "longitude": (
-        "lon, lambda gps, lambda, long, lng, longitude, laenge, laengengrad, lengde, lengdegrad, longitud, geogr "
-        "laenge, lengtegraad, geogr lengde, longitude gps"
+        "lon, lambda gps, lambda, long, lng, longitude, laenge, laengengrad, lengde, lengdegrad, longitud, "
+        "longitudine, geogr laenge, lengtegraad, geogr lengde, longitude gps"
     ),
     "north": (
         "n, north, northing, pos north, pos n, north pos, x 0, x n, x ned, x earth, eta 1, x e, nord, nordwert, "

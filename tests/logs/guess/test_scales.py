@@ -78,6 +78,23 @@ def test_a_unit_in_the_name_decides_where_a_heading_never_jumps(tmp_path: Path) 
     assert turned(dataset).max() < np.radians(0.3)
 
 
+@pytest.mark.parametrize("how", ["blanks", "near Greenwich", "Italian"])
+def test_positions_of_receivers_are_degrees_in_strange_logs(how: str, tmp_path: Path) -> None:
+    """Before, whole numbers with blanks between, and a longitude of less than a degree, were metres."""
+    if how == "blanks":
+        lat, lon = ((x * 1e7).round().where(x.index % 4 == 0) for x in (LAT, LON))
+        frame = on_globe(lat, lon)
+    else:
+        east = LON - (10.0 if how == "near Greenwich" else 0.0)
+        frame = on_globe(*((x // 1 * 100 + x % 1 * 60).round(6) for x in (LAT, east)))
+        frame = frame.rename(columns={"lat": "Latitudine", "lon": "Longitudine"}) if how == "Italian" else frame
+    _, dataset = drafted(frame, tmp_path)
+    run = dataset.frame.merge(LOG, on="t", suffixes=("", "_true"))
+    for name in ("north", "east"):
+        off = run[name] - run[f"{name}_true"]
+        np.testing.assert_allclose(off - off.iloc[0], 0.0, atol=2.0, err_msg=name)
+
+
 def test_a_position_in_radians_is_read_as_its_name_says(tmp_path: Path) -> None:
     """Before, it was drafted in degrees."""
     frame = on_globe(LAT, LON).drop(columns=["lat", "lon"])
