@@ -15,7 +15,7 @@ from shipid.hybrid.bands import Region
 from shipid.predictor import NO_BAND
 from shipid.study.kinds import kinds_of
 from shipid.study.results import Results
-from shipid.study.verdict import metres, span
+from shipid.study.verdict import metres, named, span
 
 Array = np.ndarray
 SHOWN = (0.5, 0.8, 0.9, 0.95)
@@ -153,8 +153,10 @@ def answer(results: Results) -> list[tuple[str, str]]:
     level, frame = results.plan.level, coverage_frame(results)
     mine = frame[frame["level"].eq(level)]
     if mine.empty:
-        reasons = refused_frame(results)["reason"].unique()
-        return [(f"No band is promised: {reasons[0].removeprefix(NO_BAND)}.", "cells")] if len(reasons) else []
+        refused = refused_frame(results).groupby("reason", sort=False)["model"]
+        reasons = {str(reason).removeprefix(NO_BAND): named(map(str, models)) for reason, models in refused}
+        each = [*reasons] if len(reasons) == 1 else [f"{models}: {reason}" for reason, models in reasons.items()]
+        return [(f"No band is promised: {'; '.join(each)}.", "cells")] if reasons else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
     share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
     radius = span(metres(top["width"].min()), metres(top["width"].max()))

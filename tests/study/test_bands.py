@@ -229,6 +229,12 @@ def test_why_no_band_is_promised_is_the_reason_of_the_cells_with_most_runs(resul
     assert sentence == f"No band is promised: {most} runs calibrate it."
 
 
+def test_models_without_a_band_for_different_reasons_are_named(results: Results) -> None:
+    reasons = {row["cell"]: f"{NO_BAND}{'noise' if row['model'] == 'none' else 'few runs'}" for row in results.rows}
+    ((sentence, _),) = bands.answer(replace(results, bands={}, no_band=reasons))
+    assert sentence == "No band is promised: right, wrong: few runs; pure data-driven: noise."
+
+
 def test_a_method_without_errors_on_runs_left_out_says_which_key_gives_them(tiny_run: Path) -> None:
     results = read_results(tiny_run)
     without = replace(results, no_band=dict.fromkeys(results.paths, f"{NO_BAND}{NO_REFITS}"))
