@@ -451,7 +451,8 @@ def part_folds(windows: Windows) -> list[tuple[NDArray[np.int64], NDArray[np.int
     (run,) = windows.spans
     length, span = (windows.num_past + windows.horizon) * windows.step, float(windows.end.max() - windows.begin.min())
     raise DataError(
-        f"the {len(windows)} windows of run {run!r} span {span:g} s, too short to train and validate with windows of "
+        f"the {len(windows)} {plural(len(windows), 'window')} of run {run!r} {plural(len(windows), 'spans', 'span')} "
+        f"{span:g} s, too short to train and validate with windows of "
         f"{length:g} s, which takes more than {3 * length:g} s: shorten the horizon, or raise prediction.samples if set"
     )
 

@@ -51,8 +51,8 @@ def _checked(folder: Path, plan: Plan, part: str = "") -> Checked:
     if plan.parts:
         return Checked(lines, faults)
     done = sum(len(unit.pairs) for unit in store.finished(folder, plan.units))
-    count = f"{len(faults)} {plural(len(faults), 'fault')}"
-    lines.append(f"{part}{': ' if part else ''}{done} of {plan.cells} cells finished, {count}")
+    counted = f"{done} of {plan.cells} cells finished, {len(faults)} {plural(len(faults), 'fault')}"
+    lines.append(f"{part}: {counted}" if part else counted)
     if held := claims.held(folder):
         lines.append(f"at work, or ended without giving back: {', '.join(held)}")
     left = [place for place in folder.rglob(f"{TEMPORARY}*") if place.is_dir()]

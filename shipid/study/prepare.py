@@ -40,6 +40,7 @@ from shipid.simulation.truth import draw_manoeuvres, simulate
 from shipid.study.kinds import kinds_of
 from shipid.study.plan import Batch, Foundation, Plan, beside, mapping_of
 from shipid.study.ranges import check_memory
+from shipid.units import plural
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, draw
 
@@ -142,11 +143,11 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
         if touching.any():
             notes.append(f"{int(touching.sum())} windows that touch the test runs in time never train")
         rest = rest.select(~touching)
-    available = len(rest.spans)
-    if available < max(plan.study.grid.N_D):
+    available, largest = len(rest.spans), max(plan.study.grid.N_D)
+    if available < largest:
         raise DocumentError(
-            f"{max(plan.study.grid.N_D)}: only {available} runs are left for training, {len(test.spans)} test "
-            "(split.test)",
+            f"{largest}: only {available} {plural(available, 'run is', 'runs are')} left for training, "
+            f"{len(test.spans)} {plural(len(test.spans), 'tests', 'test')} (split.test)",
             file=plan.file,
             path="grid.N_D",
         )
