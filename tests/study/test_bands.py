@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from scipy.stats import binomtest
 from typer.testing import CliRunner
 
 from shipid.cli import app
+from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.hybrid.bands import LEVELS, Bands
 from shipid.predictor import NO_BAND, NO_REFITS, Predictor
@@ -19,9 +21,10 @@ from shipid.study import bands, store
 from shipid.study.apply import Band, along_run
 from shipid.study.compare import compare_bands
 from shipid.study.findings import findings
-from shipid.study.plan import read_plan
+from shipid.study.plan import Plan, read_plan
 from shipid.study.results import Results, border, read_results
 from shipid.study.verdict import metres
+from tests.study.test_commands import weaving
 from tests.study.tiny import run_here, tiny_plan
 
 LEVEL = 0.8  # the tiny study has 6 runs at most
@@ -252,3 +255,18 @@ def test_a_refit_that_has_too_little_to_train_leaves_its_runs_without_errors(tmp
     results = read_results(tmp_path / "run")
     assert (results.cells["status"] == "ok").all()
     assert all(results.no_band[cell] for cell in results.cells["cell"])
+
+
+def test_runs_that_overlap_leave_refits_without_errors(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+    """Before, it ended the whole study: `a` and `b` share moments, so without one of them and `c` nothing is left."""
+    log = weaving("abcd")
+    begins = log.frame["run"].map({"a": 0.0, "b": 3.0, "c": 1000.0, "d": 2000.0})
+    shared = Dataset(log.frame.assign(t=log.frame["t"] + begins), log.metadata | {"clock": "shared"})
+    step = {"name": "step", "kind": "one-step", "trials": 1, "units": 8}
+    changes = {"method": [step], "grid": {"N_D": [3], "seeds": [0, 1, 2]}, "bands": {"refits": 2, "level": 0.5}}
+    plan, _ = recorded(shared, split={"test": ["d"]}, prediction={"ahead": 5.0}, **changes)
+    folder = Path(plan.file).parent / "run"
+    run_here(plan, folder)
+    results = read_results(folder)
+    assert (results.cells["status"] == "ok").all()
+    assert set(results.no_band.values()) == {f"{NO_BAND}fewer than 3 runs have errors of models that did not see them"}
