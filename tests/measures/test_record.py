@@ -85,6 +85,27 @@ def test_an_angle_in_motion_is_traced_back(rate: float) -> None:
     assert departure(t, angle, half) == pytest.approx(3.21, abs=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("interval", [0.02, 0.1])
+@pytest.mark.parametrize("digits", ["noise", "coarse"])
+def test_a_noisy_or_coarse_angle_is_traced_back_to_its_level(digits: str, interval: float, seed: int) -> None:
+    """A rudder from 3 to 35 deg at 2.5 deg/s: half of its way takes 6 s, which would be counted as too late."""
+    random = np.random.default_rng(seed)
+    t = np.arange(0, 60, interval)
+    begin = 20 + random.uniform(0, interval)
+    angle = 3 + np.clip(2.5 * (t - begin), 0, 32)
+    angle = angle + random.normal(0, 0.1, len(t)) if digits == "noise" else np.round(2 * angle) / 2
+    half = int(np.argmax(angle >= 17.5))
+    assert departure(t, angle, half) == pytest.approx(begin, abs=0.3)
+
+
+def test_corrections_before_an_order_do_not_belong_to_it() -> None:
+    """A helmsman who holds the course with 3 deg to both sides, and then orders 10 deg in one row."""
+    t = np.arange(0, 100, 0.1)
+    order = np.where(t >= 50, 10.0, 3.0 * np.sign(np.sin(t / 4)))
+    assert departure(t, order, 500) == t[500]
+
+
 def test_an_order_holds_from_its_row_on() -> None:
     t = np.arange(10.0)
     assert departure(t, np.where(t >= 4, -10.0, 2.0), 4) == 4.0
