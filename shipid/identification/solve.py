@@ -181,7 +181,10 @@ def _identified(
 def _searched(
     problem: Problem, dataset: Dataset, start: Mapping[str, float] | Solution | None, progress: Progress | None
 ) -> tuple[Result, float]:
-    """Result of the first search that converges (else of the best), and the objective at the initial factors."""
+    """Result of the first search that converges (else of the best), and the objective at the initial factors.
+
+    A search that converges to an objective above that at the initial factors is followed by one from these.
+    """
     factors, point = _begun(problem, start)
     objective_start = evaluate(problem, factors, point).objective
     ways = ORDER["base"] if start is not None else ORDER[problem.settings.start]
@@ -202,6 +205,9 @@ def _searched(
         if attempt.status in ("ok", "stopped"):
             break
     assert result is not None
+    if result.status == "ok" and result.objective > objective_start:  # led away, to an optimum worse than the base
+        attempt = search(problem, factors, point, progress, before=before)
+        result = attempt if attempt.objective < result.objective else result
     return result, objective_start
 
 
