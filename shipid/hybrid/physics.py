@@ -16,6 +16,7 @@ from shipid.engine.integrate import Method as Integrator
 from shipid.engine.rollout import Distances, Trajectories, distances, rollout
 from shipid.errors import DataError, ShipidError
 from shipid.observer import Observer, bank, observed_start
+from shipid.simulation.log import column_of
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -247,9 +248,10 @@ def check_instants(instants: Instants) -> None:
 
 
 def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:
-    """States and weather that a vessel has and the columns lack: they are taken as zero, and the report names them."""
+    """Columns of states and weather that a vessel has and the columns lack: taken as zero, and named in the report."""
     model = dynamics(vessel)
-    return [name for name in (*model.state, *model.environment) if name not in columns]
+    needed = (column_of(name) for name in (*model.state, *model.environment))
+    return [name for name in needed if name not in columns]
 
 
 def check_columns(vessel: Vessel, columns: Mapping[str, Array], file: str) -> None:

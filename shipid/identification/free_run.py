@@ -46,10 +46,11 @@ class FreeRuns:
 
 
 def unfelt(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[str]) -> list[str]:
-    """States and weather that the vessel has and neither dataset, settings nor nuisances give: they are 0."""
+    """Columns of states and weather of the vessel that neither dataset, settings nor nuisances give: they are 0."""
     model = dynamics(vessel)
     given = {*map(str, dataset.frame), *(("V_c", "beta_c") if "current" in settings.widths else ())}
-    lacking = [name for name in (*model.state, *model.environment) if name not in given]
+    needed = [COLUMNS.get(name, name) for name in (*model.state, *model.environment)]
+    lacking = [name for name in needed if name not in given]
     own = overrides(settings, runs, vessel, model.environment, dataset.runs) if lacking and settings.runs else {}
     everywhere = {name for name in lacking if own and all(f"{ENVIRONMENT}.{name}" in own[run] for run in runs)}
     return [name for name in lacking if name not in everywhere]

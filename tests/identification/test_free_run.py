@@ -8,6 +8,7 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
+from shipid.hybrid.physics import assumed
 from shipid.identification.free_run import ALL, MEASURED, free_runs, unfelt
 from shipid.identification.settings import Identify
 from shipid.vessel.load import load_vessel
@@ -88,6 +89,17 @@ def test_what_nobody_measured_is_named_unless_it_is_estimated_or_set() -> None:
     assert unfelt(ship, calm, both, DATA.runs) == ["V_c", "beta_c"]
     measured = Dataset(calm.frame.assign(V_w=3.0, beta_w=0.5), DATA.metadata)
     assert unfelt(SHIP, measured, SETTINGS, DATA.runs) == []
+
+
+def test_a_state_whose_column_has_another_name_is_measured() -> None:
+    """A log has the depth of a ship with 6 degrees of freedom as `z`."""
+    six = variety()["six"]
+    log = trials(six, runs=1, steps=5)
+    weather = ["V_w", "beta_w", "V_c", "beta_c"]
+    assert unfelt(six, log, SETTINGS, log.runs) == weather
+    assert assumed(six, dict.fromkeys(log.frame, np.empty(0))) == weather
+    flat = Dataset(log.frame.drop(columns="z"), log.metadata)
+    assert unfelt(six, flat, SETTINGS, log.runs) == ["z", *weather]
 
 
 def test_a_short_run_does_not_diverge_because_a_longer_one_is_in_company() -> None:
