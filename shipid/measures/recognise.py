@@ -88,6 +88,8 @@ def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
         return (), "the ship turns already where the helm is first put over"
     row = released(record, over)
     if off[: row + 1][-1] < LEAST_TURN:
+        if off[within].max() >= LEAST_TURN and (share[within] <= -0.5).any():
+            return (), "the helm is reversed, but the heading changes by 90 deg or more: say whether it is a zigzag"
         return (), "the helm is let go before the ship has turned by 90 deg"
     turn, rest = record.t[row - 1] - record.t[over.row], np.abs(share[row:]) < MIDSHIPS
     amidships = row + np.flatnonzero(rest)

@@ -66,6 +66,8 @@ def test_a_helm_left_over_from_before_is_no_execute() -> None:
 def test_what_is_no_manoeuvre_says_why() -> None:
     assert "less than 3 deg" in kinds_of(run([(START, 2)], 60.0))[1]
     assert "turned by 90 deg" in kinds_of(run([(START, 10), (START + 5, 0)], 60.0))[1]
+    wide = run([(START, 20), (START + 64, -20), (START + 170, 20), (START + 270, -20)], 330.0)  # a ship slow to check
+    assert "helm is reversed, but the heading changes by 90 deg or more" in kinds_of(wide)[1]
     already = run([(0.0, 20), (30.0, 1), (33.0, 20)], 60.0)
     begun = Record(*(getattr(already, name)[200:] for name in ("t", "north", "east", "psi", "u", "v", "r", "helm")))
     assert "turns already" in kinds_of(begun)[1]
