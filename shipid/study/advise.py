@@ -97,8 +97,8 @@ class Case:
 
     @cached_property
     def table(self) -> ErrorTable:
-        """Errors by test manoeuvre."""
-        return error_table(self.results, list(self.rows["model"].unique()))
+        """Errors by test manoeuvre, at the amounts of data at which a model has a result."""
+        return error_table(self.results, list(self.rows["model"].unique()), amounts=sorted(set(self.rows["N_D"])))
 
     def at(self, amount: int) -> pd.DataFrame:
         """Rows of physics models at an amount of data."""

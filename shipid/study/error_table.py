@@ -88,15 +88,21 @@ class ErrorTable:
         return self.compare([[(1.0, rival, place), (-1.0, model, place)] for model in models])
 
 
-def error_table(results: Results, models: Sequence[str], metric: Metric = "H") -> ErrorTable:
-    """Errors of models, `none` and plain `none` that have a result in every cell; H_90 is taken in each manoeuvre."""
+def error_table(
+    results: Results, models: Sequence[str], metric: Metric = "H", amounts: Sequence[int] | None = None
+) -> ErrorTable:
+    """Errors of models, `none` and plain `none` that have a result in every cell; H_90 is taken in each manoeuvre.
+
+    amounts : values of N_D that count, rising; all by default.
+    """
     _, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
 
     def by_run(path: Array) -> Array:
         return _by_run(path, results.test.future, place, metric)
 
     cells = judged_cells(results)
-    amounts, seeds = sorted(set(cells["N_D"])), sorted(set(cells["seed"]))
+    amounts = sorted(set(cells["N_D"])) if amounts is None else amounts
+    seeds = sorted(set(cells["seed"]))
     wanted = {name: cells[cells["foundation"] == name] for name in (*models, NO_MODEL)}
     if plain := results.plan.plain:
         every = results.cells

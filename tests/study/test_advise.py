@@ -255,6 +255,15 @@ def test_every_model_leaves_out_none_without_saying_so(made: Any) -> None:
     assert "at 30 runs every model with a result in every cell beats it" in advice
 
 
+def test_an_amount_without_any_result_takes_no_interval_of_the_others(made: Any) -> None:
+    """Too few runs for the method, such as 10 of a single window each: the answer is that of 20 and 30 runs."""
+    H = {"good": (None, 2.0, 1.0), "bad": (None, 3.0, 2.0), "none": (None, 9.0, 4.0)}
+    advice = text(made(grid(H, (10, 20, 30)), runs=8))
+    assert "3 of 9 cells have no result" in advice
+    assert "With 20 or 30 runs every physics model" in advice
+    assert "With 20 runs, good (best in validation) has 2.00 m [" in advice
+
+
 def test_what_is_not_known_of_the_best_model_is_said_of_it(made: Any) -> None:
     H = {"good": (1.5, None, 1.0), "bad": (3.0, 2.0, 1.5), "none": (9.0, 4.0, 2.0)}
     advice = text(made(grid(H, (10, 20, 30))))
