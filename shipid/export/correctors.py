@@ -336,11 +336,11 @@ def _free(
         graph.constant(np.zeros(model.num_dof)),
         parameters,
     )
-    places = equations.index(("north", "east", "psi", *MOTIONS))
+    places = equations.index(("north", "east", "psi"))
     x, psi = SX.sym("carry", equations.num_carry), SX.sym("psi")
     c, s = ca.cos(psi), ca.sin(psi)
     north, east = x[places["north"]], x[places["east"]]
-    velocities = graph.pack(*(after[places[name]] for name in MOTIONS))
+    velocities = graph.call(formula("horizontal", [("carry", x)], equations.horizontal(x)), after)
     block = formula(
         "way", [("carry", x), ("psi", psi)], [c * north + s * east, c * east - s * north, x[places["psi"]] - psi]
     )

@@ -12,6 +12,7 @@ from casadi import SX
 from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method, integrate
 from shipid.export.blocks import Duration, Formula, Graph, Value
+from shipid.simulation.log import LEANING, aboard, horizontal
 from shipid.vessel.dynamics import INPUTS, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
@@ -34,6 +35,11 @@ class Equations:
     def num_states(self) -> int:
         """Entries of state and hidden states."""
         return len(self.model.state) + len(self.model.hidden)
+
+    @property
+    def leans(self) -> bool:
+        """Whether velocities along the ship's axes are not those of a log, which are horizontal."""
+        return not set(self.model.state).isdisjoint(LEANING)
 
     @property
     def num_carry(self) -> int:
@@ -93,6 +99,21 @@ class Equations:
         commands = SX.sym("commands", len(model.commands))
         reached = ca.vertcat(SX(0, 1), *(commands[model.commands.index(name)] for name in model.memory))
         return Formula(ca.Function("begun", [commands], [reached], ["commands"], ["out"]))
+
+    @cached_property
+    def aboard(self) -> Formula:
+        """State with horizontal u, v, r, as a log has them -> state with those along the ship's axes."""
+        state = SX.sym("state", self.num_states)
+        now = self._by_name(state)
+        made = ca.densify(ca.vertcat(*(now | aboard(now, ca)).values()))
+        return Formula(ca.Function("aboard", [state], [made], ["state"], ["out"]))
+
+    def horizontal(self, carry: SX) -> list[SX]:
+        """u, v, r of a carry in the horizontal plane."""
+        return list(horizontal(self._by_name(carry), ca).values())
+
+    def _by_name(self, carry: SX) -> dict[str, SX]:
+        return dict(zip((*self.model.state, *self.model.hidden), ca.vertsplit(carry), strict=False))
 
     def index(self, names: Sequence[str]) -> dict[str, int]:
         """Place of some states or memories in a carry."""

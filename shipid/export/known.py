@@ -146,7 +146,8 @@ class Known:
         """State of the vessel, measured, in the frame (11) but for the heading; hidden states of terms are 0."""
         model = self.equations.model
         names = [name if name not in ("north", "east") else "" for name in (*model.state, *model.hidden)]
-        return self.of(group, names, row)
+        state = self.of(group, names, row)
+        return self.graph.call(self.equations.aboard, state) if self.equations.leans else state
 
     @cached_property
     def records(self) -> tuple[Value, Value | None]:
@@ -245,7 +246,7 @@ class Known:
         known = past_records(self, first, steps)
         carry, then = SX.sym("carry", self.equations.num_carry), SX.sym("then", 3)
         now = SX.sym("now", 4)
-        places = self.equations.index(("north", "east", *MOTIONS))
+        places = self.equations.index(("north", "east"))
         x0, y0, psi_then = ca.vertsplit(then)
         turned = now[0] - psi_then
         # the present position in the frame of the start, and the predicted one
@@ -256,7 +257,7 @@ class Known:
         dx, dy = here[0] - (c * north + s * east), here[1] - (c * east - s * north)
         c, s = ca.cos(turned), ca.sin(turned)
         errors = [c * dx + s * dy, c * dy - s * dx]
-        errors += [now[1 + i] - carry[places[name]] for i, name in enumerate(MOTIONS)]
+        errors += [now[1 + i] - motion for i, motion in enumerate(self.equations.horizontal(carry))]
         sound = finite(errors)
         block = formula(
             "error", [("carry", carry), ("then", then), ("now", now)], [ca.if_else(sound, e, 0) for e in errors]
@@ -334,18 +335,12 @@ class Table:
         known, graph = self.known, self.known.graph
         records, _ = known.records
         size, horizon = known.equations.num_carry, known.names.horizon
-        places = known.equations.index(MOTIONS)
         paths, carries = SX.sym("path", 2 * horizon), SX.sym("records", size * horizon)
-        sound = finite(
-            [
-                *ca.vertsplit(paths),
-                *(carries[size * k + places[name]] for k in range(horizon) for name in MOTIONS),
-            ]
-        )
+        motions = [known.equations.horizontal(carries[size * k : size * (k + 1)]) for k in range(horizon)]
+        sound = finite([*ca.vertsplit(paths), *(one for motion in motions for one in motion)])
         seen = []
         for k in self.trajectory:
-            seen += [paths[2 * k - 2], paths[2 * k - 1]]
-            seen += [carries[size * (k - 1) + places[name]] for name in MOTIONS]
+            seen += [paths[2 * k - 2], paths[2 * k - 1], *motions[k - 1]]
         block = formula(
             "trajectory", [("path", paths), ("records", carries)], [ca.if_else(sound, one, 0) for one in seen]
         )

@@ -16,7 +16,7 @@ from shipid.engine.integrate import Method as Integrator
 from shipid.engine.rollout import Distances, Trajectories, distances, rollout
 from shipid.errors import DataError, ShipidError
 from shipid.observer import Observer, bank, observed_start
-from shipid.simulation.log import column_of
+from shipid.simulation.log import LEANING, aboard, column_of, horizontal
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -90,15 +90,21 @@ class Physics:
         return np.stack(_in_frame(instants, north, east), axis=-1), result.diverged
 
     def states(self, instants: Instants, tau_extra: Array | None = None, *, engine: str = AUTO) -> dict[str, Array]:
-        """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S).
+        """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S), horizontal as in a log.
 
         tau_extra : (T, S, n_dof) forces [N, N m] added over the horizon; None adds none. With an observer u and v are
         those through the water.
         engine : as in `rollout`; `auto` takes C from `WORTH_COMPILING` steps on.
         """
-        result, (north, east) = self._rollout(instants, ("north", "east", *MOTION), None, "cpu", tau_extra, engine)
+        leaning = tuple(name for name in LEANING if name in dynamics(self.ship).state)
+        kept = ("north", "east", *MOTION, *leaning)
+        result, (north, east) = self._rollout(instants, kept, None, "cpu", tau_extra, engine)
         x, y = _in_frame(instants, north[:, 0], east[:, 0])
-        return {"x": x, "y": y, **{name: result[name][1:, 0] for name in MOTION}}
+        motion = {name: result[name][1:, 0] for name in (*MOTION, *leaning)}
+        if leaning:
+            with np.errstate(all="ignore"):  # a path that diverged
+                motion |= horizontal(motion)
+        return {"x": x, "y": y, **{name: motion[name] for name in MOTION}}
 
     def reached(self, instants: Instants) -> dict[str, Array]:
         """What the actuators have reached after 0..T steps, name -> (T + 1, S); none where orders act at once."""
@@ -226,6 +232,8 @@ class Physics:
             begun = observed_start(bank(self.ship, self.observer), observed, self.horizon, self.step, self.path)
             columns, environment, slow, drift = begun.columns, begun.environment, begun.tau_extra, begun.drift
         start = {name: columns.get(name, zero) for name in model.state}
+        if not start.keys().isdisjoint(LEANING):
+            start |= aboard(start)  # columns are horizontal
         return start, commands, environment, slow, drift
 
 

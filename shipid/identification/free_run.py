@@ -18,14 +18,12 @@ from shipid.identification.residuals import build
 from shipid.identification.segments import LEAST_STEPS, ShootingSegment
 from shipid.identification.sensitivities import COLUMNS
 from shipid.identification.settings import ENVIRONMENT, Identify, overrides
-from shipid.simulation.log import aboard, horizontal
+from shipid.simulation.log import LEANING, aboard, horizontal
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 CHANNELS = ("north", "east", "psi", "u", "v", "r")
-LEANING = ("phi", "theta", "w", "q")
-"""States by which velocities along the ship's own axes differ from those of a log, which are horizontal."""
 MOST_STEPS = 1e7  # of all runs together
 MEASURED, ALL = "measured", "all"
 """The log among the models of a series, and all runs together among the runs of a table of errors."""

@@ -21,13 +21,17 @@ def column_of(state: str) -> str:
     return "z" if state == "down" else state
 
 
+LEANING = ("phi", "theta", "w", "q")
+"""States by which velocities along the ship's axes differ from those of a log, which are horizontal."""
+
+
 def horizontal(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
     """Horizontal velocities u, v [m/s] along and across the heading, and r = d(psi)/dt [rad/s], from body-fixed ones.
 
     Fossen 2021, eqs. 2.31 and 2.40. maths : module with cos and sin for the columns: numpy, or casadi for symbols.
     """
     zero = 0.0 * columns["u"]
-    phi, theta, w, q = (columns.get(name, zero) for name in ("phi", "theta", "w", "q"))
+    phi, theta, w, q = (columns.get(name, zero) for name in LEANING)
     u, v, r = columns["u"], columns["v"], columns["r"]
     across = v * maths.cos(phi) - w * maths.sin(phi)
     down = v * maths.sin(phi) + w * maths.cos(phi)
@@ -38,7 +42,7 @@ def horizontal(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
 def aboard(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
     """Body-fixed u, v [m/s] and r [rad/s] from the columns of a log: inverse of `horizontal`; w, q are body-fixed."""
     zero = 0.0 * columns["u"]
-    phi, theta, w, q = (columns.get(name, zero) for name in ("phi", "theta", "w", "q"))
+    phi, theta, w, q = (columns.get(name, zero) for name in LEANING)
     v = (columns["v"] + w * maths.sin(phi)) / maths.cos(phi)
     u = (columns["u"] - (v * maths.sin(phi) + w * maths.cos(phi)) * maths.sin(theta)) / maths.cos(theta)
     r = (columns["r"] * maths.cos(theta) - q * maths.sin(phi)) / maths.cos(phi)

@@ -17,6 +17,8 @@ from shipid.observer import MEASURED, Observer, observe
 from shipid.study.prepare import at_instants
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
+from tests.conftest import variety
+from tests.identification.trials import trials
 from tests.study.test_commands import weaving
 from tests.study.test_whole import windy
 
@@ -56,6 +58,20 @@ def test_states_are_those_of_the_paths(windows: Windows) -> None:
     )
     pushed = RIGHT.states(windows.instants(), np.tile([1e4, 0.0, 0.0], (5, len(windows), 1)))
     assert (pushed["u"] > states["u"]).all()
+
+
+@pytest.mark.parametrize("kind", ["roll", "six"])
+def test_a_ship_that_heels_leads_along_her_horizontal_log(kind: str) -> None:
+    """A log's u, v and r are horizontal, the states of a ship with 4 or 6 degrees of freedom are along her axes."""
+    ship = variety()[kind]
+    data = trials(ship, runs=2, steps=30)
+    assert np.abs(data.frame["phi"]).max() > 0.02
+    windows = cut_windows(data, horizon=5)
+    physics, instants = Physics(ship, 5, 1.0, "rk4"), windows.instants(known=True)
+    np.testing.assert_allclose(physics.paths(instants), windows.future, atol=1e-9)
+    states = physics.states(instants)
+    for name in ("u", "v", "r", "psi"):
+        np.testing.assert_allclose(states[name], windows.states[name], atol=1e-9)
 
 
 def test_no_physics_stays_where_it_is(windows: Windows) -> None:
