@@ -11,7 +11,7 @@ from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import SEEN, State, unit_in_name
 from shipid.logs.guess.twins import choose_twins, twins
-from shipid.logs.guess.words import fits, is_electrical, is_order, numbered, parts_of, units_in
+from shipid.logs.guess.words import fits, is_electrical, is_engine, is_order, numbered, parts_of, units_in
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import SIGNALS, is_command, is_shaft, named, signal_of, steers
 
@@ -30,6 +30,7 @@ SHARES = {
     ("shares of 1", "norm", "normalised", "normalized", "-1..1", "-1...1", "-1 to 1", "p.u.", "pu"): 1.0,
 }
 """Words for a share of the largest value -> what that value is in it."""
+GEARED = 5.0  # rev/s: an engine that is faster usually has a gear
 UNDER_WAY, NEARLY_ALWAYS = 0.3, 0.9  # of the usual way in a window; share of these windows
 NEAR = 15.0  # times from that: a unit further off is doubted
 
@@ -280,6 +281,9 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
             )
             state.find("unit of the shaft", (name,), 0.6, f"{sentence} of the shaft: it is read in {by_motion}")
             return by_motion, 0.6, f"{why}; the way in a turn of the shaft says {by_motion}", {}
+        if written in ("rpm", "rev/s") and top * to_si(written, "propeller.n") > GEARED and is_engine(name):
+            sentence = f"{name!r}, up to {top:.4g} {written}, is the speed of an engine: is there a gear?"
+            state.ask(("n",), f"{sentence} Write factor = 1 / its ratio")
         return written, 0.9, why, {}
     if top <= 130.0 and off[by_motion] < NEAR and by_motion == "rpm":
         state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: rpm, or per cent of a shaft speed?")

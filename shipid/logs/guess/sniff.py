@@ -51,6 +51,8 @@ LONG = 1e4  # rows between two runs that have a clock each
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
 MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a comment
 SENTINELS = tuple(sign * value for value in (99.0, 999.0, 9999.0, 99999.0, 999999.0, 999.9, 9999.9) for sign in (-1, 1))
+NOT_AVAILABLE = {"psi": (511.0, 360.0), "speed": (102.3, 51.0), "latitude": (91.0, 90.0), "longitude": (181.0, 180.0)}
+"""Meaning -> number [deg, kn] that AIS writes for none (ITU-R M.1371), and the largest of the others."""
 LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
 REPEATED = 0.05  # share of the rows that may repeat the row before, at most
 NUMERIC = 0.8  # share of the cells of a line of data that are numbers
@@ -411,18 +413,21 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
     """
     texts: dict[str, None] = {}
     for name, values in columns.items():
-        for value in SENTINELS:
+        never = dict(NOT_AVAILABLE[one] for one in fits(name) if one in NOT_AVAILABLE)
+        for value in (*SENTINELS, *never):
             hit = values == value
             others = values[~hit & ~np.isin(values, SENTINELS) & np.isfinite(values)]
             if not hit.any() or len(others) < 2:
                 continue
             low, high = float(others.min()), float(others.max())
-            if low - max(high - low, -low) <= value <= high + max(high - low, high):
-                continue
-            if low == high == 0.0 and 0.0 < value < 1000.0:
-                continue
-            texts |= dict.fromkeys(_called(table, name)[hit].astype(str).str.strip())
-            values[hit] = np.nan
+            if value in never:
+                known = max(-low, high) > never[value]
+            else:
+                known = low - max(high - low, -low) <= value <= high + max(high - low, high)
+                known |= low == high == 0.0 and 0.0 < value < 1000.0
+            if not known:
+                texts |= dict.fromkeys(_called(table, name)[hit].astype(str).str.strip())
+                values[hit] = np.nan
     return list(texts)
 
 

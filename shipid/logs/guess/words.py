@@ -159,9 +159,9 @@ PHRASES: dict[str, str] = {
         "propell stigning, stigning, schroef spoed, spoed, paso helice, passo elica"
     ),
     "thrust": (
-        "thrust, t prop, propeller thrust, prop thrust, shaft thrust, thrust p, schub, propeller schub, wellen "
-        "schub, schub kraft, skyvekraft, skyve kraft, poussee, poussee helice, empuje, empuje helice, spinta, "
-        "spinta elica, stuw kracht, thrust force"
+        "thrust, t n, t prop, propeller thrust, prop thrust, shaft thrust, thrust p, schub, propeller "
+        "schub, wellen schub, schub kraft, skyvekraft, skyve kraft, poussee, poussee helice, empuje, empuje "
+        "helice, spinta, spinta elica, stuw kracht, thrust force"
     ),
     "torque": (
         "torque, q, q prop, shaft torque, propeller torque, prop torque, dreh moment, drehmoment, wellen "
@@ -347,6 +347,9 @@ def _cut(word: str) -> tuple[str, ...]:
     return best.get(len(word), (word,))
 
 
+ENGINES = frozenset("engine engines motor motors moteur moteurs motore motori me maskin".split())
+
+
 @cache
 def _phrases() -> dict[str, tuple[tuple[str, ...], ...]]:
     def cut(text: str) -> tuple[tuple[str, ...], ...]:
@@ -360,6 +363,11 @@ def is_electrical(name: str) -> bool:
     parts = parts_of(name)
     joined = "_".join(parts)
     return bool(re.search(r"(^|_)(erpm|e_rpm|elec(tr(ic(al)?)?)?_rpm|eldrehzahl)(_|$)", joined))
+
+
+def is_engine(name: str) -> bool:
+    """Whether a name says that a speed is that of an engine, which may drive its shaft through a gear."""
+    return not ENGINES.isdisjoint(parts_of(name))
 
 
 def is_order(name: str) -> bool:

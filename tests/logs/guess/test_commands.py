@@ -146,6 +146,16 @@ def test_electrical_turns_are_asked_for_their_poles(name: str) -> None:
     assert any("of how many poles" in question.sentence for question in state.questions)
 
 
+@pytest.mark.parametrize(
+    ("name", "top", "asked"),
+    [("Engine RPM", 1800, True), ("motor rpm port", 900, True), ("ME rpm", 110, False), ("shaft rpm", 1800, False)],
+)
+def test_a_fast_engine_is_asked_for_its_gear(name: str, top: float, asked: bool) -> None:
+    """Before, 1800 rpm of an engine were those of the shaft."""
+    state = chosen({name: top * (0.9 + 0.1 * np.sin(T))})
+    assert any("is there a gear? Write factor = 1 / its ratio" in one.sentence for one in state.questions) == asked
+
+
 @pytest.mark.parametrize("name", ["rpm", "engine_rpm", "engineRPM", "me rpm", "propellerpm", "ME RPM", "MERPM"])
 def test_turns_of_an_engine_are_not_electrical(name: str) -> None:
     state = chosen({name: 400 + 50 * np.sin(T)})

@@ -394,6 +394,15 @@ def test_a_word_for_nothing_is_declared_as_a_missing_value(tmp_path: Path, word:
     assert all(np.flatnonzero(np.isnan(values)).tolist() == [40] for values in sniffed.columns.values())
 
 
+@pytest.mark.parametrize(("name", "value"), [("heading", 511), ("SOG [kn]", 102.3), ("lat", 91), ("Longitude", 181)])
+def test_what_ais_writes_for_nothing_is_a_missing_value(tmp_path: Path, name: str, value: float) -> None:
+    """Before, a speed over ground was taken for one with a factor of 0.64."""
+    held = [f"{12 + 5 * np.sin(k / 9):.1f}" if k % 20 else str(value) for k in range(80)]
+    sniffed = sniff(log_of(tmp_path, [f"time,{name},rpm", *(f"{k},{one},{k % 3}" for k, one in enumerate(held))]))
+    assert sniffed.form["missing"][-1] == str(value)
+    assert np.isnan(sniffed.columns[name]).sum() == 4
+
+
 def test_a_speed_of_999_rpm_is_no_missing_value(tmp_path: Path) -> None:
     rows = [f"{k},{600 + 5 * k}" for k in range(80)] + ["80,999"]
     assert "missing" not in sniff(log_of(tmp_path, ["time,rpm", *rows])).form

@@ -73,6 +73,7 @@ def test_parts(name: str, parts: tuple[str, ...]) -> None:
         ("Sbandamento", "phi"),
         ("Rudder pump 1", ""),
         ("T_prop", "thrust"),
+        ("T_LEFT_N", "thrust"),
     ],
 )
 def test_the_best_meaning(name: str, meaning: str) -> None:
