@@ -295,7 +295,7 @@ def hull(given: Particulars) -> Values:
     return {
         "R_0": _resistance(given),
         "X_vv": Value(min(1.15 * full - 0.18, 0.0), "prime", f"1.15 C_b B / L - 0.18, at most 0, {masumoto}"),
-        "X_vr": Value(m_y - 1.91 * full + 0.08, "prime", f"m_y' - 1.91 C_b B / L + 0.08, {masumoto}"),
+        "X_vr": Value(1.91 * full - 0.08 - m_y, "prime", f"1.91 C_b B / L - 0.08 - m_y', {masumoto}: v = -U beta"),
         "X_rr": Value(-0.085 * full + 0.008, "prime", f"-0.085 C_b B / L + 0.008, {masumoto}"),
         "X_vvvv": Value(max(-6.68 * full + 1.1, 0.0), "prime", f"-6.68 C_b B / L + 1.1, at least 0, {masumoto}"),
         "Y_v": Value(s * (1 + 0.4 * C_b * B / T), "prime", clarke),

@@ -63,6 +63,20 @@ def test_formulae_near_kvlcc2_as_measured() -> None:
     assert -added_mass(KVLCC2)["Y_vdot"].number / (0.5 * 1025 * 320**2 * 20.8) == pytest.approx(0.223, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("given", "measured"),
+    [
+        (Particulars(length=175.0, beam=25.4, draught=8.5, block=0.559), 0.003939 * 175.0 / 8.5),
+        (KVLCC2, 0.002 + 0.223),
+    ],
+    ids=["S-175", "KVLCC2"],
+)
+def test_drift_in_a_turn_holds_a_ship_back_as_measured(given: Particulars, measured: float) -> None:
+    """X_vr + m_y on 1/2 rho L T of Son and Nomoto (1982), and of Yasukawa and Yoshimura (2015)."""
+    m_y = -added_mass(given)["Y_vdot"].number / (given.rho / 2 * given.length**2 * given.draught)
+    assert hull(given)["X_vr"].number + m_y == pytest.approx(measured, rel=0.15)
+
+
 def test_yaw_of_a_stern_pushed_aside_is_reported_stable_or_not() -> None:
     """The same hull: azimuth units, which are fins too, hold the course; the rudder's does not."""
     assert first_guess(GUNNERUS, "g", "g.toml").growth < 0
