@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from shipid.measures.record import Array, Measures, Record, mean, plateaus, settled
+from shipid.measures.turning import MIDSHIPS
 from shipid.units import DEGREE
 
 LEVEL_HELM = 0.5 * DEGREE  # helm angles closer than this are one level
@@ -58,11 +60,9 @@ def spiral(record: Record) -> Measures:
         `levels_not_steady`: counts.
     """
     measures, points = Measures(), levels(record)
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(points.helm))) != 0) + 1
-    corner = int(turns[0]) if len(turns) else 0
-    ways = [(points.helm[: corner + 1], points.rate[: corner + 1]), (points.helm[corner:], points.rate[corner:])]
-    zero = [_at_zero(rate, helm) for helm, rate in ways] if corner else [NAN, NAN]
-    flat = [_at_zero(helm, rate) for helm, rate in ways] if corner else [NAN, NAN]
+    ways = [(points.helm[way], points.rate[way]) for way in _ways(points.helm)]
+    zero = [_at_zero(rate, helm) for helm, rate in ways] if len(ways) == 2 else [NAN, NAN]
+    flat = [_at_zero(helm, rate) for helm, rate in ways] if len(ways) == 2 else [NAN, NAN]
     why = "the rate does not change sign on the way there and on the way back, on levels that are steady"
     measures.add("neutral_helm", (zero[0] + zero[1]) / 2, "rad", why)
     measures.add("loop_width", abs(zero[1] - zero[0]), "rad", why)
@@ -70,6 +70,17 @@ def spiral(record: Record) -> Measures:
     measures.add("levels", len(points.helm), "-", "")
     measures.add("levels_not_steady", points.skipped, "-", "")
     return measures
+
+
+def _ways(helm: Array) -> list[slice]:
+    """Levels of the way there and of the way back, from helm over to one side to the other side or amidships.
+
+    The levels before and after, as of the straight course to the first helm, belong to neither.
+    """
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(helm))) != 0) + 1
+    over = MIDSHIPS * float(np.abs(helm).max(initial=0.0))
+    stretches = pairwise([0, *turns.tolist(), len(helm) - 1])
+    return [slice(a, b + 1) for a, b in stretches if a < b and abs(helm[a]) >= over and helm[a] * helm[b] <= 0][:2]
 
 
 def _at_zero(x: Array, y: Array) -> float:

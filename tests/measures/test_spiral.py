@@ -34,6 +34,24 @@ def test_a_loop_as_wide_as_it_was_made() -> None:
     assert measures["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)
 
 
+@pytest.mark.parametrize("straight", [0.0, HOLD, 3 * HOLD])
+def test_a_straight_course_before_and_after_belongs_to_no_way(straight: float) -> None:
+    """A log that begins long before the first helm, and ends long after the last, holds the same loop."""
+    record = every(stable_spiral(), 0.5)
+    back = record.t >= START + HOLD * 8
+    jump = np.where(back, -1.0, 1.0) * np.where(record.t >= START, 0.2 * DEGREE, 0.0)
+    record = replace(record, r=record.r + jump)
+    idle = np.arange(0.0, straight, 0.5)
+    longer = {
+        name: np.concatenate([np.zeros(len(idle)), getattr(record, name), np.zeros(len(idle))])
+        for name in ("north", "east", "psi", "u", "v", "r", "helm")
+    }
+    t = np.concatenate([idle, record.t + straight, record.t[-1] + 0.5 + straight + idle])
+    measures = spiral(replace(record, t=t, shaft=None, **longer))
+    assert measures["loop_height"].value == pytest.approx(0.4 * DEGREE, rel=1e-2)
+    assert measures["loop_width"].value == pytest.approx(0.4 / GAIN * DEGREE, rel=1e-2)
+
+
 def test_reverse_spiral_finds_the_folds() -> None:
     """The helm r^3 - 3 r falls from 2 to -2 deg as the rate rises from -1 to 1 deg/s: 4 deg wide."""
     measures = reverse_spiral(every(reverse(), 0.5))
