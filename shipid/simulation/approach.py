@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 PROBE_SHAFT, PROBE_HELM = 1.0, 0.1  # rev/s, rad: values at which the effect of commands is tested
 FROUDE = 0.2  # of the service speed of a ship whose document gives none
-MOST_SHAFT, HALVINGS = 100.0, 60  # rev/s; of the interval of a shaft speed
+MOST_SHAFT, HALVINGS = 1000.0, 60  # rev/s; of the interval of a shaft speed
 NOTHING = 1e-12  # m/s^2, rad/s^2
 CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach of a small ship
 PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose speed settles over some 20
@@ -173,9 +173,9 @@ def balanced_shaft(controls: Controls, speed: float) -> float | None:
 
     low, high = 0.0, 1.0
     while surplus(high) < 0:
-        low, high = high, 2 * high
-        if high > MOST_SHAFT:
+        if high >= MOST_SHAFT:
             return None
+        low, high = high, min(2 * high, MOST_SHAFT)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if surplus(middle) < 0 else (low, middle)

@@ -139,7 +139,7 @@ def shaft_speed(controls: Controls, speed: float) -> float:
 
     Raises
     ------
-    ShipidError : the speed is not positive, or no shaft speed up to 6000 rpm gives it.
+    ShipidError : the speed is not positive, or no shaft speed up to 60,000 rpm gives it.
     """
     if not 0 < speed <= SPEED_LIMIT:
         words = f"the speed of the approach must be above 0 and at most {SPEED_LIMIT:g} m/s"

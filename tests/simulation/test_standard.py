@@ -18,6 +18,7 @@ from shipid.simulation.manoeuvre import ReverseSpiral, Spiral, Zigzag
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import KINDS, shaft_speed, standard
 from shipid.vessel.load import load_vessel
+from shipid.vessel.template import Particulars, first_guess
 from tests.measures.test_laws import SIGNED, TOLERANCE
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -38,6 +39,13 @@ def test_shaft_speed_gives_the_speed(speed: float) -> None:
     n_rpm = 60 * shaft_speed(Controls.of(SHIP), speed)
     path = perform(SHIP, [Zigzag(n_rpm=n_rpm, duration=1.0)], step=0.1)
     assert path["u"].iloc[0] == pytest.approx(speed, abs=0.02)  # an approach ends where it changes by 1 mm/s in 30 s
+
+
+@pytest.mark.parametrize(("rpm", "diameter"), [(5000.0, 0.0375), (20000.0, 0.015)])
+def test_a_small_model_may_have_a_fast_shaft(rpm: float, diameter: float) -> None:
+    particulars = Particulars(1.2, 0.2, 0.05, 0.5, 1.37, rpm=rpm, propeller_diameter=diameter)
+    guess = first_guess(particulars, "model", "model.toml")
+    assert 60 * shaft_speed(Controls.of(guess.vessel), 1.37) == pytest.approx(60 * guess.n, rel=1e-6)
 
 
 def test_a_speed_that_no_shaft_speed_gives_is_refused() -> None:
