@@ -24,9 +24,10 @@ STRAIGHT = 0.25  # of the greatest yaw rate, up to which a ship goes straight
 def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = None) -> Record:
     """Record of one run from the columns of a dataset.
 
-    The helm is the mean of the angle commands that move. Each has the sign that turns the ship to starboard: that in
-    `helm`, angle command -> +1 or -1, where the vessel is known; else the sign of the sum of angle times change of yaw
-    rate. The shaft is the mean of the shaft speeds that are not 0 at the start.
+    The helm is the mean of the angle commands that move, by a quarter of the one that moves most or more: a bow unit
+    parked across, or the offset of a rudder at rest, is no helm. Each has the sign that turns the ship to starboard:
+    that in `helm`, angle command -> +1 or -1, where the vessel is known; else the sign of the sum of angle times change
+    of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start.
 
     Raises
     ------
@@ -38,7 +39,9 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     states = {name: np.asarray(columns[name], dtype=float) for name in STATES}
     angles, shafts = _commands(columns, steers), list(_commands(columns, is_shaft).values())
     known = {name: _sense(angle, states["r"]) for name, angle in angles.items()} if helm is None else helm
-    helms = [sign * angle for name, angle in angles.items() if (sign := known.get(name, 0.0)) and angle.any()]
+    moved = {name: float(np.ptp(angle)) for name, angle in angles.items() if known.get(name, 0.0) and angle.any()}
+    least = MIDSHIPS * max(moved.values(), default=0.0)
+    helms = [known[name] * angles[name] for name, size in moved.items() if size >= least]
     running = [shaft for shaft in shafts if shaft[0] != 0]
     return Record(
         **states,

@@ -25,6 +25,15 @@ def test_helm_is_counted_by_what_it_does(kind: str, sign: float) -> None:
     np.testing.assert_allclose(record_of(columns(record) | angles).helm, record.helm)
 
 
+@pytest.mark.parametrize("kind", ["zigzag", "turning"])
+@pytest.mark.parametrize(("parked", "noise"), [(90.0, 0.0), (0.3, 0.05)])
+def test_an_angle_that_stays_where_it_is_is_no_helm(kind: str, parked: float, noise: float) -> None:
+    record = every(RECORDS[kind](), 0.5)
+    still = parked + noise * np.random.default_rng(0).standard_normal(len(record.t))
+    given = columns(record) | {"rudder.delta": record.helm, "bow.alpha": still * DEGREE}
+    np.testing.assert_allclose(record_of(given).helm, record.helm)
+
+
 def test_shafts_that_run_and_columns_that_lack() -> None:
     record = every(RECORDS["stop"](), 0.5)
     given = columns(record) | {"port.n": record.shaft, "bow.n": 0 * record.t, "actual.port.n": 9 + 0 * record.t}
