@@ -153,6 +153,8 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     force = _added_mass_force(M_A, nu_r, nu_c_dot, kept)
     if vessel.document["inertia"].get("coriolis", "full") == "full":
         force -= coriolis(M_RB, nu)
+    else:  # what the derivatives hold of it turns the mass with nu_r alone; the water turns it with the rest
+        force += M_RB @ nu_c_dot
     if HEAVE in axes:
         force += _upright(eta, nu, M_RB[0, 0])
     available |= _gives(terms, available, bound, value_of, outputs=False)

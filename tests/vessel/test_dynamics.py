@@ -114,6 +114,20 @@ def test_a_current_carries_the_ship_along() -> None:
     assert turning["r"] == pytest.approx(still["r"], rel=1e-9)
 
 
+def test_the_motion_through_the_water_is_that_in_still_water(bundled_vessel: Vessel) -> None:
+    """Galilei: nu_dot = nu_r_dot + d(nu_c)/dt, whether formulae turn the mass or the derivatives."""
+    calm = {"wind.off": True} if "wind" in bundled_vessel.document else {}  # the air stays where it is
+    ship = bundled_vessel.with_values(calm)
+    carried, model = ship.with_values({"current.kind": "uniform"}), dynamics(ship)
+    orders = {name.replace(".", "_"): 0.2 for name in (*model.commands, *model.memory)}
+    V_c, beta_c, psi, r = 0.9, 2.0, 0.5, 0.03
+    u_c, v_c = V_c * np.cos(beta_c - psi), V_c * np.sin(beta_c - psi)
+    still = rates(ship, u=1.5, v=0.1, r=r, psi=psi, **orders)
+    moved = rates(carried, u=1.5 + u_c, v=0.1 + v_c, r=r, psi=psi, V_c=V_c, beta_c=beta_c, **orders)
+    difference = [moved[axis] - still[axis] for axis in "uvr"]
+    np.testing.assert_allclose(difference, [r * v_c, -r * u_c, 0.0], atol=1e-9)
+
+
 def test_commands_and_environment_are_what_the_terms_ask_for() -> None:
     base = load_vessel("gunnerus-28.9")
     model = dynamics(base)
