@@ -118,7 +118,9 @@ class Identify(Checked, BaseModel):
         if unknown is not None:
             raise ValueError(f"nuisance.{unknown} is no valid name: {choices(unknown, NUISANCES)}")
         for path, (low, high) in self.bounds.items():
-            if not low <= high:
+            if math.isnan(low) or math.isnan(high):
+                raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] lacks a number: give [low, high], or inf")
+            if low > high:
                 raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] has low above high: give [low, high]")
         if self.commands == "between" and self.outputs:
             message = "'between' is not for measured outputs, which belong to the command of their row"

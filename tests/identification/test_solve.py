@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 from dataclasses import replace
 from fnmatch import fnmatch
@@ -482,6 +483,7 @@ def test_mistakes_are_one_line(more: dict[str, object], words: str) -> None:
         ({"weights": {"w": 0.1}}, "weights.w is no valid name"),
         ({"nuisance": ["currant"]}, "did you mean 'current'"),
         ({"bounds": {FEW[0]: (2.0, 1.0)}}, "low above high"),
+        ({"bounds": {FEW[0]: (math.nan, 2.0)}}, r"\[nan, 2\] lacks a number: give \[low, high\]"),
         ({"horizon": 1.5}, "must hold two steps"),
         ({"weights": {"u": 0.0}}, "must be above 0"),
     ],
