@@ -270,7 +270,7 @@ def run_identification(
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
         if (solution.at_bound | solution.held).all():
-            raise ShipidError("every parameter is at a bound, fixed or dropped: free more parameters, or widen bounds")
+            raise ShipidError(_nothing_free(solution))
         _go_on(held)
         judged = statistics(LinearFit.of(solution))
         determined = [path for path in profiles if path in judged.collinearity.paths]
@@ -323,6 +323,16 @@ def run_identification(
             beyond=_beyond(pair[AFTER], dataset, fitted, logs),
             outputs=outputs,
         )
+
+
+def _nothing_free(solution: Solution) -> str:
+    """Why no factor has an estimate, and what would give one."""
+    if not solution.dropped:
+        return "every parameter is at a bound or fixed: free more parameters, or widen bounds"
+    remedy = f"give a drop of less than {solution.settings.drop:g}, or runs that excite them more"
+    if len(solution.dropped) == len(solution.paths):
+        return f"every parameter was dropped, because the data do not support a change of any: {remedy}"
+    return f"every parameter is at a bound, fixed or dropped: {remedy}, or widen bounds"
 
 
 def _groups(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> pd.DataFrame:
