@@ -7,10 +7,18 @@ import sys
 FEW_LOOKS = 50_000  # objects made between two looks for garbage: imports make many objects, and no garbage
 
 
+def open_streams() -> None:
+    """Let a standard stream that is closed lead nowhere: else its number goes to the next file that is opened."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+
+
 def run() -> None:
     """Run the command line; Ctrl-C while it is being imported ends it as quietly as later."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by NumPy's import; on a busy machine waits cost half
     gc.set_threshold(FEW_LOOKS)
+    open_streams()
     try:
         from shipid.cli import main
     except KeyboardInterrupt:

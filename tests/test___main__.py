@@ -58,3 +58,17 @@ def test_ctrl_c_during_the_imports_ends_quietly() -> None:
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
     assert (result.returncode, result.stderr) == (130, "interrupted\n")
+
+
+def test_closed_streams_lead_nowhere_and_no_file_takes_their_place() -> None:
+    into, out = os.pipe()
+    code = (
+        "import os, sys, shipid.__main__ as m; sys.argv = ['shipid', 'study', 'list', '--json']\n"
+        "try: m.run()\n"
+        f"finally: os.write({out}, str(os.dup({out})).encode())"
+    )
+    closed = ["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", sys.executable, "-c", code]
+    result = subprocess.run(closed, pass_fds=[out], timeout=60, check=False)
+    os.close(out)
+    with os.fdopen(into) as stream:
+        assert (result.returncode, int(stream.read()) > 2) == (0, True)
