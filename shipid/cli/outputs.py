@@ -1,12 +1,14 @@
-"""What every command refuses before it begins: numbers that are not finite, and to write over what it reads."""
+"""What every command refuses before it begins, such as to write over what it reads; and how Ctrl-C ends it."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
+import typer
 import typer.core
 
 from shipid.errors import ShipidError
@@ -21,7 +23,10 @@ class Guarded(typer.core.TyperCommand):
     """A command that refuses numbers that are not finite, and a file named to be read and written, or written twice."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command; ShipidError for a number that is not finite, or for a file that must not be written."""
+        """Run the command; ShipidError for a number that is not finite, or for a file that must not be written.
+
+        Ctrl-C is answered here: Typer ends a command without a word.
+        """
         for one in self.params:
             values = ctx.params.get(one.name)
             for value in values if isinstance(values, list | tuple) else [values]:
@@ -34,7 +39,11 @@ class Guarded(typer.core.TyperCommand):
         for name, value in written.items():
             check_output(Path(value), read, f"--{name}")
             read.append(Path(value))
-        return super().invoke(ctx)
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            sys.stderr.write("interrupted\n")
+            raise typer.Exit(130) from None
 
 
 def check_output(file: Path, read: Iterable[Path], option: str) -> None:

@@ -1,4 +1,4 @@
-"""No command writes over what it reads, whatever it is called by; and nothing is lost by the attempt."""
+"""No command writes over what it reads, and nothing is lost by the attempt; Ctrl-C is answered with one line."""
 
 from __future__ import annotations
 
@@ -135,3 +135,11 @@ def test_every_command_is_guarded() -> None:
     assert len(leaves) > 20
     assert all(isinstance(one, Guarded) for one in leaves)
     assert {name for one in leaves for param in one.params for name in [param.name] if name in OUTPUTS} == set(OUTPUTS)
+
+
+def test_ctrl_c_is_one_line_in_every_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    def pressed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("shipid.document.bundled", pressed)
+    assert ended("study", "list") == (130, "", "interrupted\n")
