@@ -22,6 +22,7 @@ from shipid.physics.signals import SIGNALS, signal_of
 from shipid.simulation.approach import Controls, helm_effect, thrust_sharing
 from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
 from shipid.units import DEGREE, RPM
+from shipid.vessel.schema import term_blocks
 
 Array = NDArray[np.float64]
 Range = tuple[FiniteFloat, FiniteFloat]
@@ -376,6 +377,15 @@ class CrashStop(Timed):
     """Full astern, the helm amidships."""
 
     astern_rpm: Annotated[Positive, Field(description="rpm ordered astern")]
+
+    def check(self, controls: Controls) -> None:
+        """Raise DocumentError for a vessel whose thrust is known about her service speed alone."""
+        super().check(controls)
+        vessel = controls.vessel
+        about = next((path for path, key, _ in term_blocks(vessel.document) if key == "thruster.service_speed"), None)
+        if about is not None:
+            message = f"{vessel.name} cannot stop: her thrust (kind service_speed) holds near her service speed alone"
+            raise DocumentError(f"{message}, take a vessel with a propeller", file=vessel.file, path=about)
 
     @property
     def greatest_shaft(self) -> float:

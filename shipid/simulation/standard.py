@@ -110,7 +110,8 @@ def standard(
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
     asked = service_speed(vessel) if speed is None else number("speed", speed)
-    n_rpm = (shaft_speed(Controls.of(vessel), asked) if n is None else number("n", n)) / RPM
+    controls = Controls.of(vessel)
+    n_rpm = (shaft_speed(controls, asked) if n is None else number("n", n)) / RPM
     passing = length / asked  # s for one length
     interval = _round(passing / ROWS) if step is None else step * STEPS
     lead = float(np.ceil(LEAD * passing / interval) * interval)
@@ -120,6 +121,7 @@ def standard(
         words = f"{step:g} s is too long for this ship, which runs a length in {passing:.3g} s"
         raise ShipidError(f"{words}: give {passing / LEAST_STEPS:.3g} s or less", path="--step")
     manoeuvre = build(angles, cast(Side, side), duration, passing, how)
+    manoeuvre.check(controls)
     steps = manoeuvre.length / interval * STEPS
     if steps > MOST_STEPS:
         option = "--duration" if step is None else "--step"

@@ -53,6 +53,16 @@ def test_a_speed_that_no_shaft_speed_gives_is_refused() -> None:
         standard(SHIP.with_values({"hull.derivatives.X_uu": -1e9}), "turning", speed=100.0)
 
 
+def test_thrust_about_a_service_speed_says_nothing_of_a_stop() -> None:
+    """The Mariner would stop in 0.3 lengths: thrust less resistance is a cubic of u / U_0 - n / n_0."""
+    mariner = load_vessel("mariner")
+    with pytest.raises(
+        ShipidError, match=r"thruster\.propeller: Mariner .* cannot stop: .* near her service speed alone"
+    ):
+        standard(mariner, "stop")
+    assert standard(mariner, "turning").speed == pytest.approx(7.7175)
+
+
 def test_speed_is_that_of_froude_unless_asked() -> None:
     assert standard(SHIP, "turning").speed == pytest.approx(0.2 * np.sqrt(9.81 * 28.9))
     assert standard(SHIP, "turning", speed=2.0).speed == 2.0
