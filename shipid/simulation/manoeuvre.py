@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, PositiveInt
 
 from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
@@ -33,6 +33,17 @@ HELMS = (25, 20, 15, 10, 5, 3, 1, 0, -1, -3, -5, -10, -15, -20, -25)
 SPIRAL = (*HELMS, *HELMS[-2::-1])  # to the other side and back
 RATES = (3, 2, 1, 0.5, 0, -0.5, -1, -2, -3)
 SETTLES = 40.0  # rad: omega x hold of the reverse spiral's helmsman
+
+
+def _rising(limits: tuple[float, float]) -> tuple[float, float]:
+    """The pair itself; ValueError if the first is above the second."""
+    low, high = limits
+    if low > high:
+        raise ValueError(f"low > high: give [low, high], not [{low:g}, {high:g}]")
+    return limits
+
+
+Hold = Annotated[tuple[Positive, Positive], AfterValidator(_rising)]
 
 
 @dataclass(frozen=True)
@@ -163,10 +174,7 @@ class Steps(Ordered):
     """
 
     orders: Annotated[dict[str, Range], Field(description="key -> least and greatest level, in the unit of the key")]
-    hold: Annotated[tuple[Positive, Positive], Field(description="s, least and greatest time of a level")] = (
-        10.0,
-        40.0,
-    )
+    hold: Annotated[Hold, Field(description="s, least and greatest time of a level")] = (10.0, 40.0)
     seed: Annotated[int, Field(description="of levels and times")] = 0
 
     @property
@@ -405,10 +413,11 @@ class Excitation(Timed):
     amplitude_rpm: Annotated[NotNegative, Field(description="rpm about n_rpm at most; 0: not moved")] = 0.0
     period: Annotated[Positive, Field(description="s, of the multisine")] = 200.0
     harmonics: Annotated[
-        tuple[int, int],
+        tuple[PositiveInt, PositiveInt],
+        AfterValidator(_rising),
         Field(description="lowest and highest of the multisine; assigned alternately to helm and shaft"),
     ] = (1, 20)
-    hold: Annotated[tuple[Positive, Positive], Field(description="s, least and most of an APRBS level")] = (5.0, 20.0)
+    hold: Annotated[Hold, Field(description="s, least and most of an APRBS level")] = (5.0, 20.0)
     angle_rate_deg: Annotated[Positive | None, Field(description="deg/s, limit of the ordered helm")] = None
     shaft_rate_rpm: Annotated[Positive | None, Field(description="rpm/s, limit of the ordered shaft")] = None
     seed: Annotated[int, Field(description="of the levels, and of the search for phases")] = 0
