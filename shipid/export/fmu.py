@@ -6,7 +6,6 @@ The standard: Functional Mock-up Interface 2.0.4, fmi-standard.org. Its declarat
 from __future__ import annotations
 
 import platform
-import subprocess
 import tempfile
 import uuid
 import zipfile
@@ -18,6 +17,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from shipid.engine.integrate import Method
+from shipid.engine.libraries import run_compiler
 from shipid.engine.native import compiler
 from shipid.errors import ShipidError
 from shipid.export.band import CHOICE, COLUMNS
@@ -196,11 +196,11 @@ def _compiled(folder: Path, name: str) -> Path:
     command = compiler()
     assert command is not None
     options = ["-std=c99", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-s"]
-    arguments = [command, *options, "-o", f"{name}.so", f"{name}.c", "-lm"]
-    result = subprocess.run(arguments, cwd=folder, capture_output=True, text=True)
-    if result.returncode:
-        raise ShipidError(f"the C compiler failed ({(result.stderr.strip() or 'it gave no reason').splitlines()[0]})")
-    return folder / f"{name}.so"
+    built = folder / f"{name}.so"
+    complaint, _ = run_compiler([command, *options, "-o", str(built), str(folder / f"{name}.c"), "-lm"], folder)
+    if complaint is not None:
+        raise ShipidError(f"the C compiler failed ({complaint.splitlines()[0]})")
+    return built
 
 
 def description(unit: Packed, guid: str) -> str:

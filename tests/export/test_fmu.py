@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import resource
 import subprocess
@@ -16,6 +17,7 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
+from shipid.errors import ShipidError
 from shipid.export.c import c_name
 from shipid.export.fmu import predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import model
@@ -119,6 +121,18 @@ def test_a_binary_has_the_name_that_importers_load(system, file, tmp_path, monke
 
 
 @pytest.mark.slow
+def test_a_compiler_that_fails_is_one_line_and_leaves_no_file(tmp_path, monkeypatch):
+    tool, noted = tmp_path / "gcc", tmp_path / "noted"
+    tool.write_text(f"#!/bin/sh\ntouch $TMPDIR/left.s; printf %s $TMPDIR > {noted}; printf 'no \\377' >&2; exit 1\n")
+    tool.chmod(0o700)
+    monkeypatch.setattr("shipid.export.fmu.compiler", lambda: str(tool))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    with pytest.raises(ShipidError, match="the C compiler failed"):
+        write_fmu(vessel_unit(variety()["actuators"], "ship", "rk4"), tmp_path / "ship.fmu")
+    assert not os.path.exists(noted.read_text())
+    assert sorted(place.name for place in tmp_path.iterdir()) == ["gcc", "noted"]
+
+
 def test_an_importer_finds_no_fault(ship, aboard):
     validation = pytest.importorskip("fmpy.validation")
     for file in (ship, aboard):
