@@ -1,4 +1,4 @@
-"""Ctrl-C during calls into compiled code: held back until the call returns."""
+"""Ctrl-C during calls into compiled code: held back until the call returns, or known again in the error it became."""
 
 from __future__ import annotations
 
@@ -30,3 +30,30 @@ def uninterrupted() -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, before)
         if held:
             raise KeyboardInterrupt
+
+
+@contextmanager
+def recognised() -> Iterator[None]:
+    """Raise KeyboardInterrupt for any error of the block after Ctrl-C was pressed: compiled code makes others of it.
+
+    Nothing is changed in a thread, or where something else answers Ctrl-C.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    pressed: list[int] = []
+
+    def press(number: int, _frame: object) -> None:
+        pressed.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, press)
+    try:
+        yield
+    except Exception as error:
+        if pressed:
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 
 import pytest
 
-from shipid.interrupts import uninterrupted
+from shipid.interrupts import recognised, uninterrupted
 
 
 @pytest.fixture(autouse=True)
@@ -98,3 +99,16 @@ def test_another_thread_changes_no_handler(handler: object) -> None:
     thread.start()
     thread.join()
     assert seen == [handler, []]
+
+
+def test_an_error_behind_ctrl_c_is_ctrl_c() -> None:
+    def work(press: Callable[[], object]) -> None:
+        with recognised():
+            with suppress(KeyboardInterrupt):
+                press()
+            raise SystemError("returned a result with an exception set")
+
+    with pytest.raises(KeyboardInterrupt):
+        work(press)
+    with pytest.raises(SystemError):
+        work(int)

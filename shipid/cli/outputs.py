@@ -12,6 +12,7 @@ import typer
 import typer.core
 
 from shipid.errors import ShipidError
+from shipid.interrupts import recognised
 
 OUTPUTS = ("out", "csv", "html", "log", "save")
 """Names of options that say what to write."""
@@ -40,7 +41,8 @@ class Guarded(typer.core.TyperCommand):
             check_output(Path(value), read, f"--{name}")
             read.append(Path(value))
         try:
-            return super().invoke(ctx)
+            with recognised():
+                return super().invoke(ctx)
         except KeyboardInterrupt:
             sys.stderr.write("interrupted\n")
             raise typer.Exit(130) from None

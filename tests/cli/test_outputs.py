@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import signal
 from pathlib import Path
 
 import pytest
@@ -141,5 +142,12 @@ def test_ctrl_c_is_one_line_in_every_command(monkeypatch: pytest.MonkeyPatch) ->
     def pressed(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("shipid.document.bundled", pressed)
-    assert ended("study", "list") == (130, "", "interrupted\n")
+    def pressed_in_compiled_code(*_: object) -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise SystemError("returned a result with an exception set") from None
+
+    for press in (pressed, pressed_in_compiled_code):
+        monkeypatch.setattr("shipid.document.bundled", press)
+        assert ended("study", "list") == (130, "", "interrupted\n")
