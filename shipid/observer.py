@@ -11,16 +11,17 @@ A bank of extended Kalman filters on the vessel's equations of motion. The state
     xi_w'' + 2 zeta omega xi_w' + omega^2 xi_w = white noise,   measured = low frequency + wave frequency + noise.
 
 Steady uniform current moves the water and everything in it, so the equations hold for nu - nu_c with any vessel, with
-or without a [current] block. Where an order changes the physics are least sure: the white noise of nu grows by the
-change of acceleration that they compute, and fades. Filters differ in the waves, the current and the model error that
-they assume; each weighs by the likelihood of its recent innovations. Sources: Fossen, Handbook of Marine Craft
-Hydrodynamics and Motion Control (2021), ch. 13 (wave model) and sec. 10.3 (current); Bar-Shalom, Li, Kirubarajan,
-Estimation with Applications to Tracking and Navigation (2001), ch. 11 (multiple models).
+or without a [current] block. d(nu_c)/dt is that of a steady current in turning axes: where a current changes, the
+ship keeps her motion over ground at first. Where an order changes the physics are least sure: the white noise of nu
+grows by the change of acceleration that they compute, and fades. Filters differ in the waves, the current and the
+model error that they assume; each weighs by the likelihood of its recent innovations. Sources: Fossen, Handbook of
+Marine Craft Hydrodynamics and Motion Control (2021), ch. 13 (wave model) and sec. 10.3 (current); Bar-Shalom, Li,
+Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), ch. 11 (multiple models).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import product
@@ -29,6 +30,7 @@ from typing import Annotated, Any, Literal
 import casadi as ca
 import numpy as np
 from casadi import SX
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.checked import Checked
@@ -63,6 +65,8 @@ DIVERGED = 1e9  # SI: no state, variance or likelihood of a sound filter is so l
 SPIKE = 300.0  # standard deviations: a measurement as far off is a fault of the log and moves nothing
 FADES = (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, 1e6)  # x sqrt(L / g): between which `tune_observer` chooses
 YAW = 3.0  # change of the moment, x I_z g / L, over that of the force, x m g
+LONGEST = 0.6  # x sqrt(L / g): by longer steps of the filters the midpoint rule takes its own error for a force
+ROUNDING = 1e-5  # of a step: so much longer than the longest it is still one
 CALM = 1e-6  # m/s: keeps the direction of no wind defined
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
@@ -129,6 +133,7 @@ class Bank:
 
     numbers : (K, len(NUMBERS)). noise : (6,) standard deviations of samples. first : (K, 17) those of the first state
     in addition to the measured ones. fade : time constant [s] of the force ahead. mass : (3, 3), tau = mass @ a.
+    longest : step [s] beyond which the time between two rows is divided.
     """
 
     vessel: Vessel
@@ -138,6 +143,7 @@ class Bank:
     first: Array
     fade: float
     mass: Array
+    longest: float
 
     @cached_property
     def model(self) -> Dynamics:
@@ -148,6 +154,10 @@ class Bank:
     def num_filters(self) -> int:
         """Number of filters K."""
         return len(self.numbers)
+
+    def parts(self, dt: Array) -> NDArray[np.int64]:
+        """Number of equal steps that the filters take in a time dt [s] between rows, the last with the measurement."""
+        return np.maximum(np.ceil(dt / self.longest - ROUNDING), 1).astype(np.int64)
 
 
 def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
@@ -184,7 +194,9 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
         first.append([0.0] * 6 + slow + [current * speed] * 2 + [x / omega for x in w] + [*w])
     sizes = {"north": length, "east": length, "psi": 1.0, "u": speed, "v": speed, "r": 1 / time}
     noise = np.array([settings.noise.get(name, 5e-4 * size) for name, size in sizes.items()])
-    return Bank(vessel, settings, np.array(numbers), noise, np.array(first), settings.fade * time, vessel.mass)
+    return Bank(
+        vessel, settings, np.array(numbers), noise, np.array(first), settings.fade * time, vessel.mass, LONGEST * time
+    )
 
 
 @lru_cache(maxsize=16)
@@ -260,6 +272,8 @@ def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
 
     (states (n, K), commands, environment, parameters, measured, noise, numbers (., K), dt) -> (states, estimate (11,),
     innovation (6,), spread (6,), weights (K,)); estimates are means by the weights, the innovation that of the mixture.
+    A dt beyond `Bank.longest` is to be divided by `Bank.parts`: call it for each part, with NaN for the measurement in
+    all but the last.
     """
     one = filter_function(model)
     inputs = [ca.MX.sym(one.name_in(i), one.size1_in(i)) for i in range(one.n_in())]
@@ -438,8 +452,8 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
         dt = table["t"][now] - table["t"][past]
         each = (np.repeat(part[rows].T, count, axis=1) for part, rows in ((commands, past), (weather, past)))
         seen = (np.repeat(part[now].T, count, axis=1) for part in (measured, noise))
-        numbers = np.tile(filters.numbers.T, (1, going))
-        results = step(states[:, : going * count], *each, values, *seen, numbers, np.repeat(dt, count)[None])
+        given = (*each, values, *seen, np.tile(filters.numbers.T, (1, going)))
+        results = _divided(step, filters, states[:, : going * count], given, np.repeat(dt, count))
         states, estimate[now], innovation[now], spread[now], weights[now] = _mixed(results, count)
         innovation[now] = np.where(np.isnan(measured[now]), np.nan, innovation[now])
         age[now] = age[past] + dt
@@ -450,6 +464,22 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
     columns["observer.test"] = np.where(given, squares, 0.0).sum(axis=1) / np.maximum(given.sum(axis=1), 1)
     columns[AGE] = age
     return Estimates(columns, innovation, spread, weights)
+
+
+def _divided(
+    step: Callable[..., list[Array]], filters: Bank, states: Array, given: Sequence[Array], dt: Array
+) -> list[Array]:
+    """What `step` gives after dt (S,), in the parts that the filters take; `given` as by `filter_function`.
+
+    On the way nothing is measured.
+    """
+    parts = filters.parts(dt)
+    for part in range(1, parts.max()):
+        on = parts > part
+        commands, weather, values, measured, noise, numbers = given
+        some = commands[:, on], weather[:, on], values, np.full_like(measured[:, on], np.nan), noise[:, on]
+        states[:, on] = step(states[:, on], *some, numbers[:, on], (dt / parts)[None, on])[0]
+    return step(states, *given, (dt / parts)[None])
 
 
 def _mixed(results: Sequence[Array], count: int) -> tuple[Array, ...]:

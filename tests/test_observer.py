@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
+import pandas as pd
 import pytest
 from casadi import SX
 from scipy.linalg import expm
@@ -21,6 +22,7 @@ from shipid.data.dataset import Dataset, write_dataset
 from shipid.data.windows import Instants, Windows, cut_windows, from_frame
 from shipid.engine import samples
 from shipid.engine.native import compiler
+from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
@@ -193,6 +195,48 @@ def test_what_is_known_badly_counts_little() -> None:
     moved = known.assign(u=known["u"] + 3.0 * bad)
     one, other = (observe(vessel, Dataset(log, calm().data.metadata)).columns["observer.v"] for log in (known, moved))
     np.testing.assert_allclose(other, one, atol=1e-4)
+
+
+def test_a_long_step_is_the_function_that_goes_aboard_in_parts() -> None:
+    """Rows 1.6 s and 3.2 s apart, of a ship whose longest step is about 1 s; nothing is measured on the way."""
+    vessel, frame = load_vessel("gunnerus-28.9"), calm().data.frame
+    filters = bank(vessel)
+    assert filters.longest == pytest.approx(0.6 * np.sqrt(28.9 / 9.81), rel=1e-3)
+    kept = np.array([0, 2, 4, 8, 12, 14, 18, 22, 24])
+    rows = frame[frame["run"] == "M000"].iloc[kept].reset_index(drop=True).assign(t=0.8 * kept)
+    parts = filters.parts(np.diff(rows["t"]))
+    assert parts.tolist() == [2, 2, 4, 4, 2, 4, 4, 2]
+    estimates, model = observe(vessel, Dataset(rows, calm().data.metadata)), filters.model
+    aboard, values = observer_function(model, filters.num_filters), list(vessel.parameters.values())
+    orders, weather = rows[list(model.commands)].to_numpy(), rows[list(model.environment)].to_numpy()
+    measured, unseen = rows[list(MEASURED)].to_numpy(), np.full(6, np.nan)
+    states = begin(filters, measured[0], orders[0])
+    for k, count in enumerate(parts, 1):
+        for part in range(1, count + 1):
+            now = measured[k] if part == count else unseen
+            dt = 0.8 * (kept[k] - kept[k - 1]) / count
+            given = orders[k - 1], weather[k - 1], values, now, filters.noise, filters.numbers.T, dt
+            states, estimate, *_ = map(np.array, aboard(states, *given))
+        columns = [estimates.columns[f"observer.{name}"][k] for name in COLUMNS]
+        np.testing.assert_allclose(columns, estimate[:, 0], rtol=1e-6, atol=1e-9)
+
+
+def test_rows_far_apart_make_no_force_of_an_order() -> None:
+    """Mariner, rows every 8 s, new orders every 160 s; the truth is without noise, and no force is in it."""
+    vessel, step, rows = load_vessel("mariner"), 8.0, 160
+    rng, (shaft, helm) = np.random.default_rng(4), dynamics(vessel).commands
+    orders = {shaft: rng.uniform(1.1, 1.4, rows // 20), helm: rng.uniform(-0.4, 0.4, rows // 20)}
+    orders = {name: np.repeat(values, 20) for name, values in orders.items()}
+    begun = {name: np.zeros(1) for name in dynamics(vessel).state} | {"u": np.full(1, 6.0)}
+    fine = {name: np.repeat(values, 20)[:, None] for name, values in orders.items()}
+    path = rollout(vessel, begun, fine, {}, step=step / 20, num_steps=20 * rows, every=20, method="rk4")
+    log = pd.DataFrame({name: path[name][:rows, 0, 0] for name in MEASURED} | orders)
+    log = log.assign(run="a", t=step * np.arange(rows), flags=0)
+    seen = observe(vessel, Dataset(log, {"clock": "run", "flags": []})).columns
+    settled = slice(40, None)
+    assert seen["observer.test"][settled].max() < 0.1  # by one step from row to row: 1.4
+    assert np.abs(seen["observer.u"] - log["u"])[settled].max() < 0.003  # 0.016 m/s
+    assert np.abs(seen["observer.Y"][settled]).max() < 1e-4  # 5e-4 m/s^2
 
 
 def test_runs_together_are_runs_alone() -> None:

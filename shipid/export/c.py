@@ -20,7 +20,7 @@ from shipid.export.equations import Equations
 from shipid.export.model import Model
 from shipid.export.turns import SAME_TURN, Turned, turned
 from shipid.hybrid.bands import FEWEST, LEVELS, Bands
-from shipid.observer import DIVERGED, LOW, MEASURED, STATES, Bank, bank, filter_function, sizes
+from shipid.observer import DIVERGED, LOW, MEASURED, ROUNDING, STATES, Bank, bank, filter_function, sizes
 from shipid.physics.signals import SIGNALS, signal_of
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
@@ -1031,11 +1031,11 @@ def _observing(filters: Bank, filtering: str, row: Sequence[str], precision: Pre
     deviations[:, :6] = np.where(missing, wide, np.hypot(2 * filters.noise, filters.first[:, LOW:]))
     places = np.cumsum([0, *sizes(model)])
     table = precision.table
-    arguments = [f"states + k * {n}"]
-    arguments += ["commands"] if nc else []
-    arguments += ["environment"] if weather else []
-    arguments += ["parameters"] if model.parameters else []
-    arguments += ["measured", f"numbers + k * {filters.numbers.shape[1]}", "&dt", "filtered"]
+    known = [f"states + k * {n}"]
+    known += ["commands"] if nc else []
+    known += ["environment"] if weather else []
+    known += ["parameters"] if model.parameters else []
+    then = [f"numbers + k * {filters.numbers.shape[1]}", "&part", "filtered"]
     return f"""static void begin_filters(real *states, const real *row, real *estimates)
 {{
     static const int measured[6] = {{{_whole(measured)}}};
@@ -1062,9 +1062,12 @@ static void go_filters(real *states, const real *last, const real *row, real dt,
     static const int environment_at[{max(1, len(weather))}] = {{{_whole(weather)}}};
     static const real numbers[{filters.numbers.size}] = {{{table(filters.numbers)}}};
     const real most = {precision.number(DIVERGED)};
-    real measured[6], commands[{max(1, nc)}], environment[{max(1, len(weather))}];
+    const real parts = M(fmax)(M(ceil)(dt / {precision.number(filters.longest)} - {precision.number(ROUNDING)}), 1);
+    const real part = dt / parts; /* nothing is measured on the way */
+    real unseen[6], measured[6], left, commands[{max(1, nc)}], environment[{max(1, len(weather))}];
     real likelihood[{count}], weight[{count}], each[{count}][{LOW}], likely[{n}], best = -INFINITY, sum = 0, ties = 0;
     int sound[{count}], i, k;
+    for (i = 0; i < 6; ++i) unseen[i] = NAN;
     for (i = 0; i < 6; ++i) measured[i] = measured_at[i] < 0 ? NAN : row[measured_at[i]];
     for (i = 0; i < {nc}; ++i) commands[i] = last[commands_at[i]];
     for (i = 0; i < {len(weather)}; ++i) environment[i] = environment_at[i] < 0 ? 0 : last[environment_at[i]];
@@ -1074,7 +1077,11 @@ static void go_filters(real *states, const real *last, const real *row, real dt,
     (void)parameters;
     for (k = 0; k < {count}; ++k) {{
         real filtered[{n + LOW}];
-        {filtering}({", ".join(arguments)});
+        for (left = parts; left > 1; left -= 1) {{
+            {filtering}({", ".join([*known, "unseen", *then])});
+            memcpy(states + k * {n}, filtered, {n} * sizeof *states);
+        }}
+        {filtering}({", ".join([*known, "measured", *then])});
         sound[k] = 1;
         for (i = 0; i < {n}; ++i) {{
             if (!(M(fabs)(filtered[i]) < most)) sound[k] = 0;

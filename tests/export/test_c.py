@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid import observer
 from shipid.data.dataset import Dataset, sample
 from shipid.data.windows import Instants, past_of
 from shipid.engine.casadi import memory_along
@@ -23,7 +24,7 @@ from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import MOTIONS, Memory
 from shipid.hybrid.physics import Physics
-from shipid.observer import Observer, observe
+from shipid.observer import LONGEST, Observer, observe
 from shipid.predictor import Predictor
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
@@ -176,9 +177,10 @@ def log_of(vessel, seconds, rng, interval):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("velocity", [False, True])
-def test_a_recorder_knows_what_python_takes_from_a_log(velocity, tmp_path):
-    """Past, actuators and estimates of the observer, row by row, at uneven times."""
+@pytest.mark.parametrize(("velocity", "longest"), [(False, LONGEST), (True, LONGEST), (False, 0.1)])
+def test_a_recorder_knows_what_python_takes_from_a_log(velocity, longest, tmp_path, monkeypatch):
+    """Past, actuators and estimates of the observer, row by row, at uneven times; also by parts of them."""
+    monkeypatch.setattr(observer, "LONGEST", longest)
     vessel = variety()["actuators"]
     rng = np.random.default_rng(1)
     dataset = log_of(vessel, 25, rng, 0.5)
