@@ -91,7 +91,7 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         raise DataError(f"no column can be the {missing}: {remedy}", file=file)
     if best.misfit > POOR and not state.numbered:
         state.ask(
-            ("psi", "north", "east"),
+            ("psi", "north", "east", "u", "v", "r"),
             f"course and heading agree badly (misfit {best.misfit:.2f}): are {best.north!r}, {best.east!r} the "
             f"position and {best.heading!r} the heading?",
         )

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from itertools import product
 
 import numpy as np
+from pymap3d import geodetic2ned
 
 from shipid.data.dataset import Array
 from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.words import fits, units_in
 from shipid.logs.mapping import degrees_of
 from shipid.units import DEGREE
@@ -28,6 +31,8 @@ ANGLES = ("psi", "course", "alpha", "beta_w")
 WHOLE = 0.1  # share of the rows that are whole numbers, at least: between them rows without a value were filled
 FINE = 1e-7  # deg, of whole numbers of a receiver
 CLOSE = 0.97  # share of a whole turn that a heading sweeps before it jumps: it has been all round
+BEYOND, TWICE = 360.5, 720.0  # deg: a compass shows less; more than two turns in a row are rare
+OFF, BETTER, AGREES = 0.02, 4.0, 0.2  # misfit of a course and a heading, 1 - cos: of 11 deg; times; of a bad one
 
 
 def take_scales(state: State) -> None:
@@ -38,6 +43,11 @@ def take_scales(state: State) -> None:
             turn = _written(name) or _turn(values)
             if turn is not None:
                 _scale(state, name, 360.0 / turn, f"a whole turn is {turn:g}: {TURNS[turn]}")
+    _take_positions(state)
+    _by_track(state)
+
+
+def _take_positions(state: State) -> None:
     pairs = [(a, b) for a in state.called("latitude") for b in state.called("longitude")]
     for north, east in pairs[:1]:
         if {unit_in_name(name, "rad") for name in (north, east)} == {"rad"}:
@@ -62,6 +72,75 @@ def take_scales(state: State) -> None:
             if not lettered and min(state.columns[north].min(), state.columns[east].min()) >= 0:
                 words = f"do {north!r} and {east!r}, degrees and minutes without a sign, count to north and east? "
                 state.ask(("latitude", "longitude"), f"{words}If they are S or W, write sign = -1")
+
+
+def _by_track(state: State) -> None:
+    """Find a heading or course that never jumps and has no unit, in parts of a turn with which it keeps to the track.
+
+    What a compass in degrees cannot show is decided so; below that it is asked.
+    """
+    track = _track(state)
+    for name, values in state.columns.items():
+        scores = fits(name)
+        best = max(scores, key=lambda one: scores[one], default="")
+        if best not in ("psi", "course") or name in state.scaled or unit_in_name(name, "rad") or track is None:
+            continue
+        top, low = float(values.max()), float(values.min())
+        if top <= 2.2 * np.pi or _jumps(values):
+            continue
+        left = {
+            turn: _misfits(state, track, values, turn)
+            for turn in (360.0, *TURNS)
+            if top <= 1.01 * turn or turn == 360.0
+        }
+        turn = min(left, key=lambda one: left[one][0])
+        degrees = left[360.0]
+        about = ("psi", "u", "v", "r") if best == "psi" else ("course", "u", "v")
+        better = degrees[0] > OFF and left[turn][0] * BETTER < degrees[0] and left[turn][0] < AGREES
+        offset = 2.0 * degrees[1] < left[turn][1]  # degrees with another zero
+        if better and not offset and top > BEYOND and low >= 0.0:
+            _scale(
+                state, name, 360.0 / turn, f"a whole turn is {turn:g}: {TURNS[turn]}, with which it keeps to the track"
+            )
+        elif (better and not offset) or (top > TWICE and degrees[0] > AGREES):
+            words = (
+                f"{name!r}, {low:g} to {top:g}, has no unit: degrees, or gon, tenths or hundredths of a degree (factor"
+            )
+            why = f"; in {TURNS[turn]} it keeps to the track better" if better else ""
+            state.ask(about, f"{words} = 0.9, 0.1, 0.01)? deg is a guess{why}")
+
+
+def _track(state: State) -> Complex | None:
+    """Changes (W,) of the position over the windows, north + i east; None where no names say a position."""
+    for meanings in (("latitude", "longitude"), ("north", "east"), ("x", "y")):
+        for north, east in product(*(state.called(one) for one in meanings)):
+            a, b = state.columns[north], state.columns[east]
+            if north == east or len(state.chosen.first) < 2:
+                continue
+            if meanings[0] == "latitude":
+                if max(np.abs(a).max() / 90.0, np.abs(b).max() / 360.0) > 1.0:
+                    continue
+                a, b, _ = geodetic2ned(a, b, 0.0, float(a[0]), float(b[0]), 0.0)
+            return state.chosen.change(np.asarray(a + 1j * b))
+    return None
+
+
+def _misfits(state: State, track: Complex, values: Array, turn: float) -> tuple[float, float]:
+    """1 - cos of the angle between a track and a heading in parts of a whole turn: as it is, and with any other zero.
+
+    It may count from any side of the world and to both sides.
+    """
+    middle = (state.chosen.first + state.chosen.last) // 2
+    angle = np.exp(2j * np.pi * values[middle] / turn)
+    size = max(float(np.sum(np.abs(track))), 1e-12)
+    both = [complex(np.sum(track * way)) / size for way in (np.conj(angle), angle)]
+    zeros = [max(abs(one.real), abs(one.imag)) for one in both]
+    return 1.0 - max(zeros), 1.0 - max(map(abs, both))
+
+
+def _jumps(values: Array) -> bool:
+    """Whether an angle jumps by most of its range, at the end of a turn."""
+    return bool(np.any(np.abs(np.diff(values)) > 0.8 * float(np.ptp(values))))
 
 
 def _take_sides(state: State, north: str, east: str) -> None:
@@ -97,7 +176,7 @@ def _written(name: str) -> float | None:
 def _turn(values: Array) -> float | None:
     """Whole turn of an angle that jumps, where it is none of degrees or radians."""
     span = float(np.ptp(values))
-    if not span > 0 or not np.any(np.abs(np.diff(values)) > 0.8 * span):
+    if not span > 0 or not _jumps(values):
         return None
     return next((turn for turn in TURNS if CLOSE * turn < span <= turn), None)
 

@@ -428,6 +428,9 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
             if not known:
                 texts |= dict.fromkeys(_called(table, name)[hit].astype(str).str.strip())
                 values[hit] = np.nan
+    for name, values in columns.items() if texts else ():  # the import takes them so in every column
+        if not is_clock(name):
+            values[_called(table, name).astype(str).str.strip().isin(texts).to_numpy()] = np.nan
     return list(texts)
 
 

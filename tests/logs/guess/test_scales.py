@@ -40,6 +40,15 @@ def drafted(frame: pd.DataFrame, folder: Path) -> tuple[Guess, Dataset]:
     return proposal, import_log(whole, folder / "log.csv")
 
 
+def turned_round(first: float) -> pd.DataFrame:
+    """The zigzag of the log [rows], turned so that it begins with this heading [deg]."""
+    frame = BRIDGE.iloc[:600]
+    angle = np.radians(first - frame["psi"].iloc[0])
+    north, east = (frame[name] * np.cos(angle) for name in ("N", "E"))
+    turned = {"N": north - frame["E"] * np.sin(angle), "E": east + frame["N"] * np.sin(angle)}
+    return frame.assign(**turned, psi=(frame["psi"] + np.degrees(angle)) % 360.0)
+
+
 def asked(proposal: Guess) -> str:
     return " ".join(question.sentence for question in proposal.questions)
 
@@ -76,6 +85,23 @@ def test_a_unit_in_the_name_decides_where_a_heading_never_jumps(tmp_path: Path) 
     assert column is not None
     assert column.extra["factor"] == 0.01
     assert turned(dataset).max() < np.radians(0.3)
+
+
+@pytest.mark.parametrize(("turn", "first"), [(400.0, 260.0), (36000.0, 120.0), (3600.0, 200.0), (6400.0, 250.0)])
+def test_a_heading_that_never_jumps_is_read_as_it_keeps_to_the_track(turn: float, first: float, tmp_path: Path) -> None:
+    frame = turned_round(first).drop(columns="psi")
+    frame["Heading"] = (turned_round(first)["psi"] * turn / 360.0).round(2)
+    column = drafted(frame, tmp_path)[0].column("psi")
+    assert column is not None
+    assert column.extra["factor"] == pytest.approx(360.0 / turn)
+    assert "keeps to the track" in column.evidence
+
+
+@pytest.mark.parametrize(("turn", "asks"), [(400.0, True), (360.0, False)])
+def test_gon_that_a_compass_in_degrees_may_show_are_asked(turn: float, asks: bool, tmp_path: Path) -> None:
+    frame = turned_round(200.0).drop(columns="psi")
+    frame["Heading"] = (turned_round(200.0)["psi"] * turn / 360.0).round(2)
+    assert ("'Heading', " in asked(drafted(frame, tmp_path)[0])) == asks
 
 
 @pytest.mark.parametrize("how", ["blanks", "near Greenwich", "Italian"])

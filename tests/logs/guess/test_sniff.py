@@ -403,6 +403,13 @@ def test_what_ais_writes_for_nothing_is_a_missing_value(tmp_path: Path, name: st
     assert np.isnan(sniffed.columns[name]).sum() == 4
 
 
+def test_a_number_for_missing_values_is_one_in_every_column(tmp_path: Path) -> None:
+    """In hundredths of a degree -999 is not far from the others, but the import takes it for a missing value."""
+    rows = [f"{k},{np.sin(k):.3f},{400 * k}" for k in range(80)]
+    rows[40] = "40,-999,-999"
+    assert np.isnan(sniff(log_of(tmp_path, ["time,x,heading", *rows])).columns["heading"][40])
+
+
 def test_a_speed_of_999_rpm_is_no_missing_value(tmp_path: Path) -> None:
     rows = [f"{k},{600 + 5 * k}" for k in range(80)] + ["80,999"]
     assert "missing" not in sniff(log_of(tmp_path, ["time,rpm", *rows])).form
