@@ -232,6 +232,11 @@ def ways_of(texts: pd.Series[Any]) -> list[str]:
     return [one for one in ways if _moments(some, one).notna().mean() > 0.5] if len(some) else []
 
 
+def days_by(texts: pd.Series[Any], way: str) -> Array:
+    """Dates (N,) of one of the `ways_of` writing as seconds since 1970, NaN for others."""
+    return _since_1970(_moments(texts, way))
+
+
 def _moments(texts: pd.Series[Any], way: str) -> pd.Series[Any]:
     """Dates of one way of writing, NaT for others; a second may have a fraction, or none."""
     moments = pd.to_datetime(texts, format=way, utc=True, errors="coerce").dt.as_unit("us")

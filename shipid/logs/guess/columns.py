@@ -115,6 +115,8 @@ def guess(
         choose_yaw_rate(state, 0.05)
     choose_velocities(state)
     check_clock(state, np.inf if vessel is None else vessel.document.get("particulars", {}).get("L_pp", np.inf))
+    for doubt in sniffed.doubts:
+        state.ask(("clock", "t"), doubt)
     if sniffed.clock["unit"] != "date":
         _ask_for_clock(state, str(sniffed.clock["from"]))
     if state.r is None:

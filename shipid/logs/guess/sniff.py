@@ -7,6 +7,7 @@ import io
 import itertools
 import re
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,6 +26,8 @@ from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, since_midnight
 from shipid.logs.readers import (
     DAY,
     DAY_OF,
+    HALF_DAY,
+    HOUR,
     LONGEST_LINE,
     LOOKED_AT,
     NEXT_DAY,
@@ -33,7 +36,9 @@ from shipid.logs.readers import (
     SheetFormat,
     TableFormat,
     TextFormat,
+    date_of,
     dated,
+    days_by,
     hour_twice,
     in_one_number,
     moment_of,
@@ -41,6 +46,7 @@ from shipid.logs.readers import (
     read_table,
     require_file,
     seconds,
+    ways_of,
     widest,
 )
 from shipid.logs.workbook import SEPARATOR, sheet_text, sheets_of
@@ -99,6 +105,7 @@ class Sniffed:
     that were left out. `seams` counts the places where rows of a large log were not read, or runs begin. `runs` has the
     column that says the run, and the number of runs, where the clock begins again with each; `t` goes on then. `sides`
     are the letters, N, S, E or W, that columns beside positions hold. `words` are columns of words, with their first.
+    `doubts` are questions on what the dates of the clock mean.
     """
 
     form: dict[str, Any]
@@ -110,6 +117,7 @@ class Sniffed:
     runs: dict[str, int] = field(default_factory=dict)
     sides: frozenset[str] = frozenset()
     words: dict[str, str] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
 
     @property
     def scattered(self) -> bool:
@@ -179,7 +187,8 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
     texts = {name: _called(table, name).dropna().astype(str).str.strip() for name in words}
     says = {name: next(filter(None, column), "") for name, column in texts.items()}
-    return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), says)
+    doubts = tuple(_doubts(table.loc[once], clock, t))
+    return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), says, doubts)
 
 
 def _sample(file: Path, encoding: str, size: int) -> str:
@@ -537,6 +546,38 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     fault = f"{called[0]!r} {_unread(table, called[0], first) or _fault(first)}" if called else "none rises"
     fault = fault if called else "none rises from row to row"
     raise DataError(f"no column can be the clock: {fault}", file=file)
+
+
+def _doubts(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[str]:
+    """Yield questions on dates and times of day at t (N,) [s] that may mean another moment."""
+    if clock["unit"] not in ("date", "hhmmss"):
+        return
+    texts = _called(table, clock["from"])
+    texts = dated(_called(table, clock["date"]), texts) if "date" in clock else texts
+    if pd.api.types.is_string_dtype(texts.dtype):
+        texts = texts.astype(str).str.strip()
+        ways = ways_of(texts)
+        spans = {way: days_by(texts, way) for way in ways}
+        least = min((since[-1] - since[0] for since in spans.values()), default=0.0)
+        alike = [s for s in spans.values() if np.all(np.diff(s) >= 0) and s[-1] - s[0] == least]  # false where NaN
+        firsts = sorted({date_of(since[0])[:10] for since in alike} - {date_of(t[0])[:10]})
+        if firsts and len(alike) > 1:
+            others = " or ".join(firsts)
+            yield f"{texts.iloc[0]!r} is read as {date_of(t[0])[:10]}: or is it {others}? Then write 2024-05-14"
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    of_day = t % DAY
+    late = np.flatnonzero((steps >= HALF_DAY) & (steps <= HALF_DAY + NEXT_DAY))
+    if len(late) and t[-1] - t[0] < 3 * DAY and of_day.min() >= HOUR and of_day.max() < HOUR + HALF_DAY:
+        before, after = (date_of(of_day[late[0] + k])[11:] for k in (0, 1))
+        words = f"after {before} comes {after}, read as 12 hours later: has the clock twelve hours without AM and PM?"
+        yield f"{words} Then write 24 hours"
+    for row in np.flatnonzero((steps >= HOUR) & (steps <= HOUR + 3 * usual)):
+        if -t[row] % HOUR <= t[row + 1] - t[row] - HOUR:  # from one full hour to the next
+            before, after = date_of(t[row])[11:], date_of(t[row + 1])[11:]
+            words = f"after {before} comes {after}: is it local time as daylight saving begins, and no pause?"
+            yield f"{words} Then write UTC, or in every row the zone that holds there"
+            return
 
 
 def _called(table: pd.DataFrame, name: str) -> pd.Series[Any]:

@@ -192,7 +192,10 @@ def _joined(logs: list[Sniffed]) -> Sniffed:
     if missing:
         form["missing"] = list(missing)
     notes = tuple(dict.fromkeys(note for log in logs for note in log.notes))
+    doubts = tuple(dict.fromkeys(doubt for log in logs for doubt in log.doubts))
     seams = sum(log.seams for log in chosen) + len(chosen) - 1
     sides = frozenset[str]().union(*(log.sides for log in logs))
-    joined = replace(first, form=form, clock=clock, t=np.concatenate(t), columns=columns, notes=notes, seams=seams)
+    joined = replace(
+        first, form=form, clock=clock, t=np.concatenate(t), columns=columns, notes=notes, seams=seams, doubts=doubts
+    )
     return replace(joined, sides=sides)

@@ -309,6 +309,40 @@ def test_what_is_no_log_is_one_sentence(content: bytes, message: str, tmp_path: 
         sniff(tmp_path / "log.csv")
 
 
+@pytest.mark.parametrize(
+    ("first", "style", "jump", "words"),
+    [
+        (
+            "2024-05-08 08:00",
+            "%d/%m/%Y %H:%M:%S",
+            0,
+            "'08/05/2024 08:00:00' is read as 2024-05-08: or is it 2024-08-05",
+        ),
+        (
+            "2024-05-08 08:00",
+            "%m/%d/%Y %H:%M:%S",
+            0,
+            "'05/08/2024 08:00:00' is read as 2024-08-05: or is it 2024-05-08",
+        ),
+        ("2024-05-08 12:59:30", "%I:%M:%S", 0, "after 12:59:59 comes 01:00:00, read as 12 hours later"),
+        ("2024-03-31 01:59:30", "%Y-%m-%d %H:%M:%S", 3600, "after 01:59:59 comes 03:00:00: is it local time"),
+        ("2024-05-08 08:00", "%d.%m.%Y %H:%M:%S", 0, ""),
+        ("2024-05-14 08:00", "%d/%m/%Y %H:%M:%S", 0, ""),
+        ("2024-05-05 08:00", "%d/%m/%Y %H:%M:%S", 0, ""),
+        ("2024-05-08 12:59:30", "%H:%M:%S", 0, ""),
+        ("2024-05-08 23:59:30", "%H:%M:%S", 0, ""),
+        ("2024-03-31 01:50:10", "%Y-%m-%d %H:%M:%S", 3605, ""),
+    ],
+)
+def test_dates_that_may_be_other_moments_are_asked(
+    first: str, style: str, jump: int, words: str, tmp_path: Path
+) -> None:
+    moments = pd.Timestamp(first) + pd.to_timedelta([k + jump * (k >= 30) for k in range(60)], "s")
+    rows = [f"{one.strftime(style)},{k % 7}" for k, one in enumerate(moments)]
+    doubts = sniff(log_of(tmp_path, ["time,x", *rows])).doubts
+    assert [words in doubt for doubt in doubts] == [True] * bool(words)
+
+
 def test_dates_that_rise_are_the_clock_beside_dates_that_go_back(tmp_path: Path) -> None:
     """A receiver's clock set back is no reason to refuse the logger's own."""
     table = TABLE.assign(
