@@ -97,9 +97,10 @@ def import_log(
     """Turn a log into a dataset as its mapping declares; nothing is repaired that is not declared.
 
     Order: units, resampling of channels, repair of wrapping channels, unwrapping, `despike` and `scale` of speed,
-    course, latitude or longitude, position on the Earth to north and east, gaps, speed and course or earth-fixed to
-    body velocities, the other repairs in the order of the mapping, estimation of u, v, r, apparent to true wind, runs,
-    resampling. `metadata["repairs"]` counts every repair, `flags` marks its rows.
+    course, latitude or longitude, `despike` of a heading that turns velocities over ground, position on the Earth to
+    north and east, gaps, speed and course or earth-fixed to body velocities, the other repairs in the order of the
+    mapping, estimation of u, v, r, apparent to true wind, runs, resampling. `metadata["repairs"]` counts every repair,
+    `flags` marks its rows.
 
     Parameters
     ----------
@@ -240,7 +241,14 @@ def _texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_]:
 def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, ...]) -> Imported:
     rows, first, read, begins = _columns(mapping, file, log)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
+    fixed = "speed" in mapping.columns or ("u" in mapping.columns and mapping.columns["u"].frame == "earth")
     early = [repair for repair in mapping.repair if isinstance(repair, Despike | Scale) and repair.of_inputs]
+    early += [
+        repair
+        for repair in mapping.repair
+        if fixed and isinstance(repair, Despike) and "psi" in repair.columns and not {"u", "v"} & {*repair.columns}
+        if repair not in early and {*repair.columns} <= {*mapping.columns}
+    ]  # before speed and course are turned by it
     others = [repair for repair in mapping.repair if repair not in [*wrapping, *early]]
     rows, records = apply_repairs(rows, wrapping, off, file)
     rows = _unwrapped(rows, mapping, file)
@@ -249,7 +257,6 @@ def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, .
     rows, origin = _projected(rows, mapping, file) if "latitude" in rows else (rows, None)
     rows, gaps = _close_gaps(rows, mapping.clock.max_gap, file)
     rows = _in_body(rows, mapping.columns)
-    fixed = "speed" in mapping.columns or ("u" in mapping.columns and mapping.columns["u"].frame == "earth")
     others = [
         repair.model_copy(update={"turn": fixed}) if isinstance(repair, Latency) and repair.turn is None else repair
         for repair in others
