@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 SEPARATOR = "\t"
 LARGEST = 2_000_000_000  # bytes of a workbook once unpacked: some twenty million cells
+FIRST_YEAR = 1904  # of dates of a workbook, 1900 or 1904: no log has one
 _STARTS = re.compile(
     rb"PK\x03\x04(?:.{26}mimetypeapplication/vnd\.oasis|.{0,4000}?(?:\[Content_Types\]\.xml|xl/))", re.DOTALL
 )
@@ -103,6 +104,8 @@ def _written(cell: Any) -> str:
     """Return a cell as text."""
     if isinstance(cell, bool):
         return str(cell).upper()
+    if isinstance(cell, date) and cell.year <= FIRST_YEAR:  # a time of day after a midnight
+        return (cell if isinstance(cell, datetime) else datetime.combine(cell, time_of_day())).time().isoformat()
     if isinstance(cell, datetime):
         return cell.isoformat(sep=" ")
     if isinstance(cell, date | time_of_day):

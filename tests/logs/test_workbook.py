@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from openpyxl import Workbook
+from openpyxl import Workbook, load_workbook
 
 from shipid.errors import DataError
 from shipid.logs import workbook
@@ -88,6 +88,17 @@ def test_cells_are_read_as_written(tmp_path: Path) -> None:
         ["2024-05-02", "2", "01:02:03.250000", "0.5", "FALSE", ""],
         ["", "-4", "", "", "", "a"],
     ]
+
+
+def test_times_of_day_go_on_after_midnight(tmp_path: Path) -> None:
+    """A cell of the format hh:mm:ss that counts on past a day is a date of 1900 to a reader."""
+    rows = [["time", "x"], *([(86400 - 20 + k) / 86400, k % 7] for k in range(40))]
+    file = saved(tmp_path / "log.xlsx", rows)
+    book = load_workbook(file)
+    for row in range(2, 42):
+        book["log"].cell(row, 1).number_format = "hh:mm:ss"
+    book.save(file)
+    np.testing.assert_allclose(sniff(file).t, 86400 - 20 + np.arange(40))
 
 
 def test_a_sheet_is_chosen_by_its_name(tmp_path: Path) -> None:
