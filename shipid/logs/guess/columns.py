@@ -24,6 +24,7 @@ from shipid.logs.guess.defects import (
     defects_of_spikes,
     take_lost_fixes,
     take_spikes,
+    take_zeros,
 )
 from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
@@ -105,6 +106,7 @@ def guess(
         _runs(state, source)
     take_scales(state)
     take_lost_fixes(state)
+    take_zeros(state)
     if len(state.chosen.first) < 5:
         rows = f"{len(sniffed.t)} rows over {sniffed.t[-1] - sniffed.t[0]:.3g} s are too few for a draft"
         clock = f"is {sniffed.clock['from']!r} the clock, in {sniffed.clock['unit']}?"

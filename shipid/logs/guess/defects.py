@@ -28,6 +28,12 @@ VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
 STREAM = 0.5  # of the misfit of positions and velocities: less is no current
+NOTHING, HALF, AWAY, OFTEN = (
+    0.3,
+    0.5,
+    18.0,
+    20.0,
+)  # rows that are 0, at most; of the way; part of a turn; s between rows
 
 
 def _held_positions(state: State) -> None:
@@ -290,6 +296,44 @@ def take_lost_fixes(state: State) -> None:
         state.find("no fix", (north, east), 0.95, sentence, repair)
 
 
+def take_zeros(state: State) -> None:
+    """Interpolate, in place, a speed or heading of 0 between rows far from it: no ship stops or turns in one row.
+
+    Short ones count as spikes, of a speed up to `OFTEN` seconds; the others break the log.
+    """
+    t, unit = state.t, to_si(state.clock_unit, "t")
+    step = float(np.median(np.diff(t)))
+    speeds = [*state.called("speed"), *state.called("u")]
+    for name in dict.fromkeys([*speeds, *state.called("psi"), *state.called("course")]):
+        values, known = state.columns[name], state.columns[name] != 0.0
+        if step > 2.0 or not 0.0 < np.mean(~known) < NOTHING:
+            continue
+        turn = 360.0 if np.ptp(values) > 7.0 else 2 * np.pi
+        size = np.abs(values if name in speeds else (values + turn / 2) % turn - turn / 2)
+        least = HALF * float(np.percentile(size[known], 75)) if name in speeds else turn / AWAY
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], (~known).astype(int), [0]]))).reshape(-1, 2)
+        inside = [(a, b) for a, b in edges if a > 0 and b < len(t) and t[b] - t[a - 1] < (b - a + 2) * step]
+        inside = [(a, b) for a, b in inside if min(size[a - 1], size[b]) > least]
+        if not inside:
+            continue
+        rows = np.concatenate([np.arange(a, b) for a, b in inside])
+        kept = np.ones(len(t), dtype=bool)
+        kept[rows] = False
+        smallest = float(min(min(size[a - 1], size[b]) for a, b in inside))
+        state.columns[name] = np.interp(t, t[kept], values[kept])
+        most = OFTEN / step if name in speeds else 2
+        if max(b - a for a, b in inside) <= most and name not in state.called("course"):
+            before, least = state.spikes.get(name, (rows, smallest))
+            state.spikes[name] = np.union1d(rows, before), min(smallest, least)
+            continue
+        starts = np.array([a for a, _ in inside], dtype=np.intp)
+        sentence = f"{name!r} is 0 {_times(state, starts)} between values far from it: it was written for no value"
+        if state.joined:
+            state.ask(("u", "v", "psi", "speed", "course"), f"{sentence}. Leave these cells empty, and draft again")
+        breaks = [[t[a - 1] / unit, t[b] / unit] for a, b in inside]
+        state.find("zeros", (name,), 0.9, sentence, None if state.joined else {"kind": "break", "intervals": breaks})
+
+
 def take_spikes(t: Array, columns: dict[str, Array]) -> dict[str, tuple[NDArray[np.intp], float]]:
     """Interpolate spikes of columns (N,) in place; column -> their rows, and the least of their sizes."""
     found: dict[str, tuple[NDArray[np.intp], float]] = {}
@@ -316,5 +360,7 @@ def defects_of_spikes(state: State) -> None:
             threshold = float(f"{size / 2:.2g}")
             least = f"{size:.3g} {one.unit}{' or more' * (len(rows) > 1)}"
             sentence = f"{one.source!r} leaves its course by {least} and comes back {_times(state, rows)}"
-            repair = {"kind": "despike", "columns": [one.name], "window": round(max(5 * step, 1e-3), 3)}
+            longest = max(len(run) for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1))
+            width = max(5, 2 * longest + 3) * step
+            repair = {"kind": "despike", "columns": [one.name], "window": round(max(width, 1e-3), 3)}
             state.find("spikes", (one.source,), 0.9, sentence, repair | {"threshold": threshold, "unit": one.unit})

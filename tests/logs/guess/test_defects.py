@@ -130,6 +130,41 @@ def test_a_slower_receiver_that_was_held_is_named(every: int, tmp_path: Path) ->
     assert len(found) == (every > 1)
 
 
+def test_a_speed_of_0_far_from_the_others_is_no_speed(tmp_path: Path) -> None:
+    """Before, one speed in twenty-five that was 0 was drafted as a factor of 1.04."""
+    drawn = np.random.default_rng(0).random(len(CLEAN)) < 0.04
+    lost = {name: CLEAN[name].mask(drawn, 0.0) for name in ("u",)}
+    proposal = guessed(tmp_path, CLEAN.assign(**lost))
+    assert proposal.kinds == {"spikes"}
+    (tmp_path / "draft.toml").write_text(draft_mapping(proposal))
+    mapping = read_mapping(tmp_path / "draft.toml").model_copy(update={"segment": ()})
+    assert import_log(mapping, tmp_path / "log.csv").frame["u"].to_numpy() == pytest.approx(CLEAN["u"], abs=0.1)
+
+
+@pytest.mark.parametrize("earth", [False, True])
+def test_a_heading_is_mended_before_velocities_over_ground_are_turned_by_it(earth: bool, tmp_path: Path) -> None:
+    """Before, u and v of these rows stayed those of the wrong heading."""
+    psi = np.radians(CLEAN["psi"])
+    ground = (CLEAN["u"] + 1j * CLEAN["v"]) * np.exp(1j * psi)
+    spiky = CLEAN["psi"].where(CLEAN.index % 200 != 150, (CLEAN["psi"] + 70) % 360)
+    both = {"V north": ground.to_numpy().real, "V east": ground.to_numpy().imag}
+    if not earth:
+        both = {"SOG [m/s]": np.abs(ground), "COG [deg]": np.degrees(np.angle(ground)) % 360}
+    proposal = guessed(tmp_path, CLEAN.drop(columns=["u", "v"]).assign(psi=spiky, **both))
+    assert "spikes" in proposal.kinds
+    (tmp_path / "draft.toml").write_text(draft_mapping(proposal))
+    mapping = read_mapping(tmp_path / "draft.toml").model_copy(update={"segment": ()})
+    rows = import_log(mapping, tmp_path / "log.csv").frame
+    assert rows["v"].to_numpy() == pytest.approx(CLEAN["v"], abs=0.1)
+
+
+def test_a_heading_of_0_far_from_the_others_breaks_the_log(tmp_path: Path) -> None:
+    far = int(np.argmax((CLEAN["psi"] > 120) & (CLEAN["psi"] < 200)))
+    frame = CLEAN.assign(psi=CLEAN["psi"].mask(np.isin(CLEAN.index, range(far, far + 10)), 0.0))
+    found = next(one for one in guessed(tmp_path, frame).findings if one.kind == "zeros")
+    assert found.repair == {"kind": "break", "intervals": [[CLEAN["time"][far - 1], CLEAN["time"][far + 10]]]}
+
+
 @pytest.mark.parametrize("rows", [slice(0, 30), slice(600, 640), slice(-20, None)], ids=["begin", "middle", "end"])
 def test_positions_of_0_north_0_east_are_no_fix(rows: slice, tmp_path: Path) -> None:
     """Before, heading, yaw rate and rudder were drafted to port, and the shaft in other units."""
