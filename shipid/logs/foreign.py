@@ -34,8 +34,8 @@ FOREIGN = (
     Foreign(rb"PK\x03\x04", "a ZIP archive", UNPACK),
     Foreign(
         rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",
-        "an old Excel workbook (.xls)",
-        "save it as .xlsx, or its sheet as CSV",
+        "an old Excel workbook (.xls), or one with a password",
+        "save it as .xlsx without a password, or its sheet as CSV",
     ),
     Foreign(rb"\x1f\x8b", "packed by gzip", UNPACK),
     Foreign(rb"BZh[1-9]1AY&SY", "packed by bzip2", UNPACK),
