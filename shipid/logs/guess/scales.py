@@ -29,7 +29,8 @@ WRITTEN = {
 """A whole turn -> regular expression of how logs write its unit, in lower case."""
 ANGLES = ("psi", "course", "alpha", "beta_w")
 WHOLE = 0.1  # share of the rows that are whole numbers, at least: between them rows without a value were filled
-FINE = 1e-7  # deg, of whole numbers of a receiver
+FINE, MICRO = 1e-7, 1e-6  # deg, of whole numbers of a receiver
+SLOW = 0.17  # way over the integral of a speed in m/s, km/h or kn: less is ten times too little
 CLOSE = 0.97  # share of a whole turn that a heading sweeps before it jumps: it has been all round
 BEYOND, TWICE = 360.5, 720.0  # deg: a compass shows less; more than two turns in a row are rare
 OFF, BETTER, AGREES = 0.02, 4.0, 0.2  # misfit of a course and a heading, 1 - cos: of 11 deg; times; of a bad one
@@ -60,8 +61,9 @@ def _take_positions(state: State) -> None:
             _take_sides(state, north, east)
             continue
         if all(np.mean(one % 1 == 0) > WHOLE and one.max() > 1e6 for one in both) and _on_globe(both, FINE):
+            fine = MICRO if _on_globe(both, MICRO) and _is_micro(state, north, east) else FINE
             for name in (north, east):
-                _scale(state, name, FINE, "whole numbers of 1e-7 deg")
+                _scale(state, name, fine, f"whole numbers of {fine:.0e} deg".replace("e-0", "e-"))
         elif all(_is_ddmm(one) for one in both) and both[0].max() < 9000 and both[1].max() < 18000:
             for name in (north, east):
                 state.columns[name] = degrees_of(state.columns[name])
@@ -72,6 +74,19 @@ def _take_positions(state: State) -> None:
             if not lettered and min(state.columns[north].min(), state.columns[east].min()) >= 0:
                 words = f"do {north!r} and {east!r}, degrees and minutes without a sign, count to north and east? "
                 state.ask(("latitude", "longitude"), f"{words}If they are S or W, write sign = -1")
+
+
+def _is_micro(state: State, north: str, east: str) -> bool:
+    """Whether whole numbers are of 1e-6 deg, as the speed shows: of 1e-7 deg the way would be a tenth; else asked."""
+    place = [FINE * state.columns[name] for name in (north, east)]
+    a, b, _ = geodetic2ned(*place, 0.0, float(place[0][0]), float(place[1][0]), 0.0)
+    way = float(np.sum(np.abs(state.chosen.change(np.asarray(a + 1j * b)))))
+    for name in [*state.called("speed"), *state.called("u")]:
+        ran = state.chosen.change(np.cumsum(np.abs(state.columns[name]) * np.gradient(state.t)))
+        if (length := float(np.sum(np.abs(ran)))) > 0:
+            return way < SLOW * length
+    state.ask(("latitude", "longitude", "t"), f"are {north!r} and {east!r} whole numbers of 1e-7 deg, or of 1e-6 deg?")
+    return False
 
 
 def _by_track(state: State) -> None:

@@ -97,6 +97,13 @@ def test_a_heading_that_never_jumps_is_read_as_it_keeps_to_the_track(turn: float
     assert "keeps to the track" in column.evidence
 
 
+@pytest.mark.parametrize("digits", [6, 7])
+def test_whole_numbers_of_parts_of_a_degree_are_told_by_the_speed(digits: int, tmp_path: Path) -> None:
+    proposal, _ = drafted(on_globe(*((10**digits * one).round().astype(int) for one in (LAT, LON))), tmp_path)
+    columns = [proposal.column(name) for name in ("latitude", "longitude")]
+    assert [one.extra["factor"] for one in columns if one is not None] == [10.0**-digits] * 2
+
+
 @pytest.mark.parametrize(("turn", "asks"), [(400.0, True), (360.0, False)])
 def test_gon_that_a_compass_in_degrees_may_show_are_asked(turn: float, asks: bool, tmp_path: Path) -> None:
     frame = turned_round(200.0).drop(columns="psi")
