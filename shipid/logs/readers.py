@@ -339,7 +339,8 @@ def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:
 def widest(head: bytes, separator: str, file: Path) -> None:
     """Raise DataError where a line in the first bytes of a log has more cells than any log has."""
     mark = b" " if separator == "whitespace" else separator.encode()
-    for line in head.split(b"\n", LOOKED_AT)[:LOOKED_AT]:
+    end = b"\n" if b"\n" in head else b"\r"
+    for line in head.split(end, LOOKED_AT)[:LOOKED_AT]:
         count = line.count(mark) + 1
         if count > WIDEST:
             raise DataError(

@@ -61,12 +61,13 @@ NOT_AVAILABLE = {"psi": (511.0, 360.0), "speed": (102.3, 51.0), "latitude": (91.
 """Meaning -> number [deg, kn] that AIS writes for none (ITU-R M.1371), and the largest of the others."""
 LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
 REPEATED = 0.05  # share of the rows that may repeat the row before, at most
+WIDE = 0.9  # share of every second byte that is 0, in text of two bytes a character
 NUMERIC = 0.8  # share of the cells of a line of data that are numbers
 CLOCK_WORDS = frozenset(
     (
         "t tvec time timestamp stamp clock sec secs seconds date datetime utc ms zeit messzeit zeitstempel "
         "tid tidspunkt sekunden millis epoch zulu hora temps heure elapsed stempel mess uhrzeit klokke tiempo "
-        "gmt datenum tow itow sow sod"
+        "gmt datenum tow itow sow sod ticks filetime"
     ).split()
 )
 WRITTEN = {
@@ -83,6 +84,8 @@ FINE = {"ns": (1e17, 1e8), "us": (1e14, 1e5)}
 """Unit of a clock -> least number that counts from 1970 in it, and least step of whole numbers: 0.1 s."""
 DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in {**EPOCHS, "d": 0.0}.items()}
 """Unit of a clock in days -> its numbers of 1990 and 2050, `d` since 1970; modified Julian dates are later."""
+TICKS = {11_644_473_600: "1601, as Windows does", 62_135_596_800: "the year 1, as .NET does"}
+"""Seconds from the begin of a clock of ticks of 100 ns to 1970 -> who counts so."""
 SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
 NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
 _UNIT = re.compile(
@@ -235,6 +238,9 @@ def _sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], str, tup
 def _encoding(head: bytes, file: Path) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
+    for order, zeros, others in (("utf-16-le", head[1::2], head[::2]), ("utf-16-be", head[::2], head[1::2])):
+        if zeros.count(b"\0") > WIDE * len(zeros) and b"\0" not in others:  # without the mark of its order
+            return order
     if b"\0" in head:
         raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
     for encoding in ("utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8", "cp1252"):
@@ -613,6 +619,10 @@ def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tu
     if values.min() > 1e9 and _is_time_of_day(values % 1e6):
         message = f"{name!r} is a date and a time of day in one number, {values[0]:.15g}: write 2024-05-14 08:00:00"
         raise DataError(f"no column can be the clock: {message}", file=file)
+    for epoch, what in TICKS.items():
+        if DATES["d"][0] < (values[0] / 1e7 - epoch) / DAY < DATES["d"][1] and np.median(np.diff(values)) >= 1e5:
+            message = f"{name!r} counts 100 ns since {what}: write seconds since 1970, value / 1e7 - {epoch}"
+            raise DataError(f"no column can be the clock: {message}", file=file)
     unit = _unit_of_clock(name, values)
     return unit, clock_seconds(values, unit)
 

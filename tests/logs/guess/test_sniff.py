@@ -149,6 +149,28 @@ def test_a_date_and_a_time_in_one_number_are_no_seconds(step: float, stored: str
     np.testing.assert_allclose(sniffed.t, t + pd.Timestamp("2024-05-14 08:13:20").timestamp(), atol=5e-3)
 
 
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_text_of_two_bytes_without_a_mark_is_read(encoding: str, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_bytes("\n".join(["time,x", *(f"{k},{k % 7}.5" for k in range(80))]).encode(encoding))
+    sniffed = sniff(file)
+    assert sniffed.form["encoding"] == encoding
+    np.testing.assert_array_equal(sniffed.t, np.arange(80))
+
+
+def test_many_lines_that_end_in_a_carriage_return_alone_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_bytes("\r".join(["time,x,y", *(f"{k},{k % 7}.5,1" for k in range(8000))]).encode())
+    np.testing.assert_array_equal(sniff(file).t, np.arange(8000))
+
+
+@pytest.mark.parametrize(("epoch", "who"), [(11_644_473_600, "Windows"), (62_135_596_800, ".NET")])
+def test_ticks_of_100_ns_are_refused_with_what_to_write(epoch: int, who: str, tmp_path: Path) -> None:
+    rows = [f"{(1_715_673_600 + k + epoch) * 10**7},{k % 7}" for k in range(80)]
+    with pytest.raises(DataError, match=rf"as {who} does: write seconds since 1970, value / 1e7 - {epoch}"):
+        sniff(log_of(tmp_path, ["Timestamp,x", *rows]))
+
+
 def test_a_date_without_a_century_in_one_number_is_refused(tmp_path: Path) -> None:
     moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(np.arange(200), "s")
     log = pd.DataFrame({"time": moments.strftime("%d%m%y%H%M%S"), "N": 1.0, "psi": 2.0})
