@@ -33,7 +33,7 @@ def is_workbook(head: bytes) -> bool:
 
 
 def sheets_of(file: Path) -> list[str]:
-    """Return the names of the sheets of a workbook that have values, the one with most cells first.
+    """Return the names of the sheets of a workbook that have values, the one with most cells first; hidden ones last.
 
     Raises
     ------
@@ -41,7 +41,8 @@ def sheets_of(file: Path) -> list[str]:
     """
     book = _opened(file)
     cells = {name: sheet.height * sheet.width for name in book.sheet_names for sheet in [_sheet(book, name, file)]}
-    names = sorted((name for name in cells if cells[name]), key=cells.__getitem__, reverse=True)
+    hidden = {one.name: not str(one.visible).endswith(".Visible") for one in book.sheets_metadata}
+    names = sorted((name for name in cells if cells[name]), key=lambda name: (hidden[name], -cells[name]))
     if not names:
         raise DataError("no sheet of this workbook has a cell with a value", file=file)
     return names

@@ -90,6 +90,21 @@ def test_cells_are_read_as_written(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("hidden", [False, True])
+def test_the_log_is_found_beside_a_larger_sheet(hidden: bool, tmp_path: Path) -> None:
+    """A table without a clock, or a hidden sheet with another one."""
+    book = load_workbook(saved(tmp_path / "log.xlsx", [["time", "x"], *([k, k % 7] for k in range(40))]))
+    other = book.create_sheet("other")
+    other.append(["time" if hidden else "c", *"abcdef"])
+    for row in range(60):
+        other.append([float(row), *range(6)])
+    other.sheet_state = "hidden" if hidden else "visible"
+    book.save(tmp_path / "log.xlsx")
+    sniffed = sniff(tmp_path / "log.xlsx")
+    assert sniffed.form["sheet"] == "log"
+    assert sniffed.notes[0] == "of the workbook the sheet 'log' is read, not 'other'"
+
+
 def test_times_of_day_go_on_after_midnight(tmp_path: Path) -> None:
     """A cell of the format hh:mm:ss that counts on past a day is a date of 1900 to a reader."""
     rows = [["time", "x"], *([(86400 - 20 + k) / 86400, k % 7] for k in range(40))]

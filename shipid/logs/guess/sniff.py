@@ -225,14 +225,22 @@ def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], str, tuple[str, ...]]:
-    """Keys of [format] of a workbook, the lines of its largest sheet, and what is said of the others."""
-    sheet, *others = sheets_of(file)
+    """Keys of [format] of a workbook, the lines of its largest sheet with a clock, and what is said of the others."""
+    found = sheets_of(file)
+    sheet = found[0] if len(found) == 1 else next((one for one in found if _has_clock(sheet_text(file, one))), found[0])
+    others = [name for name in found if name != sheet]
     lines = sheet_text(file, sheet)
     layout = _text_format(lines.splitlines()[:LOOKED_AT], "utf-8", file, names, (SEPARATOR,))
     keys = {key: value for key, value in layout.items() if key in SheetFormat.model_fields}
     notes = (f"of the workbook the sheet {sheet!r} is read, not {', '.join(map(repr, others))}",) if others else ()
     named = {"sheet": sheet} if others else {}  # each run of a folder may have a sheet of another name
     return {"kind": "sheet"} | named | keys, lines, notes
+
+
+def _has_clock(lines: str) -> bool:
+    """Whether one of the first lines of a sheet has the name of a clock in a cell."""
+    first = lines.split("\n", LOOKED_AT)[:LOOKED_AT]
+    return any(is_clock(cell) for line in first for cell in cells(line, SEPARATOR) if cell and not _is_number(cell))
 
 
 def _encoding(head: bytes, file: Path) -> str:
