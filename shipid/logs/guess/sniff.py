@@ -179,7 +179,13 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     clock, t, once = _clock_once(table, columns if since is None else columns | since, file)
     columns = {name: values[once] for name, values in columns.items()}
     named = {clock["from"], clock.get("date")}
-    notes += tuple(f"column {name!r} holds words, not numbers" for name in words if name and name not in named)
+    texts = {name: _called(table, name).dropna().astype(str).str.strip() for name in words}
+    says = {name: next(filter(None, column), "") for name, column in texts.items()}
+    notes += tuple(
+        f"column {name!r} holds words, not numbers{_as_number(name, says[name])}"
+        for name in words
+        if name and name not in named
+    )
     constant = [name for name, values in columns.items() if np.isnan(values).all()]
     kept = {name: values for name, values in columns.items() if name not in named and name not in constant}
     empty = tuple(f"column {name!r} is empty" for name in constant if name)
@@ -188,10 +194,15 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         notes += ("rows that repeat the row before are left out",)
     kept = {name: values for name, values in kept.items() if name not in runs}
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
-    texts = {name: _called(table, name).dropna().astype(str).str.strip() for name in words}
-    says = {name: next(filter(None, column), "") for name, column in texts.items()}
     doubts = tuple(_doubts(table.loc[once], clock, t))
     return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), says, doubts)
+
+
+def _as_number(name: str, text: str) -> str:
+    """What to do with a column of words whose name says a quantity and whose texts have a number, such as P12.5."""
+    quantity = any(meaning and score > 0.6 for meaning, score in fits(name).items())
+    remedy = f", such as {text[:40]!r}: write it as a number with a sign"
+    return remedy if quantity and re.search(r"\d", text) else ""
 
 
 def _sample(file: Path, encoding: str, size: int) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipid.logs.guess.clues import State, unit_of_another
-from shipid.logs.guess.words import fits, is_order
+from shipid.logs.guess.words import fits, is_order, parts_of
 from shipid.logs.repairs import INPUTS
 from shipid.physics.signals import SIGNALS
 
@@ -14,6 +14,13 @@ ALIKE = (
     {"u", "v", "speed", "course", "velocity_north", "velocity_east"},
 )
 """Meanings of which a log needs one pair: what gives the position, what gives the velocity."""
+
+REMEDIES = {
+    "awd": "it may be the direction of the apparent wind from north: write the angle from the bow, less the heading",
+    "blowing": "it may be a direction of the wind: map it to beta_w with direction = 'from' or 'towards'",
+    "telegraph": "it may be an order of the shaft: map it to a command .n with factor = rpm / its largest value",
+}
+"""Word of a name that says no known quantity -> what the column may be, and what to do."""
 
 
 def reasons(state: State, numbering: tuple[str, ...] = ()) -> dict[str, str]:
@@ -29,6 +36,9 @@ def _reason(state: State, name: str, numbers: bool) -> str:
         return "it holds the numbers of the rows"
     meanings = sorted((scores := fits(name)), key=lambda meaning: -scores[meaning])
     if not meanings:
+        remedy = next((REMEDIES[part] for part in parts_of(name) if part in REMEDIES), None)
+        if remedy is not None:
+            return remedy
         return "its name says no known quantity, and no other column is like it"
     meaning = meanings[0]
     if not meaning or meaning not in {*SIGNALS, *INPUTS, "x", "y", "velocity_north", "velocity_east"}:

@@ -158,6 +158,13 @@ def test_text_of_two_bytes_without_a_mark_is_read(encoding: str, tmp_path: Path)
     np.testing.assert_array_equal(sniffed.t, np.arange(80))
 
 
+def test_a_rudder_in_words_has_its_remedy(tmp_path: Path) -> None:
+    rows = [f"{k},{'PS'[k % 2]}{k % 9}.5,A{k},{k % 3},{k % 5}" for k in range(80)]
+    notes = sniff(log_of(tmp_path, ["time,Rudder,remark,x,y", *rows])).notes
+    assert "column 'Rudder' holds words, not numbers, such as 'P0.5': write it as a number with a sign" in notes
+    assert "column 'remark' holds words, not numbers" in notes
+
+
 def test_many_lines_that_end_in_a_carriage_return_alone_are_read(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_bytes("\r".join(["time,x,y", *(f"{k},{k % 7}.5,1" for k in range(8000))]).encode())

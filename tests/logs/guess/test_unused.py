@@ -19,6 +19,9 @@ from tests.logs.simulated import as_bridge, si_log
         ("Rudder order", "rudder", "an order, and the measured rudder is read from 'rudder'"),
         ("Wind speed [deg]", "noise", "its unit deg does not fit wind speed"),
         ("SOG", "u", "is read from 'u' and 'v'"),
+        ("AWD [deg]", "noise", "write the angle from the bow"),
+        ("Telegraph [%]", "noise", "map it to a command .n with factor"),
+        ("Wind blowing towards [deg]", "noise", "map it to beta_w with direction"),
         ("row", "number", "it holds the numbers of the rows"),
     ],
 )
