@@ -12,7 +12,7 @@ from shipid.logs.guess.defects import FEW, when
 from shipid.logs.guess.evidence import GAP, integral
 from shipid.logs.mapping import to_si
 
-LEAST_ROWS, LEAST, LONG = 8, 5.0, 4.0  # rows; s; times as long as nearly all other repetitions
+LEAST_ROWS, LEAST, LONG = 5, 4.5, 4.0  # rows; s; times as long as nearly all other repetitions
 TURNED = np.radians(6.0)  # by which the ship turns meanwhile
 
 

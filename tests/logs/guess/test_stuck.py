@@ -34,6 +34,12 @@ def stood(name: str, start: float, duration: float) -> pd.DataFrame:
     return frame
 
 
+def test_a_heading_of_few_rows_that_stands_still_in_a_turn_is_found(tmp_path: Path) -> None:
+    """One row a second: five seconds are six rows."""
+    stood("Heading", TURNING, 5.0).iloc[::2].to_csv(tmp_path / "log.csv", index=False)
+    assert "frozen sensor" in guess(tmp_path / "log.csv").kinds
+
+
 @pytest.mark.parametrize("name", ["Heading", "r", "COG"])
 def test_a_sensor_that_stands_still_in_a_turn_is_broken_out(name: str, tmp_path: Path) -> None:
     stood(name, TURNING, 30.0).to_csv(tmp_path / "log.csv", index=False)
