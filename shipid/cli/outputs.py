@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterable, Iterator
 from math import isfinite
@@ -49,12 +50,18 @@ class Guarded(typer.core.TyperCommand):
 
 
 def check_output(file: Path, read: Iterable[Path], option: str) -> None:
-    """Raise ShipidError where a file to write is one of those that are read, or no file."""
+    """Raise ShipidError where a file to write is one of those that are read, is no file, or cannot be there."""
     if any(_same(file, one) for one in read):
         message = "is named twice, and would be written over: name another file to write"
         raise ShipidError(message, file=file, path=option)
     if file.exists() and not (file.is_file() or file.is_dir()):
         raise ShipidError("is a device or a pipe: name a file to write", file=file, path=option)
+    folder = next(one for one in (file.absolute(), *file.absolute().parents) if one.exists())
+    if folder.is_file() and folder != file.absolute():
+        raise ShipidError("is a file, not a folder: name another place to write", file=folder, path=option)
+    if not os.access(folder.parent if folder.is_file() else folder, os.W_OK | os.X_OK):
+        message = "is in a folder that this user may not write into: name another place to write"
+        raise ShipidError(message, file=file, path=option)
     if file.is_file() and (results := results_of(file)) is not None:
         message = f"belongs to the results in {results}, and would be written over: name another file to write"
         raise ShipidError(message, file=file, path=option)

@@ -12,8 +12,9 @@ import pytest
 import typer.main
 
 from shipid.cli import app
-from shipid.cli.outputs import OUTPUTS, Guarded
+from shipid.cli.outputs import OUTPUTS, Guarded, check_output
 from shipid.document import bundled
+from shipid.errors import ShipidError
 from tests.cli.running import ended, output_of
 
 SHIP = "otter"
@@ -56,6 +57,19 @@ def test_what_is_read_is_not_written(words: str, there: Path) -> None:
     assert status == 1
     assert "is named twice" in error
     assert {file.name: file.read_bytes() for file in there.iterdir()} == before
+
+
+@pytest.mark.usefixtures("there")
+def test_what_cannot_be_written_is_refused_before_anything_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    status, _, error = ended("manoeuvre", "./ship.toml", "zigzag", "20", "20", "--out", "ship.toml/new/a.html")
+    assert status == 1
+    assert "ship.toml: --out: is a file, not a folder: name another place to write" in error
+    monkeypatch.setattr(os, "access", lambda folder, _: Path(folder).name != "locked")
+    Path("locked").mkdir()
+    for name in ("locked/a.html", "locked/new/a.html"):
+        with pytest.raises(ShipidError, match="is in a folder that this user may not write into: name another"):
+            check_output(Path(name), [], "--out")
+    check_output(Path("new/a.html"), [], "--out")
 
 
 @pytest.mark.usefixtures("there")
