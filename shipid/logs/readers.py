@@ -27,14 +27,14 @@ from shipid.data.dataset import DATED, Array
 from shipid.errors import DataError
 from shipid.logs.foreign import ENOUGH, foreign
 from shipid.logs.repairs import Strict
-from shipid.logs.workbook import SEPARATOR, is_workbook, sheet_text, sheets_of
+from shipid.logs.workbook import SEPARATOR, check_width, is_workbook, sheet_text, sheets_of
 from shipid.units import KNOT
 
 DAY, HALF_DAY = 86400.0, 43200.0  # s
 NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, but for those that go back by an hour
 HOUR = 3600.0  # s: by which local time goes back at the end of daylight saving
 LOOKED_AT = 300  # lines that a guess at the format looks at
-WIDEST, LONGEST_LINE = 10_000, 8_000_000  # cells and bytes of a line: more is no log
+LONGEST_LINE = 8_000_000  # bytes: more is no log
 LARGE = 32_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
 TIME_OF_DAY = r"\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?(\s*[AaPp][Mm])?\s*"
 DAY_OF = (
@@ -341,11 +341,7 @@ def widest(head: bytes, separator: str, file: Path) -> None:
     mark = b" " if separator == "whitespace" else separator.encode()
     end = b"\n" if b"\n" in head else b"\r"
     for line in head.split(end, LOOKED_AT)[:LOOKED_AT]:
-        count = line.count(mark) + 1
-        if count > WIDEST:
-            raise DataError(
-                f"a line of {count} cells: a log has {WIDEST} columns at most; is the table transposed?", file=file
-            )
+        check_width(line.count(mark) + 1, file)
 
 
 def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.DataFrame:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from python_calamine import CalamineSheet, CalamineWorkbook
 
 SEPARATOR = "\t"
+WIDEST = 10_000  # cells of a line: more is no log
 LARGEST = 2_000_000_000  # bytes of a workbook once unpacked: some twenty million cells
 FIRST_YEAR = 1904  # of dates of a workbook, 1900 or 1904: no log has one
 _STARTS = re.compile(
@@ -30,6 +31,14 @@ _STARTS = re.compile(
 def is_workbook(head: bytes) -> bool:
     """Whether a file with these first bytes is a workbook of Excel or OpenDocument."""
     return _STARTS.match(head) is not None
+
+
+def check_width(cells: int, file: Path) -> None:
+    """Raise DataError where a line has more cells than that of any log."""
+    if cells > WIDEST:
+        raise DataError(
+            f"a line of {cells} cells: a log has {WIDEST} columns at most; is the table transposed?", file=file
+        )
 
 
 def sheets_of(file: Path) -> list[str]:
@@ -62,6 +71,7 @@ def sheet_text(file: Path, name: str) -> str:
     if name not in book.sheet_names:
         raise DataError(f"no sheet {name!r}: {choices(name, book.sheet_names)}", file=file, path="format.sheet")
     sheet = _sheet(book, name, file)
+    check_width(sheet.width, file)
     first = sheet.start[1] if sheet.start is not None else 0
     lines = io.StringIO()
     writer = csv.writer(lines, delimiter=SEPARATOR, lineterminator="\n")

@@ -18,7 +18,6 @@ from shipid.logs.guess.sniff import sniff
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.readers import (
     READERS,
-    WIDEST,
     NmeaFormat,
     ParquetFormat,
     TextFormat,
@@ -30,6 +29,7 @@ from shipid.logs.readers import (
     span_of,
     widest,
 )
+from shipid.logs.workbook import WIDEST
 from tests.logs.conftest import PLAIN, as_log, turning
 
 Write = Callable[..., Path]

@@ -180,6 +180,13 @@ def test_what_cannot_be_held_or_has_no_value_is_refused(tmp_path: Path, monkeypa
         sniff(file)
 
 
+def test_a_sheet_wider_than_any_log_is_refused_at_once(tmp_path: Path) -> None:
+    file = saved(tmp_path / "log.xlsx", [[f"c{k}" for k in range(10_001)], [*range(10_001)]])
+    for read in (sniff, rows_of):
+        with pytest.raises(DataError, match="a line of 10001 cells: a log has 10000 columns at most"):
+            read(file)
+
+
 def test_the_package_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = saved(tmp_path / "log.xlsx", [["time", "x"], [0, 1], [1, 2]])
     monkeypatch.setitem(sys.modules, "python_calamine", None)
