@@ -78,7 +78,8 @@ def test_orders_between_slow_rows_are_named_with_the_change_that_the_remedy_make
     late = lateness(held, log)
     assert late is not None
     place = FEW.index("hull.mmg.N_v")
-    assert left[place] < 0.4 * off[place]
+    noise = statistics(LinearFit.of(mended)).errors[place]
+    assert left[place] < 0.4 * off[place] + noise
     assert late.changes[place] == pytest.approx(1 - held.factors[place], abs=0.5 * off[place])
     assert sentence(held, log).startswith("commands count from their row, on average 0.5 s late")
     assert "--set commands=between --set step=0.5" in sentence(held, log)
