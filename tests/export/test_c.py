@@ -176,6 +176,21 @@ def log_of(vessel, seconds, rng, interval):
     return Dataset(frame, {"clock": "run"})
 
 
+def path_after(exported, t, log, folder):
+    """Path (T, 2) [m] of exported C that has recorded the rows of a log at times t [s]."""
+    files = predictor_files(exported, "odd", Precision())
+    kept = np.zeros(_size_of_struct(files, folder) + 64, dtype=np.uint8)
+    path = np.zeros((exported.layout.horizon, 2))
+    loaded = library(files, folder)
+    loaded.odd_init(pointer(kept))
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    for at, row in zip(t, log[list(order)].to_numpy(dtype=float), strict=True):
+        assert loaded.odd_record(pointer(kept), at, pointer(np.ascontiguousarray(row))) == 0
+    assert loaded.odd_predict(pointer(kept), None, pointer(path)) == 0
+    return path
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("velocity", "longest"), [(False, LONGEST), (True, LONGEST), (False, 0.1)])
 def test_a_recorder_knows_what_python_takes_from_a_log(velocity, longest, tmp_path, monkeypatch):
@@ -254,16 +269,8 @@ def test_a_row_just_after_an_instant_of_the_past_is_not_taken_for_it(tmp_path):
     instants = Instants(sample(log, t[-1:]), past_of(log, t[-1:], 2, 1.0, "position"), None, hidden)
     table = inputs.table(physics, instants)
     network = network_of(np.random.default_rng(2), list(table), table, 3, 2, False)
-    exported = model(Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {})))
-    files = predictor_files(exported, "odd", Precision())
-    kept, path = np.zeros(_size_of_struct(files, tmp_path) + 64, dtype=np.uint8), np.zeros((3, 2))
-    loaded = library(files, tmp_path)
-    loaded.odd_init(pointer(kept))
-    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
-    for at, row in zip(t, log[list(order)].to_numpy(dtype=float), strict=True):
-        assert loaded.odd_record(pointer(kept), at, pointer(np.ascontiguousarray(row))) == 0
-    loaded.odd_predict(pointer(kept), None, pointer(path))
+    exported = model(Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}), {"u": (-9.0, 9.0)}))
+    path = path_after(exported, t, log, tmp_path)
     expected = exported.predictor.predict(instants)[:, 0]
     np.testing.assert_allclose(path, expected, rtol=0, atol=1e-11)
 
@@ -281,15 +288,7 @@ def test_rows_may_come_as_often_as_they_like(interval, tmp_path):
     table = inputs.table(physics, instants)
     network = network_of(np.random.default_rng(2), list(table), table, 3, 2, False)
     exported = model(Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}), {"u": (-9.0, 9.0)}))
-    files = predictor_files(exported, "odd", Precision())
-    kept, path = np.zeros(_size_of_struct(files, tmp_path) + 64, dtype=np.uint8), np.zeros((3, 2))
-    loaded = library(files, tmp_path)
-    loaded.odd_init(pointer(kept))
-    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
-    for at, row in zip(t, log[list(order)].to_numpy(dtype=float), strict=True):
-        assert loaded.odd_record(pointer(kept), at, pointer(np.ascontiguousarray(row))) == 0
-    assert loaded.odd_predict(pointer(kept), None, pointer(path)) == 0
+    path = path_after(exported, t, log, tmp_path)
     np.testing.assert_allclose(path, exported.predictor.predict(instants)[:, 0], rtol=0, atol=1e-9)
 
 
@@ -308,15 +307,7 @@ def test_rows_far_apart_for_the_steps_are_no_pauses(pause, kept_on, tmp_path):
     along = memory_along(vessel, orders, t[first:])
     columns = {name: log[name].to_numpy()[-1:] for name in log if name not in ("run", "flags")}
     expected = exported.predictor.predict(Instants(columns, hidden={k: values[-1:] for k, values in along.items()}))
-    files = predictor_files(exported, "odd", Precision())
-    kept, path = np.zeros(_size_of_struct(files, tmp_path) + 64, dtype=np.uint8), np.zeros((20, 2))
-    loaded = library(files, tmp_path)
-    loaded.odd_init(pointer(kept))
-    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
-    for at, row in zip(t, log[list(order)].to_numpy(dtype=float), strict=True):
-        assert loaded.odd_record(pointer(kept), at, pointer(np.ascontiguousarray(row))) == 0
-    assert loaded.odd_predict(pointer(kept), None, pointer(path)) == 0
+    path = path_after(exported, t, log, tmp_path)
     np.testing.assert_allclose(path, expected[:, 0], rtol=0, atol=1e-11)
 
 
