@@ -28,12 +28,8 @@ VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
 STREAM = 0.5  # of the misfit of positions and velocities: less is no current
-NOTHING, HALF, AWAY, OFTEN = (
-    0.3,
-    0.5,
-    18.0,
-    20.0,
-)  # rows that are 0, at most; of the way; part of a turn; s between rows
+NOTHING, OFTEN = 0.3, 20.0  # share of the rows that are 0 for no value, at most; s of a speed that count as a spike
+HALF, AWAY = 0.5, 18.0  # share of the usual speed, and parts of a turn, by which the rows around are away from 0
 
 
 def _held_positions(state: State) -> None:
@@ -44,7 +40,7 @@ def _held_positions(state: State) -> None:
         return
     same, going = ([np.diff(state.columns[name]) == 0 for name in names] for names in (places, others))
     held = np.all(same, axis=0) & ~np.all(going, axis=0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(int), [0]]))).reshape(-1, 2)
+    edges = evidence.spans_of(held)
     lengths = edges[:, 1] - edges[:, 0]  # rows that repeat the one before; long stays are those of a ship at rest
     some = lengths[lengths <= HELD_ROWS]
     share = float(some.sum()) / len(held)
@@ -286,7 +282,7 @@ def take_lost_fixes(state: State) -> None:
         for name, one in zip((north, east), values, strict=True):
             state.columns[name] = np.interp(state.t, state.t[~lost], one[~lost])
         step, unit = float(np.median(np.diff(state.t))), to_si(state.clock_unit, "t")
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], lost.astype(int), [0]]))).reshape(-1, 2)
+        edges = evidence.spans_of(lost)
         t = np.concatenate([[state.t[0] - step], state.t, [state.t[-1] + step]])
         breaks = [[t[first] / unit, t[end + 1] / unit] for first, end in edges]
         sentence = f"{north!r} and {east!r} are 0 {_times(state, edges[:, 0])}: the receiver had no fix"
@@ -311,7 +307,7 @@ def take_zeros(state: State) -> None:
         turn = 360.0 if np.ptp(values) > 7.0 else 2 * np.pi
         size = np.abs(values if name in speeds else (values + turn / 2) % turn - turn / 2)
         least = HALF * float(np.percentile(size[known], 75)) if name in speeds else turn / AWAY
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], (~known).astype(int), [0]]))).reshape(-1, 2)
+        edges = evidence.spans_of(~known)
         inside = [(a, b) for a, b in edges if a > 0 and b < len(t) and t[b] - t[a - 1] < (b - a + 2) * step]
         inside = [(a, b) for a, b in inside if min(size[a - 1], size[b]) > least]
         if not inside:

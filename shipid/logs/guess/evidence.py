@@ -338,14 +338,18 @@ def _spikes(values: Array) -> NDArray[np.bool_]:
     wild &= ~np.any([np.abs(off / turn - 1) < 0.05 for turn in TURNS], axis=0)
     touching = wild | np.append(False, wild[:-1])
     usual = around(np.where(touching, 0.0, steps), 1.0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], wild.astype(int), [0]])))
     result = none.copy()
-    for first, end in edges.reshape(-1, 2):
+    for first, end in spans_of(wild):
         before, after = max(first - 1, 0), min(end, len(values) - 1)
         size = float(off[first:end].min())
         agrees = abs(values[after] - values[before]) < 0.25 * size
         result[first:end] = end - first <= 2 and agrees and size > 4 * usual[first:end].max()
     return result if result.mean() <= 0.02 else none
+
+
+def spans_of(rows: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """First row of each stretch of chosen rows (N,), and the row after its last, (K, 2)."""
+    return np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(int), [0]]))).reshape(-1, 2)
 
 
 def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:

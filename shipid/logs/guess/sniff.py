@@ -238,9 +238,13 @@ def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
 def _sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], str, tuple[str, ...]]:
     """Keys of [format] of a workbook, the lines of its largest sheet with a clock, and what is said of the others."""
     found = sheets_of(file)
-    sheet = found[0] if len(found) == 1 else next((one for one in found if _has_clock(sheet_text(file, one))), found[0])
+    sheet, lines = found[0], sheet_text(file, found[0])
+    for other in found[1:] if not _has_clock(lines) else ():
+        text = sheet_text(file, other)
+        if _has_clock(text):
+            sheet, lines = other, text
+            break
     others = [name for name in found if name != sheet]
-    lines = sheet_text(file, sheet)
     layout = _text_format(lines.splitlines()[:LOOKED_AT], "utf-8", file, names, (SEPARATOR,))
     keys = {key: value for key, value in layout.items() if key in SheetFormat.model_fields}
     notes = (f"of the workbook the sheet {sheet!r} is read, not {', '.join(map(repr, others))}",) if others else ()
