@@ -61,6 +61,7 @@ from shipid.logs.repairs import (
     REPAIRS,
     Despike,
     Latency,
+    Repair,
     Scale,
     WrapInterpolation,
     apply_repairs,
@@ -230,6 +231,18 @@ def _restarts(log: pd.DataFrame, mapping: Mapping, file: Path) -> list[int]:
     return np.flatnonzero(changed).tolist() if back.any() and not (back & ~changed).any() else []
 
 
+def _comes_first(repair: Repair, fixed: bool, read: set[str]) -> bool:
+    """Whether a repair mends columns that become others, or the heading by which velocities over ground are turned.
+
+    fixed : whether there are such. read : names of the columns that the log has.
+    """
+    if not isinstance(repair, Despike | Scale):
+        return False
+    mended = {*repair.columns}
+    turns = fixed and isinstance(repair, Despike) and "psi" in mended and not {"u", "v"} & mended and mended <= read
+    return repair.of_inputs or turns
+
+
 def _texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_]:
     """The column that says the run, as texts (N,); whole numbers without a point."""
     column = _column(log, source, file, "parts.from").ffill().bfill()
@@ -242,13 +255,7 @@ def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, .
     rows, first, read, begins = _columns(mapping, file, log)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
     fixed = "speed" in mapping.columns or ("u" in mapping.columns and mapping.columns["u"].frame == "earth")
-    early = [repair for repair in mapping.repair if isinstance(repair, Despike | Scale) and repair.of_inputs]
-    early += [
-        repair
-        for repair in mapping.repair
-        if fixed and isinstance(repair, Despike) and "psi" in repair.columns and not {"u", "v"} & {*repair.columns}
-        if repair not in early and {*repair.columns} <= {*mapping.columns}
-    ]  # before speed and course are turned by it
+    early = [repair for repair in mapping.repair if _comes_first(repair, fixed, {*mapping.columns})]
     others = [repair for repair in mapping.repair if repair not in [*wrapping, *early]]
     rows, records = apply_repairs(rows, wrapping, off, file)
     rows = _unwrapped(rows, mapping, file)
