@@ -159,9 +159,9 @@ class _Source(Parts):
         saved = "const V *saved0, const V *saved1"
         bars = "const V *bar, V *state_bar, V *memory_bar, V *grad, V *tau_bar"
         return f"""
-static void stage0(const V *parameters, V *saved) {{ {" ".join(self.stage(0, p) for p in self.all)} }}
+static void stage0(const V *parameters, V *saved) {{ {self.stage(0)} }}
 static void stage1(const V *commands, const V *environment, const V *saved0, V *saved) {{
-{" ".join(self.stage(1, p) for p in self.all)} }}
+{self.stage(1)} }}
 static void rates({inputs}, const V *tau_extra, {saved}, V *out) {{
 {self.block(rates, (0, 1), [*rates.lines[2], *ends(rates.outputs)])} }}
 static void advance({inputs}, double step, {saved}, V *out) {{ const V dt[1] = {{ K(step) }};

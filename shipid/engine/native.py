@@ -69,6 +69,7 @@ _ARRAYS = {
     **dict.fromkeys(("values", "start", "memory", "commands", "environment", "extra"), "REAL"), "goal": "const U",
     **dict.fromkeys(("records", "sums", "worst"), "REAL"), "tally": "unsigned",
 }  # fmt: skip
+_ADD = "for (int i = 0; i < {0}; ++i) {4}[i] = {1}[i] + K({2!r}) * {3}[i];"
 PARTS = 8  # tasks for each core at least: for an even load
 BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
 
@@ -198,15 +199,44 @@ class Parts:
         """Number of values that a stage saves, at least 1 (C has no empty arrays)."""
         return max(1, sum(len(printed.saved[stage]) for printed in self.all))
 
-    def stage(self, number: int, printed: Printed) -> str:
-        """C statements of stage `number` of one function."""
-        saves = [f"saved[{self.offset(number, printed) + i}] = {text};" for i, text in enumerate(printed.saved[number])]
-        return self.block(printed, range(number), [*printed.lines[number], *saves])
+    def stage(self, number: int) -> str:
+        """C statements of stage `number` of all functions."""
+        texts = []
+        for printed in self.all:
+            first = self.offset(number, printed)
+            saves = [f"saved[{first + i}] = {text};" for i, text in enumerate(printed.saved[number])]
+            texts.append(self.block(printed, range(number), [*printed.lines[number], *saves]))
+        return " ".join(texts)
 
     def block(self, printed: Printed, stages: Sequence[int], lines: Sequence[str]) -> str:
         """A C block with `lines`, preceded by pointers to the values that the given stages saved."""
         heads = [f"const V *s{stage} = saved{stage} + {self.offset(stage, printed)};" for stage in stages]
         return "{ " + "\n".join([*heads, *lines]) + " }"
+
+
+def integrated(
+    num_states: int, num_memory: int, rates: str, advance: str, step: float, method: Method
+) -> tuple[list[str], str, str]:
+    """C statements of one step from `x` and `m`, and the names of state and memory after it.
+
+    `integrate` runs on names of buffers, and each operation emits a line.
+
+    rates : C call with places for state, memory and result. advance : the same for memory, time [s] and result.
+    """
+    lines: list[str] = []
+
+    def named(size: int, line: str, *given: str | float) -> str:
+        out = f"b{len(lines)}"
+        lines.append(f"V {out}[{max(1, size)}]; " + line.format(*given, out))
+        return out
+
+    after, later = integrate(
+        lambda x, m: named(num_states, rates, x, m),
+        lambda m, dt: named(num_memory, advance, m, dt),
+        lambda x, a, k: named(num_states, _ADD, num_states, x, a, k),
+        "x", "m", step, method,
+    )  # fmt: skip
+    return lines, after, later
 
 
 class _Source(Parts):
@@ -243,9 +273,9 @@ class _Source(Parts):
         ends = [f"out[{i}] = {text};" for i, text in enumerate(rates.outputs)]
         lags = [f"out[{i}] = {text};" for i, text in enumerate(advance.outputs)]
         return f"""
-static void stage0(const V *parameters, V *saved) {{ {" ".join(self.stage(0, p) for p in self.all)} }}
+static void stage0(const V *parameters, V *saved) {{ {self.stage(0)} }}
 static void stage1(const V *commands, const V *environment, const V *saved0, V *saved) {{
-{" ".join(self.stage(1, p) for p in self.all)} }}
+{self.stage(1)} }}
 static void rates(const V *state, const V *memory, const V *tau, const V *saved0, const V *saved1,
                   const U *const *drawn, const long *counts, V *out) {{
 V total[{n}]; for (int i = 0; i < {n}; ++i) total[i] = tau[i];
@@ -258,33 +288,14 @@ const V dt[1] = {{ K(step) }};
 """
 
     def one_step(self) -> str:
-        """One integrator step as C statements: `integrate` runs on buffer names, and each operation emits a line."""
-        lines: list[str] = []
-        num_states = len(self.model.state) + len(self.model.hidden)
-
-        def name(size: int) -> str:
-            lines.append(f"V b{len(lines)}[{max(1, size)}];")
-            return f"b{len(lines) - 1}"
-
-        def rates(state: str, memory: str) -> str:
-            out = name(num_states)
-            lines.append(f"rates({state}, {memory}, tau, saved0, saved1, components, counts, {out});")
-            return out
-
-        def advance(memory: str, dt: float) -> str:
-            out = name(len(self.model.memory))
-            lines.append(f"advance(x, {memory}, {dt!r}, saved0, saved1, {out});")
-            return out
-
-        def add(state: str, a: float, k: str) -> str:
-            out = name(num_states)
-            lines.append(f"for (int i = 0; i < {num_states}; ++i) {out}[i] = {state}[i] + K({a!r}) * {k}[i];")
-            return out
-
-        after, memory_after = integrate(rates, advance, add, "x", "m", self.step, self.method)
-        copy = f"for (int i = 0; i < {num_states}; ++i) x[i] = {after}[i];"
-        lags = f"for (int i = 0; i < {len(self.model.memory)}; ++i) m[i] = {memory_after}[i];"
-        return "\n".join([*lines, copy, lags])
+        """C statements of one step."""
+        nx, nm = len(self.model.state) + len(self.model.hidden), len(self.model.memory)
+        rates = "rates({0}, {1}, tau, saved0, saved1, components, counts, {2});"
+        lines, after, later = integrated(
+            nx, nm, rates, "advance(x, {0}, {1!r}, saved0, saved1, {2});", self.step, self.method
+        )
+        copy = f"for (int i = 0; i < {nx}; ++i) x[i] = {after}[i];"
+        return "\n".join([*lines, copy, f"for (int i = 0; i < {nm}; ++i) m[i] = {later}[i];"])
 
     def text(self, wanted: Target) -> str:
         """The complete C source for the target processor."""

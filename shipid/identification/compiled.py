@@ -2,95 +2,43 @@
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.engine.integrate import cores, integrate
-from shipid.engine.native import C, compiled, target
-from shipid.engine.printing import Printed, print_function
+from shipid.engine.native import C, Parts, compiled, integrated, target
+from shipid.engine.printing import print_function
+from shipid.engine.threads import in_parallel, threaded
 from shipid.engine.vectors import Target, head
 from shipid.identification.sensitivities import Layout, Variation, variation
 
 Array = NDArray[np.float64]
 STAGES = (("fixed",), ("known",))  # once an interval; once a step
-THREADS_FROM = 1e5  # vectors stepped: below it starting a thread costs more than it saves
+_ARRAYS = dict.fromkeys(("numbers", "inputs", "signals", "state", "records"), "double")
 
 
-class _Source:
+class _Source(Parts):
     """C source of one variation: terms of parameters alone are computed once, terms of the inputs once per step."""
 
     def __init__(self, model: Variation) -> None:
         self.model = model
-        self.parts = [print_function(f, STAGES, C) for f in (model.rates, model.advance, model.outputs)]
-
-    def total(self, stage: int) -> int:
-        """Number of values that stage `stage` saves, at least 1 (C has no empty arrays)."""
-        return max(1, sum(len(printed.saved[stage]) for printed in self.parts))
-
-    def stage(self, number: int) -> str:
-        """Statements of stage `number` (0: once per prediction, 1: once per step) for all three functions."""
-        return " ".join(
-            self.block(
-                printed,
-                range(number),
-                [
-                    *printed.lines[number],
-                    *(
-                        f"saved[{self._offset(number, printed) + i}] = {t};"
-                        for i, t in enumerate(printed.saved[number])
-                    ),
-                ],
-            )
-            for printed in self.parts
-        )
-
-    def block(self, printed: Printed, stages: Sequence[int], lines: Sequence[str]) -> str:
-        """A C block with `lines`, preceded by pointers to the values that the given stages saved."""
-        heads = [f"const V *s{stage} = saved{stage} + {self._offset(stage, printed)};" for stage in stages]
-        return "{ " + "\n".join([*heads, *lines]) + " }"
-
-    def _offset(self, stage: int, printed: Printed) -> int:
-        before = self.parts[: next(i for i, other in enumerate(self.parts) if other is printed)]
-        return sum(len(other.saved[stage]) for other in before)
+        self.all = [print_function(f, STAGES, C) for f in (model.rates, model.advance, model.outputs)]
 
     def main(self, number: int) -> str:
         """Body of function `number` (rates, advance, outputs): the part evaluated at every integrator stage."""
-        printed = self.parts[number]
+        printed = self.all[number]
         ends = [f"out[{i}] = {text};" for i, text in enumerate(printed.outputs)]
         return self.block(printed, (0, 1), [*printed.lines[2], *ends])
 
     def one_step(self) -> str:
-        """One integrator step as C statements: `integrate` runs on buffer names, and each operation emits a line."""
-        lines: list[str] = []
+        """C statements of one step, with the outputs after it."""
         num_z, num_m = self.model.rates.size1_in(0), self.model.rates.size1_in(1)
-
-        def name(size: int) -> str:
-            lines.append(f"V b{len(lines)}[{max(1, size)}];")
-            return f"b{len(lines) - 1}"
-
-        def rates(z: str, m: str) -> str:
-            out = name(num_z)
-            lines.append(f"rates({z}, {m}, saved0, saved1, {out});")
-            return out
-
-        def advance(m: str, dt: float) -> str:
-            out = name(num_m)
-            lines.append(f"advance({m}, {dt!r}, saved0, saved1, {out});")
-            return out
-
-        def add(z: str, a: float, k: str) -> str:
-            out = name(num_z)
-            lines.append(f"for (int i = 0; i < {num_z}; ++i) {out}[i] = {z}[i] + {a!r} * {k}[i];")
-            return out
-
-        layout = self.model.layout
-        after, later = integrate(rates, advance, add, "x", "m", layout.step, layout.method)
+        layout, ends = self.model.layout, "saved0, saved1, {2});"
+        lines, after, later = integrated(
+            num_z, num_m, f"rates({{0}}, {{1}}, {ends}", f"advance({{0}}, {{1!r}}, {ends}", layout.step, layout.method
+        )
         lines.append(f"outputs({after}, {later}, saved0, saved1, seen, record);")
         lines.append(f"for (int i = 0; i < {num_z}; ++i) x[i] = {after}[i];")
         if layout.carried:
@@ -104,6 +52,22 @@ class _Source:
         fixed, known = model.rates.size1_in(2), model.rates.size1_in(3)
         seen, record = model.outputs.size1_in(3), model.outputs.size1_out(0)
         memory = f"x + {num_z}" if model.layout.carried else f"given + {known - num_m}"
+        task = f"""V fixed[{max(1, fixed)}], given[{max(1, known)}], saved0[{self.total(0)}], saved1[{self.total(1)}];
+V x[{model.size}];
+const U *n = (const U *)numbers + number * {fixed};
+for (int i = 0; i < {fixed}; ++i) fixed[i] = n[i];
+const U *s = (const U *)state + number * {model.size};
+for (int i = 0; i < {model.size}; ++i) x[i] = s[i];
+stage0(fixed, saved0);
+for (long k = number * steps; k < (number + 1) * steps; ++k) {{
+  const U *now = (const U *)inputs + k * {known}, *seen = (const U *)signals + k * {seen};
+  U *note = (U *)records + k * {record};
+  for (int i = 0; i < {known}; ++i) given[i] = now[i];
+  V *m = {memory}, record[{record}];
+  stage1(given, saved0, saved1);
+  {{ {self.one_step()} }}
+  for (int i = 0; i < {record}; ++i) note[i] = record[i];
+}}"""
         return f"""{head(wanted)}
 static void stage0(const V *fixed, V *saved) {{ {self.stage(0)} }}
 static void stage1(const V *known, const V *saved0, V *saved) {{ {self.stage(1)} }}
@@ -112,28 +76,7 @@ static void advance(const V *m, double step, const V *saved0, const V *saved1, V
 const V dt[1] = {{ K(step) }}; {self.main(1)} }}
 static void outputs(const V *z, const V *m, const V *saved0, const V *saved1, const U *seen, V *out) {{
 {self.main(2)} }}
-void run(long first, long last, long steps, double *numbers, double *given_, double *seen_, double *state,
-         double *records) {{
-V fixed[{max(1, fixed)}], given[{max(1, known)}], saved0[{self.total(0)}], saved1[{self.total(1)}], x[{model.size}];
-for (long g = first; g < last; ++g) {{
-  const U *n = (const U *)numbers + g * {fixed};
-  for (int i = 0; i < {fixed}; ++i) fixed[i] = n[i];
-  U *s = (U *)state + g * {model.size};
-  for (int i = 0; i < {model.size}; ++i) x[i] = s[i];
-  stage0(fixed, saved0);
-  for (long k = 0; k < steps; ++k) {{
-    const U *now = (const U *)given_ + (g * steps + k) * {known};
-    const U *seen = (const U *)seen_ + (g * steps + k) * {seen};
-    U *note = (U *)records + (g * steps + k) * {record};
-    for (int i = 0; i < {known}; ++i) given[i] = now[i];
-    V *m = {memory}, record[{record}];
-    stage1(given, saved0, saved1);
-    {{ {self.one_step()} }}
-    for (int i = 0; i < {record}; ++i) note[i] = record[i];
-  }}
-  for (int i = 0; i < {model.size}; ++i) s[i] = x[i];
-}} }}
-"""
+{threaded(("steps",), _ARRAYS, task)}"""
 
 
 @lru_cache(maxsize=32)
@@ -158,16 +101,6 @@ def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Arr
     state, numbers = pack(x), pack(fixed)
     groups, num_steps = known.shape[:2]
     records = np.empty((groups, num_steps, model.outputs.size1_out(0), target().lanes))
-    arrays = [ctypes.c_void_p(array.ctypes.data) for array in (numbers, known, seen, state, records)]
-
-    def part(first: int, last: int) -> None:
-        run(ctypes.c_long(first), ctypes.c_long(last), ctypes.c_long(num_steps), *arrays)
-
-    threads = min(cores(), groups) if groups * num_steps * model.size > THREADS_FROM else 1
-    if threads == 1:
-        part(0, groups)
-    else:
-        edges = np.linspace(0, groups, threads + 1).astype(int).tolist()
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(part, edges[:-1], edges[1:]))
+    work = num_steps * model.size  # of one group
+    in_parallel(run, (num_steps,), (numbers, known, seen, state, records), groups, work)
     return np.moveaxis(records, -1, 1)
