@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from shipid.physics import hull, learned, propeller, radiation, restoring, rudder, signals, thruster, waves, wind
+from shipid.physics import hull, learned, propeller, radiation, restoring, rudder, thruster, waves, wind
 
 
 @dataclass(frozen=True)
@@ -56,18 +56,6 @@ MOTION = ("eta", "nu", "nu_r", "psi", "state")
 """Positional arguments that every term may have, besides the commands and environment of `signals.SIGNALS`."""
 GIVEN = ("wash",)
 """Positional arguments that another component provides: the one named by the key `behind` of the block."""
-
-
-class _Commands:
-    """Commands and their units, for code that does not read `signals.SIGNALS` directly."""
-
-    @property
-    def commands(self) -> dict[str, str]:
-        """Signal of a command -> SI unit."""
-        return {name: row.unit for name, row in signals.named("command").items()}
-
-
-SIGNALS = _Commands()
 
 TERMS: dict[str, Term] = {
     "hull.derivatives": Term(hull.derivatives),

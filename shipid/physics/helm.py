@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -51,8 +51,7 @@ def zigzag(commands: tuple[str, ...]) -> Helmsman:
         return ca.if_else(turned >= inputs["execute_heading"] ** 2, -memory["side"], memory["side"])
 
     def orders(signals: Named, inputs: Named, memory: Named) -> Named:
-        now = side(signals, inputs, memory)
-        return {name: inputs[name] * now if steers(name) else inputs[name] for name in commands}
+        return _steered(commands, inputs, side(signals, inputs, memory))
 
     return Helmsman(
         "zigzag",
@@ -75,8 +74,7 @@ def yaw_rate(commands: tuple[str, ...]) -> Helmsman:
         return _limit(memory["integral"] + inputs["gain"] * (inputs["rate"] - signals["r"]))
 
     def orders(signals: Named, inputs: Named, memory: Named) -> Named:
-        now = share(signals, inputs, memory)
-        return {name: inputs[name] * now if steers(name) else inputs[name] for name in commands}
+        return _steered(commands, inputs, share(signals, inputs, memory))
 
     def advance(signals: Named, inputs: Named, memory: Named, dt: Any) -> Named:
         gained = inputs["gain"] / inputs["reset"] * (inputs["rate"] - signals["r"]) * dt
@@ -95,14 +93,12 @@ def course_keeping(commands: tuple[str, ...]) -> Helmsman:
     """
 
     def error(signals: Named, inputs: Named) -> SX:
-        turn = inputs["course"] - signals["psi"]
-        return SX(ca.atan2(ca.sin(turn), ca.cos(turn)))
+        return _wrapped(inputs["course"] - signals["psi"])
 
     def orders(signals: Named, inputs: Named, memory: Named) -> Named:
         omega = inputs["omega"]
         asked = omega**2 * error(signals, inputs) - 2 * DAMPING * omega * signals["r"]
-        now = _limit(memory["integral"] + asked / inputs["effect"])
-        return {name: inputs[name] * now if steers(name) else inputs[name] for name in commands}
+        return _steered(commands, inputs, _limit(memory["integral"] + asked / inputs["effect"]))
 
     def advance(signals: Named, inputs: Named, memory: Named, dt: Any) -> Named:
         gained = INTEGRAL * inputs["omega"] ** 3 * error(signals, inputs) / inputs["effect"] * dt
@@ -114,6 +110,16 @@ def course_keeping(commands: tuple[str, ...]) -> Helmsman:
 
 def _limit(share: SX) -> SX:
     return ca.fmin(ca.fmax(share, -1), 1)
+
+
+def _wrapped(angle: SX) -> SX:
+    """The angle [rad] within half a turn to either side."""
+    return SX(ca.atan2(ca.sin(angle), ca.cos(angle)))
+
+
+def _steered(commands: Iterable[str], inputs: Named, share: SX) -> Named:
+    """Order of each command: what it has with the largest helm, angles that steer times the share of that helm."""
+    return {name: inputs[name] * share if steers(name) else inputs[name] for name in commands}
 
 
 @dataclass(frozen=True)
@@ -140,9 +146,8 @@ def station_keeping(units: tuple[Unit, ...], idle: tuple[str, ...]) -> Helmsman:
     """
 
     def error(signals: Named, inputs: Named) -> tuple[SX, SX, SX]:
-        turn = inputs["heading"] - signals["psi"]
-        wrapped = ca.atan2(ca.sin(turn), ca.cos(turn))
-        return inputs["north"] - signals["north"], inputs["east"] - signals["east"], wrapped
+        turn = _wrapped(inputs["heading"] - signals["psi"])
+        return inputs["north"] - signals["north"], inputs["east"] - signals["east"], turn
 
     def orders(signals: Named, inputs: Named, memory: Named) -> Named:
         omega, c, s = inputs["omega"], ca.cos(signals["psi"]), ca.sin(signals["psi"])
@@ -170,14 +175,11 @@ def _thrust(unit: Unit, acceleration: list[SX], inputs: Named) -> tuple[SX, SX]:
 
     The angle is measured from the bias direction, so that its discontinuity is opposite to the bias.
     """
-    along = (
-        sum(share * a for share, a in zip(unit.along, acceleration, strict=True)) + unit.bias[0] * inputs["n_bias"] ** 2
-    )
-    across = (
-        sum(share * a for share, a in zip(unit.across, acceleration, strict=True))
-        + unit.bias[1] * inputs["n_bias"] ** 2
-    )
     b_x, b_y = unit.bias
+    along, across = (
+        sum(share * a for share, a in zip(shares, acceleration, strict=True)) + b * inputs["n_bias"] ** 2
+        for shares, b in ((unit.along, b_x), (unit.across, b_y))
+    )
     with_bias, off_bias = b_x * along + b_y * across, b_x * across - b_y * along
     square = along**2 + across**2
     turned = ca.atan2(off_bias, ca.if_else(square < SMALL, 1, with_bias))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated
 
 import casadi as ca
@@ -18,6 +18,7 @@ from shipid.physics.grammar import (
     MOTIONS,
     POSITIVE,
     PRIME_DERIVATIVES,
+    Monomial,
     bis_scale,
     derivative,
     deviation,
@@ -34,11 +35,23 @@ def derivatives(nu_r: SX, eta: SX, **values: Annotated[SX, DERIVATIVES]) -> SX:
     unit that its name implies.
     """
     motions = {**dict(zip(MOTIONS, ca.vertsplit(nu_r), strict=True)), HEEL: eta[3]}
+    return summed(values, derivative, motions)
+
+
+def summed(
+    values: Mapping[str, SX],
+    formula_of: Callable[[str], Monomial],
+    factors: Mapping[str, SX],
+    force: SX | float = 1,
+    lever: SX | float = 1,
+) -> SX:
+    """Wrench (6) = sum over names of value x monomial, times `force` [N], moments also times `lever` [m]."""
     wrench = [SX(1, 1)] * 6
     for name, value in values.items():
-        formula = derivative(name)
+        formula = formula_of(name)
         axis = AXES.index(formula.axis)
-        wrench[axis] = wrench[axis] + value * formula.value(motions)
+        unit = force * (1 if formula.axis in "XYZ" else lever)
+        wrench[axis] = wrench[axis] + unit * value * formula.value(factors)
     return ca.vertcat(*wrench)
 
 
@@ -113,14 +126,7 @@ def about_service_speed(nu_r: SX, delta: SX | float, values: Mapping[str, SX], L
     Factors u' = (u - U_0) / U_0, v' = v / U_0, r' = r L / U_0, delta [rad].
     """
     factors = {"u": nu_r[0] / U_0 - 1, "v": nu_r[1] / U_0, "r": nu_r[5] * L_pp / U_0, "delta": SX(delta)}
-    force = rho / 2 * L_pp**2 * U_0**2
-    wrench = [SX(1, 1)] * 6
-    for name, value in values.items():
-        formula = deviation(name)
-        axis = AXES.index(formula.axis)
-        lever = 1 if formula.axis in "XYZ" else L_pp
-        wrench[axis] = wrench[axis] + force * lever * value * formula.value(factors)
-    return ca.vertcat(*wrench)
+    return summed(values, deviation, factors, rho / 2 * L_pp**2 * U_0**2, L_pp)
 
 
 def abkowitz(

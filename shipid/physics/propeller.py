@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated
+from functools import wraps
+from typing import Annotated, Any
 
 import casadi as ca
 from casadi import SX
@@ -145,30 +146,10 @@ def propeller(
     return wrench
 
 
-def propeller_thrust(
-    nu_r: SX,
-    n: SX,
-    *,
-    x: Annotated[SX, "m"],
-    y: Annotated[SX | float, "m"] = 0.0,
-    D_p: Annotated[SX, "m", POSITIVE],
-    K_T: Annotated[Mapping[str, SX], ADVANCE],
-    K_T_astern: Annotated[Mapping[str, SX] | None, ADVANCE] = None,
-    J_min: Annotated[SX | float, "-"] = -1.0,
-    J_max: Annotated[SX | float, "-"] = 1.5,
-    k_astern: Annotated[SX | float, "-"] = 1.0,
-    k_drag: Annotated[SX | float, "-"] = 0.0,
-    w_P0: Annotated[SX, "-"],
-    C_1: Annotated[SX, "-"],
-    C_2_plus: Annotated[SX, "-"],
-    C_2_minus: Annotated[SX, "-"],
-    tau: Annotated[SX | float, "-"] = 0.0,
-    C_P: Annotated[SX | float, "-"] = 0.0,
-    rho: Annotated[SX, "kg m^-3", POSITIVE],
-) -> SX:
+@wraps(propeller, assigned=("__annotations__",))
+def propeller_thrust(nu_r: SX, n: SX, **numbers: Any) -> SX:
     """Thrust [N] in the shaft of `propeller`: before the thrust deduction."""
-    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
-    return polynomial_thrust(u_P, n, D_p, K_T, K_T_astern, SX(J_min), SX(J_max), k_astern, k_drag, rho)
+    return propeller(nu_r, n, **{**numbers, "t_P": 0.0})[0]
 
 
 def propeller_torque(
@@ -284,28 +265,10 @@ def controllable_pitch(
     return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
 
 
-def controllable_thrust(
-    nu_r: SX,
-    n: SX,
-    pitch: SX,
-    *,
-    x: Annotated[SX, "m"],
-    y: Annotated[SX | float, "m"] = 0.0,
-    D_p: Annotated[SX, "m", POSITIVE],
-    k_P: Annotated[SX, "-", POSITIVE],
-    k_J: Annotated[SX, "-", POSITIVE],
-    k_astern: Annotated[SX | float, "-"] = 1.0,
-    w_P0: Annotated[SX | float, "-"] = 0.0,
-    C_1: Annotated[SX | float, "-"] = 0.0,
-    C_2_plus: Annotated[SX | float, "-"] = 1.0,
-    C_2_minus: Annotated[SX | float, "-"] = 1.0,
-    tau: Annotated[SX | float, "-"] = 0.0,
-    C_P: Annotated[SX | float, "-"] = 0.0,
-    rho: Annotated[SX, "kg m^-3", POSITIVE],
-) -> SX:
+@wraps(controllable_pitch, assigned=("__annotations__",))
+def controllable_thrust(nu_r: SX, n: SX, pitch: SX, **numbers: Any) -> SX:
     """Thrust [N] in the shaft of `controllable_pitch`."""
-    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
-    return rho * D_p**2 * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
+    return controllable_pitch(nu_r, n, pitch, **{**numbers, "t_P": 0.0})[0]
 
 
 def controllable_wash(
@@ -387,20 +350,10 @@ def quadratic(
     return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1)) + thrust * vector(0, Y_T, 0, -z * Y_T, 0, N_T)
 
 
-def quadratic_shaft_thrust(
-    nu_r: SX,
-    n: SX,
-    *,
-    T_nn: Annotated[SX, "kg m", POSITIVE],
-    T_nu: Annotated[SX | float, "kg"] = 0.0,
-    T_uu: Annotated[SX | float, "kg m^-1"] = 0.0,
-    k_astern: Annotated[SX | float, "-"] = 1.0,
-    dT_nu: Annotated[SX | float, "kg"] = 0.0,
-    k_driven: Annotated[SX | float, "-"] = 1.0,
-    w_P0: Annotated[SX | float, "-"] = 0.0,
-) -> SX:
+@wraps(quadratic, assigned=("__annotations__",))
+def quadratic_shaft_thrust(nu_r: SX, n: SX, **numbers: Any) -> SX:
     """Thrust [N] in the shaft of `quadratic`."""
-    return quadratic_thrust((1 - w_P0) * nu_r[0], n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
+    return quadratic(nu_r, n, **{**numbers, "t_P": 0.0})[0]
 
 
 def quadratic_wash(
@@ -484,26 +437,10 @@ def four_quadrant(
     return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
 
 
-def four_quadrant_shaft_thrust(
-    nu_r: SX,
-    n: SX,
-    *,
-    x: Annotated[SX, "m"],
-    y: Annotated[SX | float, "m"] = 0.0,
-    D_p: Annotated[SX, "m", POSITIVE],
-    beta_deg: Annotated[list[SX], "deg"],
-    C_T: Annotated[list[SX], "-"],
-    w_P0: Annotated[SX | float, "-"] = 0.0,
-    C_1: Annotated[SX | float, "-"] = 0.0,
-    C_2_plus: Annotated[SX | float, "-"] = 1.0,
-    C_2_minus: Annotated[SX | float, "-"] = 1.0,
-    tau: Annotated[SX | float, "-"] = 0.0,
-    C_P: Annotated[SX | float, "-"] = 0.0,
-    rho: Annotated[SX, "kg m^-3", POSITIVE],
-) -> SX:
+@wraps(four_quadrant, assigned=("__annotations__",))
+def four_quadrant_shaft_thrust(nu_r: SX, n: SX, **numbers: Any) -> SX:
     """Thrust [N] in the shaft of `four_quadrant`."""
-    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
-    return rho * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T)
+    return four_quadrant(nu_r, n, **{**numbers, "t_P": 0.0})[0]
 
 
 def four_quadrant_wash(

@@ -11,7 +11,6 @@ from casadi import SX
 
 from shipid.physics.frames import given, vector
 from shipid.physics.grammar import (
-    AXES,
     CROSS_FLOWS,
     POSITIVE,
     RUDDER_DEVIATIONS,
@@ -19,7 +18,7 @@ from shipid.physics.grammar import (
     cross_flow_monomial,
     rudder_flow,
 )
-from shipid.physics.hull import SPEED_FLOOR, about_service_speed
+from shipid.physics.hull import SPEED_FLOOR, about_service_speed, summed
 from shipid.physics.propeller import drift, signed_root
 
 TIGHTEST = 2.0  # r L / U: turns of ships under rudders are wider, with r L / U up to 1.2
@@ -199,13 +198,7 @@ def rudder_coefficients(
     """
     _, beta = drift(nu_r)
     factors = {"c": wash[0] + kappa * (wash[1] - wash[0]), "beta": beta, "delta": delta}
-    wrench = [SX(1, 1)] * 6
-    for name, value in values.items():
-        formula = rudder_flow(name)
-        axis = AXES.index(formula.axis)
-        lever = 1 if formula.axis in "XYZ" else L_pp
-        wrench[axis] = wrench[axis] + rho / 2 * L_pp**2 * lever * value * formula.value(factors)
-    return ca.vertcat(*wrench)
+    return summed(values, rudder_flow, factors, rho / 2 * L_pp**2, L_pp)
 
 
 @wraps(rudder_coefficients, assigned=("__annotations__",))
