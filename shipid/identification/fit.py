@@ -315,7 +315,7 @@ def _gauss_newton(J: Array, f: Array) -> tuple[Array, Array, float]:
 def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
     """Residuals and Jacobian at given factors (n,), with the unknowns of the runs at their optimum."""
     at, parts = _eliminated(problem, factors, point), list[Array]()
-    threshold = problem.settings.threshold if problem.settings.loss == "huber" else np.inf
+    threshold = problem.settings.linear_from
     n = problem.num_factors
     f, J, A = _robust(at, threshold)
     if np.isfinite(f).all() and np.isfinite(J).all():
@@ -352,7 +352,7 @@ def _eliminated(problem: Problem, factors: Array, point: Point) -> Prediction:
     at = predict(problem, factors, point.nuisances, point.away)
     if not (point.nuisances.size or point.away.size) or not np.isfinite(at.r).all():
         return at
-    threshold = problem.settings.threshold if problem.settings.loss == "huber" else np.inf
+    threshold = problem.settings.linear_from
     costs = _costs(problem, at, threshold)
     for _ in range(INNER):
         step, fall = _steps(problem, at, threshold)

@@ -10,15 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid import document as documents
 from shipid.data.dataset import Dataset, pieces
 from shipid.engine.rollout import SPEED_LIMIT, rollout
 from shipid.errors import DataError
 from shipid.identification.residuals import build
 from shipid.identification.segments import LEAST_STEPS, ShootingSegment
-from shipid.identification.sensitivities import COLUMNS
-from shipid.identification.settings import ENVIRONMENT, Identify, overrides
-from shipid.simulation.log import LEANING, aboard, horizontal
+from shipid.identification.settings import ENVIRONMENT, Identify, overrides, overrides_of
+from shipid.simulation.log import LEANING, aboard, column_of, horizontal
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -47,11 +45,13 @@ def unfelt(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[
     """Columns of states and weather of the vessel that neither dataset, settings nor nuisances give: they are 0."""
     model = dynamics(vessel)
     given = {*map(str, dataset.frame), *(("V_c", "beta_c") if "current" in settings.widths else ())}
-    needed = [COLUMNS.get(name, name) for name in (*model.state, *model.environment)]
-    lacking = [name for name in needed if name not in given]
-    own = overrides(settings, runs, vessel, model.environment, dataset.runs) if lacking and settings.runs else {}
-    everywhere = {name for name in lacking if own and all(f"{ENVIRONMENT}.{name}" in own[run] for run in runs)}
-    return [name for name in lacking if name not in everywhere]
+    needed = [column_of(name) for name in (*model.state, *model.environment)]
+    overridden = overrides(settings, runs, vessel, model.environment, dataset.runs)
+    return [
+        name
+        for name in needed
+        if name not in given and not all(f"{ENVIRONMENT}.{name}" in overridden[run] for run in runs)
+    ]
 
 
 def check_length(settings: Identify, length: float) -> None:
@@ -74,10 +74,10 @@ def free_runs(
     if steps > MOST_STEPS:
         many = f"{settings.step:g} s makes {steps:.2g} steps of these runs, at most {MOST_STEPS:.0e}"
         raise DataError(f"{many}: give a longer step, or fewer runs", path="step")
-    overrides = {key: value for key, value in documents.leaves(settings.runs) if _belongs(key, runs)}
+    overridden = overrides_of(settings, runs)
     first = next(iter(vessels.values()))
-    asked = {"horizon": length, "nuisance": [], "runs": overrides}
-    problem = build(first, dataset, runs, settings.model_copy(update=_nothing_free(first, overrides) | asked))
+    asked = {"horizon": length, "nuisance": [], "runs": overridden}
+    problem = build(first, dataset, runs, settings.model_copy(update=_nothing_free(first, overridden) | asked))
     given = np.array(list(first.parameters.values()))
     predicted: dict[tuple[int, int], Array] = {}
     for values in np.unique(problem.base, axis=0):  # runs of the same parameters at once
@@ -104,10 +104,6 @@ def _nothing_free(vessel: Vessel, overrides: Mapping[str, object]) -> dict[str, 
     return none | {"parameters": [path], "fixed": [], "together": [], "ranges": False}
 
 
-def _belongs(key: str, runs: Sequence[str]) -> bool:
-    return any(key.startswith(f"{run}.") for run in runs)
-
-
 def _predicted(
     vessel: Vessel, segments: Sequence[ShootingSegment], values: Array, settings: Identify
 ) -> dict[tuple[int, int], Array]:
@@ -116,7 +112,7 @@ def _predicted(
     longest = max(segment.num_steps for segment in segments)
 
     def column(segment: ShootingSegment, name: str) -> Array:
-        return segment.columns.get(COLUMNS.get(name, name), np.zeros(segment.num_steps + 1))
+        return segment.columns.get(column_of(name), np.zeros(segment.num_steps + 1))
 
     def held(name: str) -> Array:  # (longest, S): the last one where a piece is shorter
         rows = [np.minimum(np.arange(longest), segment.num_steps - 1) for segment in segments]

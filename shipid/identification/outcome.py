@@ -30,7 +30,7 @@ from shipid.identification.late_fit import late_fit
 from shipid.identification.plausible import verdict
 from shipid.identification.profile import Profile, profile, variance_ratio
 from shipid.identification.reach import beyond, of_log, reach_of
-from shipid.identification.settings import BLOCK, Identify, overrides, unknowns
+from shipid.identification.settings import BLOCK, Identify, overrides, overrides_of, unknowns
 from shipid.identification.sides import by_group, uneven
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, Statistics, autocorrelation, statistics
@@ -265,7 +265,7 @@ def run_identification(
 
         free({BEFORE: vessel})  # an error in the free runs is raised before the long fit
         _go_on(held)
-        fit_settings = settings.model_copy(update={"runs": _of_runs(settings, fitted)})
+        fit_settings = settings.model_copy(update={"runs": overrides_of(settings, fitted)})
         solution = identify(vessel, dataset, fitted, fit_settings, progress=progress)
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
@@ -406,12 +406,6 @@ def check(
     if wrong is not None:
         raise DataError(f"{wrong!r} is not free in the fit: {choices(wrong, known)}", path="profile")
     return fitted, tested
-
-
-def _of_runs(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:
-    """The settings' overrides `<run>.<path>` -> value that belong to the given runs."""
-    given = documents.leaves(settings.runs)
-    return {key: value for key, value in given if any(key.startswith(f"{run}.") for run in runs)}
 
 
 def write_patch(outcome: Identified, file: Path) -> Path:

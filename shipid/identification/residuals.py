@@ -20,7 +20,7 @@ from shipid.engine.native import compiler, refuse
 from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.compiled import pack, run_compiled
 from shipid.identification.segments import ShootingSegment, cut_segments
-from shipid.identification.sensitivities import COLUMNS, Layout, Variation, is_thrust, run_machine, variation
+from shipid.identification.sensitivities import Layout, Variation, is_thrust, run_machine, variation
 from shipid.identification.settings import (
     BLOCK,
     ENVIRONMENT,
@@ -31,6 +31,7 @@ from shipid.identification.settings import (
     overrides,
     unknowns,
 )
+from shipid.simulation.log import column_of
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -221,7 +222,7 @@ class Predictions:
         return len(self.run)
 
     def _log(self, segment: ShootingSegment) -> list[float]:
-        columns = (segment.columns.get(COLUMNS.get(name, name)) for name in self.problem.model.entries)
+        columns = (segment.columns.get(column_of(name)) for name in self.problem.model.entries)
         values = [0.0 if column is None else float(column[0]) for column in columns]
         if self.problem.layout.carried:
             values += [float(segment.memory[name][0]) for name in self.problem.layout.model.memory]

@@ -26,8 +26,6 @@ from shipid.simulation.log import aboard, horizontal
 from shipid.vessel.dynamics import Dynamics
 
 Array = NDArray[np.float64]
-COLUMNS = {"down": "z"}
-"""State -> column of a log, where the names differ."""
 
 
 @dataclass(frozen=True)

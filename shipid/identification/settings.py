@@ -141,6 +141,11 @@ class Identify(Checked, BaseModel):
         return {column: width for name, width in self.weights.items() for column in columns_of(name)}
 
     @property
+    def linear_from(self) -> float:
+        """Standard deviations beyond which a residual counts linearly: `threshold` with huber, else infinite."""
+        return self.threshold if self.loss == "huber" else math.inf
+
+    @property
     def outputs(self) -> list[str]:
         """Fitted outputs of components, such as `propeller.thrust`."""
         return [name for name in self.weights if is_output(name)]
@@ -300,6 +305,12 @@ def _groups(settings: Identify, free: list[str], chosen: Any, file: str) -> list
     for path in free:
         groups.setdefault(of.get(path, path), []).append(path)
     return [tuple(group) for group in groups.values()]
+
+
+def overrides_of(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:
+    """The overrides `<run>.<path>` -> value in the settings that belong to some runs."""
+    given = documents.leaves(settings.runs)
+    return {key: value for key, value in given if any(key.startswith(f"{run}.") for run in runs)}
 
 
 def overrides(

@@ -254,9 +254,8 @@ def _point(result: Result) -> Point:
 def _solution(problem: Problem, result: Result, objective_start: float, seconds: float) -> Solution:
     unknown, settings, end, word = problem.unknown, problem.settings, result.at, result.status
     factors = result.factors
-    threshold = settings.threshold if settings.loss == "huber" else np.inf
     at_bound = (unknown.low < unknown.high) & ((factors - unknown.low < NEAR) | (unknown.high - factors < NEAR))
-    residuals, jacobian, spent = end.marginal(threshold)
+    residuals, jacobian, spent = end.marginal(settings.linear_from)
     values, sentence = unknown.values(factors), _sentence(problem, result, at_bound)
     reason = _refusal(problem.vessel, values)
     if reason is not None:
