@@ -8,8 +8,7 @@ This weak form needs no derivative of a measured signal. It is linear in the hyd
 mass, so a linear least-squares problem remains. Parameters that enter nonlinearly (a diameter, a drag coefficient under
 a root) are detected numerically; the equations are then linearised about the present values, and the fit is repeated.
 
-Measured velocities are regressors too, so noise biases this estimate (errors in variables). Smooth the runs first
-(`noise`), and use the result as an initial value only.
+Measured velocities are regressors too, so noise biases this estimate (errors in variables): it is an initial value.
 
 Source of the weak form: Messenger, Bortz, Journal of Computational Physics 443 (2021) 110525, whose bumps are used.
 """
@@ -26,10 +25,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset, pieces
-from shipid.data.kinematics import STATES, Noise, smooth
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError
-from shipid.identification.collinearity import Collinearity, collinearity
 from shipid.physics.signals import wraps
 from shipid.simulation.log import aboard
 from shipid.vessel.dynamics import Dynamics, dynamics
@@ -52,23 +49,16 @@ class Inverse:
     """Result of inverse dynamics.
 
     paths, factors : first path of each group, and its factor (n,). linear : (n,) whether forces are linear in it.
-    residuals : (m,) force residuals over their standard deviation; jacobian : (m, n) d residual / d factor.
-    clusters, signals : of each residual the run number, and the velocity (u, v, r) of its equation.
-    levels : velocity -> standard deviation of the residuals of its equation [m/s^2, rad/s^2].
-    explained : velocity -> share of the residual variance of the base vessel that the fit removes.
-    collinearity : diagnostics of the Jacobian. settled : whether the iteration converged.
+    jacobian : (m, n) d residual / d factor, residuals over their standard deviation.
+    levels : velocity (u, v, r) -> standard deviation of the residuals of its equation [m/s^2, rad/s^2].
+    settled : whether the iteration converged.
     """
 
     paths: tuple[str, ...]
     factors: Array
     linear: NDArray[np.bool_]
-    residuals: Array
     jacobian: Array
-    clusters: NDArray[np.int64]
-    signals: tuple[str, ...]
     levels: Mapping[str, float]
-    explained: Mapping[str, float]
-    collinearity: Collinearity
     settled: bool
 
 
@@ -81,8 +71,6 @@ def inverse_dynamics(
     scale: Sequence[Sequence[float]] | None = None,
     prior: Array | None = None,
     environment: Mapping[str, Mapping[str, float]] | None = None,
-    noise: Noise | None = None,
-    window: float | None = None,
 ) -> Inverse:
     """Fit factors so that the forces explain the motion of the runs.
 
@@ -92,8 +80,6 @@ def inverse_dynamics(
     prior : (n,) standard deviation of each factor about its base (1, or 0 where the base value is 0). It is limited to
         1, so that a factor with little information stays near its base and the result can be simulated.
     environment : run -> channel -> constant value [SI] of channels that are not logged; default: 0.
-    noise : settings of the kinematic smoother (EKF + RTS) applied first; default: no smoothing.
-    window : length of a test function [s]; default: the time for one ship length, at least 8 samples.
 
     Raises
     ------
@@ -111,23 +97,11 @@ def inverse_dynamics(
     given = np.full(len(paths), np.inf) if prior is None else np.asarray(prior, dtype=float)
     widths = np.minimum(given, LOOSE)
     model = dynamics(vessel)
-    known = _runs(vessel, model, dataset, runs, environment or {}, noise, window)
-    problem = _Problem(vessel, model, tied, sizes, known)
+    problem = _Problem(vessel, model, tied, sizes, _runs(vessel, model, dataset, runs, environment or {}))
     linear = problem.linear(centre)
     factors, levels, settled = _solved(problem, centre, widths, bool(linear.all()))
-    residual, jacobian = problem.evaluate(factors)
     weight = np.array([1 / levels[name] for name in problem.signals])
-    start = problem.evaluate(centre)[0]
-    labels = np.array(problem.signals)
-    explained = {
-        name: float(1 - (residual[labels == name] ** 2).sum() / max((start[labels == name] ** 2).sum(), 1e-300))
-        for name in levels
-    }
-    weighted = jacobian * weight[:, None]
-    return Inverse(
-        paths, factors, linear, residual * weight, weighted, problem.clusters, problem.signals, levels, explained,
-        collinearity(weighted, paths), settled,
-    )  # fmt: skip
+    return Inverse(paths, factors, linear, problem.evaluate(factors)[1] * weight[:, None], levels, settled)
 
 
 def _solved(problem: _Problem, centre: Array, widths: Array, linear: bool) -> tuple[Array, dict[str, float], bool]:
@@ -169,7 +143,6 @@ class _Stretch:
     pull : (num_bumps, num_rows) weights of nu.
     """
 
-    run: int
     inputs: tuple[Array, Array, Array, Array]
     nu: Array
     weigh: Array
@@ -206,9 +179,7 @@ class _Problem:
         self.mapped = [by_size[stretch.inputs[0].shape[1]] for stretch in stretches]
         still = motion(*(np.zeros(motion.size1_in(i)) for i in range(shared[0])), self.base)
         self.inertia = np.diag(np.array(still[2]))[self.rows]
-        counts = [len(stretch.weigh) for stretch in stretches]
-        self.signals = tuple(name for count in counts for name in MEASURED for _ in range(count))
-        self.clusters = np.repeat([stretch.run for stretch in stretches], [count * len(MEASURED) for count in counts])
+        self.signals = tuple(name for stretch in stretches for name in MEASURED for _ in stretch.weigh)
 
     def evaluate(self, factors: Array) -> tuple[Array, Array]:
         """Residuals (m,) [m/s^2, rad/s^2] and d residual / d factor (m, n); forces are divided by the base inertia."""
@@ -279,20 +250,16 @@ def _runs(
     dataset: Dataset,
     runs: Sequence[str],
     environment: Mapping[str, Mapping[str, float]],
-    noise: Noise | None,
-    window: float | None,
 ) -> list[_Stretch]:
     """Unbroken stretches of the runs that are long enough for one test function."""
     missing = next((name for name in runs if name not in dataset.runs), None)
     if missing is not None:
         raise DataError(f"no run {missing!r}", path="runs")
-    order = {name: number for number, name in enumerate(runs)}
     result = []
     for run, rows in pieces(dataset):
-        if run not in order or len(rows) <= LEAST_SAMPLES:
+        if run not in runs or len(rows) <= LEAST_SAMPLES:
             continue
-        length = _window(vessel, rows) if window is None else window
-        stretch = _stretch(vessel, model, order[run], rows, environment.get(run, {}), noise, length)
+        stretch = _stretch(vessel, model, rows, environment.get(run, {}))
         if stretch is not None:
             result.append(stretch)
     if not result:
@@ -312,19 +279,13 @@ def _window(vessel: Vessel, rows: pd.DataFrame) -> float:
 def _stretch(
     vessel: Vessel,
     model: Dynamics,
-    run: int,
     rows: pd.DataFrame,
     environment: Mapping[str, float],
-    noise: Noise | None,
-    window: float,
 ) -> _Stretch | None:
     """One stretch with its weights; None if it is shorter than a test function."""
     t = rows["t"].to_numpy(dtype=float)
     columns = {str(name): rows[name].to_numpy() for name in rows.columns if name not in ("run", "t", "flags")}
     columns |= {name: np.unwrap(columns[name]) for name in columns if wraps(name)}
-    if noise is not None:
-        smoothed = smooth(t, {name: columns[name] for name in STATES}, noise)
-        columns |= {name: smoothed.state(name) for name in STATES}
     absent = next((name for name in model.commands if name not in columns), None)
     if absent is not None:
         raise DataError(
@@ -338,7 +299,7 @@ def _stretch(
     memory = np.array([reached[name] for name in model.memory]).reshape(-1, len(t))
     given = {name: np.full(len(t), environment[name]) for name in model.environment if name in environment}
     weather = np.array([given.get(name, columns.get(name, zero)) for name in model.environment]).reshape(-1, len(t))
-    before, after, pull = _bumps(t, window)
+    before, after, pull = _bumps(t, _window(vessel, rows))
     if not len(pull):
         return None
     # an order is held until the next row, so where it changes the end of the interval is an additional point
@@ -348,7 +309,7 @@ def _stretch(
     weigh[:, changed] -= before[:, changed]
     orders = np.concatenate([commands, commands[:, changed - 1]], axis=1)
     nu = state[model.num_dof : 2 * model.num_dof].T
-    return _Stretch(run, (state[:, rows_at], memory[:, rows_at], orders, weather[:, rows_at]), nu, weigh, pull)
+    return _Stretch((state[:, rows_at], memory[:, rows_at], orders, weather[:, rows_at]), nu, weigh, pull)
 
 
 def _bumps(t: Array, window: float) -> tuple[Array, Array, Array]:
