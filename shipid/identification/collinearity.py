@@ -1,17 +1,14 @@
 """Collinearity of sensitivities: which parameters the data distinguish, and which only in combination.
 
-Columns are scaled to unit length, as both sources ask, so that nothing depends on units. Then
+Columns are scaled to unit length, so that nothing depends on units. The collinearity index of a set K is
 
-    gamma_K = 1 / sqrt(smallest eigenvalue of S_K^T S_K)      collinearity index of a set K (Brun et al. 2001, eq. 10)
-    eta_k   = largest / k-th singular value of S              condition index (Belsley, Kuh, Welsch 1980, ch. 3)
-    pi_kj   = (V_jk / s_k)^2 / sum_k (V_jk / s_k)^2           share of the variance of parameter j that comes from k
+    gamma_K = 1 / sqrt(smallest eigenvalue of S_K^T S_K)
 
-gamma above 10 to 15: the other parameters can compensate a change of one parameter to within 1 / gamma. eta above 30
-with two shares above 0.5: a harmful dependency. Neither index depends on the noise: collinear parameters may still be
-identified from enough good data. So the indices explain a wide interval; they are not a criterion by themselves.
+gamma above 10 to 15: the other parameters can compensate a change of one parameter to within 1 / gamma. It does not
+depend on the noise: collinear parameters may still be identified from enough good data. So it explains a wide interval
+and is no criterion by itself.
 
-Sources: Brun, Reichert, Kuensch, Water Resources Research 37 (2001) 1015; Belsley, Kuh, Welsch, Regression Diagnostics
-(1980), ch. 3.
+Source: Brun, Reichert, Kuensch, Water Resources Research 37 (2001) 1015, eq. 10.
 """
 
 from __future__ import annotations
@@ -62,56 +59,6 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-@dataclass(frozen=True)
-class Collinearity:
-    """Diagnostics of sensitivities (num_residuals, n).
-
-    sensitivity : root mean square of each column, (n,): delta^msqr of Brun et al.
-    gamma : collinearity index of all parameters that have an effect.
-    indices : condition indices, rising, (n,). shares : variance shares, (n, n), rows as the indices; columns sum to 1.
-    directions : (n, n), one direction of the factors in each row, in the order of `indices`; each factor is scaled by
-        the length of its column.
-    combinations : the smallest sets of parameters that the data do not distinguish.
-    """
-
-    paths: tuple[str, ...]
-    sensitivity: Array
-    gamma: float
-    indices: Array
-    shares: Array
-    directions: Array
-    combinations: tuple[Combination, ...]
-
-
-def collinearity(jacobian: Array, paths: Sequence[str]) -> Collinearity:
-    """Collinearity diagnostics of the sensitivities d residual / d factor (m, n); `paths` names the n columns."""
-    lengths = np.sqrt((jacobian**2).sum(axis=0))
-    moved = lengths > 0
-    scaled = _unit(jacobian)
-    values, vectors = _eigen(scaled.T @ scaled)
-    largest = values.max(initial=UNSEEN)
-    indices = np.sqrt(largest / np.maximum(values, UNSEEN * max(largest, 1.0)))
-    variances = (vectors**2 / np.maximum(values, UNSEEN * max(largest, 1.0))).T
-    effective = np.flatnonzero(moved)
-    return Collinearity(
-        paths=tuple(paths),
-        sensitivity=lengths / np.sqrt(max(len(jacobian), 1)),
-        gamma=index_of(jacobian[:, effective]),
-        indices=indices,
-        shares=variances / variances.sum(axis=0),
-        directions=(vectors / np.where(moved, lengths, 1.0)[:, None]).T,
-        combinations=combinations(jacobian, paths),
-    )
-
-
-def index_of(jacobian: Array) -> float:
-    """Collinearity index gamma_K of all columns: 1 for orthogonal columns, infinite for dependent ones."""
-    if jacobian.shape[1] == 0:
-        return 1.0
-    smallest = float(np.linalg.eigvalsh(_gram(jacobian))[0])
-    return float(1 / np.sqrt(smallest)) if smallest > UNSEEN else float("inf")
-
-
 def combinations(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, ...]:
     """Smallest sets with a collinearity index above `MOST_COLLINEAR`; worst first.
 
@@ -157,18 +104,8 @@ def _weakest(gram: Array, members: list[int]) -> Array:
     return np.asarray(np.linalg.eigh(gram[np.ix_(members, members)])[1][:, 0])
 
 
-def _unit(jacobian: Array) -> Array:
-    """The columns scaled to unit length; zero columns stay 0."""
-    lengths = np.sqrt((jacobian**2).sum(axis=0))
-    return np.asarray(jacobian / np.where(lengths > 0, lengths, 1.0))
-
-
 def _gram(jacobian: Array) -> Array:
-    scaled = _unit(jacobian)
+    """Gram matrix of the columns scaled to unit length; zero columns stay 0."""
+    lengths = np.sqrt((jacobian**2).sum(axis=0))
+    scaled = jacobian / np.where(lengths > 0, lengths, 1.0)
     return np.asarray(scaled.T @ scaled)
-
-
-def _eigen(matrix: Array) -> tuple[Array, Array]:
-    """Eigenvalues in falling order, and the eigenvectors as columns in that order."""
-    values, vectors = np.linalg.eigh(matrix)
-    return values[::-1], vectors[:, ::-1]

@@ -110,7 +110,7 @@ class Identified:
         vague = self.estimates[~self.estimates["identified"].astype(bool)]
         combinations = [
             combination
-            for combination in self.statistics.collinearity.combinations
+            for combination in self.statistics.combinations
             if not set(combination.paths).isdisjoint(vague["path"])
         ]
         explained = {path for combination in combinations for path in combination.paths}
@@ -273,7 +273,7 @@ def run_identification(
             raise ShipidError(_nothing_free(solution))
         _go_on(held)
         judged = statistics(LinearFit.of(solution))
-        determined = [path for path in profiles if path in judged.collinearity.paths]
+        determined = [path for path in profiles if path in judged.free]
         curves = tuple(_profile(path, dataset, solution, judged) for path in determined)
         pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
         pairs = free(pair)
@@ -578,7 +578,6 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
         again = identify(solution.vessel, dataset, solution.runs, changed, start=begin)
         return (again.objective if again.status == "ok" else float("inf")), again.factors
 
-    free = judged.collinearity.paths
     return profile(
         path,
         solution.factors,
@@ -586,7 +585,7 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
         solution.objective,
         refit,
         half_width=float(judged.high[index] - solution.factors[index]),
-        freedom=float(judged.covariances[judged.chosen].freedom[free.index(path)]),
+        freedom=float(judged.covariances[judged.chosen].freedom[judged.free.index(path)]),
         ratio=variance_ratio(judged, path),
         bounds=(float(unknown.low[index]), float(unknown.high[index])),
     )

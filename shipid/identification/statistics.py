@@ -34,7 +34,7 @@ from scipy.special import chdtrc, stdtrit
 
 from shipid.document import short_names
 from shipid.errors import ShipidError
-from shipid.identification.collinearity import Collinearity, collinearity, digits, listed
+from shipid.identification.collinearity import Combination, combinations, digits, listed
 from shipid.identification.covariance import inverted
 
 if TYPE_CHECKING:
@@ -158,7 +158,8 @@ class Statistics:
     chosen : the form of covariance to report. errors : (n,) standard errors. low, high : (n,) ends of the 95 %
     intervals. All are infinite for factors that the data do not determine.
     alone : (n,) half-widths without the priors. identifiable : (n,) whether that is at most `WIDEST`.
-    sentences : the result in words, one for each factor. correlations : (n, n).
+    sentences : the result in words, one for each factor. correlations : (n, n). free : paths of the factors that are
+    neither held nor at a bound. combinations : sets of these that the data do not distinguish.
     """
 
     fit: LinearFit
@@ -171,7 +172,8 @@ class Statistics:
     correlations: Array
     identifiable: NDArray[np.bool_]
     sentences: tuple[str, ...]
-    collinearity: Collinearity
+    free: tuple[str, ...]
+    combinations: tuple[Combination, ...]
     whiteness: Mapping[str, Whiteness]
 
     @property
@@ -204,7 +206,7 @@ def statistics(fit: LinearFit) -> Statistics:
     half = np.where(basis.unseen & ~basis.held, np.inf, best.half_widths)
     errors = np.where(basis.unseen & ~basis.held, np.inf, best.errors)
     alone = _alone(inner, best, covariances["fisher"], colours)
-    seen = collinearity(inner.jacobian, inner.paths)
+    together = combinations(inner.jacobian, inner.paths)
     n = len(fit.paths)
     full = {name: _spread(values, free, n) for name, values in {"errors": errors, "half": half, "alone": alone}.items()}
     identifiable = np.zeros(n, dtype=bool)
@@ -223,8 +225,9 @@ def statistics(fit: LinearFit) -> Statistics:
         alone=full["alone"],
         correlations=correlations,
         identifiable=identifiable,
-        sentences=_sentences(fit, full["half"], full["alone"], identifiable, seen),
-        collinearity=seen,
+        sentences=_sentences(fit, full["half"], full["alone"], identifiable, together),
+        free=inner.paths,
+        combinations=together,
         whiteness=colours,
     )
 
@@ -237,14 +240,13 @@ def _last(covariances: Mapping[Kind, Covariance]) -> Kind:
 
 def _nothing(fit: LinearFit) -> Statistics:
     """Statistics of a fit without a free factor: infinite errors, nothing identified."""
-    n, jacobian = len(fit.paths), fit.jacobian[:, :0]
+    n = len(fit.paths)
     none, wide, fixed = np.zeros(0), np.full(n, np.inf), np.zeros(n, dtype=bool)
-    seen = collinearity(jacobian, ())
     covariance = Covariance("fisher", np.zeros((0, 0)), none, False, "no factor is free", none.reshape(0, 0))
-    sentences = _sentences(fit, wide, wide, fixed, seen)
+    sentences = _sentences(fit, wide, wide, fixed, ())
     low, high, levels = fit.factors - wide, fit.factors + wide, whiteness(fit)
     return Statistics(
-        fit, {"fisher": covariance}, "fisher", wide, low, high, wide, np.eye(n), fixed, sentences, seen, levels
+        fit, {"fisher": covariance}, "fisher", wide, low, high, wide, np.eye(n), fixed, sentences, (), (), levels
     )
 
 
@@ -469,12 +471,12 @@ def _alone(fit: LinearFit, best: Covariance, plain: Covariance, colours: Mapping
 
 
 def _sentences(
-    fit: LinearFit, half: Array, alone: Array, identifiable: NDArray[np.bool_], seen: Collinearity
+    fit: LinearFit, half: Array, alone: Array, identifiable: NDArray[np.bool_], sets: Sequence[Combination]
 ) -> tuple[str, ...]:
     """One sentence for each factor: its interval, or the reason why it has none."""
     free, sentences = _free_places(fit), list[str]()
     for j, (path, name) in enumerate(zip(fit.paths, short_names(fit.paths), strict=True)):
-        together = next((combination for combination in seen.combinations if path in combination.paths), None)
+        together = next((combination for combination in sets if path in combination.paths), None)
         known = f"{name} is known to +-{digits(100 * half[j], 2)} % of its base value"
         if path in fit.dropped:
             sentences.append(f"{name} was dropped, to {fit.factors[j]:.4g}: the data do not support a change")

@@ -109,7 +109,7 @@ def _figures(judged: list[Statistics]) -> dict[str, Any]:
     worst = min(free, key=lambda j: float(covered[j]))
     others = [j for j in range(len(paths)) if j not in free]
     named = [
-        any(set(PAIR) <= set(combination.paths) for combination in one.collinearity.combinations)
+        any(set(PAIR) <= set(combination.paths) for combination in one.combinations)
         and not any(one.identifiable[paths.index(path)] for path in PAIR)
         for one in judged
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.identification.collinearity import collinearity, combinations, index_of, listed
+from shipid.identification.collinearity import MOST_COLLINEAR, combinations, listed
 
 RNG = np.random.default_rng(0)
 FREE = np.linalg.qr(RNG.normal(size=(200, 6)))[0]
@@ -16,34 +16,38 @@ def correlated(cosine: float) -> np.ndarray:
     return np.stack([FREE[:, 0], cosine * FREE[:, 0] + np.sqrt(1 - cosine**2) * FREE[:, 1]], axis=1)
 
 
-@pytest.mark.parametrize("cosine", [0.0, 0.9, 0.999])
+@pytest.mark.parametrize("cosine", [0.996, 0.9999])
 def test_index_of_two_columns_is_known(cosine: float) -> None:
-    """gamma = 1 / sqrt(1 - cosine): 1 at right angles (Brun et al. 2001, eq. 10)."""
-    assert index_of(correlated(cosine)) == pytest.approx(1 / np.sqrt(1 - cosine))
+    """gamma = 1 / sqrt(1 - cosine) (Brun et al. 2001, eq. 10)."""
+    (pair,) = combinations(correlated(cosine), "ab")
+    assert pair.gamma == pytest.approx(1 / np.sqrt(1 - cosine))
 
 
-def test_condition_indices_and_shares_of_two_columns() -> None:
-    """Eigenvalues 1 +- c: eta = sqrt((1 + c) / (1 - c)); the weak direction has (1 + c) / 2 of both variances."""
-    diagnosis = collinearity(correlated(0.999), ("a", "b"))
-    np.testing.assert_allclose(diagnosis.indices, [1, np.sqrt(1.999 / 0.001)], rtol=1e-9)
-    np.testing.assert_allclose(diagnosis.shares[1], 0.9995, rtol=1e-9)
-    np.testing.assert_allclose(diagnosis.shares.sum(axis=0), 1)
+def test_a_set_has_an_index_above_the_limit() -> None:
+    """gamma = 15 at a cosine of 1 - 1 / 225."""
+    limit = 1 - 1 / MOST_COLLINEAR**2
+    assert combinations(correlated(limit - 1e-5), "ab") == ()
+    assert len(combinations(correlated(limit + 1e-5), "ab")) == 1
 
 
 def test_nothing_depends_on_units() -> None:
-    jacobian = RNG.normal(size=(50, 4)) @ RNG.normal(size=(4, 4))
-    scale = np.array([1e-5, 1.0, 30.0, 1e4])
-    one, other = collinearity(jacobian, "abcd"), collinearity(jacobian * scale, "abcd")
-    assert one.gamma == pytest.approx(other.gamma)
-    np.testing.assert_allclose(one.indices, other.indices, rtol=1e-6)
-    np.testing.assert_allclose(np.abs(one.directions), np.abs(other.directions * scale), rtol=1e-6)
+    """b = a, and c has no effect: the weights of the set are those of the factors."""
+    jacobian = np.column_stack([correlated(0.9999), np.zeros(200), FREE[:, 2]])
+    scale = np.array([0.01, 30.0, 1.0, 100.0])
+    for one, other in zip(combinations(jacobian, "abcd"), combinations(jacobian * scale, "abcd"), strict=True):
+        assert one.names == other.names
+        assert one.gamma == pytest.approx(other.gamma, rel=1e-6)
+        if len(one.names) == 2:
+            ratio = np.array(other.weights) / one.weights
+            assert ratio[1] / ratio[0] == pytest.approx(0.01 / 30.0)
 
 
-def test_directions_move_the_residuals_as_little_as_they_say() -> None:
+def test_the_weights_move_the_residuals_as_little_as_the_index_says() -> None:
     jacobian = correlated(0.999) * np.array([1.0, 20.0])
-    diagnosis = collinearity(jacobian, ("a", "b"))
-    seen = np.linalg.norm(jacobian @ diagnosis.directions.T, axis=0)
-    np.testing.assert_allclose(seen[0] / seen, diagnosis.indices, rtol=1e-9)
+    (pair,) = combinations(jacobian, "ab")
+    moved = np.array(pair.weights)
+    seen = np.linalg.norm(jacobian @ moved) / np.linalg.norm(moved * [1.0, 20.0])
+    assert seen == pytest.approx(1 / pair.gamma)
 
 
 def test_sets_are_as_small_as_they_can_be() -> None:
@@ -62,7 +66,7 @@ def test_columns_at_right_angles_have_no_set_and_each_silent_one_has_one() -> No
     silent = np.column_stack([FREE[:, :2], np.zeros(200)])
     (silent_one,) = combinations(silent, "abc")
     assert silent_one.sentence() == "c has no effect on these data"
-    assert collinearity(silent, "abc").gamma == pytest.approx(1)
+    assert silent_one.gamma == float("inf")
 
 
 def test_a_pair_is_named_in_one_sentence() -> None:
