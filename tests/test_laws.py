@@ -426,29 +426,49 @@ def _powers(unit: str) -> tuple[float, float, float]:
     return tuple(total)
 
 
+FROUDE = (25.0**3, 25.0, 25.0**0.5)  # of a ship 25 times as long: mass, length, time
+
+
 @CALM
-@pytest.mark.parametrize("seed", range(3))
-def test_froude_scaling(key: str, seed: int) -> None:
-    """A ship scaled by 25 in length, by the units that its parameters claim: forces 25^3, moments 25^4."""
-    scale, case = 25.0, example(key)
+@pytest.mark.parametrize("scale", [FROUDE, (2.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.7)])
+def test_forces_follow_the_units(key: str, scale: tuple[float, float, float]) -> None:
+    """Mass, length and time in other units, by those that parameters and signals claim: forces and moments follow."""
+    case = example(key)
 
-    def factor(mass: float, length: float, time: float) -> float:
-        return float(scale ** (3 * mass + length + time / 2))
+    def factor(*powers: float) -> float:
+        return float(np.prod(np.power(scale, powers)))
 
-    values = case.values * [factor(*_powers(unit)) for unit in case.units]
-    motion = np.array([scale**0.5] * 3 + [scale**-0.5] * 3)
-    signal = {name: factor(*_powers(row.unit)) for name, row in SIGNALS.items()}
-    signal |= {"nu": motion, "nu_r": motion, "wash": np.array([scale**0.5, scale**0.5, scale])}
-    signal |= {"eta": scale ** np.array([1, 1, 1, 0, 0, 0]), "state": scale ** np.array(SCALE_OF_STATES.get(key, 0.0))}
-    drawn = random_signals(case, seed)
+    def of(unit: str) -> float:
+        return factor(*_powers(unit))
+
+    values = case.values * [of(unit) for unit in case.units]
+    motion = np.repeat([of("m/s"), of("rad/s")], 3)
+    signal = {name: of(row.unit) for name, row in SIGNALS.items()} | {"nu": motion, "nu_r": motion}
+    signal |= {"eta": np.repeat([of("m"), 1.0], 3), "wash": np.array([of("m/s"), of("m/s"), of("m")])}
+    signal |= {"state": of("m") ** np.array(SCALE_OF_STATES.get(key, 0.0))}
+    drawn = random_signals(case, 0)
     for name in VECTORS:
         if name in drawn:
             drawn[name][0] = abs(drawn[name][0]) + 2.0  # far above the floors of speed, which do not scale
     if "wash" in drawn:
         drawn["wash"][:2] = np.abs(drawn["wash"][:2]) + 2.0
     scaled = {name: value * signal.get(name, 1.0) for name, value in drawn.items()}
-    expected = case.wrench(drawn) * scale ** np.array([3, 3, 3, 4, 4, 4])
+    expected = case.wrench(drawn) * np.repeat([of("N"), of("N m")], 3)
     np.testing.assert_allclose(case.wrench(scaled, values), expected, rtol=1e-4, atol=1e-9 * np.abs(expected).max())
+
+
+NOT_ZERO = {
+    **dict.fromkeys(("k_astern", "k_driven", "C_2_plus", "C_2_minus", "kappa"), 1.0),
+    "J_min": -1.0,
+    "J_max": 1.5,
+}
+
+
+@ALL
+def test_a_number_that_is_left_out_is_zero_or_one(key: str) -> None:
+    """What may be left out adds nothing or multiplies by 1; the range of a polynomial in J is what it is for."""
+    left_out = {p.name: p.default for p in term_parameters(TERMS[key]) if p.default is not None}
+    assert left_out == {name: NOT_ZERO.get(name, 0.0) for name in left_out}
 
 
 @ALL

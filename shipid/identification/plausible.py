@@ -92,7 +92,7 @@ def within(vessel: Vessel, path: str) -> tuple[float, float]:
         return -math.inf, math.inf
 
     def ratio(factor: float) -> float | None:
-        return kind.ratio(factor * base, {**numbers, path: factor * base}, length)
+        return kind.ratio(factor * base, numbers, length)
 
     one, far = ratio(1.0), ratio(FARTHEST)
     if one is None or far is None or one == far:
