@@ -7,16 +7,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.special import stdtrit
 
 from shipid.arguments import of_class
 from shipid.metrics import over_time, position_error
-from shipid.study.evidence import contrasts, mean_errors
+from shipid.study.evidence import contrasts, mean_errors, over_worlds
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results
 
 EVERY = "with physics"  # all families but pure data-driven
-CONFIDENCE = 0.95
 LEAST = 3  # worlds from which an interval over worlds is given
 COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
@@ -148,8 +146,7 @@ def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapp
     row |= {"low": float(judged.low[0]), "high": float(judged.high[0])}
     row |= {"better": int((values < 0).sum()), "least": float(means.min()), "greatest": float(means.max())}
     if len(worlds) >= LEAST:
-        wide = float(stdtrit(len(worlds) - 1, (1 + CONFIDENCE) / 2) * means.std(ddof=1) / len(worlds) ** 0.5)
-        row |= {"world_low": float(means.mean()) - wide, "world_high": float(means.mean()) + wide}
+        row["world_low"], row["world_high"] = over_worlds(means)
     return row
 
 
