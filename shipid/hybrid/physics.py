@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, get_args
 
@@ -255,14 +255,14 @@ def check_instants(instants: Instants) -> None:
     of_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
 
 
-def assumed(vessel: Vessel, columns: Mapping[str, Array]) -> list[str]:
+def assumed(vessel: Vessel, columns: Collection[str]) -> list[str]:
     """Columns of states and weather that a vessel has and the columns lack: taken as zero, and named in the report."""
     model = dynamics(vessel)
     needed = (column_of(name) for name in (*model.state, *model.environment))
     return [name for name in needed if name not in columns]
 
 
-def check_columns(vessel: Vessel, columns: Mapping[str, Array], file: str) -> None:
+def check_columns(vessel: Vessel, columns: Collection[str], file: str) -> None:
     """Raise DataError if a command of the vessel is not among the columns."""
     missing = [name for name in dynamics(vessel).commands if name not in columns]
     if missing:

@@ -96,7 +96,7 @@ def play(
     band = None if level is None else Band(level, kind, rate)
     dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
     vessel, step = predictor.vessel, predictor.physics.step
-    names = {str(name): np.empty(0) for name in dataset.frame.columns}
+    names = list(map(str, dataset.frame.columns))
     if vessel is not None:
         check_columns(vessel, names, str(log))
     if every is not None and not every > 0:

@@ -59,7 +59,7 @@ def predict_log(
         predictor.check_level(level, kind)
     dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
     if predictor.vessel is not None:
-        check_columns(predictor.vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(log))
+        check_columns(predictor.vessel, dataset.frame.columns, str(log))
     if predictor.causal:
         dataset = causal_columns(dataset, predictor.causal)
     estimates = None

@@ -219,7 +219,7 @@ def first_look(
     ------
     DataError : no run is as long as the horizon, or a command of the vessel is missing.
     """
-    check_columns(vessel, {name: np.empty(0) for name in map(str, dataset.frame.columns)}, str(vessel.file))
+    check_columns(vessel, dataset.frame.columns, str(vessel.file))
     part = dataset.select(runs)
     late = late_commands(vessel, part, part.runs)
     finer = 1 if late is None else max(1, math.ceil(step / late.delay - 1e-9))  # steps in which orders change in time

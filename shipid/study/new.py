@@ -104,9 +104,8 @@ def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
     if data is None:
         return _simulated(loaded, out)
     dataset = read_dataset(data)
-    columns = {str(name): dataset.frame[name].to_numpy() for name in dataset.frame}
     for vessel in loaded.values():
-        check_columns(vessel, columns, str(data))
+        check_columns(vessel, dataset.frame.columns, str(data))
     return _recorded(loaded, dataset, data, out)
 
 
@@ -311,7 +310,7 @@ def _question(vessels: Mapping[str, Vessel], dataset: Dataset, seen: Survey, hor
 def _measured(vessels: Mapping[str, Vessel], dataset: Dataset) -> str:
     columns = [str(name) for name in dataset.frame]
     orders = ", ".join(dataset.commands)
-    lacking = {name: assumed(vessel, dict.fromkeys(columns, np.empty(0))) for name, vessel in vessels.items()}
+    lacking = {name: assumed(vessel, columns) for name, vessel in vessels.items()}
     missing = [f"{key} takes {', '.join(names)} as 0" for key, names in lacking.items() if names]
     estimated = [name for name, std in STANDARD_DEVIATIONS.items() if std in columns]
     wind = "wind is measured" if "V_w" in columns else "wind is not measured and is no input"
