@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.arguments import of_class
-from shipid.data.dataset import Array, Dataset, cumulative_integral, pieces, shares_clock, unit_of
+from shipid.data.dataset import Array, Dataset, cumulative_integral, pieces, pieces_by_run, shares_clock, unit_of
 from shipid.errors import DataError
 from shipid.physics.signals import row_of
 
@@ -37,10 +37,7 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     Raises DataError for what is no dataset.
     """
     of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
-    by_run: dict[str, list[pd.DataFrame]] = {}
-    for run, rows in pieces(dataset):
-        by_run.setdefault(run, []).append(rows)
-    shared = shares_clock(dataset)
+    by_run, shared = pieces_by_run(dataset), shares_clock(dataset)
     whole = {run: _motion(pd.concat(stretches)) for run, stretches in by_run.items()}
     table = []
     for run, stretches in by_run.items():

@@ -128,6 +128,14 @@ def pieces(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
         yield name, dataset.frame.iloc[places]
 
 
+def pieces_by_run(dataset: Dataset) -> dict[str, list[pd.DataFrame]]:
+    """Run -> its unbroken stretches, in the order of the table."""
+    by_run: dict[str, list[pd.DataFrame]] = {}
+    for run, rows in pieces(dataset):
+        by_run.setdefault(run, []).append(rows)
+    return by_run
+
+
 def stretches(dataset: Dataset) -> Iterator[tuple[str, NDArray[np.intp]]]:
     """Yield (run, indices of rows in the table) of every stretch that `pieces` yields."""
     broken = (dataset.frame["flags"].to_numpy() & flag_bit(dataset.metadata, BREAK)) != 0

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, pieces
+from shipid.data.dataset import Dataset, pieces_by_run
 from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM, declared_kind
 from shipid.logs.segments import kind_of
 from shipid.physics.signals import is_shaft, steers
@@ -28,9 +28,6 @@ def kinds_of(dataset: Dataset, runs: Container[str] | None = None, test: Contain
 
     runs : those wanted; all by default. test : runs of the test; the usual speeds come from all others.
     """
-    stretches: dict[str, list[pd.DataFrame]] = {}
-    for run, rows in pieces(dataset):
-        stretches.setdefault(run, []).append(rows)
     declared = dataset.metadata.get("manoeuvres", {})
     frame = dataset.frame[[run not in test for run in dataset.frame["run"]]]
     shafts = [name for name in dataset.commands if is_shaft(name)]
@@ -39,7 +36,7 @@ def kinds_of(dataset: Dataset, runs: Container[str] | None = None, test: Contain
     shaft = float(frame[shafts].abs().max(axis=1).median()) if shafts else 0.0
     return {
         run: declared.get(run) or declared_kind(run) or seen_kind(longest(parts), speed, shaft)
-        for run, parts in stretches.items()
+        for run, parts in pieces_by_run(dataset).items()
         if runs is None or run in runs
     }
 

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.checks import check_dataset
-from shipid.data.dataset import Dataset, cumulative_integral, pieces
+from shipid.data.dataset import Dataset, cumulative_integral, pieces, pieces_by_run
 from shipid.physics.signals import steers
 from shipid.study.kinds import kinds_of, longest
 
@@ -47,10 +47,7 @@ class Survey:
 
 def survey(dataset: Dataset) -> Survey:
     """Look at every run of a dataset: how long, how fast, what manoeuvre, in which order."""
-    stretches: dict[str, list[pd.DataFrame]] = {}
-    for run, rows in pieces(dataset):
-        stretches.setdefault(run, []).append(rows)
-    kinds = kinds_of(dataset)
+    stretches, kinds = pieces_by_run(dataset), kinds_of(dataset)
     checks = check_dataset(dataset)
     failed = checks[~checks["ok"].astype(bool)]
     straying = set(failed.loc[failed["check"] == "path", "run"])
