@@ -58,7 +58,8 @@ def contrasts(differences: Array, counts: Array, training: Array | float = 0.0) 
         blank = np.full_like(mean, np.nan)
         return Contrasts(mean, blank, blank, blank, blank)
     away, spreads, spread = _bootstrap(differences, weights)
-    return _judged(mean, _distances(away, spreads, spread), np.hypot(spread, training), len(counts) - 1)
+    error, alike = np.hypot(spread, training), np.hypot(_alike(differences, weights), training)
+    return _judged(mean, _distances(away, spreads, spread), error, alike, len(counts) - 1)
 
 
 def mean_errors(errors: Array, counts: Array, training: Array | float = 0.0) -> Contrasts:
@@ -96,17 +97,33 @@ def contrasts_apart(
     freedom = np.maximum(
         1 / (shares[0] ** 2 / (len(one_counts) - 1) + shares[1] ** 2 / (len(other_counts) - 1) + 1e-12), least
     )
-    return _judged(mean, _distances(here - there, np.hypot(spreads, more), error), np.hypot(error, training), freedom)
+    alike = np.hypot(*(_alike(*side) for side in sides))
+    drawn = _distances(here - there, np.hypot(spreads, more), error)
+    return _judged(mean, drawn, np.hypot(error, training), np.hypot(alike, training), freedom)
 
 
-def _judged(mean: Array, drawn: Array, error: Array, freedom: Array | int) -> Contrasts:
-    """Intervals and chances of means from resampled distances (B, J); those of Student where they are wider."""
-    ahead = mean / np.maximum(error, 1e-12 * np.abs(mean) + 1e-300)
-    student = stdtrit(freedom, 1 - LEVEL)
-    lower = np.minimum(np.quantile(drawn, LEVEL, axis=0, method="lower"), -student)
-    upper = np.maximum(np.quantile(drawn, 1 - LEVEL, axis=0, method="higher"), student)
-    chances = (_beyond(drawn, ahead, freedom), _beyond(-drawn, -ahead, freedom))
-    return Contrasts(mean, mean - upper * error, mean - lower * error, *chances)
+def _judged(mean: Array, drawn: Array, error: Array, alike: Array, freedom: Array | int) -> Contrasts:
+    """Intervals and chances of means from resampled distances (B, J); those of Student where they are wider.
+
+    error, alike : (J,) standard errors, of the manoeuvres as they scatter, and if all scatter alike; Student's
+        interval takes the larger one.
+    """
+    wide, least = np.maximum(error, alike), 1e-12 * np.abs(mean) + 1e-300
+    student = stdtrit(freedom, 1 - LEVEL) * wide
+    lower = np.minimum(np.quantile(drawn, LEVEL, axis=0, method="lower") * error, -student)
+    upper = np.maximum(np.quantile(drawn, 1 - LEVEL, axis=0, method="higher") * error, student)
+    ahead, apart = (mean / np.maximum(one, least) for one in (error, wide))
+    chances = (_beyond(drawn, ahead, apart, freedom), _beyond(-drawn, -ahead, -apart, freedom))
+    return Contrasts(mean, mean - upper, mean - lower, *chances)
+
+
+def _alike(values: Array, weights: Array) -> Array:
+    """(J,) standard errors of weighted means of values (J, R), if the values of all manoeuvres scatter alike.
+
+    A manoeuvre with most of the windows lies near the mean because it makes the mean: its distance from it says little.
+    """
+    errors: Array = np.sqrt(np.square(weights).sum()) * values.std(axis=1, ddof=1)
+    return errors
 
 
 def _bootstrap(values: Array, weights: Array, seed: int = SEED) -> tuple[Array, Array, Array]:
@@ -131,9 +148,12 @@ def _distances(away: Array, spread: Array, here: Array) -> Array:
     return distances
 
 
-def _beyond(drawn: Array, ahead: Array, freedom: Array | int) -> Array:
-    """Share of resampled distances that reach the observed one, or Student's where that is larger or none reaches."""
-    share, student = (drawn >= ahead).mean(axis=0), stdtr(freedom, -ahead)
+def _beyond(drawn: Array, ahead: Array, apart: Array, freedom: Array | int) -> Array:
+    """Share of resampled distances that reach the observed one, or Student's where that is larger or none reaches.
+
+    ahead, apart : (J,) the observed mean in standard errors, as in `_judged` for the resampled ones and for Student's.
+    """
+    share, student = (drawn >= ahead).mean(axis=0), stdtr(freedom, -apart)
     chance: Array = np.maximum(share, student)
     return chance
 

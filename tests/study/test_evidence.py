@@ -38,6 +38,22 @@ def test_intervals_cover(runs: int, tail: str) -> None:
     assert (contrast.high < 0).sum() <= limit
 
 
+UNEQUAL = [(1, 1, 1, 1, 50), (200, *[10] * 6), (1, 2, 30, 4, 50, 1, 1, 7), (*[1] * 10, 30, 30), (51, 38, 31, 16, 3)]
+
+
+@pytest.mark.parametrize("windows", UNEQUAL)
+@pytest.mark.parametrize("paired", [True, False])
+def test_intervals_cover_where_few_manoeuvres_have_most_of_the_windows(windows: tuple[int, ...], paired: bool) -> None:
+    """As above: a long manoeuvre is near the mean because it makes the mean, and proves no more than a short one."""
+    rng, counts = np.random.default_rng(len(windows)), np.array(windows, dtype=float)
+    one, other = (rng.normal(size=(1000, len(windows))) for _ in range(2))
+    contrast = contrasts(one, counts) if paired else contrasts_apart(one, counts, other, counts[::-1])
+    limit = stats.binom.ppf(0.999, 1000, 0.025)
+    assert (contrast.low > 0).sum() <= limit
+    assert (contrast.high < 0).sum() <= limit
+    assert ((contrast.low > 0) == (contrast.above <= LEVEL)).mean() > 0.99
+
+
 @pytest.mark.parametrize("runs", [5, 12])
 @pytest.mark.parametrize("spread", [0.3, 0.6, 1.0])
 def test_intervals_of_errors_are_never_below_0_and_cover_as_before(runs: int, spread: float) -> None:
