@@ -208,7 +208,8 @@ class Physics:
             engine=engine,
             device=device,
         )
-        north, east = result["north"][1:], result["east"][1:]
+        lost = np.where(result.diverged, np.nan, 0.0)  # a force may hide an input that is no number
+        north, east = result["north"][1:] + lost, result["east"][1:] + lost
         if drift is not None:
             ages = self.step * np.arange(1, self.horizon + 1)[:, None, None]
             north, east = north + ages * drift[0], east + ages * drift[1]

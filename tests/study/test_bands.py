@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import binomtest
+from scipy.stats import binom, binomtest
 from typer.testing import CliRunner
 
 from shipid.cli import app
@@ -71,6 +71,16 @@ def test_intervals_cover_shares_of_few_runs() -> None:
         low, high = bands.share_interval(rng.random(200) < chance[run], run)
         covered += low <= 0.8 <= high
     assert covered / 300 > 0.92
+
+
+@pytest.mark.parametrize("sizes", [(200, *[10] * 6), (5, 5, 5, 5, 5, 100), (1, 1, 1, 1, 50), (300, *[40] * 8)])
+def test_a_long_run_that_is_mostly_outside_breaks_no_promise(sizes: tuple[int, ...]) -> None:
+    """Bands of 90 % that hold 90 %: at most one in forty intervals lies below, whatever share one long run makes."""
+    rng, run, below = np.random.default_rng(2), np.repeat(np.arange(len(sizes)), sizes), 0
+    for _ in range(400):
+        chance = rng.beta(0.9, 0.1, len(sizes))  # of each run; 0.9 in the mean
+        below += bands.share_interval(rng.random(len(run)) < chance[run], run)[1] < 0.9
+    assert below <= binom.ppf(0.999, 400, 0.025)
 
 
 def test_cells_keep_coverage_and_width(results: Results) -> None:
