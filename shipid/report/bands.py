@@ -210,7 +210,9 @@ def _lowest(frame: pd.DataFrame) -> str:
         return ""
     worst = kinds.sort_values("coverage").iloc[0]
     text = f"Bands hold least at {worst.group} ({worst.model}): {_percent(worst.coverage)} of the paths."
-    return f"{text} The band for this kind (--kind of shipid predict) holds its share." if worst.by == "kind" else text
+    if worst.by != "kind" or worst.note:
+        return text
+    return f"{text} --kind of shipid predict gives the band that is calibrated for this kind alone."
 
 
 def worst(content: ReportContent) -> Table | None:

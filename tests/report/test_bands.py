@@ -66,6 +66,16 @@ def test_it_says_what_was_held(banded: ReportContent) -> None:
     assert worst.rows[0][0].text == "M003"
 
 
+def test_a_band_of_its_own_is_offered_to_a_kind_that_has_one(banded: ReportContent) -> None:
+    few = bands.groups(banded)
+    assert few is not None
+    assert "--kind" not in few.takeaway, "2 runs of this kind calibrated the band: too few"
+    groups = banded.frames["coverage_groups"].assign(note="")
+    enough = bands.groups(replace(banded, frames={**banded.frames, "coverage_groups": groups}))
+    assert enough is not None
+    assert enough.takeaway.endswith("--kind of shipid predict gives the band that is calibrated for this kind alone.")
+
+
 def test_bands_of_a_small_model_are_no_zeros(banded: ReportContent) -> None:
     frames = {name: frame.copy() for name, frame in banded.frames.items()}
     for name in ("coverage", "coverage_groups"):
