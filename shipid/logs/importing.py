@@ -404,6 +404,8 @@ def repeated_rows(table: pd.DataFrame) -> NDArray[np.bool_]:
     same = np.ones(len(table), dtype=bool)
     same[:1] = False
     for index in range(table.shape[1]):
+        if not same.any():  # most often the first column is a time
+            break
         column = table.iloc[:, index]
         same &= (column.eq(column.shift()) | (column.isna() & column.shift().isna())).to_numpy(dtype=bool)
     return same

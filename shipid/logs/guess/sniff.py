@@ -439,7 +439,9 @@ def _words_for_nothing(table: pd.DataFrame, columns: dict[str, Array], form: Tab
     """Return the texts in columns of numbers that say that there is no value, such as `---` or `N/A`."""
     texts: dict[str, None] = {}
     for name, values in columns.items():
-        texts |= dict.fromkeys(_called(table, name)[np.isnan(values)].dropna().astype(str).str.strip().unique())
+        lost = np.isnan(values)
+        if lost.any():
+            texts |= dict.fromkeys(_called(table, name)[lost].dropna().astype(str).str.strip().unique())
     return [text for text in texts if text not in form.missing and _NOTHING.fullmatch(text.lower())]
 
 
