@@ -3,6 +3,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.report.error_map import error_map
@@ -122,6 +123,20 @@ def test_sides_of_the_bars_have_units(simulation):
     assert (layout.xaxis.title.text, layout.yaxis.title.text) == ("models by A [m]", "H, front row [m]")
     assert layout.yaxis.range[0] == 0
     assert {note.text for note in layout.annotations} == {"N_D = 10", "N_D = 30", "N_D = 100"}
+
+
+def test_two_methods_on_the_same_physics_do_not_hide_each_other(simulation):
+    names = simulation.cells.model.isin(["moderate-1", "moderate-2"])
+    others = simulation.cells[names].assign(model=lambda cells: cells.model + " + alone", H=1.7)
+    figure = error_map(replace(simulation, cells=pd.concat([simulation.cells, others], ignore_index=True)))
+    bars = figure.views["0"][0].figure.data[0]
+    assert len(bars.x) == 7 * 3
+    assert min(bars.y) > 0.05
+    assert not any("alone" in words for words in bars.customdata)
+    assert (
+        "Not on the map, where another method has their place: moderate-1 + alone and moderate-2 + alone." in figure.how
+    )
+    assert "another method" not in error_map(simulation).how
 
 
 def test_there_is_no_map_of_one_size_or_one_model(simulation, full_scale):
