@@ -27,7 +27,8 @@ def factors(content: ReportContent) -> Figure | None:
     if frame.empty:
         return None
     names = [str(name) for name in families(content).model if name in set(frame.model)]
-    untouched = [str(name) for name in families(content).model if name not in names]
+    bases = set(content.models.model)  # further methods on one of them have its numbers
+    untouched = [str(name) for name in families(content).model if name in bases and name not in names]
     groups = [str(name) for name in pd.unique(frame.group)]
     return Figure(
         id="factors",

@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.report.factors import factors
@@ -46,6 +47,12 @@ def test_a_removed_term_lies_at_the_left_edge(full_scale, factor, word):
     assert plot.data[0].x[0] == pytest.approx(plot.layout.xaxis.tickvals[0])
     assert plot.layout.xaxis.range[0] < plot.data[0].x[0] < np.log(0.8)
     assert "0 removes the term" in figure.how
+
+
+def test_another_method_on_a_model_is_not_called_unperturbed(simulation):
+    others = simulation.cells[simulation.cells.model.eq("high-1")].assign(model="high-1 + alone")
+    figure = factors(replace(simulation, cells=pd.concat([simulation.cells, others], ignore_index=True)))
+    assert "Not perturbed: nominal and no model." in figure.how
 
 
 def test_no_rows_no_figure(simulation):
