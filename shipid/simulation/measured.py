@@ -140,6 +140,13 @@ def trials(vessel: Vessel, speed: float | None = None) -> tuple[list[dict[str, A
     return rows, [f"{', '.join(names)}: {message}" for message, names in refused.items()]
 
 
+def _to_the_end(log: pd.DataFrame, measured: Measured) -> pd.DataFrame:
+    """Rows of the manoeuvre itself: a stop ends when the ship no longer moves ahead, and the log goes on astern."""
+    known = {row["measure"]: float(row["value"]) for row in measured.measures}
+    end = known["execute"] + known["stopping time"] if measured.standard.kind == "stop" else np.inf
+    return log[: int(np.searchsorted(log["t"], end)) + 1] if np.isfinite(end) else log
+
+
 def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent:
     """Assemble the report page of a manoeuvre; `command` is the command line that reproduces it."""
     ship, chosen, record = measured.vessel, measured.standard, measured.record
@@ -151,7 +158,7 @@ def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent
         title=f"{ship.name}: {chosen.title}",
         name=chosen.kind,
         kind=chosen.kind,
-        log=pd.DataFrame({**columns, "shaft": shaft}),
+        log=_to_the_end(pd.DataFrame({**columns, "shaft": shaft}), measured),
         measures=pd.DataFrame(measured.measures),
         criteria=pd.DataFrame(measured.criteria),
         outline=ship_outline(ship.document["particulars"]),

@@ -22,6 +22,17 @@ def test_a_manoeuvre_is_simulated_measured_and_shown(name):
     assert content.answer[0].figure == "measures"
 
 
+def test_the_page_of_a_stop_ends_with_the_stop():
+    done = measure_standard(load_vessel("gunnerus-28.9"), "stop")
+    measures = {row["measure"]: row["value"] for row in done.measures}
+    log = manoeuvre_content(done).log
+    begin = log[log["t"] >= measures["execute"]].iloc[0]
+    reach = np.hypot(*(log.iloc[-1][["north", "east"]] - begin[["north", "east"]]))
+    assert reach == pytest.approx(measures["head reach"], abs=0.2)  # not 700 m astern of where she stopped
+    assert log["u"].iloc[-2] > 0 >= log["u"].iloc[-1]
+    assert len(done.frame) > len(log)
+
+
 def test_a_ship_that_does_not_go_straight_gets_a_helmsman():
     lame = load_vessel("gunnerus-28.9").with_values({"thruster.starboard.off": True})
     done = measure_standard(lame, "turning", (20,), duration=120.0)
