@@ -75,7 +75,7 @@ def write_manoeuvre(content: ManoeuvreContent, file: Path) -> Path:
 
 
 def _amount(value: float, unit: str) -> str:
-    return f"{number(round(value, 2) + 0.0)} {unit}" if np.isfinite(value) else "not reached"
+    return f"{number(round(value, 3) + 0.0)} {unit}" if np.isfinite(value) else "not reached"
 
 
 def measures(content: ManoeuvreContent) -> Table:

@@ -65,6 +65,16 @@ def test_first_measures_exist() -> None:
         assert set(names) <= set(content(kind).measures["measure"])
 
 
+def test_the_answer_has_the_digits_of_the_table() -> None:
+    shown = content("spiral")
+    helm = shown.measures["measure"].eq("neutral helm")
+    shown = replace(shown, measures=shown.measures.assign(value=shown.measures["value"].mask(helm, -0.0248)))
+    assert "Neutral helm: −0.025 deg" in shown.answer[0].text
+    assert "−0.025" in [row[1].text for row in manoeuvre.measures(shown).rows]
+    still = shown.measures.assign(value=shown.measures["value"].mask(helm, -1e-9))
+    assert "Neutral helm: 0.00 deg" in replace(shown, measures=still).answer[0].text
+
+
 def test_answer_counts_the_criteria_that_are_judged() -> None:
     shown = content("zigzag")
     assert shown.answer[1].text == "3 of 3 criteria of IMO MSC.137(76) are met."
