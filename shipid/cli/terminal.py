@@ -111,7 +111,7 @@ def measure_table(rows: Iterable[Any], first: list[str]) -> Table:
             row["measure"],
             digits(row["value"]),
             row["unit"],
-            "" if row["lengths"] != row["lengths"] else f"{row['lengths']:.2f}",
+            "" if row["lengths"] != row["lengths"] else f"{row['lengths']:z.2f}",
             *[row["note"]] * missing,
         ]
         for row in rows

@@ -25,6 +25,16 @@ def test_digits() -> None:
     assert [digits(value) for value in (1.23456, -0.00001, float("nan"), 1.6e9)] == ["1.235", "0", "-", "1600000000.0"]
 
 
+def test_a_table_of_measures_has_no_minus_zero(capsys: pytest.CaptureFixture[str]) -> None:
+    from shipid.cli.terminal import measure_table, show
+
+    row = {"measure": "lateral deviation", "value": -1e-7, "unit": "m", "lengths": -3e-9, "note": ""}
+    show(measure_table([row], []))
+    out = capsys.readouterr().out
+    assert "0.00" in out
+    assert "-" not in out
+
+
 class Still:
     """A watch that sees two searches of which one moves."""
 
