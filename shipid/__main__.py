@@ -1,6 +1,7 @@
 """`python -m shipid`: the command line."""
 
 import gc
+import io
 import os
 import sys
 
@@ -8,10 +9,15 @@ FEW_LOOKS = 50_000  # objects made between two looks for garbage: imports make m
 
 
 def open_streams() -> None:
-    """Let a standard stream that is closed lead nowhere: else its number goes to the next file that is opened."""
+    """Let a standard stream that is closed lead nowhere: else its number goes to the next file that is opened.
+
+    Signs that the terminal cannot show, such as dots in Latin-1, are written out as escapes.
+    """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # as standard error has it
 
 
 def run() -> None:

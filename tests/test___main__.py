@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from shipid.version import __version__
 
 
@@ -58,6 +60,16 @@ def test_ctrl_c_during_the_imports_ends_quietly() -> None:
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
     assert (result.returncode, result.stderr) == (130, "interrupted\n")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_signs_that_a_terminal_does_not_know_are_written_out(encoding: str) -> None:
+    """Before, a table with dots where a cell is too long, or a name in another script, ended in a traceback."""
+    command = [sys.executable, "-m", "shipid", "vessel", "show", "gunnerus-28.9"]
+    environment = os.environ | {"PYTHONIOENCODING": encoding, "FORCE_COLOR": "1", "COLUMNS": "40"}
+    result = subprocess.run(command, env=environment, capture_output=True, timeout=120, check=False)
+    assert (result.returncode, result.stderr) == (0, b"")
+    assert b"\\u2026" in result.stdout, "the dots of a cell that is cut"
 
 
 def test_closed_streams_lead_nowhere_and_no_file_takes_their_place() -> None:
