@@ -26,7 +26,7 @@ import numpy as np
 from shipid.engine import libraries
 from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
 from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_compiler
-from shipid.engine.printing import ARITHMETIC, STAGES, Dialect, Printed, print_function
+from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, Printed, print_function
 from shipid.engine.threads import in_parallel, threaded
 from shipid.engine.vectors import DOUBLE, SINGLE, Precision, Target, head
 from shipid.metrics import BINS, BINS_AN_OCTAVE, LEAST, OCTAVES, SHIFT
@@ -35,13 +35,8 @@ from shipid.vessel.dynamics import Dynamics
 log = logging.getLogger(__name__)
 
 OPTIONS = ("-O3", "-fschedule-insns", "-fno-math-errno", "-fPIC", "-shared", "-pthread", "-w")  # of the C compiler
-_CALLS = {
-    ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_SQRT: "sqrt", ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh",
-    ca.OP_TANH: "tanh", ca.OP_FLOOR: "floor", ca.OP_CEIL: "ceil",
-}  # fmt: skip
 _OPERATIONS = {
-    **{operation: f"v_{name}({{0}})" for operation, name in _CALLS.items()},
+    **{operation: f"v_{name}({{0}})" for operation, name in LIBM.items()},
     ca.OP_FABS: "v_fabs({0})",
     ca.OP_SIGN: "(NUMBER({0} > 0) - NUMBER({0} < 0))",
     ca.OP_INV: "(1 / {0})",

@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from shipid.engine.printing import ARITHMETIC, Dialect, print_function
+from shipid.engine.printing import ARITHMETIC, LIBM, Dialect, print_function
 from shipid.errors import ShipidError
 
 Array = np.ndarray
@@ -26,16 +26,9 @@ LONGEST = 600  # operations of one C function
 _ARRAY = re.compile(r"real (\w+)\[\d+\];")
 _VALUE, _TARGET = re.compile(r"\ba\d+\b"), re.compile(r"const real (a\d+) = ")
 
-_CALLS = {
-    ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_SQRT: "sqrt", ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh",
-    ca.OP_TANH: "tanh", ca.OP_FLOOR: "floor", ca.OP_CEIL: "ceil", ca.OP_FABS: "fabs",
-}  # fmt: skip
-_TWO = {
-    **{ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow", ca.OP_ATAN2: "atan2", ca.OP_FMIN: "fmin", ca.OP_FMAX: "fmax"},
-}
+_TWO = {ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow", ca.OP_ATAN2: "atan2", ca.OP_FMIN: "fmin", ca.OP_FMAX: "fmax"}
 _OPERATIONS = {
-    **{operation: f"M({name})({{0}})" for operation, name in _CALLS.items()},
+    **{operation: f"M({name})({{0}})" for operation, name in (LIBM | {ca.OP_FABS: "fabs"}).items()},
     **{operation: f"M({name})({{0}}, {{1}})" for operation, name in _TWO.items()},
     ca.OP_SIGN: "(real)(({0} > 0) - ({0} < 0))",
     ca.OP_INV: "(1 / {0})",

@@ -13,6 +13,7 @@ import numpy as np
 from casadi import SX
 
 from shipid.engine.integrate import Method
+from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import ShipidError
 from shipid.export.band import COLUMNS
 from shipid.export.blocks import Block, Formula, Precision, c_functions
@@ -21,7 +22,8 @@ from shipid.export.model import Model
 from shipid.export.turns import SAME_TURN, Turned, turned
 from shipid.hybrid.bands import FEWEST, LEVELS, Bands
 from shipid.observer import DIVERGED, LOW, MEASURED, ROUNDING, STATES, Bank, bank, filter_function, sizes
-from shipid.physics.signals import SIGNALS, signal_of
+from shipid.physics.signals import SIGNALS, row_of, signal_of
+from shipid.simulation.log import column_of
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
@@ -32,7 +34,6 @@ NEARBY = [  # of the header in single precision
     "Single precision: give north and east from a point nearby. In coordinates of a map, such as 7,000,000 m, the next",
     "number is 0.5 m away.",
 ]
-SPEED_LIMIT = 100.0  # m/s and rad/s: a faster state has diverged
 WORDS = frozenset(
     """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
@@ -164,9 +165,8 @@ class VesselParts:
             return self.vessel.units[name]
         if group == "loads":
             return "N" if name in "XYZ" else "N m"
-        last = signal_of(name)
-        extra = {"down": "m", "w": "m/s", "p": "rad/s", "q": "rad/s"}
-        return extra.get(last) or (SIGNALS[last].unit if last in SIGNALS else "-")
+        row = row_of(column_of(name))
+        return "-" if row is None else row.unit
 
     def _tables(self) -> tuple[str, str]:
         declared, defined = [], []

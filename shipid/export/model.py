@@ -19,11 +19,13 @@ from shipid.hybrid.bands import Bands
 from shipid.hybrid.learned_force import ForceCorrector
 from shipid.hybrid.method import Corrector
 from shipid.hybrid.physics import Physics
-from shipid.physics.signals import SIGNALS, signal_of
-from shipid.vessel.dynamics import ETA, ETA_UNITS, NU
+from shipid.physics.signals import row_of, signal_of
+from shipid.simulation.log import column_of
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
+ESTIMATES = {"X": "m/s^2", "Y": "m/s^2", "N": "rad/s^2"}
+"""Slow force of the observer over the mass -> unit; its other estimates are velocities."""
 MOST_NUMBERS = 250_000
 """Numbers in the tables of an exported predictor, at most: about 5 MB of source, 2 MB compiled in double."""
 
@@ -122,14 +124,8 @@ class Model:
         """SI unit of an entry of an input."""
         if self.vessel is not None and name in self.vessel.units:
             return self.vessel.units[name]
-        last = signal_of(name)
-        if last in SIGNALS:
-            return SIGNALS[last].unit
-        if last in ETA:
-            return ETA_UNITS[ETA.index(last)]
-        if last in NU:
-            return "m/s" if last in "uvw" else "rad/s"
-        return {"X": "m/s^2", "Y": "m/s^2", "N": "rad/s^2"}.get(last, "m/s")
+        row = row_of(column_of(name))
+        return ESTIMATES.get(signal_of(name), "m/s") if row is None else row.unit
 
     def inputs(self, instants: Instants) -> dict[str, Array]:
         """The inputs of the graph for S instants, name -> (S, entries); what a log does not hold is 0."""

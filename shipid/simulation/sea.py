@@ -9,6 +9,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveFloat, PositiveInt
 
 from shipid.checked import Checked
+from shipid.physics.grammar import AXES
+from shipid.physics.waves import EVEN
 from shipid.units import GRAVITY
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import uniform
@@ -16,7 +18,7 @@ from shipid.vessel.schema import term_blocks
 
 Array = np.ndarray
 LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.2 % of the energy of a JONSWAP spectrum lies between
-SIDE = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}  # symmetry in the relative heading: 1 even, -1 odd
+SIDE = {axis: 1 if place in EVEN else -1 for place, axis in enumerate(AXES)}  # in the relative heading: -1 for odd
 
 
 class Sea(Checked, BaseModel):

@@ -25,7 +25,6 @@ from shipid.vessel.schema import parameters as declared
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
 NU = ("u", "v", "w", "p", "q", "r")
-ETA_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 INPUTS = ("state", "memory", "commands", "environment", "parameters")
 LAST = {"rates": "tau_extra", "advance": "dt", "sum": "component"}  # input of each function beside those of all
 PLANE, HEAVE = (0, 1, 5), 2

@@ -661,10 +661,7 @@ def _shaft(vessel: Vessel, speed: float) -> float:
         low, high = high, 2 * high
     if high >= 1e3:
         raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: give a lower speed")
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if acceleration((speed, 0.0, 0.0), middle)[0] < 0 else (low, middle)
-    return high
+    return _bisect(lambda n: float(acceleration((speed, 0.0, 0.0), n)[0]), low, high)
 
 
 def _growth(vessel: Vessel, speed: float, n: float) -> float:

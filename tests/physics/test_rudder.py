@@ -68,6 +68,11 @@ def test_going_astern_the_helm_works_the_other_way() -> None:
     assert wrench([-1.0, 0, 0, 0, 0, 0], 0.3, [-1.0, -1.0, D_P])[5] < 0
 
 
+def test_the_force_in_slow_flow_has_the_sign_of_that_in_fast_flow() -> None:
+    slow, fast = (wrench([0, 0, 0, 0, 0, 0], 0.3, [flow, flow, D_P])[1] for flow in (0.05, 5.0))
+    assert slow / fast == pytest.approx(1e-4, rel=0.05)
+
+
 def test_derivatives_by_hand() -> None:
     """Y = 1/2 rho L^2 U_0^2 (Y_delta delta + Y_udelta u' delta + Y_vvdelta v'^2 delta), N with L^3."""
     values = {"Y_delta": -0.003, "Y_udelta": -0.006, "Y_vvdelta": -0.01, "N_delta": 0.0014}
