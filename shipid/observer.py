@@ -171,7 +171,7 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     unknown = next((name for name in settings.noise if name not in MEASURED), None)
     if unknown is not None:
         raise DocumentError(f"no measured column: {choices(unknown, MEASURED)}", path=f"observer.noise.{unknown}")
-    length = float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
+    length = vessel.length or 0.0
     if not length:
         message = f"{vessel.name} has no particulars.L_pp, by which the observer scales its numbers: add it"
         raise DocumentError(message, file=vessel.file, path="particulars.L_pp")

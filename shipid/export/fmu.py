@@ -78,8 +78,7 @@ def vessel_unit(vessel: Vessel, name: str, method: Method, largest: float | None
     """
     parts = VesselParts(vessel, name, method, Precision())
     groups = parts.groups()
-    length = float(vessel.document.get("particulars", {}).get("L_pp", 30.0))
-    largest = largest or round(LARGEST_STEP * min(1.0, (length / 30.0) ** 0.5), 4)
+    largest = largest or round(LARGEST_STEP * min(1.0, ((vessel.length or 30.0) / 30.0) ** 0.5), 4)
     variables = [
         Variable(key, "output", "continuous",
                  parts.unit("carry", key), described(key) if not key.startswith("actual.")

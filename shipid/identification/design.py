@@ -32,7 +32,7 @@ from shipid.simulation.approach import FROUDE, Controls, NotStraight
 from shipid.simulation.log import aboard, horizontal
 from shipid.simulation.manoeuvre import Approached, Excitation
 from shipid.simulation.perform import perform
-from shipid.simulation.standard import length_of, shaft_speed, standard
+from shipid.simulation.standard import shaft_speed, standard
 from shipid.units import GRAVITY, RPM
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -89,7 +89,7 @@ def candidates(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | No
     At each speed: zigzags, turning circles, a pull-out, a stop, a multisine of helm and shaft, and a speed run in which
     only the shaft speed changes, in steps. Default speeds: Froude numbers 0.1 and 0.2.
     """
-    length = length_of(vessel)
+    length = vessel.length
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
     bounds = limits or Limits()
@@ -186,7 +186,7 @@ def performed(
 
 def steps_between(vessel: Vessel, interval: float) -> int:
     """Integrator steps in one interval [s] between rows: 40 or more per ship length at Froude number 0.2."""
-    length = length_of(vessel) or 30.0
+    length = vessel.length or 30.0
     passing = length / (FROUDE * float(np.sqrt(GRAVITY * length)))
     return max(int(np.ceil(40 * interval / passing)), 1)
 

@@ -271,9 +271,8 @@ def _window(vessel: Vessel, rows: pd.DataFrame) -> float:
     """Time [s] for one ship length at the run's speed, at least 8 samples, at most a quarter of the run."""
     t = rows["t"].to_numpy()
     speed = float(np.sqrt((rows["u"].to_numpy() ** 2 + rows["v"].to_numpy() ** 2).mean()))
-    length = float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
     samples = LEAST_SAMPLES * float(np.median(np.diff(t)))
-    return float(max(samples, min(LENGTHS * length / max(speed, 1e-3), (t[-1] - t[0]) / 4)))
+    return float(max(samples, min(LENGTHS * (vessel.length or 0.0) / max(speed, 1e-3), (t[-1] - t[0]) / 4)))
 
 
 def _stretch(

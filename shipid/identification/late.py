@@ -52,11 +52,10 @@ def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Late
     by_run = rows.groupby("run", sort=False)
     steering = [name for name in dynamics(vessel).commands if steers(name) and name in rows]
     steering = [name for name in steering if (by_run[name].nunique() > 1).any()]
-    length = float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
-    if not steering or not length:
+    if not steering or vessel.length is None:
         return None
     late = Late(interval_of(dataset, runs))
-    return late if late.delay * float(rows["u"].abs().mean()) / length >= CONSIDERABLE else None
+    return late if late.delay * float(rows["u"].abs().mean()) / vessel.length >= CONSIDERABLE else None
 
 
 def between_rows(

@@ -87,12 +87,11 @@ def within(vessel: Vessel, path: str) -> tuple[float, float]:
     """
     kind = next((one for one in KINDS if re.fullmatch(one.pattern, path)), None)
     base, numbers = vessel.parameters[path], vessel.parameters
-    length = vessel.document.get("particulars", {}).get("L_pp")
     if kind is None or base == 0:
         return -math.inf, math.inf
 
     def ratio(factor: float) -> float | None:
-        return kind.ratio(factor * base, numbers, length)
+        return kind.ratio(factor * base, numbers, vessel.length)
 
     one, far = ratio(1.0), ratio(FARTHEST)
     if one is None or far is None or one == far:
@@ -128,8 +127,7 @@ def outside(vessel: Vessel, values: Mapping[str, float]) -> set[str]:
 def _judged(vessel: Vessel, path: str, numbers: Mapping[str, float]) -> tuple[Kind, float] | None:
     """Kind of a number and its ratio; None where no range is known."""
     kind = next((one for one in KINDS if re.fullmatch(one.pattern, path)), None)
-    length = vessel.document.get("particulars", {}).get("L_pp")
-    ratio = kind.ratio(numbers[path], numbers, length) if kind is not None else None
+    ratio = kind.ratio(numbers[path], numbers, vessel.length) if kind is not None else None
     return None if kind is None or ratio is None else (kind, ratio)
 
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset
 from shipid.identification.collinearity import listed
 from shipid.physics.signals import steers
-from shipid.simulation.standard import length_of
 from shipid.units import DEGREE
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -41,7 +40,7 @@ class Reach:
         u, v, r = (np.asarray(columns[name], dtype=float) for name in ("u", "v", "r"))
         speed = np.hypot(u, v)
         moving = speed >= SLOW * np.quantile(speed, share)
-        length = length_of(vessel) or 1.0
+        length = vessel.length or 1.0
         helms = [np.abs(columns[name]) for name in dynamics(vessel).commands if steers(name)]
         return cls(
             float(np.quantile(np.abs(np.arctan2(v, np.abs(u)))[moving], share)) / DEGREE,

@@ -302,7 +302,7 @@ def _course(controls: Controls, n: Array) -> dict[str, Array]:
 
 def _length(vessel: Vessel) -> float:
     """Length between perpendiculars [m], of a ship without one a usual length."""
-    return float(vessel.document.get("particulars", {}).get("L_pp", LENGTH))
+    return vessel.length or LENGTH
 
 
 def _speed(controls: Controls, n: float) -> float:

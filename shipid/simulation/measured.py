@@ -19,7 +19,7 @@ from shipid.measures.spiral import Levels, levels, rate_levels
 from shipid.report.manoeuvre import ManoeuvreContent
 from shipid.simulation.approach import Controls, NotStraight
 from shipid.simulation.perform import perform
-from shipid.simulation.standard import Standard, length_of, standard
+from shipid.simulation.standard import Standard, standard
 from shipid.units import RPM
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
@@ -111,7 +111,7 @@ def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
     """The measures of one log."""
     columns = {str(column): frame[column].to_numpy() for column in frame if column != "run"}
     record = record_of(columns, Controls(vessel).helm)
-    measures, length = MEASURES[chosen.kind](record), length_of(vessel)
+    measures, length = MEASURES[chosen.kind](record), vessel.length
     judged = criterion_rows(criteria(chosen.kind, measures, length))
     return Measured(vessel, chosen, frame, record, measure_rows(measures, length), judged)
 

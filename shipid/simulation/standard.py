@@ -106,7 +106,7 @@ def standard(
     for option, value in (("--duration", duration), ("--step", step)):
         if value is not None and not 0 < number(option.strip("-"), value) < np.inf:
             raise ShipidError(f"{value:g} s must be positive and finite", path=option)
-    length = length_of(vessel)
+    length = vessel.length
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
     asked = service_speed(vessel) if speed is None else number("speed", speed)
@@ -128,12 +128,6 @@ def standard(
         remedy = f"at most {MOST_STEPS:.0e}: give a {'shorter duration' if step is None else 'longer step'}"
         raise ShipidError(f"{steps:.2g} steps of {interval / STEPS:g} s, {remedy}", path=option)
     return Standard(name, _title(name, manoeuvre), manoeuvre, float(asked), interval / STEPS, interval)
-
-
-def length_of(vessel: Vessel) -> float | None:
-    """Length between perpendiculars [m]; None if the document does not give it."""
-    length = vessel.document.get("particulars", {}).get("L_pp")
-    return None if length is None else float(length)
 
 
 def shaft_speed(controls: Controls, speed: float) -> float:

@@ -26,7 +26,7 @@ from shipid.hybrid.physics import assumed, check_columns
 from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
 from shipid.simulation.approach import Controls, service_speed
 from shipid.simulation.manoeuvre import order_keys
-from shipid.simulation.standard import length_of, shaft_speed
+from shipid.simulation.standard import shaft_speed
 from shipid.study.first_look import Look, first_look
 from shipid.study.plan import NO_MODEL, Plan, build_plan
 from shipid.study.prepare import all_windows, obtain, over_gaps, partition, prepare
@@ -128,7 +128,7 @@ def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -
 def proposed_horizon(vessel: Vessel, dataset: Dataset) -> tuple[float, float]:
     """Horizon and step [s] that a new study of a vessel and its runs would have."""
     seen = survey(dataset)
-    horizon, _ = horizon_of(length_of(vessel), seen.speed, seen.runs["duration"].tolist())
+    horizon, _ = horizon_of(vessel.length, seen.speed, seen.runs["duration"].tolist())
     step = step_of(horizon, seen.step)
     return max(round(horizon / step), 2) * step, step
 
@@ -160,17 +160,17 @@ def ladder(total: int, least: int = LEAST_RUNS) -> list[int]:
 def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: Path) -> Draft:
     seen = survey(dataset)
     first = next(iter(vessels.values()))
-    horizon, why = horizon_of(length_of(first), seen.speed, seen.runs["duration"].tolist())
+    horizon, why = horizon_of(first.length, seen.speed, seen.runs["duration"].tolist())
     step = step_of(horizon, seen.step)
     steps = max(round(horizon / step), 2)
     usable = _usable(dataset, steps, step, data)
-    method = _method(length_of(first), step, float(seen.runs.loc[usable, "duration"].median()) - horizon)
+    method = _method(first.length, step, float(seen.runs.loc[usable, "duration"].median()) - horizon)
     past = _past(method)
     held = _held(dataset, steps, step, past)
     if len(held) > LEAST_RUNS:
         usable = held
     else:
-        method = _method(length_of(first), step, 0.0)
+        method = _method(first.length, step, 0.0)
     runs = seen.runs.loc[usable]
     interval = max(step, seen.step, _round_up(float(runs["duration"].sum()) / MOST_WINDOWS))
     tests = typical_runs(runs)
@@ -474,7 +474,7 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         message = "one vessel makes the truth of a simulated study: give one, or --data with recorded runs"
         raise ShipidError(message, path="--vessel")
     (named, vessel), *_ = vessels.items()
-    length = length_of(vessel)
+    length = vessel.length
     if length is None:
         raise ShipidError("particulars.L_pp is missing: the manoeuvres are timed in ship lengths", file=vessel.file)
     service = service_speed(vessel)
@@ -547,7 +547,7 @@ def _truth(
     named: str, controls: Controls, service: float, rpm: float, horizon: float, step: float, past: float
 ) -> Iterator[Choice]:
     vessel = controls.vessel
-    length = length_of(vessel) or 0.0
+    length = vessel.length or 0.0
     fine = min(_round_down(length / service / STEPS_A_LENGTH), step / 10)
     yield Choice("truth.vessel", named)
     yield Choice("truth.manoeuvres", MANOEUVRES, f"{MANOEUVRES - TESTS} for training, {TESTS} for the test")

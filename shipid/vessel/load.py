@@ -74,6 +74,12 @@ class Vessel:
         return Path(self.file).stem
 
     @property
+    def length(self) -> float | None:
+        """Length between perpendiculars [m]; None if the document does not give it."""
+        length = self.document.get("particulars", {}).get("L_pp")
+        return None if length is None else float(length)
+
+    @property
     def axes(self) -> tuple[int, ...]:
         """Rows of the six degrees of freedom that this vessel moves in."""
         return DOFS[self.document["dof"]]
