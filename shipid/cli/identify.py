@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +11,7 @@ import typer
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import files
 from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
-from shipid.cli.terminal import digits, iterations, steps, table
+from shipid.cli.terminal import digits, ended_by, iterations, steps, table
 from shipid.errors import ShipidError
 from shipid.units import plural
 
@@ -126,15 +125,11 @@ def identify(
             how |= {} if folds is None else {"folds": folds}
             _compare(ship, log, declared, structures, how, band, file, html, dataset, answer)
             return
-        try:
-            with iterations() as progress:
-                outcome = run_identification(
-                    ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or (),
-                    programme=design, band=band, progress=progress,
-                )  # fmt: skip
-        except KeyboardInterrupt:
-            sys.stderr.write("interrupted: nothing was written\n")
-            sys.exit(130)
+        with ended_by(), iterations() as progress:
+            outcome = run_identification(
+                ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or (),
+                programme=design, band=band, progress=progress,
+            )  # fmt: skip
         _show_identified(outcome, answer)
         write_patch(outcome, file)
         count = len(outcome.solution.values)
@@ -168,14 +163,8 @@ def _compare(
     from shipid.study.structures import LEVEL, compare_structures, structures_content, write_chosen
 
     names = [PRESENT, *STRUCTURES] if structures == "all" else [name.strip() for name in structures.split(",")]
-    try:
-        with steps() as say:
-            compared = compare_structures(
-                ship, log, declared, names, level=LEVEL if band is None else band, say=say, **how
-            )
-    except KeyboardInterrupt:
-        sys.stderr.write("interrupted: nothing was written\n")
-        sys.exit(130)
+    with ended_by(), steps() as say:
+        compared = compare_structures(ship, log, declared, names, level=LEVEL if band is None else band, say=say, **how)
     _show_structures(compared, answer)
     written = write_chosen(compared, file)
     answer.say(f"vessel with the structure {compared.chosen} -> {written}", chosen=compared.chosen, file=written)

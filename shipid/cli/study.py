@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
@@ -14,7 +13,7 @@ from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import bundled_or_file, files
 from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyName, Workers, parsed, stem
 from shipid.cli.outputs import check_output
-from shipid.cli.terminal import counted, digits, draw, short, show_reasons, steps, table
+from shipid.cli.terminal import counted, digits, draw, ended_by, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
 from shipid.units import length_text
 
@@ -470,13 +469,10 @@ def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, d
     from shipid.study.progress import Watch
 
     resume = f"{plan.program} study resume {as_argument(folder)}"
-    try:
+    with ended_by(f"interrupted; what is finished is kept. Continue with: {resume}"):
         events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, leave=leave)
         with closing(events):  # where a line cannot be printed, claims are given back before the process ends
             end = draw(events, Watch(plan, folder))
-    except KeyboardInterrupt:
-        sys.stderr.write(f"interrupted; what is finished is kept. Continue with: {resume}\n")
-        sys.exit(130)
     if end is not None and end.done < end.total:
         left = f"{end.total - end.done} of {end.total} cells"
         typer.echo(f"others work on the last {left}: the one that ends last writes the report. If they die: {resume}")

@@ -135,9 +135,20 @@ def criterion_table(rows: Iterable[Any], first: list[str]) -> Table:
     return table([*first, "IMO MSC.137(76)", "value", "limit", "unit", "verdict", "note"], body)
 
 
-def counted(
-    blocks: Iterable[Any], total: int, what: str = "members", interrupted: str = "interrupted: nothing was written"
-) -> Iterator[Any]:
+NOTHING = "interrupted: nothing was written"
+
+
+@contextmanager
+def ended_by(interrupted: str = NOTHING) -> Iterator[None]:
+    """Answer Ctrl-C with a sentence on standard error, and end with 130."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        sys.stderr.write(f"{interrupted}\n")
+        sys.exit(130)
+
+
+def counted(blocks: Iterable[Any], total: int, what: str = "members", interrupted: str = NOTHING) -> Iterator[Any]:
     """Yield the blocks of rows unchanged; show how many of `total` rows are there, as a bar or, elsewhere, as lines.
 
     interrupted : what Ctrl-C is answered with.
@@ -147,7 +158,7 @@ def counted(
 
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
-    try:
+    with ended_by(interrupted):
         if not console.is_terminal:
             yield from _said(blocks, total, what)
             return
@@ -156,9 +167,6 @@ def counted(
             for block in blocks:
                 progress.advance(task, len(block))
                 yield block
-    except KeyboardInterrupt:
-        sys.stderr.write(f"{interrupted}\n")
-        sys.exit(130)
 
 
 def _said(blocks: Iterable[Any], total: int, what: str) -> Iterator[Any]:
