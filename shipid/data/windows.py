@@ -243,14 +243,12 @@ def cut_windows(
         if len(instants):
             grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], t[-1])  # (T + 1, S)
             values = sample(rows, grid)
-            north, east = travelled(rows, grid) if path == "velocity" else (values["north"], values["east"])
-            x, y = to_frame(north, east, north[0], east[0], values["psi"][0])
             parts.append(
                 Windows(
                     run=np.full(len(instants), run),
                     t=instants,
                     columns={name: column[0] for name, column in values.items()},
-                    future=np.stack([x, y], axis=-1)[1:],
+                    future=true_path(rows, grid, values, path)[1:],
                     planned=in_force(rows, instants + step * np.arange(horizon + 1)[:, None]),
                     horizon=horizon,
                     step=step,
@@ -289,19 +287,26 @@ def past_of(rows: pd.DataFrame, instants: Array, past: int, step: float, path: P
     grid = np.concatenate([instants - step * np.arange(past, 0, -1)[:, None], instants[None]])  # (P + 1, S)
     grid = np.clip(grid, t[0], t[-1])
     values = sample(rows, grid)
-    north, east = travelled(rows, grid) if path == "velocity" else (values["north"], values["east"])
-    x, y = to_frame(north[:-1], east[:-1], north[-1], east[-1], values["psi"][-1])
+    before = true_path(rows, grid, values, path, origin=-1)[:-1]
     kept = {name: column[:-1] for name, column in values.items() if name not in ("flags", "north", "east")}
-    return {**kept, "x": x, "y": y}
+    return {**kept, "x": before[..., 0], "y": before[..., 1]}
 
 
 def future_of(rows: pd.DataFrame, instants: Array, horizon: int, step: float, path: PathSource) -> Array:
     """True paths (T, S, 2) [m] in the frame (11) after instants (S,) [s] of one unbroken stretch that holds them."""
     grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], rows["t"].to_numpy()[-1])
-    values = sample(rows, grid)
-    north, east = travelled(rows, grid) if path == "velocity" else (values["north"], values["east"])
-    x, y = to_frame(north, east, north[0], east[0], values["psi"][0])
-    return np.stack([x, y], axis=-1)[1:]
+    return true_path(rows, grid, sample(rows, grid), path)[1:]
+
+
+def true_path(
+    rows: pd.DataFrame, instants: Array, values: Mapping[str, Array], path: PathSource, origin: int = 0
+) -> Array:
+    """True positions (T, ..., 2) [m] at instants (T, ...) [s] of one unbroken stretch, in the frame (11) of the first.
+
+    values : what `sample` gives at the instants. origin : index of another instant to take the frame of.
+    """
+    north, east = travelled(rows, instants) if path == "velocity" else (values["north"], values["east"])
+    return np.stack(to_frame(north, east, north[origin], east[origin], values["psi"][origin]), axis=-1)
 
 
 def travelled(rows: pd.DataFrame, instants: Array) -> tuple[Array, Array]:

@@ -17,8 +17,7 @@ from shipid.data.windows import (
     from_frame,
     gaps_in_words,
     past_of,
-    to_frame,
-    travelled,
+    true_path,
     without_rows,
 )
 from shipid.errors import DataError
@@ -207,7 +206,8 @@ def _judged(
     there = (later <= t[-1] + clock_slack(t)) & ~without_rows(t, later, physics.step)
     missed = np.full((physics.horizon, 2), np.nan)
     if there.any():
-        missed[there] = true_path(rows, i, later[there], physics.path) - predicted[there]
+        shown = np.append(t[i], later[there])
+        missed[there] = true_path(rows, shown, sample(rows, shown), physics.path)[1:] - predicted[there]
     error, reach = np.hypot(*missed.T), np.nan
     if region is not None:
         course = np.arctan2(region.ahead[:, 0, 1], region.ahead[:, 0, 0]) + origin[2]
@@ -215,18 +215,6 @@ def _judged(
         table["band_course"] = np.mod(course, 2 * np.pi)
         reach = float(region.reach(missed[:, None]).max())
     return pd.DataFrame({**table, "error": error}), float(error[-1]), reach
-
-
-def true_path(rows: pd.DataFrame, i: int, later: Array, path: str) -> Array:
-    """True positions (T, 2) [m] in body axes at row i, at later times [s]."""
-    if path == "velocity":
-        north, east = travelled(rows, np.append(rows["t"].to_numpy()[i], later))
-        north, east = north[1:] - north[0], east[1:] - east[0]
-    else:
-        sampled = sample(rows, later)
-        north, east = (sampled[name] - float(rows[name].iloc[i]) for name in ("north", "east"))
-    x, y = to_frame(north, east, 0.0, 0.0, float(rows["psi"].iloc[i]))
-    return np.stack([x, y], axis=1)
 
 
 def write(played: Played, file: Path) -> None:
