@@ -19,7 +19,7 @@ from shipid.study.evidence import Contrasts, contrasts
 from shipid.study.plan import NO_MODEL, Plan
 from shipid.study.results import Results, judged_cells, naive_summary
 from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, span, too_few
-from shipid.study.worth import FEWEST_MODELS, Estimate, break_even, runs_without_physics
+from shipid.study.worth import Estimate, break_even, runs_without_physics
 from shipid.units import plural
 
 MANY = 3  # methods that learn: their comparison is what the study asks
@@ -215,7 +215,7 @@ def _good_enough(case: Case) -> str:
         models = _any(len(case.at(case.largest)))
         return f"How good must the physics be? With {amounts} runs the test cannot tell {models} from no physics."
     for amount, sides in every.items():
-        limit = break_even(case.table, case.fixed, case.place(amount))
+        limit = _limit_of_A(case, amount, sides)
         if not sides.better and not sides.worse:
             parts.append(f"the test cannot tell {_any(len(sides.open))} from no physics")
         elif limit is None:
@@ -230,8 +230,19 @@ def _good_enough(case: Case) -> str:
     return f"{begins}{each[0].upper()}{each[1:]}."
 
 
+def _limit_of_A(case: Case, amount: int, sides: Sides) -> Estimate | None:
+    """Up to which error A physics pays; None where too few models are known, or A does not divide them.
+
+    A line that says that all models pay, or none, is wrong where a model is shown to do the opposite.
+    """
+    limit = break_even(case.table, case.fixed, case.place(amount))
+    if limit is None or (limit.above and sides.worse) or (limit.below and sides.better):
+        return None
+    return limit
+
+
 def _uncrossed(case: Case, sides: Sides) -> str:
-    """What is known at an amount where too few models are known for a limit of A: who pays, up to which A."""
+    """What is known at an amount without a limit of A: who pays, up to which A."""
     worst = max((case.table.mean(model, ALONE) for model in case.fixed), default=0.0)
     paying = not sides.worse and not sides.open and worst > 0
     return _counted(sides, "no physics") + (f", even with an error A of {metres(worst)}" if paying else "")
@@ -343,10 +354,12 @@ def _physics_or_none(case: Case, judged: bool) -> list[str]:
         where = runs(case.largest)
         return [f"There is no result without physics in every cell, so it is unknown whether physics harms at {where}."]
     every = {amount: _against_none(case, amount) for amount in dict.fromkeys((case.smallest, case.largest))}
-    if len(case.fixed) < FEWEST_MODELS:
-        return []  # no limit of A is known, so the first sentence names them
     decided = {amount: sides for amount, sides in every.items() if sides.better or sides.worse}
-    return [f"At {runs(amount)} {_counted(sides, 'no physics')}." for amount, sides in decided.items()]
+    return [
+        f"At {runs(amount)} {_counted(sides, 'no physics')}."
+        for amount, sides in decided.items()
+        if _limit_of_A(case, amount, sides) is not None  # else the first sentence names them
+    ]
 
 
 def _counted(sides: Sides, rival: str) -> str:

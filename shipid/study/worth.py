@@ -66,7 +66,7 @@ def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate
     """Accuracy A [m] at which compensated physics is as good as none, at the amount of this place.
 
     A line ln H over ln A is fitted to the models by least squares, and crosses H of `none`; values beyond the models
-    that were tried are bounds. None with fewer than four models.
+    that were tried are bounds. None with fewer than four models, or where all have the same A.
     """
     if len(models) < FEWEST_MODELS:
         return None
@@ -80,6 +80,8 @@ def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate
     means, drawn = values @ table.weights, _trained(resampled_means(values, table.counts), noise)
     A = means[0, :-1]
     limits = float(A.min()), float(A.max())
+    if np.isclose(*limits):
+        return None
     return _estimate(_crossing(means[None], limits), _crossing(drawn, limits), table.runs, limits)
 
 

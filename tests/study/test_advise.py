@@ -156,6 +156,28 @@ def test_how_good_physics_must_be(made: Any) -> None:
     assert "With 10 runs physics does not pay even with an error A of 1.00 m, the best tried" in advice
 
 
+def test_no_limit_of_A_where_better_physics_does_worse(made: Any) -> None:
+    """The better the physics, the worse it predicts with data: no A divides what pays from what harms."""
+    alone = {f"m{k}": 2.0**k for k in range(5)}
+    H = {name: (10.0 / A, 10.0 / A) for name, A in alone.items()} | {"none": (3.0, 3.0)}
+    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
+    assert "physics pays" not in advice
+    sides = "3 of 5 physics models do better than no physics; m0, m1 do worse"
+    assert advice.startswith(f"With 10 or 30 runs {sides}.\n")
+    assert advice.count(sides) == 1
+    H = {name: (10.0 / A, 10.0 / A) for name, A in alone.items()} | {"none": (1.0, 1.0)}
+    assert "physics does not pay" not in text(made(grid(H), alone=alone, claims=None, runs=8))
+
+
+def test_no_limit_of_A_where_all_models_have_the_same(made: Any) -> None:
+    alone = {f"m{k}": 2.0 for k in range(5)}
+    H = {name: (1.0 + 0.1 * k, 1.0) for k, name in enumerate(alone)} | {"none": (3.0, 3.0)}
+    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
+    assert "worst tried" not in advice
+    every = "every physics model with a result does better than no physics, even with an error A of 2.00 m"
+    assert advice.startswith(f"With 10 or 30 runs {every}.")
+
+
 def test_an_interval_of_everything_is_no_bound() -> None:
     """A value at one end of what the study covers, with an interval that reaches to the other."""
     assert _limit(Estimate(9.0, 2.0, 9.0, (2.0, 9.0))).endswith("9.00 m, the worst tried [under 2.0, over 9.0]")
