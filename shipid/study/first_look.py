@@ -147,7 +147,8 @@ class Look:
     @property
     def wrong(self) -> bool:
         """Whether the vessel should not be used as it is."""
-        return bool(self.changes) or self.current is not None or self.timely >= self.constant
+        explained = bool(self.changes) or self.current is not None
+        return explained or bool(self.facts) or self.timely >= self.constant
 
     @property
     def values(self) -> dict[str, float]:
@@ -168,9 +169,11 @@ class Look:
             causes.append((stream, self.current.error))
         causes += [(_shown(self.vessel, one), one.error) for one in self.changes]
         if not causes:
-            if self.alone < self.constant:
-                return f"{self.vessel.name} and the log agree, and no single number would explain the rest: {seen}"
-            return f"{self.vessel.name} is worse than constant u, v, r, and no single number explains it: {seen}"
+            if self.alone >= self.constant:
+                return f"{self.vessel.name} is worse than constant u, v, r, and no single number explains it: {seen}"
+            if self.facts:
+                return f"{self.vessel.name} and the log differ, and no single number explains it: {seen}"
+            return f"{self.vessel.name} and the log agree, and no single number would explain the rest: {seen}"
         (first, error), *others = causes
         explained = (
             f"{first}{', which' * (self.late is not None)} would explain {self._part(error)} of it ({error:.3g} m)"

@@ -82,6 +82,20 @@ def test_a_rudder_of_the_other_sign_is_reported(log: Dataset) -> None:
     assert view.wrong
 
 
+def test_a_wrong_sign_is_no_agreement_where_constant_motion_is_worse() -> None:
+    """From rest the speed counts more than a little turning: constant motion is worse than the wrong vessel."""
+    ship = load_vessel("gunnerus-28.9")
+    how = {"n_rpm": 150.0, "approach": "rest", "angle_deg": 5.0, "execute_at": 50.0, "duration": 100.0}
+    kinds = [TurningCircle(name=side, side=side, **how) for side in ("port", "starboard")]
+    frame = perform(ship, kinds, step=0.1, interval=1.0)
+    frame = frame[[name for name in frame if not str(name).startswith("actual.")]]
+    angles = {name: -frame[name] for name in ("port.alpha", "starboard.alpha")}
+    view = look(ship, Dataset(frame.assign(**angles).astype({"run": "str"}), {"clock": "run", "flags": []}))
+    assert view.alone < view.constant
+    assert "the log differ, and no single number explains it: the vessel turns the other way" in view.sentence
+    assert view.wrong
+
+
 def test_a_current_that_nobody_measured_is_found_and_no_number_is_blamed() -> None:
     truth = load_vessel(SHIP).with_values({"current.kind": "uniform"})
     kinds: list[Zigzag | TurningCircle] = [
