@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Mapping as PlainMapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,12 +34,15 @@ from shipid.logs.mapping import (
     Column,
     FileClock,
     Mapping,
+    Named,
     Parts,
     Segment,
     Source,
     clock_seconds,
+    degrees_in_parts,
     degrees_of,
     is_dated,
+    names_of,
     read_mapping,
     to_si,
 )
@@ -48,6 +51,7 @@ from shipid.logs.readers import (
     Progress,
     TableFormat,
     TextFormat,
+    date_texts,
     dated,
     hour_twice,
     moment_of,
@@ -55,6 +59,7 @@ from shipid.logs.readers import (
     require_file,
     seconds,
     span_of,
+    time_texts,
 )
 from shipid.logs.repairs import (
     FLAGS,
@@ -207,12 +212,12 @@ def _tables(
     mapping: Mapping, logs: PlainMapping[str, Path], progress: Progress | None
 ) -> Iterator[tuple[str, Path, pd.DataFrame]]:
     """Yield name, file and rows of each log; those of each run separately where the clock begins again with a run."""
-    here = {column.source for column in mapping.columns.values() if not column.file}
-    here |= {mapping.clock.date} if mapping.clock.date is not None else set()
+    here = {name for column in mapping.columns.values() if not column.file for name in names_of(column.source)}
+    here |= {*mapping.clock.sources}
     here |= {mapping.parts.source} if mapping.parts is not None and mapping.parts.source is not None else set()
     whole_rows = mapping.clock.repeated == "drop" and mapping.clock.every is not None  # compared in all columns
     for run, file in logs.items():
-        log = read_table(file, mapping.format, mapping.clock.source, () if whole_rows else here, progress)
+        log = read_table(file, mapping.format, mapping.clock.sources[0], () if whole_rows else here, progress)
         first = 0
         for end in [*_restarts(log, mapping, file), len(log)]:
             part = log.iloc[first:end].reset_index(drop=True) if first or end < len(log) else log
@@ -313,26 +318,31 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
     files = {"": (log, t, mapping.format, file)}
     for name, entry in mapping.file.items():
         other = file.parent / entry.path
-        table = read_table(other, entry.format, entry.clock.source)
+        table = read_table(other, entry.format, entry.clock.sources[0])
         times = _instants(table, entry.clock, entry.format, other, f"file.{name}.clock")
         files[name] = (table, times, entry.format, other)
         records += _passed_over(table)
     channels: dict[str, Channel] = {}
     for name, column in mapping.columns.items():
         table, _, _, other = files[column.file or ""]
-        _column(table, column.source, other, f"columns.{name}.from")
-    uses = Counter((column.file or "", column.source) for column in mapping.columns.values())
+        for source in names_of(column.source):
+            _column(table, source, other, f"columns.{name}.from")
+    uses = Counter((one.file or "", source) for one in mapping.columns.values() for source in names_of(one.source))
     for name, column in mapping.columns.items():
         table, times, form, other = files[column.file or ""]
-        numbers = _numbers(table, column.source, form, other, f"columns.{name}.from")
+        parts = [_numbers(table, one, form, other, f"columns.{name}.from") for one in names_of(column.source)]
+        numbers = parts[0]
         if column.unit == "ddmm":
             numbers = _of_minutes(numbers, other, f"columns.{name}.unit")
+        if len(parts) > 1:
+            numbers = _of_parts(parts, names_of(column.source), other, f"columns.{name}.from")
         unit = to_si(column.unit, name)
         factor = column.sign * column.factor * unit
         values = numbers * factor if factor != 1.0 else numbers
-        uses[column.file or "", column.source] -= 1
-        if not uses[column.file or "", column.source]:
-            table.pop(column.source)  # of a large log there is room for one copy only
+        for source in names_of(column.source):
+            uses[column.file or "", source] -= 1
+            if not uses[column.file or "", source]:
+                table.pop(source)  # of a large log there is room for one copy only
         values = values + column.offset * unit if column.offset else values
         channels[name] = (times - column.latency if column.latency else times, values)
     read = len(log)
@@ -361,6 +371,18 @@ def _of_minutes(numbers: NDArray[np.float64], file: Path, path: str) -> NDArray[
         row = int(np.argmax(wrong))
         message = f"{numbers[row]:.10g} in row {row + 1} has 60 minutes or more: is the unit deg?"
         raise DataError(message, file=file, path=path)
+    return degrees
+
+
+def _of_parts(parts: list[NDArray[np.float64]], names: tuple[str, ...], file: Path, path: str) -> NDArray[np.float64]:
+    """Degrees, minutes and seconds (N,), of columns of these names, as degrees."""
+    degrees = degrees_in_parts(parts)
+    for name, part in zip(names[1:], parts[1:], strict=True):
+        wrong = np.abs(part) >= 60.0
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            message = f"{name!r} is {part[row]:.10g} in row {row + 1}, 60 or more: are these minutes or seconds?"
+            raise DataError(message, file=file, path=path)
     return degrees
 
 
@@ -414,9 +436,26 @@ def repeated_rows(table: pd.DataFrame) -> NDArray[np.bool_]:
 def _times(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
     """The column of time [s] as it is written, not a number where it is missing."""
     if clock.unit == "date":
-        times = _column(log, clock.source, file, f"{path}.from")
-        return seconds(times if clock.date is None else dated(_column(log, clock.date, file, f"{path}.date"), times))
+        times = _as_text(log, clock.source, time_texts, form, file, f"{path}.from")
+        if clock.date is None:
+            return seconds(times)
+        return seconds(dated(_as_text(log, clock.date, date_texts, form, file, f"{path}.date"), times))
+    assert isinstance(clock.source, str)
     return clock_seconds(_numbers(log, clock.source, form, file, f"{path}.from"), clock.unit)
+
+
+def _as_text(
+    log: pd.DataFrame,
+    source: Named,
+    write: Callable[[list[Array]], pd.Series[Any]],
+    form: Format,
+    file: Path,
+    path: str,
+) -> pd.Series[Any]:
+    """The column of dates or times, or those of its parts as one."""
+    if isinstance(source, str):
+        return _column(log, source, file, path)
+    return write([_numbers(log, name, form, file, path) for name in source])
 
 
 def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
@@ -444,11 +483,15 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
 
 def _unread(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path, path: str) -> str:
     """Say what is wrong with the time of a row: nothing is there, or a text that is no date."""
-    places = {"from": clock.source, "date": clock.date} if clock.date is not None else {"from": clock.source}
-    cells = {key: _column(log, source, file, f"{path}.{key}").iloc[row] for key, source in places.items()}
-    if any(pd.isna(cell) or not str(cell).strip() for cell in cells.values()):
+    times, days = names_of(clock.source), names_of(clock.date) if clock.date is not None else ()
+    places = [*((name, f"{path}.date") for name in days), *((name, f"{path}.from") for name in times)]
+    cells = [_column(log, name, file, place).iloc[row] for name, place in places]
+    if any(pd.isna(cell) or not str(cell).strip() for cell in cells):
         return "no time here: remove the row"
-    text = " ".join(str(cell).strip() for cell in reversed(cells.values()))
+    text = " ".join(str(cell).strip() for cell in cells)
+    if len(times) > 1 or len(days) > 1:
+        said = " and ".join(filter(None, (", ".join(map(repr, days)), ", ".join(map(repr, times)))))
+        return f"{text!r} is no date or time of day, as {said} have to say: correct it, or list them in their order"
     if clock.unit != "date":
         return f"{text} is no time of day, hours, minutes and seconds as in 123005.5: correct it, or write another unit"
     if np.isfinite(seconds(pd.Series([text]))[0]):
@@ -619,7 +662,8 @@ def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str
             "thousands? Take it out of the log. Is it the decimal of this column? Write a comma there"
         )
         raise DataError(message, file=file, path=f"row {grouped + 1}")
-    numbers = pd.to_numeric(plain.mask(missing), errors="coerce").to_numpy(dtype=np.float64, copy=True)
+    signed = plain.mask(missing).replace("-0", "-0.0")  # degrees before minutes: a whole number has no such sign
+    numbers = pd.to_numeric(signed, errors="coerce").to_numpy(dtype=np.float64, copy=True)
     bad = np.flatnonzero(~np.isfinite(numbers) & ~missing.to_numpy())
     if len(bad):
         message = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,16 @@ from shipid.units import DEGREE, KNOT, MINUTE, RPM
 
 UNITS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": MINUTE, "h": 3600.0, "d": DAY}
-    | {"date": 1.0, "datenum": 1.0, "excel": 1.0, "hhmmss": 1.0, "s of day": 1.0, "s of week": 1.0},
+    | {
+        "date": 1.0,
+        "datenum": 1.0,
+        "excel": 1.0,
+        "mjd": 1.0,
+        "jd": 1.0,
+        "hhmmss": 1.0,
+        "s of day": 1.0,
+        "s of week": 1.0,
+    },
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
     "rad": {"rad": 1.0, "deg": DEGREE, "ddmm": DEGREE},
@@ -44,11 +53,12 @@ UNITS: dict[str, dict[str, float]] = {
 """SI unit -> unit a log may use -> factor to SI (knot and nautical mile: BIPM, SI Brochure, 9th ed., table 8;
 mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 
-`date`, `datenum` and `excel` are read as seconds since 1970 (UTC), and so are the times of segments and breaks;
-`hhmmss` as seconds since the first midnight. `ddmm`, of latitude and longitude only, are degrees and minutes.
+`date`, `datenum`, `excel`, `mjd` and `jd` are read as seconds since 1970 (UTC), and so are the times of segments and
+breaks; `hhmmss` as seconds since the first midnight. `ddmm`, of latitude and longitude only, are degrees and minutes.
 """
-EPOCHS = {"datenum": 719529.0, "excel": 25569.0}
-"""Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system)."""
+EPOCHS = {"datenum": 719529.0, "excel": 25569.0, "mjd": 40587.0, "jd": 2440587.5}
+"""Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system; Julian dates, modified
+or not: IAU resolution B1 of 1997)."""
 AGAIN = {"s of day": DAY, "s of week": 7 * DAY}
 """Unit of a clock in seconds that begins again -> after how many seconds."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
@@ -65,6 +75,15 @@ Manoeuvre = Literal[
     "random",
     "manoeuvring at low speed",
 ]
+
+
+Named = str | Annotated[tuple[str, ...], Field(min_length=2, max_length=3)]
+"""A column of the log, or two or three that say one value in parts: degrees and minutes; hour, minute and second."""
+
+
+def names_of(source: Named) -> tuple[str, ...]:
+    """Return the names of the columns of the log that say a value."""
+    return (source,) if isinstance(source, str) else tuple(source)
 
 
 class Source(Strict):
@@ -86,29 +105,38 @@ class Source(Strict):
     licence: str | None = None
 
 
-class Clock(Strict):
-    """The column of time; gaps up to `max_gap` [s] are interpolated, longer ones break the run.
+class TimeColumn(Strict):
+    """The column of time of a file, or two or three of hour, minute and second; beside times of day the date.
 
-    `date` is the column of dates beside times of day, with the unit "date". With `step` [s] the rows of the dataset are
-    that far apart, and every column is interpolated at their instants. With `every` [s] the rows of the log are that
-    far apart, and its column of time is only their rounded time.
+    `date` is a column of dates, or two or three of year, month and day, or of year and day of the year. The unit is
+    "date" then, and where the time is in parts.
     """
 
-    source: str = Field(alias="from")
+    source: Named = Field(alias="from")
     unit: str = "s"
-    date: str | None = None
+    date: Named | None = None
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of all columns of the log that say the time."""
+        return (*names_of(self.source), *(names_of(self.date) if self.date is not None else ()))
+
+
+class Clock(TimeColumn):
+    """The column of time; gaps up to `max_gap` [s] are interpolated, longer ones break the run.
+
+    With `step` [s] the rows of the dataset are that far apart, and every column is interpolated at their instants. With
+    `every` [s] the rows of the log are that far apart, and its column of time is only their rounded time.
+    """
+
     max_gap: float | None = Field(default=None, gt=0)
     step: float | None = Field(default=None, gt=0)
     every: float | None = Field(default=None, gt=0)
     repeated: Literal["refuse", "drop"] = "refuse"
 
 
-class FileClock(Strict):
+class FileClock(TimeColumn):
     """The column of time of a further file."""
-
-    source: str = Field(alias="from")
-    unit: str = "s"
-    date: str | None = None
 
 
 class File(Strict):
@@ -129,10 +157,11 @@ class Origin(Strict):
 class Column(Strict):
     """One column of the dataset: value = sign * factor * (source column) + offset, in `unit`, then turned as declared.
 
-    Its samples are of `latency` [s] before their time stamp; `interpolation` is the rule between samples.
+    The source of a latitude or longitude may be two or three columns: degrees, minutes and seconds. Its samples are of
+    `latency` [s] before their time stamp; `interpolation` is the rule between samples.
     """
 
-    source: str = Field(alias="from")
+    source: Named = Field(alias="from")
     unit: str
     file: str | None = None
     factor: float = 1.0
@@ -252,7 +281,7 @@ def to_si(unit: str, name: str) -> float:
 
 
 def clock_seconds(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
-    """Numbers (N,) of a clock in one of its units as seconds; days of MATLAB and Excel as seconds since 1970."""
+    """Numbers (N,) of a clock in one of its units as seconds; days of a calendar as seconds since 1970."""
     if unit == "hhmmss":
         return since_midnight(values)
     if unit in AGAIN:
@@ -276,6 +305,17 @@ def degrees_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
     size = np.abs(values)
     degrees = size // 100 + np.where(size % 100 < 60, size % 100, np.nan) / 60.0
     return np.asarray(np.copysign(degrees, values), dtype=np.float64)
+
+
+def degrees_in_parts(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Degrees, minutes and, if there are three, seconds (N,) in degrees; NaN where there are 60 of them or more.
+
+    The sign of one is that of all: -33 deg 18 min, and -0 deg 18 min.
+    """
+    degrees = np.abs(parts[0])
+    for part, share in zip(parts[1:], (60.0, 3600.0), strict=False):
+        degrees = degrees + np.where(np.abs(part) < 60.0, np.abs(part), np.nan) / share
+    return np.asarray(np.where(np.any(np.signbit(parts), axis=0), -degrees, degrees), dtype=np.float64)
 
 
 def is_dated(unit: str) -> bool:
@@ -335,6 +375,9 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
         if column.unit == "ddmm" and name not in ("latitude", "longitude"):
             message = "only latitude and longitude are in degrees and minutes: write deg or rad"
             raise DocumentError(message, file=file, path=f"{path}.unit")
+        if not isinstance(column.source, str) and (name not in ("latitude", "longitude") or column.unit != "deg"):
+            message = "only a latitude or longitude in deg is written in degrees, minutes and seconds: name one column"
+            raise DocumentError(message, file=file, path=f"{path}.from")
         if (column.direction is None) == (name == "beta_w"):
             message = "must be 'towards' or 'from' for beta_w, and belongs to no other column"
             raise DocumentError(message, file=file, path=f"{path}.direction")
@@ -423,6 +466,9 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
                 f"a column of dates is used only with the unit 'date', not with {clock.unit!r}: write unit = 'date'"
             )
             raise DocumentError(message, file=file, path=f"{path}.date")
+        if not isinstance(clock.source, str) and clock.unit != "date":
+            message = "hour, minute and second in several columns are a time of day: write unit = 'date'"
+            raise DocumentError(message, file=file, path=f"{path}.unit")
     if mapping.resamples and mapping.clock.max_gap is None:
         message = "missing: columns are interpolated at other instants, so set the longest gap"
         raise DocumentError(message, file=file, path="clock.max_gap")

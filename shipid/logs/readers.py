@@ -22,6 +22,7 @@ import numpy as np
 import pandas as pd
 import pyarrow
 import pyarrow.parquet
+from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from shipid.data.dataset import DATED, Array
@@ -284,6 +285,42 @@ def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
     """Return dates and times of day, of two columns (N,) of text, as one column of text for `seconds`."""
     text = dates.astype("string").str.strip() + " " + times.astype("string").str.strip().str.replace(",", ".")
     return text.astype(object)
+
+
+def date_texts(parts: list[Array]) -> pd.Series[Any]:
+    """Return year, month and day, or year and day of the year (N,), as text for `dated`; None where there is no such.
+
+    Years of two digits are of 1969 to 2068, as everywhere in Python.
+    """
+    year, last = parts[0], 31 if len(parts) == 3 else 366
+    year = np.where((year >= 0) & (year < 100), year + np.where(year < 69, 2000, 1900), year)
+    limits = [(1900, 9999), *([(1, 12)] if len(parts) == 3 else []), (1, last)]
+    form = "{:.0f}-{:02.0f}-{:02.0f}" if len(parts) == 3 else "{:.0f}-{:03.0f}"
+    known = _all_whole([year, *parts[1:]], limits)
+    cells = zip(*(part.tolist() for part in (year, *parts[1:])), strict=True)
+    return pd.Series(
+        [form.format(*cell) if one else None for one, cell in zip(known, cells, strict=True)], dtype=object
+    )
+
+
+def time_texts(parts: list[Array]) -> pd.Series[Any]:
+    """Return hour, minute and, if there is a third, second (N,), as text for `seconds`; None where there is no such."""
+    hour, minute, *rest = parts
+    second = rest[0] if rest else np.zeros(len(hour))
+    known = _all_whole([hour, minute, np.floor(second)], [(0, 23), (0, 59), (0, 60)])
+    micros = np.round(1e6 * (3600.0 * hour + 60.0 * minute + second)[known]).astype(np.int64)
+    texts = pd.Series([None] * len(hour), dtype=object)
+    whole = micros // 1_000_000
+    numbers = zip(whole // 3600, whole // 60 % 60, whole % 60, micros % 1_000_000, strict=True)
+    texts[known] = ["{:02d}:{:02d}:{:02d}.{:06d}".format(*one) for one in numbers]
+    return texts
+
+
+def _all_whole(parts: list[Array], limits: list[tuple[int, int]]) -> NDArray[np.bool_]:
+    """Whether all parts (N,) are whole numbers from the first to the second of their limits."""
+    pairs = zip(parts, limits, strict=True)
+    inside = [(part >= low) & (part <= high) & (part % 1 == 0) for part, (low, high) in pairs]
+    return np.asarray(np.all(inside, axis=0), dtype=np.bool_)
 
 
 def _since_1970(moments: pd.Series[Any]) -> Array:

@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset, flag_bit, pieces, read_dataset, write_dataset
-from shipid.errors import DataError
+from shipid.errors import DataError, DocumentError
 from shipid.logs import readers
 from shipid.logs.importing import _unwrap, even_clock, evenly, import_log, read_mapping, rounding_of, runs_of
 from shipid.logs.mapping import Source
@@ -509,3 +510,89 @@ def test_a_point_that_may_mark_thousands_is_refused_beside_a_decimal_comma(
     )
     shaft = import_log(read_mapping(mapping), tmp_path / "log.csv").frame["propeller.n"]
     np.testing.assert_allclose(60 * shaft, 0.001 * np.arange(len(log)), atol=1e-9)
+
+
+PARTED = """
+name = "parts"
+[clock]
+from = ["h", "min", "s"]
+date = ["year", "month", "day"]
+unit = "date"
+[columns.latitude]
+from = ["lat", "lat min", "lat s"]
+unit = "deg"
+[columns.longitude]
+from = ["lon", "lon min"]
+unit = "deg"
+[columns.psi]
+from = "psi"
+unit = "rad"
+[estimate]
+position = 1.0
+heading_deg = 1.0
+acceleration = 0.1
+angular_acceleration_deg = 1.0
+"""
+
+
+def parted(side: float = 1.0) -> pd.DataFrame:
+    """Five seconds over a midnight in columns; at 33 deg 18 min, from one minute to the next."""
+    moments = pd.Timestamp("2023-12-31T23:59:58") + pd.to_timedelta(0.5 * np.arange(10), "s")
+    size = 33.3 + 1e-5 * np.arange(10)
+    log = pd.DataFrame({one: getattr(moments, one) for one in ("year", "month", "day")})
+    log = log.assign(h=moments.hour, min=moments.minute, s=moments.second + 1e-6 * moments.microsecond)
+    log["lat"], minutes = side * np.floor(size), 60.0 * (size % 1)
+    log["lat min"], log["lat s"] = np.floor(minutes), 60.0 * (minutes % 1)
+    return log.assign(lon="-0", **{"lon min": 7.5, "psi": 0.0})
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_dates_and_angles_in_several_columns(side: float, tmp_path: Path) -> None:
+    (tmp_path / "mapping.toml").write_text(PARTED)
+    log = parted(side)
+    log.to_csv(tmp_path / "log.csv", index=False)
+    dataset = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+    np.testing.assert_allclose(dataset.frame["t"] - 1704067198.0, 0.5 * np.arange(10), atol=1e-5)  # date -u +%s
+    assert dataset.metadata["origin"] == pytest.approx({"latitude": side * 33.3, "longitude": -0.125})
+    metres = side * 111.0e3 * 1e-5 * np.arange(10)  # of latitude there: a degree has 110.9 km
+    np.testing.assert_allclose(dataset.frame["north"], metres, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("change", "row", "said"),
+    [
+        (
+            {"min": 75},
+            4,
+            "'2023 12 31 23 75 59.5' is no date or time of day, as 'year', 'month', 'day' and 'h', 'min', 's'",
+        ),
+        ({"month": 13}, 4, "'2023 13 31 23 59 59.5' is no date or time of day"),
+        ({"s": None}, 4, "no time here: remove the row"),
+        ({"lon min": 60.5}, 4, "'lon min' is 60.5 in row 4, 60 or more: are these minutes or seconds"),
+    ],
+)
+def test_parts_that_cannot_be_are_named(change: dict[str, float], row: int, said: str, tmp_path: Path) -> None:
+    (tmp_path / "mapping.toml").write_text(PARTED)
+    log = parted()
+    for name, value in change.items():
+        log.loc[row - 1, name] = value
+    log.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=re.escape(said)):
+        import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(
+    ("change", "path"),
+    [
+        (('from = "psi"', 'from = ["psi", "s"]'), "columns.psi.from"),
+        (('"lon min"]\nunit = "deg"', '"lon min"]\nunit = "rad"'), "columns.longitude.from"),
+        (('date = ["year", "month", "day"]\nunit = "date"', 'unit = "s"'), "clock.unit"),
+        (('["h", "min", "s"]', '["h"]'), "clock.from"),
+    ],
+)
+def test_only_dates_and_positions_are_in_parts(change: tuple[str, str], path: str, tmp_path: Path) -> None:
+    assert change[0] in PARTED
+    (tmp_path / "mapping.toml").write_text(PARTED.replace(*change))
+    with pytest.raises(DocumentError) as caught:
+        read_mapping(tmp_path / "mapping.toml")
+    assert caught.value.path == path

@@ -12,7 +12,7 @@ import pytest
 
 from shipid.document import bundled
 from shipid.errors import DocumentError
-from shipid.logs.mapping import INPUTS, UNITS, clock_seconds, is_dated, read_mapping, to_si
+from shipid.logs.mapping import EPOCHS, INPUTS, UNITS, clock_seconds, is_dated, read_mapping, to_si
 from shipid.logs.repairs import REPAIRS, Despike
 
 Write = Callable[..., Path]
@@ -27,7 +27,7 @@ def test_bundled_mappings_are_valid_and_have_a_source(name: str) -> None:
 
 DEFINED = {  # from the definitions: an inch is 25.4 mm, a nautical mile 1852 m, a turn 2 pi
     "s": {"s": 1, "ms": 1 / 1000, "us": 1 / 1000**2, "ns": 1 / 1000**3, "min": 60, "h": 60 * 60, "d": 24 * 60 * 60}
-    | {"date": 1, "datenum": 1, "excel": 1, "hhmmss": 1, "s of day": 1, "s of week": 1},
+    | {"date": 1, "datenum": 1, "excel": 1, "mjd": 1, "jd": 1, "hhmmss": 1, "s of day": 1, "s of week": 1},
     "m": {"m": 1, "cm": 1 / 100, "mm": 1 / 1000, "km": 1000, "ft": 12 * 0.0254, "nmi": 1852},
     "m/s": {
         "m/s": 1,
@@ -74,9 +74,12 @@ def test_units_of_columns(unit: str, name: str, factor: float) -> None:
         ("excel", 44040.25, "2020-07-28 06:00"),  # a sheet shows the cell 44040.25 so
         ("excel", 25569.0, "1970-01-01 00:00"),
         ("excel", 61.0, "1900-03-01 00:00"),  # after 29 February 1900, which only Excel has
+        ("jd", 2451545.0, "2000-01-01 12:00"),  # J2000.0
+        ("mjd", 51544.5, "2000-01-01 12:00"),
+        ("mjd", 40587.0, "1970-01-01 00:00"),
     ],
 )
-def test_days_of_matlab_and_excel_are_dates(unit: str, value: float, moment: str) -> None:
+def test_days_of_a_calendar_are_dates(unit: str, value: float, moment: str) -> None:
     since = datetime.fromisoformat(moment).replace(tzinfo=UTC).timestamp()
     assert clock_seconds(np.array([value]), unit).tolist() == [since]
     assert is_dated(unit)
@@ -85,12 +88,12 @@ def test_days_of_matlab_and_excel_are_dates(unit: str, value: float, moment: str
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("unit", UNITS["s"])
 def test_a_clock_has_the_same_seconds_in_every_unit(unit: str, seed: int) -> None:
-    """Differences are those of the unit; only MATLAB's and Excel's days have another zero."""
+    """Differences are those of the unit; only days of a calendar have another zero."""
     random = np.random.default_rng([7, seed])
-    days = random.uniform(44000.0, 46000.0) if unit in ("excel", "datenum") else random.uniform(0.0, 2.0)
+    days = random.uniform(44000.0, 46000.0) if unit in EPOCHS else random.uniform(0.0, 2.0)
     values = days + np.cumsum(random.uniform(1e-6, 1e-3, 50))
     t = clock_seconds(values, unit)
-    size = 24 * 3600 if unit in ("excel", "datenum") else DEFINED["s"][unit]
+    size = 24 * 3600 if unit in EPOCHS else DEFINED["s"][unit]
     np.testing.assert_allclose(np.diff(t), np.diff(values) * size, rtol=1e-4, atol=1e-9 * size)
     assert is_dated(unit) or t[0] == pytest.approx(values[0] * size)
 

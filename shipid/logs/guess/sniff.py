@@ -22,7 +22,7 @@ from shipid.errors import DataError
 from shipid.logs.foreign import foreign
 from shipid.logs.guess.words import fits, is_run, parts_of, units_in
 from shipid.logs.importing import even_clock, repeated_rows, rounding_of
-from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, since_midnight
+from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, degrees_in_parts, names_of, since_midnight
 from shipid.logs.readers import (
     DAY,
     DAY_OF,
@@ -37,6 +37,7 @@ from shipid.logs.readers import (
     TableFormat,
     TextFormat,
     date_of,
+    date_texts,
     dated,
     days_by,
     hour_twice,
@@ -46,6 +47,7 @@ from shipid.logs.readers import (
     read_table,
     require_file,
     seconds,
+    time_texts,
     ways_of,
     widest,
 )
@@ -67,7 +69,7 @@ CLOCK_WORDS = frozenset(
     (
         "t tvec time timestamp stamp clock sec secs seconds date datetime utc ms zeit messzeit zeitstempel "
         "tid tidspunkt sekunden millis epoch zulu hora temps heure elapsed stempel mess uhrzeit klokke tiempo "
-        "gmt datenum tow itow sow sod ticks filetime"
+        "gmt datenum tow itow sow sod ticks filetime mjd jd julian"
     ).split()
 )
 WRITTEN = {
@@ -80,10 +82,22 @@ WRITTEN = {
     "d": "d day days tage",
 }
 """Unit of a clock -> words for it, in brackets or at the end of a name."""
+FIELDS = {
+    "year": ("year yr yyyy yy jahr annee anno ano jaar aar ar", 0.0, 2100.0),
+    "month": ("month mon mo mm m monat mois mese mes maand maaned manad", 1.0, 12.0),
+    "day": ("day dd d dom tag jour giorno dia dag", 1.0, 31.0),
+    "day of the year": ("doy yday jday", 1.0, 366.0),
+    "hour": ("hour hours hr hh h stunde heure ora hora uur timme", 0.0, 23.0),
+    "minute": ("minute minutes min mm m mi minuto minuut minutt", 0.0, 59.0),
+    "second": ("second seconds sec ss s sekunde seconde secondo segundo sekund sek", 0.0, 60.0),
+}
+"""Field of a date or time in columns -> words for it, and its least and largest number."""
+MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
 FINE = {"ns": (1e17, 1e8), "us": (1e14, 1e5)}
 """Unit of a clock -> least number that counts from 1970 in it, and least step of whole numbers: 0.1 s."""
 DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in {**EPOCHS, "d": 0.0}.items()}
-"""Unit of a clock in days -> its numbers of 1990 and 2050, `d` since 1970; modified Julian dates are later."""
+"""Unit of a clock in days -> its numbers of 1990 and 2050, `d` since 1970. Those of Excel from 2031 and
+modified Julian dates to 2008 are the same numbers."""
 TICKS = {11_644_473_600: "1601, as Windows does", 62_135_596_800: "the year 1, as .NET does"}
 """Seconds from the begin of a clock of ticks of 100 ns to 1970 -> who counts so."""
 SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
@@ -108,7 +122,7 @@ class Sniffed:
     that were left out. `seams` counts the places where rows of a large log were not read, or runs begin. `runs` has the
     column that says the run, and the number of runs, where the clock begins again with each; `t` goes on then. `sides`
     are the letters, N, S, E or W, that columns beside positions hold. `words` are columns of words, with their first.
-    `doubts` are questions on what the dates of the clock mean.
+    `doubts` are questions on what the dates of the clock mean. `in_parts` are columns made of several, with those.
     """
 
     form: dict[str, Any]
@@ -121,6 +135,7 @@ class Sniffed:
     sides: frozenset[str] = frozenset()
     words: dict[str, str] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
+    in_parts: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def scattered(self) -> bool:
@@ -170,15 +185,18 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         table = read_table(file, model, "time")
         notes = tuple(f"{name!r} is {table.attrs['other'][name]}" for name in table.attrs.get("to save anew", ()))
     columns, words = _numbers(table, form.get("decimal", "."))
+    in_parts = _degrees(columns)
     if isinstance(model, TableFormat):
         missing = [*_words_for_nothing(table, columns, model), *_sentinels(table, columns)]
         if missing:
             form["missing"] = [*model.missing, *missing]
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
+    made = {name: degrees_in_parts([columns[part] for part in parts]) for name, parts in in_parts.items()}
     runs, since = _restarts(table, columns)
     clock, t, once = _clock_once(table, columns if since is None else columns | since, file)
-    columns = {name: values[once] for name, values in columns.items()}
-    named = {clock["from"], clock.get("date")}
+    columns = {name: values[once] for name, values in (columns | made).items()}
+    named = {one for key in ("from", "date") if key in clock for one in names_of(clock[key])}
+    named |= {part for parts in in_parts.values() for part in parts}
     texts = {name: _called(table, name).dropna().astype(str).str.strip() for name in words}
     says = {name: next(filter(None, column), "") for name, column in texts.items()}
     notes += tuple(
@@ -187,7 +205,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         if name and name not in named
     )
     constant = [name for name, values in columns.items() if np.isnan(values).all()]
-    kept = {name: values for name, values in columns.items() if name not in named and name not in constant}
+    kept = {name: values for name, values in columns.items() if name not in {*named, *constant}}
     empty = tuple(f"column {name!r} is empty" for name in constant if name)
     form.pop("ragged", None) if form.get("ragged") == "refuse" else None
     if not once.all():
@@ -195,7 +213,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     kept = {name: values for name, values in kept.items() if name not in runs}
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
     doubts = tuple(_doubts(table.loc[once], clock, t))
-    return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), says, doubts)
+    return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), says, doubts, in_parts)
 
 
 def _as_number(name: str, text: str) -> str:
@@ -404,7 +422,7 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
             words.append(name)
             continue
         if not pd.api.types.is_numeric_dtype(column.dtype):
-            text = column.astype(str).str.strip()
+            text = column.astype(str).str.strip().replace("-0", "-0.0")
             column = pd.to_numeric(text.str.replace(",", ".") if decimal == "," else text, errors="coerce")
         values = column.to_numpy(dtype=np.float64, na_value=np.nan).copy()
         values[np.isinf(values)] = np.nan
@@ -415,6 +433,80 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
         elif name and name not in columns:
             columns[name] = values
     return columns, words
+
+
+def _degrees(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
+    """Latitudes and longitudes in columns of whole degrees, minutes and perhaps seconds, by the names of all."""
+    found: dict[str, tuple[str, ...]] = {}
+    names = list(columns)
+    for place, name in enumerate(names[:-1]):
+        meant = next((one for one in ("latitude", "longitude") if fits(name).get(one, 0.0) > 0.5), None)
+        if meant is None or any(name in parts for parts in found.values()) or not _is_whole(columns[name], 180.0):
+            continue
+        parts = [name]
+        for other in names[place + 1 : place + 3]:
+            last = parts_of(other)[-1:] + tuple(units_in(other))
+            of_angle = meant in fits(other) or bool(MINUTES & {*last})
+            if not of_angle or (meant != "longitude" and "longitude" in fits(other)):
+                break
+            if not np.nanmax(np.abs(columns[other]), initial=0.0) < 60.0:
+                break
+            parts.append(other)
+            if not _is_whole(columns[other], 60.0):
+                break
+        if len(parts) > 1 and not _is_whole(columns[parts[-1]], 60.0):
+            found[" + ".join(parts)] = tuple(parts)
+    return found
+
+
+def _is_whole(values: Array, most: float) -> bool:
+    """Whether all numbers (N,) that are there are whole, and at most that large."""
+    known = values[np.isfinite(values)]
+    return bool(len(known) and np.all(known % 1 == 0.0) and np.all(np.abs(known) <= most))
+
+
+def _fields(columns: dict[str, Array]) -> dict[str, str]:
+    """Field of a date or time -> column of whole numbers that is called so: year, month, day, hour, minute, second."""
+    found: dict[str, str] = {}
+    for name, values in columns.items():
+        word = (parts_of(name) or ("",))[-1]
+        called = [one for one, (words, _, _) in FIELDS.items() if word in words.split() and one not in found]
+        one = "minute" if "minute" in called and "hour" in found else next(iter(called), "")
+        if one and one in ("minute", "second") and "hour" not in found:
+            continue
+        whole = np.floor(values) if one == "second" else values
+        if one and _is_whole(whole, FIELDS[one][2]) and np.nanmin(whole) >= FIELDS[one][1]:
+            found[one] = name
+    return found
+
+
+def _day_in(fields: dict[str, str]) -> list[str]:
+    """Columns of year, month and day, or of year and day of the year; none where one is not there."""
+    ways = (("year", "month", "day"), ("year", "day of the year"))
+    return next(([fields[one] for one in way] for way in ways if {*way} <= fields.keys()), [])
+
+
+def _in_columns(
+    table: pd.DataFrame, columns: dict[str, Array], dates: str | None
+) -> tuple[dict[str, Any], Array] | None:
+    """Return the clock of a log with hour, minute and second in columns; `dates` is a column of dates."""
+    fields = _fields(columns)
+    times, days = [fields[one] for one in ("hour", "minute", "second") if one in fields], _day_in(fields)
+    if not {"hour", "minute"} <= fields.keys():
+        return None
+    texts = time_texts([columns[name] for name in times])
+    day: str | list[str] | None = dates or days or None
+    if day is not None:
+        written = _called(table, day) if isinstance(day, str) else date_texts([columns[name] for name in day])
+        texts = dated(written, texts)
+    since = seconds(texts)
+    if not np.isfinite(since).all():
+        return None
+    rate = None if np.all(np.diff(since) > 0) else _rate(since)
+    if rate is None and not np.all(np.diff(since) > 0):
+        return None
+    keys = {"from": times, "unit": "date"} | ({"date": day} if day is not None else {})
+    return (keys, since) if rate is None else (keys | {"every": rate[0]}, rate[1])
 
 
 def _sides(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
@@ -534,11 +626,13 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     for name in sorted(texts, key=lambda name: not is_clock(name)):
         column = _called(table, name)
         of_day = column.dropna().astype(str).str.fullmatch(TIME_OF_DAY)
-        dates = _dates(table, texts) if len(of_day) and of_day.all() else None
-        if dates is not None:
-            with_date = seconds(dated(_called(table, dates), column))
+        whole = len(of_day) and of_day.all()
+        day = (_dates(table, texts) or _day_in(_fields(columns))) if whole else None
+        if day:
+            of_date = _called(table, day) if isinstance(day, str) else date_texts([columns[one] for one in day])
+            with_date = seconds(dated(of_date, column))
             if np.isfinite(with_date).all() and np.all(np.diff(with_date) > 0):
-                return {"from": name, "unit": "date", "date": dates}, with_date
+                return {"from": name, "unit": "date", "date": day}, with_date
         since = seconds(column) if is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
         times[name] = since
         if not np.isfinite(since).all():
@@ -550,6 +644,9 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         if rate is not None:
             return {"from": name, "unit": "date", "every": rate[0]}, rate[1]
         called.append(name)
+    in_columns = _in_columns(table, columns, _dates(table, texts))
+    if in_columns is not None:
+        return in_columns
     if not any(name in called for name in rising):  # another column that happens to rise is no clock then
         for name, since in times.items():
             if np.isfinite(since).all() and np.any(np.diff(since) < 0):
@@ -581,7 +678,10 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
 
 def _doubts(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[str]:
     """Yield questions on dates and times of day at t (N,) [s] that may mean another moment."""
-    if clock["unit"] not in ("date", "hhmmss"):
+    if clock["unit"] == "excel" and DATES["mjd"][0] < t[0] / DAY + EPOCHS["excel"]:
+        excel, other = (date_of(t[0] + days * DAY)[:10] for days in (0.0, EPOCHS["excel"] - EPOCHS["mjd"]))
+        yield f"{clock['from']!r} is read as a day of Excel, {excel}: or is it a modified Julian date (mjd), {other}?"
+    if clock["unit"] not in ("date", "hhmmss") or {type(clock["from"]), type(clock.get("date", ""))} != {str}:
         return
     texts = _called(table, clock["from"])
     texts = dated(_called(table, clock["date"]), texts) if "date" in clock else texts
@@ -664,7 +764,7 @@ def _unit_of_clock(name: str, values: Array) -> str:
     steps = np.diff(values)
     rising = steps[steps > 0]  # a rounded clock often stands
     short = len(rising) > 0 and float(np.median(rising)) < SHORT_DAY
-    dates = next((unit for unit in EPOCHS if DATES[unit][0] < values[0] < DATES[unit][1]), "")
+    dates = next((unit for unit in _calendars(parts) if DATES[unit][0] < values[0] < DATES[unit][1]), "")
     if dates and (written == "d" if written else short and ends in ("", "d")):
         return dates
     if written or ends not in ("", "s"):
@@ -680,6 +780,12 @@ def _unit_of_clock(name: str, values: Array) -> str:
         step = 0.0 if slow else float(np.median(steps))
         return next((unit for unit, (least, far) in FINE.items() if values[0] > least or step >= far), "ms")
     return "s"
+
+
+def _calendars(parts: tuple[str, ...]) -> list[str]:
+    """Units of clocks in days that count from a date, first the one that a name with these parts says."""
+    said = "mjd" if {"mjd", "modified"} & {*parts} else ""
+    return sorted(EPOCHS, key=lambda unit: unit != said)
 
 
 def _again(values: Array) -> str | None:

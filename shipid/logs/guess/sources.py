@@ -146,7 +146,7 @@ def _alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) 
 
     def written(log: Sniffed) -> tuple[object, ...]:
         form = {key: value for key, value in log.form.items() if key not in ("ragged", "missing")}
-        unit = (log.clock["from"], log.clock["unit"])
+        unit = (str(log.clock["from"]), log.clock["unit"])
         return (*sorted((key, str(value)) for key, value in form.items()), unit)
 
     commonest = Counter(written(log) for log in sniffed.values()).most_common(1)[0][0]

@@ -247,7 +247,10 @@ def test_rounded_days_keep_their_rate(unit: str, step: float, digits: int, tmp_p
         ("Zeit / min", T / 60, "min"),
         ("Time (d)", T / 86400, "d"),
         ("time_d", 134.3 + T / 86400, "d"),  # the day of the year
-        ("Time [d]", 60443.3 + T / 86400, "d"),  # a modified Julian date is no date of Excel
+        ("Time [d]", 60443.3 + T / 86400, "mjd"),  # no date of Excel
+        ("JD", 2460444.8 + T / 86400, "jd"),
+        ("mjd_utc", 54000.3 + T / 86400, "mjd"),
+        ("time", 54000.3 + T / 86400, "excel"),
         ("time", 45000.0 + T, "s"),  # seconds of a day, half past twelve
         ("time", np.floor(45000.0 + T), "s"),  # the same, in whole seconds: most steps are 0
         ("time_of_day", 45000.0 + T, "s"),
@@ -605,3 +608,72 @@ def test_rows_in_too_short_a_time_name_the_clock(tmp_path: Path) -> None:
     frame.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(DataError, match=r"6 rows over 5e-05 s are too few .* is 't' the clock, in s\?"):
         guess(tmp_path / "log.csv")
+
+
+def in_columns(frame: pd.DataFrame, fields: dict[str, str], begin: str = "2024-02-29T23:59:57.5") -> pd.DataFrame:
+    """A log with its moments in columns: name -> what `strftime` makes of a moment, as a number."""
+    moments = pd.Timestamp(begin) + pd.to_timedelta(frame["time"], "s")
+    written = {name: moments.dt.strftime(form).astype(float) for name, form in fields.items()}
+    return pd.concat([pd.DataFrame(written), frame.drop(columns="time")], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("fields", "clock", "zero"),
+    [
+        (
+            {"Year": "%Y", "Month": "%m", "Day": "%d", "Hour": "%H", "Minute": "%M", "Second": "%S.%f"},
+            {"from": ["Hour", "Minute", "Second"], "date": ["Year", "Month", "Day"]},
+            1709251197.5,
+        ),
+        (
+            {"dd": "%d", "mm": "%m", "yy": "%y", "hh": "%H", "MM": "%M", "ss": "%S.%f"},
+            {"from": ["hh", "MM", "ss"], "date": ["yy", "mm", "dd"]},
+            1709251197.5,
+        ),
+        ({"Jahr": "%Y", "DOY": "%j", "Stunde": "%H", "Minute": "%M", "Sekunde": "%S.%f"}, {}, 1709251197.5),
+        ({"UTC hour": "%H", "UTC minute": "%M", "UTC second": "%S.%f"}, {}, 86397.5),
+    ],
+)
+def test_a_date_in_columns_is_the_clock(
+    fields: dict[str, str], clock: dict[str, object], zero: float, tmp_path: Path
+) -> None:
+    file = tmp_path / "log.csv"
+    in_columns(TABLE, fields).to_csv(file, index=False)
+    sniffed = sniff(file)
+    np.testing.assert_allclose(sniffed.t, zero + T, atol=1e-5)
+    assert sniffed.clock.items() >= clock.items()
+    assert list(sniffed.columns) == ["N", "psi"]
+
+
+def test_a_date_in_columns_beside_a_time_of_day(tmp_path: Path) -> None:
+    log = in_columns(TABLE, {"Day": "%d", "Month": "%m", "Year": "%Y"})
+    moments = pd.Timestamp("2024-02-29T23:59:57.5") + pd.to_timedelta(T, "s")
+    log.assign(Time=moments.strftime("%H:%M:%S.%f")).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "Time", "unit": "date", "date": ["Year", "Month", "Day"]}
+    np.testing.assert_allclose(sniffed.t, 1709251197.5 + T, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("names", "columns"),
+    [
+        (("Lat deg", "Lat min"), {"Lat deg + Lat min": ("Lat deg", "Lat min")}),
+        (("Latitude (deg)", "Latitude (')", 'Latitude (")'), {}),
+        (("LatD", "LatM", "LatS"), {}),
+        (("Lat 1", "Lat 2"), None),
+    ],
+)
+def test_degrees_and_minutes_in_columns(
+    names: tuple[str, ...], columns: dict[str, tuple[str, ...]] | None, tmp_path: Path
+) -> None:
+    """Not two latitudes of two receivers."""
+    size = 33.3 + 1e-4 * T
+    parts = [-np.floor(size), np.floor(size % 1 * 60), size % 1 * 60 % 1 * 60]
+    parts = [parts[0], size % 1 * 60] if len(names) == 2 else parts
+    parts = [-size, -size] if columns is None else parts
+    TABLE.assign(**dict(zip(names, parts, strict=True))).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.in_parts == (columns or {} if columns is None else columns or {" + ".join(names): names})
+    if columns is not None:
+        np.testing.assert_allclose(sniffed.columns[" + ".join(names)], -size)
+        assert not set(names) & set(sniffed.columns)
