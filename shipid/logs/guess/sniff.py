@@ -61,6 +61,11 @@ MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a com
 SENTINELS = tuple(sign * value for value in (99.0, 999.0, 9999.0, 99999.0, 999999.0, 999.9, 9999.9) for sign in (-1, 1))
 NOT_AVAILABLE = {"psi": (511.0, 360.0), "speed": (102.3, 51.0), "latitude": (91.0, 90.0), "longitude": (181.0, 180.0)}
 """Meaning -> number [deg, kn] that AIS writes for none (ITU-R M.1371), and the largest of the others."""
+MOST_HEADS = 3  # lines above the data: names in two, and units
+FEWEST_TIMES, OFF = (
+    10,
+    0.02,
+)  # times of a second clock, or steps of the first; share of its span that it may go otherwise
 LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
 REPEATED = 0.05  # share of the rows that may repeat the row before, at most
 WIDE = 0.9  # share of every second byte that is 0, in text of two bytes a character
@@ -213,6 +218,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     kept = {name: values for name, values in kept.items() if name not in runs}
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
     doubts = tuple(_doubts(table.loc[once], clock, t))
+    doubts += () if runs else tuple(_other_clocks(table.loc[once], columns, clock, t))
     return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), says, doubts, in_parts)
 
 
@@ -329,7 +335,7 @@ def _text_format(
     for i in marked:
         blanks = len(words[i]) == width + 1 and rows[i][0] not in MARKS  # between names, and not between numbers
         rows[i] = words[i][1:] if blanks else rows[i][rows[i][0] in MARKS :]
-    above = [i for i in range(data - 1, -1, -1) if any(rows[i])][:2]
+    above = [i for i in range(data - 1, -1, -1) if any(rows[i])][:MOST_HEADS]
     if above and separator == "whitespace" and len(rows[above[0]]) > width:
         joined = cells(re.sub(r"\s+(?=[\[(])", "", lines[above[0]]), separator)[above[0] in marked :]
         if len(joined) == width:  # blanks before units
@@ -342,18 +348,52 @@ def _text_format(
             pairs = zip(wide[1], ["" if k == dated_at else unit for k, unit in enumerate(wide[0])], strict=True)
             return form | {"skip_rows": data, "names": _distinct([_with_unit(*pair) for pair in pairs])}
         return form | {"skip_rows": data, "names": _distinct(wide[0])}
-    if len(heads) == 2 and _is_units(rows[heads[0]]):
-        called = [*rows[heads[1]], ""][:width]
-        units = [*rows[heads[0]], ""][:width]
-        joined = [_with_unit(*pair) for pair in zip(called, units, strict=True)]
-        while joined and not joined[-1]:
-            joined.pop()
-        return form | {"skip_rows": data, "names": _distinct(joined)}
+    called = _called_in([[*rows[i], ""][:width] for i in heads])
+    if called:
+        return form | {"skip_rows": data, "names": _distinct(called)}
     if heads and heads[0] == above[0] and heads[0] in marked and rows[heads[0]] != cells(lines[heads[0]], separator):
         return form | {"skip_rows": data, "names": _distinct([*rows[heads[0]], ""][:width])}
     if heads and heads[0] == above[0]:
         return form | {"skip_rows": heads[0]}
+    wide = [i for i in range(data) if len(rows[i]) > width and all(rows[i][:width]) and not shares[i]]
+    if wide and not heads:  # a table beside the log ends above this line
+        beside = [""] * (len(rows[wide[-1]]) - width)
+        return form | {"skip_rows": wide[-1] + 1, "names": [*_distinct(rows[wide[-1]][:width]), *beside]}
     return form | {"skip_rows": data, "header": False}
+
+
+def _called_in(heads: list[list[str]]) -> list[str]:
+    """Return the names that lines above the data give the columns, the nearest line first; none where that one has all.
+
+    A line of units goes behind the names. Of two others the line is taken that names most quantities, or both: the
+    upper one has groups, such as GPS, over the first of their columns.
+    """
+    units = next((row for row in heads if _is_units(row)), None) if len(heads) > 1 else None
+    lines = [row for row in heads if row is not units][:2]
+    if not lines:
+        return []
+    ways = list(lines)
+    if len(lines) == 2:
+        group = ""
+        upper = [group := cell or group for cell in lines[1]]
+        ways.append([" ".join(filter(None, pair)) for pair in zip(upper, lines[0], strict=True)])
+    sense = [_sense(way) for way in ways]
+    best = ways[int(np.argmax(sense))] if max(sense) > sense[0] + 0.5 else ways[0]
+    if len(ways) == 3 and len({*ways[2]}) == len(ways[2]):  # Wind and Wind over Speed and Direction
+        twice = {name for name, count in Counter(best).items() if count > 1}
+        best = [both if name in twice else name for name, both in zip(best, ways[2], strict=True)] if twice else best
+    if best is heads[0] and units is None:
+        return []
+    named = [_with_unit(*pair) for pair in zip(best, units or [""] * len(best), strict=True)]
+    while named and not named[-1]:
+        named.pop()
+    return named
+
+
+def _sense(names: list[str]) -> float:
+    """How much the names of columns say: the sum of how well they fit a quantity, or a clock."""
+    known = {name for name in names if name}
+    return sum(1.0 if is_clock(name) else max([0.0, *(fits(name)[one] for one in fits(name) if one)]) for name in known)
 
 
 def _with_unit(name: str, unit: str) -> str:
@@ -709,6 +749,27 @@ def _doubts(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[st
             words = f"after {before} comes {after}: is it local time as daylight saving begins, and no pause?"
             yield f"{words} Then write UTC, or in every row the zone that holds there"
             return
+
+
+def _other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str, Any], t: Array) -> Iterator[str]:
+    """Yield a question for each further clock that goes otherwise than the times t (N,) [s] of the rows.
+
+    So it is where each channel has a time beside it, or where a second log is beside the first.
+    """
+    of_rows = {one for key in ("from", "date") if key in clock for one in names_of(clock[key])}
+    for name in map(str, table.columns):
+        if name in of_rows or not is_clock(name):
+            continue
+        other = columns[name] if name in columns else seconds(_called(table, name))
+        known = np.isfinite(other)
+        values, times = other[known], t[known]
+        if len(values) < FEWEST_TIMES or not np.all(np.diff(values) > 0):
+            continue
+        since = clock_seconds(values, _unit_of_clock(name, values)) if name in columns else values
+        off = float(np.ptp(since - times))
+        if off > max(FEWEST_TIMES * float(np.median(np.diff(t))), OFF * float(times[-1] - times[0])):
+            how = f"{name!r} is a clock, too, and goes otherwise than that of the rows: they part by {off:.3g} s"
+            yield f"{how}. Are the columns beside it of its times? Then write them to another file ([file.<name>])"
 
 
 def _called(table: pd.DataFrame, name: str) -> pd.Series[Any]:

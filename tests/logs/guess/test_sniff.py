@@ -677,3 +677,63 @@ def test_degrees_and_minutes_in_columns(
     if columns is not None:
         np.testing.assert_allclose(sniffed.columns[" + ".join(names)], -size)
         assert not set(names) & set(sniffed.columns)
+
+
+@pytest.mark.parametrize(
+    ("above", "names"),
+    [
+        ("time,GPS,\n,N,psi\n", ["time", "GPS N", "GPS psi"]),
+        ("time,GPS,\n,North,Heading\ns,m,deg\n", ["time [s]", "GPS North [m]", "GPS Heading [deg]"]),
+        ("time,North,Heading\nT01,AI02,AI03\n", ["time", "North", "Heading"]),
+        ("T01,AI02,AI03\ntime,North,Heading\n", None),
+        ("time,Wind,Wind\n,Speed,Direction\n", ["time", "Wind Speed", "Wind Direction"]),
+        ("time,North,Heading\ns,m,deg\nDOUBLE,DOUBLE,DOUBLE\n", ["time [s]", "North [m]", "Heading [deg]"]),
+        ("s,m,deg\ntime,North,Heading\n", ["time [s]", "North [m]", "Heading [deg]"]),
+        ("Trial,Ada,\ntime,North,Heading\n", None),
+    ],
+)
+def test_names_in_several_lines(above: str, names: list[str] | None, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text(text(above=above, header=False))
+    sniffed = sniff(file)
+    assert sniffed.form.get("names") == names
+    assert [sniffed.clock["from"], *sniffed.columns] == (names or ["time", "North", "Heading"])
+    np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
+
+
+def test_a_table_beside_the_first_lines_is_left_out(tmp_path: Path) -> None:
+    """A block of statistics has made the header longer than the rows, and the names of the log were lost."""
+    lines = text().splitlines()
+    beside = ["channel,mean", "psi,34.75", "N,7.1"]
+    lines = [",".join([line, "", *beside[i : i + 1]]) if i < len(beside) else line for i, line in enumerate(lines)]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    sniffed = sniff(tmp_path / "log.csv")
+    assert list(sniffed.columns) == ["N", "psi"]
+    np.testing.assert_allclose(sniffed.columns["psi"], 30.0 + T[2:])
+    assert any("2 lines repeat the header or have another number of cells" in note for note in sniffed.notes)
+    table = read_table(tmp_path / "log.csv", TextFormat.model_validate(sniffed.form), "time")
+    np.testing.assert_allclose(table["psi"].astype(float), 30.0 + T[2:])
+
+
+@pytest.mark.parametrize(
+    ("second", "asked"),
+    [
+        ({"Time 2": 2.0 * T}, True),
+        ({"Time 2": np.where(np.arange(len(T)) < 15, 2.0 * T, np.nan)}, True),
+        ({"Time 2": 1e3 * T}, False),  # milliseconds of the same clock
+        ({"timestamp": 1.7e9 + T}, False),
+        ({"Time received": T + 0.05 * np.sin(T)}, False),
+    ],
+)
+def test_a_second_clock_that_goes_otherwise_is_asked(
+    second: dict[str, np.ndarray], asked: bool, tmp_path: Path
+) -> None:
+    """Each channel of some recorders has a time beside it, and a row then holds moments that do not belong together."""
+    long = np.arange(0.0, 100.0, 5.0)
+    log = TABLE.assign(
+        time=long, **{name: 10.0 * values if name != "timestamp" else values for name, values in second.items()}
+    )
+    log = log.assign(timestamp=1.7e9 + long) if "timestamp" in second else log
+    log.to_csv(tmp_path / "log.csv", index=False)
+    doubts = sniff(tmp_path / "log.csv").doubts
+    assert [doubt.partition(",")[0] for doubt in doubts] == [f"{next(iter(second))!r} is a clock"] * asked
