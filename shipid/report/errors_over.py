@@ -22,7 +22,7 @@ BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
 PIXELS = 540  # twice the height of the error over time
 LONGEST = 14  # characters of a name beside a line
-LEADER, LETTER = 16, 7  # length of the line from an end to its name; width of a letter of a name, at most [px]
+LEADER, LETTER, EDGE = 16, 7, 6  # line from an end to its name; a letter of a name, at most; space around it [px]
 STATISTICS = {  # option -> column of the frame, title of the axis, unit
     "mean": ("mean", "position error, mean", "m"),
     "90th percentile": ("p90", "position error, 90th percentile", "m"),
@@ -53,10 +53,12 @@ def horizon(content: ReportContent) -> Figure | None:
         traces = _traces(content, means[means.N_D.isin([0, size])], "ahead", column, unit)
         traces = [*_seed_bands(traces, seeds[column][seeds[column].N_D.eq(size)]), *traces]
         y = axis(f"{title} [{unit}]", rangemode="tozero")
-        names = _names_at_the_end(traces, float(means[column].max()))
+        names = _names_at_the_end(traces)
         reach = float(means.ahead.max())
         x = axis("time ahead [s]", range=[0.0, reach])
-        room = LEADER + LETTER * max((len(name["text"]) for name in names), default=0)  # that names fit any window
+        room = (
+            LEADER + EDGE + LETTER * max((len(name["text"]) for name in names), default=0)
+        )  # that names fit any window
         margin = {"l": 48, "r": max(12, room), "t": 12, "b": 44}
         plot = layout(x, y, hovermode="x unified", annotations=names, margin=margin)
         views[f"{i}-{j}"] = [Panel(Plot(traces, plot))]
@@ -192,8 +194,9 @@ def _seed_bands(traces: Sequence[Trace], seeds: pd.DataFrame) -> list[Trace]:
     return bands
 
 
-def _names_at_the_end(traces: Sequence[Trace], most: float) -> list[dict[str, Any]]:
-    """Names joined to the ends of the compensated lines, moved apart where they would collide."""
+def _names_at_the_end(traces: Sequence[Trace]) -> list[dict[str, Any]]:
+    """Names joined to the ends of the compensated lines, moved apart where they would collide in this view."""
+    most = max((float(np.nanmax(t["y"])) for t in traces if np.isfinite(t["y"]).any()), default=0.0)
     ends = sorted(
         ((float(t["y"][-1]), float(t["x"][-1]), t) for t in traces if t["mode"] == "lines+markers" and len(t["y"])),
         key=lambda end: end[:2],

@@ -86,6 +86,17 @@ def test_names_at_the_ends_of_lines_fit_a_narrow_window(simulation):
     assert all((name.axref, name.ax) == ("pixel", 16) for name in plot.layout.annotations)
 
 
+def test_names_at_the_ends_do_not_stretch_the_axis_of_their_view(simulation):
+    """Moved apart by the largest error of another N_D, they pressed the lines of a small one to the ground."""
+    small = simulation.horizon.N_D.eq(10) & simulation.horizon.model.eq("high-2")
+    lost = simulation.horizon.assign(mean=simulation.horizon["mean"].mask(small, 100 * simulation.horizon["mean"]))
+    figure = horizon(replace(simulation, horizon=lost))
+    for view in ("0-0", "0-2"):
+        plot = figure.views[view][0].figure
+        highest = max(max(trace.y) for trace in plot.data)
+        assert max(name.ay for name in plot.layout.annotations) <= 1.1 * highest
+
+
 def test_what_failed_has_no_compensated_line(full_scale):
     names = [name for name in lines(horizon(full_scale), "0-0") if name.startswith("bare hull")]
     assert len(names) == 1
