@@ -21,6 +21,8 @@ LEVELS = 24
 # Okabe and Ito (2008), "Color universal design"; yellow and black are left out: one page is white, one nearly black.
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 SYMBOLS = ("circle", "diamond", "square", "triangle-up", "cross", "star")
+# Of the second, third, ... model without physics: all are ink.
+FURTHER = ("cross", "circle-open", "square-open", "diamond-open", "triangle-up-open", "star", "square", "diamond")
 DASHES = {"cooperative": "solid", "physics": "dot", "naive": "dash"}
 
 
@@ -73,7 +75,11 @@ def styles(content: ReportContent) -> Mapping[str, Style]:
             result[str(row.model)] = _without_physics(sum(style.colour == INK for style in result.values()))
             continue
         colour = category(index) if span is None else _by_accuracy(float(str(row.A)), span)
-        result[str(row.model)] = Style(colour, SYMBOLS[kinds.index(row.family) % len(SYMBOLS)], 2.0)
+        symbol = SYMBOLS[kinds.index(row.family) % len(SYMBOLS)]
+        # Of several methods on one model the first is filled.
+        before = frame[:index]
+        again = span is not None and (before.family.eq(row.family) & before.A.eq(row.A)).any()
+        result[str(row.model)] = Style(colour, f"{symbol}-open" if again else symbol, 2.0)
     return result
 
 
@@ -93,8 +99,8 @@ def close_styles(content: ReportContent) -> Mapping[str, Style]:
 
 
 def _without_physics(number: int) -> Style:
-    """Ink: thick for the first model without physics, thin for others."""
-    return Style(INK, "x" if number == 0 else "cross", 3.0 if number == 0 else 1.5)
+    """Ink: thick for the first model without physics, thin and with other markers for others."""
+    return Style(INK, "x", 3.0) if number == 0 else Style(INK, FURTHER[(number - 1) % len(FURTHER)], 1.5)
 
 
 def level(value: float, span: tuple[float, float]) -> int:

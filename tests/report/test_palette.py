@@ -1,4 +1,7 @@
 import re
+from dataclasses import replace
+
+import pandas as pd
 
 from shipid.report.palette import accuracy_range, styles, variables
 
@@ -40,3 +43,13 @@ def test_few_models_have_names_many_have_a_scale(simulation, full_scale):
     assert len(set(colours)) == len(colours)
     symbols = {name.split("-")[0]: style.symbol for name, style in styles(simulation).items()}
     assert len(set(symbols.values())) == len(symbols)
+
+
+def test_methods_on_one_model_and_models_without_physics_have_markers_of_their_own(simulation):
+    cells, pure = simulation.cells, simulation.cells.model.eq("no model")
+    more = [cells[cells.model.eq("high-1")].assign(model="high-1 + alone")]
+    more += [cells[pure].assign(model=f"none + {name}") for name in ("plain", "forest", "step")]
+    looks = styles(replace(simulation, cells=pd.concat([cells, *more], ignore_index=True)))
+    drawn = [(look.colour, look.symbol) for name, look in looks.items() if name.startswith(("high-1", "no"))]
+    assert len(drawn) == 1 + 6  # nominal
+    assert len(set(drawn)) == len(drawn)
