@@ -11,7 +11,7 @@ import pandas as pd
 from shipid.report.content import ReportContent
 from shipid.report.error_map import cells_map
 from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line
-from shipid.report.palette import MUTED, styles
+from shipid.report.palette import MUTED, close_styles
 from shipid.report.section import Section
 from shipid.report.selection import exemplars, sizes
 from shipid.report.tables import Cell, Table, figure, length_places, text
@@ -40,7 +40,7 @@ def coverage(content: ReportContent) -> Figure | None:
     frame = _frame(content, "coverage")
     if frame.empty:
         return None
-    counts, looks = sizes(frame.N_D), styles(content)
+    counts, looks = sizes(frame.N_D), close_styles(content)
     names = [name for name in exemplars(content) if name in set(frame.model)]
     views = {}
     for place, size in enumerate(counts):
@@ -61,7 +61,8 @@ def coverage(content: ReportContent) -> Figure | None:
             reach = {"type": "data", "symmetric": False, "thickness": 1.5, "width": 4, "color": looks[name].colour}
             reach |= {"array": mine.high.to_numpy() - y, "arrayminus": y - mine.low.to_numpy()}
             ink = {"color": looks[name].colour, "width": looks[name].width}
-            points = line(name, x, y, [f"model:{name}"], "", mode="lines+markers", line=ink, marker={"size": 6})
+            points = line(name, x, y, [f"model:{name}"], "", mode="lines+markers", line=ink)
+            points["marker"] = {"symbol": looks[name].symbol, "size": 7}
             points.update(error_y=reach, customdata=[_words(row) for row in mine.to_dict("records")])
             points.update(hovertemplate=f"{label(name)}: %{{customdata}}<extra></extra>")
             traces.append(points)
@@ -82,7 +83,10 @@ def coverage(content: ReportContent) -> Figure | None:
         height=420,
         views=views,
         controls=[Control("Manoeuvres, N_D", [str(count) for count in counts], len(counts) - 1)],
-        chips=[Chip(f"model:{name}", name, looks[name].colour, width=looks[name].width) for name in names],
+        chips=[
+            Chip(f"model:{name}", name, looks[name].colour, width=looks[name].width, symbol=looks[name].symbol)
+            for name in names
+        ],
     )
 
 

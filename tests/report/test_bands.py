@@ -76,6 +76,17 @@ def test_a_band_of_its_own_is_offered_to_a_kind_that_has_one(banded: ReportConte
     assert enough.takeaway.endswith("--kind of shipid predict gives the band that is calibrated for this kind alone.")
 
 
+def test_lines_of_the_coverage_are_those_of_a_close_up(banded: ReportContent) -> None:
+    """Colours by A of two models of like accuracy cannot be told apart."""
+    figure = bands.coverage(banded)
+    assert figure is not None
+    looks = {(chip.colour, chip.symbol) for chip in figure.chips}
+    assert len(looks) == len(figure.chips)
+    assert all(chip.symbol and "scale" not in chip.colour for chip in figure.chips)
+    symbols = [trace.marker.symbol for trace in figure.views["0"][0].figure.data if trace.mode == "lines+markers"]
+    assert symbols == [chip.symbol for chip in figure.chips]
+
+
 def test_bands_of_a_small_model_are_no_zeros(banded: ReportContent) -> None:
     frames = {name: frame.copy() for name, frame in banded.frames.items()}
     for name in ("coverage", "coverage_groups"):
