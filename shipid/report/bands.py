@@ -214,9 +214,8 @@ def _lowest(frame: pd.DataFrame) -> str:
         return ""
     worst = kinds.sort_values("coverage").iloc[0]
     text = f"Bands hold least at {worst.group} ({worst.model}): {_percent(worst.coverage)} of the paths."
-    if worst.by != "kind" or worst.note:
-        return text
-    return f"{text} --kind of shipid predict gives the band that is calibrated for this kind alone."
+    better = worst.by == "kind" and not worst.note and kinds.group[kinds.by.eq("kind")].nunique() > 1
+    return f"{text} --kind of shipid predict gives the band that is calibrated for this kind alone." if better else text
 
 
 def worst(content: ReportContent) -> Table | None:

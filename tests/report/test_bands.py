@@ -58,6 +58,7 @@ def test_it_says_what_was_held(banded: ReportContent) -> None:
     assert NASTY in groups.takeaway
     assert groups.takeaway.startswith("Bands hold least at ")
     assert "60 % of the paths" in groups.takeaway
+    assert "--kind" not in groups.takeaway, "too few runs of this kind: it has no band"
     table = bands.table(banded)
     assert table is not None
     assert "needs 9 runs" in table.takeaway
@@ -66,14 +67,18 @@ def test_it_says_what_was_held(banded: ReportContent) -> None:
     assert worst.rows[0][0].text == "M003"
 
 
-def test_a_band_of_its_own_is_offered_to_a_kind_that_has_one(banded: ReportContent) -> None:
-    few = bands.groups(banded)
-    assert few is not None
-    assert "--kind" not in few.takeaway, "2 runs of this kind calibrated the band: too few"
-    groups = banded.frames["coverage_groups"].assign(note="")
-    enough = bands.groups(replace(banded, frames={**banded.frames, "coverage_groups": groups}))
-    assert enough is not None
-    assert enough.takeaway.endswith("--kind of shipid predict gives the band that is calibrated for this kind alone.")
+@pytest.mark.parametrize(("kinds", "said"), [(("zigzag", "turning"), True), (("zigzag",), False)])
+def test_a_band_for_one_kind_is_named_where_there_is_one(
+    banded: ReportContent, kinds: tuple[str, ...], said: bool
+) -> None:
+    rows = [
+        {"model": "nominal", "by": "kind", "group": kind, "coverage": 0.6, "low": 0.5, "high": 0.7, "width": 1.0}
+        | {"runs": 5, "note": ""}
+        for kind in kinds
+    ]
+    table = bands.groups(replace(banded, frames={**banded.frames, "coverage_groups": pd.DataFrame(rows)}))
+    assert table is not None
+    assert ("--kind of shipid predict" in table.takeaway) is said
 
 
 def test_lines_of_the_coverage_are_those_of_a_close_up(banded: ReportContent) -> None:
