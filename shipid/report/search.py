@@ -23,6 +23,9 @@ WIDE = 3.0  # largest / smallest value from which an axis is logarithmic
 MOST_DECADES = 5.0  # with a tick each
 CEILING = 4.0  # times the best of the cell: farther off is drawn here
 FAILED = CEILING * 1.25  # where diverged trials lie
+UNITS = {"delays": "s"}  # of hyperparameters; others have none
+# The kinds of memory that a trial may have, by number.
+MEMORIES = ("none", "the error of the physics", "that and history", "estimates of the observer", "everything")
 
 
 def search(content: ReportContent) -> Figure | None:
@@ -44,7 +47,7 @@ def search(content: ReportContent) -> Figure | None:
         f"{_thinned(frame)}{_stopped(frame)}diamonds are those whose networks the cell uses; those beyond "
         f"{CEILING:g} times lie at the upper edge, those that diverged above it. The line joins the medians of all "
         "that have a value. Rank correlation (Spearman) is taken within each cell, then averaged over cells: it sees "
-        "what rises or falls throughout, not an optimum in the middle.",
+        f"what rises or falls throughout, not an optimum in the middle.{_memories(frame, names)}",
         alternative="Dots of the relative validation error of trials over each hyperparameter; a table sums up.",
         height=270,
         views=views,
@@ -61,7 +64,9 @@ def table(content: ReportContent) -> Table | None:
     passes = bool(frame.epochs.any())
     shares = {name: _yes_or_no(frame[name]) for name in names}
     rows = [_row(int(str(size)), mine, shares, passes) for size, mine in frame.groupby("N_D", sort=True)]
-    chosen = [f"{'share of ' if share else ''}chosen {spoken(name)} [1]" for name, share in shares.items()]
+    chosen = [
+        f"{'share of ' if share else ''}chosen {spoken(name)} [{unit_of(name)}]" for name, share in shares.items()
+    ]
     headings = ["N_D [1]", "cells [1]", "trials [1]", "stopped [1]", "diverged [1]"]
     headings += [*(["epochs [1]"] if passes else []), "time [s]", "time per cell [s]", *chosen]
     takeaway = " ".join(part for part in (_counts(frame), _tried(frame, names)) if part)
@@ -77,6 +82,11 @@ def searched(content: ReportContent) -> list[str]:
 def spoken(name: str) -> str:
     """Name a hyperparameter as in a sentence."""
     return name.replace("_", " ")
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a hyperparameter; most have none."""
+    return UNITS.get(name, "1")
 
 
 def importance(frame: pd.DataFrame, name: str) -> float:
@@ -134,7 +144,8 @@ def _dots(mine: pd.DataFrame, name: str, what: str, keys: list[str], marker: dic
     y = np.where(np.isnan(ratio), FAILED, np.minimum(ratio, CEILING))
     trace = line(what, mine[name].to_numpy(dtype=float), np.round(y, 3), keys, mode="markers", marker=marker)
     known = "" if what == "diverged" else ", %{y:.2f} times the best of its cell"
-    trace["hovertemplate"] = f"{label(what)}: {label(spoken(name))} %{{x:.3g}}{known}<extra></extra>"
+    value = f"{label(spoken(name))} %{{x:.3g}}" + (f" {UNITS[name]}" if name in UNITS else "")
+    trace["hovertemplate"] = f"{label(what)}: {value}{known}<extra></extra>"
     return trace
 
 
@@ -153,6 +164,13 @@ def _stopped(frame: pd.DataFrame) -> str:
     return "triangles are those that a part of the windows judged, and that were not among the best; " if early else ""
 
 
+def _memories(frame: pd.DataFrame, names: list[str]) -> str:
+    """Sentence on what the numbers of `memory` mean, if it is searched."""
+    most = int(frame.memory.max()) if "memory" in names else -1
+    words = [f"{i} {word}" for i, word in enumerate(MEMORIES[: most + 1])]
+    return f" Memory: {', '.join(words)}." if words else ""
+
+
 def _medians(frame: pd.DataFrame, name: str) -> Floats:
     """Median ratio per value of a hyperparameter, or per eighth of its values where there are many: (n, 2)."""
     values = frame[name].astype(float)
@@ -166,7 +184,7 @@ def _medians(frame: pd.DataFrame, name: str) -> Floats:
 
 def _frame(name: str, every: pd.Series[float]) -> dict[str, Any]:
     low, high = float(every.min()), float(every.max())
-    title = f"{label(spoken(name))} [1]"
+    title = f"{label(spoken(name))} [{unit_of(name)}]"
     room = 0.04
     if _yes_or_no(every):
         x = axis(label(spoken(name)), range=[-0.3, 1.3], tickvals=[0, 1], ticktext=["no", "yes"])
@@ -210,7 +228,9 @@ def _tried(frame: pd.DataFrame, names: list[str]) -> str:
     ranges = []
     for name in names:
         low, high = float(frame[name].min()), float(frame[name].max())
-        ranges.append(f"{spoken(name)} {'yes or no' if _yes_or_no(frame[name]) else f'{short(low)} to {short(high)}'}")
+        unit = f" {UNITS[name]}" if name in UNITS else ""
+        values = "yes or no" if _yes_or_no(frame[name]) else f"{short(low)} to {short(high)}{unit}"
+        ranges.append(f"{spoken(name)} {values}")
     return f"Tried: {', '.join(ranges)}." if ranges else ""
 
 

@@ -6,7 +6,8 @@ import pandas as pd
 import pytest
 from scipy.stats import spearmanr
 
-from shipid.report.search import CEILING, FAILED, importance, searched, table
+from shipid.hybrid.path_drawn import CHOICES, OBSERVED, PathDrawn
+from shipid.report.search import CEILING, FAILED, MEMORIES, importance, searched, table
 from shipid.report.search import search as drawn_anew
 from shipid.report.wording import short
 
@@ -121,6 +122,30 @@ def test_a_search_in_closed_form_says_what_there_was(simulation):
     assert row["share of chosen mirror [1]"].text == "0.75"
     assert "epochs [1]" in table(simulation).columns
     assert {"stopped early", "diverged"} < {chip.label for chip in search(simulation).chips}
+
+
+def test_delays_are_seconds_and_kinds_of_memory_are_named(simulation):
+    trials = simulation.trials.drop(columns=["learning_rate", "weight_decay", "units"])
+    trials = trials.assign(delays=2.0 + trials.number.mod(3), memory=trials.number.mod(3).astype(float))
+    content = replace(simulation, trials=trials)
+    assert {panel.figure.layout.xaxis.title.text for panel in search(content).views["0"]} == {
+        "delays [s]",
+        "memory [1]",
+    }
+    assert all(
+        "%{x:.3g} s" in dot.hovertemplate for name, dot in dots(panels(content)["delays"]).items() if name != "median"
+    )
+    assert search(content).how.endswith(" Memory: 0 none, 1 the error of the physics, 2 that and history.")
+    assert "chosen delays [s]" in table(content).columns
+    assert "delays 2 to 4 s," in table(content).takeaway
+    assert "Memory:" not in search(simulation).how
+
+
+@pytest.mark.parametrize("memory", [{}, {"observer": True}])
+def test_every_kind_of_memory_has_its_words(memory):
+    kinds = PathDrawn(choose=True, memory={"history": [2.0], "error": 8.0, **memory}).memories
+    assert len(kinds) <= len(MEMORIES)
+    assert (*CHOICES, *OBSERVED)[: len(kinds)] == kinds
 
 
 def test_trials_that_all_diverged_stand(simulation):
