@@ -352,7 +352,7 @@ def _physics_or_none(case: Case, judged: bool) -> list[str]:
     """Which physics models, compensated, beat none and which harm, at the smallest and the largest amount of data."""
     if not judged:
         where = runs(case.largest)
-        return [f"There is no result without physics in every cell, so it is unknown whether physics harms at {where}."]
+        return [f"Not every cell has a result without physics, so it is unknown whether physics harms at {where}."]
     every = {amount: _against_none(case, amount) for amount in dict.fromkeys((case.smallest, case.largest))}
     decided = {amount: sides for amount, sides in every.items() if sides.better or sides.worse}
     return [
@@ -369,6 +369,7 @@ def _counted(sides: Sides, rival: str) -> str:
         where = " in every cell" if sides.left_out else ""
         return f"every physics model with a result{where} does better than {rival}"
     verb = "do" if len(sides.better) > 1 else "does"  # none does
+    verb = "is shown to do" if sides.open and not sides.better else verb
     parts = [f"{len(sides.better) or 'none'} of {count} physics models {verb} better than {rival}"]
     if sides.worse:
         parts.append(f"{named(sides.worse)} {plural(len(sides.worse), 'does', 'do')} worse")

@@ -84,6 +84,8 @@ def test_harm_is_reported_with_names(made: Any) -> None:
     both = text(made(grid({"good": (1.5, 3.5), "bad": (5.0, 4.0), "none": (4.0, 3.0)})))
     assert "ith 30 runs none of 2 physics models does better than no physics; good, bad do worse." in both
     assert "every physics model" not in both
+    unsure = text(made(grid({"good": (1.5, 3.0), "bad": (5.0, 4.0), "none": (4.0, 3.0)})))
+    assert "none of 2 physics models is shown to do better than no physics; bad does worse; for good the test" in unsure
 
 
 def test_what_holds_at_both_ends_is_said_once(made: Any) -> None:
@@ -114,6 +116,7 @@ def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
     methods = [{"name": "drawn", "kind": "path-drawn", "families": ["good", "bad"]}]
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0)}), changes={"method": methods}))
     assert "With 30 runs, good (best in validation; 2.00 m mean error alone)" in advice
+    assert "Not every cell has a result without physics, so it is unknown whether physics harms at 30 runs." in advice
 
 
 def test_data_that_did_not_help_is_reported(made: Any) -> None:
