@@ -21,7 +21,7 @@ from shipid.study import results as parts
 from shipid.study.claims import Claims
 from shipid.study.error_table import intervals_frame
 from shipid.study.findings import findings
-from shipid.study.plan import Plan
+from shipid.study.plan import NO_MODEL, Plan
 from shipid.study.results import Results, read_results
 
 log = logging.getLogger(__name__)
@@ -62,7 +62,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
         cells=results.cells,
         naive=parts.naive_summary(results),
-        models=results.models,
+        models=_shown_models(results),
         factors=parts.factors_frame(results),
         trials=parts.trials_frame(results),
         horizon=parts.horizon_frame(results),
@@ -78,6 +78,12 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         best=results.plan.label(best, results.plan.judged) if (best := advise.best_model(results)) else "",
         frames=frames,
     )
+
+
+def _shown_models(results: Results) -> pd.DataFrame:
+    """The models; without `none` where no method that the study judges by meets it: nothing of it can be drawn."""
+    judged = (NO_MODEL, results.plan.judged) in {(name, way.name) for name, way in results.plan.pairs}
+    return results.models if judged else results.models[results.models["model"].ne(NO_MODEL)]
 
 
 def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:

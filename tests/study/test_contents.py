@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from shipid.files import read_json
+from shipid.report import errors_over
 from shipid.study import contents, seals
 from shipid.study.contents import report_content, share_pages, write_pages
 from shipid.study.plan import build_plan
@@ -26,6 +27,16 @@ def test_content_holds_what_the_results_hold(tiny_run: Path) -> None:
     assert set(content.horizon["model"]) >= {"right", "wrong-1", "wrong-2", "none"}
     assert content.naive["mean"] == pytest.approx(results.naive.mean())
     assert content.answer
+
+
+def test_no_model_is_named_that_no_cell_has(tmp_path: Path) -> None:
+    methods = [{"name": "drawn", "kind": "path-drawn", "trials": 1, "units": 8, "families": ["right", "wrong"]}]
+    plan, folder = tiny_plan(tmp_path, {"method": methods, "grid.N_D": [4]}), tmp_path / "run"
+    with without_figures():
+        run_here(plan, folder)
+    content = report_content(read_results(folder))
+    assert set(content.models["model"]) == {"right", "wrong-1", "wrong-2"}
+    assert "none" not in [chip.label for chip in errors_over.horizon(content).chips]
 
 
 def test_a_further_frame_is_one_line(tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
