@@ -84,7 +84,7 @@ def error_map(content: ReportContent) -> Figure | None:
         title="Physics and data: the map",
         takeaway=_takeaway(rows, spots),
         how="Each cell is a model, at its A on a square-root scale, trained on N_D manoeuvres; colour is H, mean over "
-        "seeds. Hatched: H is not below that of pure data-driven at the same N_D."
+        f"seeds. Hatched: H is not below that of {_rival(rows)} at the same N_D."
         + (lined if pieces else "")
         + " The bars show the same cells, models in the order of A; the front row is the largest N_D."
         + left_out(content)
@@ -416,6 +416,12 @@ def _heights(most: float) -> list[float]:
     return [round(step * k, 3) for k in range(int(most / step) + 1)]
 
 
+def _rival(rows: pd.DataFrame) -> str:
+    """The model without physics that others are compared with: by name where there are several."""
+    pure = rows.model[rows.family == DATA_DRIVEN]
+    return "pure data-driven" if len(pure) < 2 else f"{pure.iloc[0]} (pure data-driven)"
+
+
 def _takeaway(rows: pd.DataFrame, spots: list[Spot]) -> str:
     """Where H is lowest and highest, and up to which A physics helped at every N_D."""
     pure = set(rows.model[rows.family == DATA_DRIVEN])
@@ -426,7 +432,7 @@ def _takeaway(rows: pd.DataFrame, spots: list[Spot]) -> str:
     text += f"N_D = {worst.size})"
     judged = {spot.size for spot in good if spot.model in pure}
     physics = [spot for spot in good if spot.model not in pure and spot.size in judged]
-    worse, rival = [spot for spot in physics if spot.worse], "pure data-driven"
+    worse, rival = [spot for spot in physics if spot.worse], _rival(rows)
     if not physics:
         return f"{text}."
     if not worse:

@@ -139,6 +139,14 @@ def test_two_methods_on_the_same_physics_do_not_hide_each_other(simulation):
     assert "another method" not in error_map(simulation).how
 
 
+def test_of_several_models_without_physics_the_rival_has_its_name(simulation):
+    """Another may err less than all models with physics: H is not below that of every pure data-driven model."""
+    better = simulation.cells[simulation.cells.model.eq("no model")].assign(model="none + plain", H=0.01)
+    figure = error_map(replace(simulation, cells=pd.concat([simulation.cells, better], ignore_index=True)))
+    assert "H is not below that of no model (pure data-driven)" in figure.takeaway
+    assert "Hatched: H is not below that of no model (pure data-driven) at the same N_D." in figure.how
+
+
 def test_there_is_no_map_of_one_size_or_one_model(simulation, full_scale):
     assert error_map(full_scale) is None
     names = ["nominal", "no model"]
