@@ -48,7 +48,7 @@ def on_dask(
     ----------
     scheduler : address of a Dask scheduler, such as `tcp://host:8786`.
     shared : sent once to each worker. tasks : with a key each, taken when workers are about to need them. name : of the
-        whole work, so that no other has its keys.
+        whole work; beside it the keys name this client, since a scheduler computes a key once for all its clients.
 
     Raises
     ------
@@ -90,14 +90,15 @@ def _results(
 
     ended: SimpleQueue[Any] = SimpleQueue()
     killed: list[str] = []
+    keys = f"shipid-{name}-{client.id}"
     try:
-        given = client.submit(_given, shared, key=f"shipid-{name}-shared", pure=False)  # made again if its worker dies
+        given = client.submit(_given, shared, key=f"{keys}-shared", pure=False)  # made again if its worker dies
         left: dict[str, tuple[str, Task, Any]] = {}
         waiting, watch = iter(tasks), _Watch(client)
         while True:
             watch.look()
             for key, task in islice(waiting, max(AHEAD * watch.threads - len(left), 0)):
-                future = client.submit(work, given, task, key=f"shipid-{name}-{key}", pure=False)
+                future = client.submit(work, given, task, key=f"{keys}-{key}", pure=False)
                 left[future.key] = (key, task, future)
                 future.add_done_callback(ended.put)
             if not left:

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +84,10 @@ def test_tasks_and_results_on_a_cluster_in_this_process() -> None:
             assert len(taken) <= number + cluster.AHEAD, "others may take what no worker needs yet"
             done.append(result)
         assert sorted(done) == [(i, 10 + i) for i in range(12)]
+
+        one, other = (on_dask(address, napping(0.0), shared, [("t", 1), ("u", 2)], "z") for shared in (10, 20))
+        both = [*islice(one, 1), *other, *one]  # before, the scheduler gave both runs of one plan the results of one
+        assert sorted(both) == [(1, 11), (1, 21), (2, 12), (2, 22)]
 
         def failing(_: int, task: int) -> float:
             return 1 / task
