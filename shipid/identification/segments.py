@@ -58,7 +58,8 @@ def cut_segments(
 ) -> list[ShootingSegment]:
     """Cut runs into consecutive segments of `horizon` [s]; 0: one segment for each unbroken stretch.
 
-    A shorter segment at the end of a stretch is kept if it has at least half a horizon.
+    Each begins at a row of the log: the last one that the segment before it holds. A shorter segment at the end of a
+    stretch is kept if it has at least half a horizon.
 
     Parameters
     ----------
@@ -68,8 +69,8 @@ def cut_segments(
 
     Raises
     ------
-    DataError : an unknown run, a command that was not recorded, a run without a long enough stretch, or a step too long
-        for orders that change between rows.
+    DataError : an unknown run, a command that was not recorded, a run without a long enough stretch or whose rows are
+        further apart than the horizon, or a step too long for orders that change between rows.
     """
     unknown = next((run for run in runs if run not in dataset.runs), None)
     if unknown is not None:
@@ -94,6 +95,11 @@ def cut_segments(
         half = f", half of {horizon:g} s" if horizon and wanted == horizon / 2 else ""
         message = f"{without!r} has no unbroken stretch of {wanted:g} s{half}: predict less far, or leave it out"
         raise DataError(message, path="runs")
+    seen = {segment.run for segment in result if segment.measured[1:].any()}
+    unseen = next((run for i, run in enumerate(runs) if i not in seen), None)
+    if unseen is not None:
+        message = f"rows of {unseen!r} are so far apart that no prediction of {horizon:g} s holds two of them"
+        raise DataError(f"{message}: predict farther, or leave it out", path="runs")
     return sorted(result, key=lambda segment: segment.run)
 
 
@@ -135,12 +141,14 @@ def _cut(
         columns |= between_rows(vessel, rows, grid + step / 2)  # as they are in the middle of each step
     commands = {name: columns[name] for name in dynamics(vessel).commands}
     memory = memory_along(vessel, commands, grid) or {}
-    result = []
-    empty = without_rows(t, grid, step)
-    for start in range(0, count, each):
-        last = min(start + each, count)
-        first = start + int(np.argmin(empty[start : last + 1]))  # a state between far rows is no beginning
-        if last - first < least or empty[first]:
+    result, begin = [], 0
+    beginnings = measured & ~without_rows(t, grid, step)  # a state between two rows is no beginning
+    while begin < count:
+        last = min(begin + each, count)
+        first = begin + int(np.argmax(beginnings[begin : last + 1]))
+        seen = first + 1 + np.flatnonzero(measured[first + 1 : last + 1])
+        begin = int(seen[-1]) if len(seen) else last  # no time from row to row is left out
+        if last - first < least or not beginnings[first]:
             continue
         here = slice(first, last + 1)
         past = np.clip(first - 1 - np.arange(lags), 0, None)

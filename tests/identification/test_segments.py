@@ -134,5 +134,16 @@ def test_no_segment_begins_between_far_rows() -> None:
     assert [(one.t[0], one.t[-1]) for one in whole] == [(0.0, 20.0), (20.0, 40.0), (40.0, 60.0)]
     assert [(one.t[0], one.t[-1]) for one in cut] == [(0.0, 20.0), (20.0, 40.0), (46.0, 60.0)]
     assert all(one.measured[0] for one in cut)
-    coarse = Dataset(data.frame[t % 2 == 0], data.metadata)  # rows of 2 s: steps of 1 s begin between near rows, too
-    assert [one.t[0] for one in cut_segments(SHIP, coarse, coarse.runs, 1.0, 15.0)] == [0.0, 15.0, 30.0, 45.0]
+
+
+def test_every_segment_begins_at_a_row_and_no_row_is_left_out() -> None:
+    """A state interpolated between two rows is wrong by what happened there: at the true numbers nothing is left."""
+    coarse = Dataset(DATA.frame[DATA.frame["t"] % 5 == 0], DATA.metadata)
+    segments = cut_segments(SHIP, coarse, coarse.runs[:1], 1.0, 12.0)
+    assert [(one.t[0], one.t[-1]) for one in segments] == [(0, 12), (10, 22), (20, 32), (30, 42), (40, 50)]
+    fit = build(SHIP, coarse, coarse.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=12))
+    at = predict(fit, np.ones(1), np.zeros((2, 0)))
+    assert sorted(set(at.time)) == [5.0 * i for i in range(1, 11)]
+    assert np.abs(at.r).max() < 1e-9
+    with pytest.raises(DataError, match=r"rows of 'M01' are so far apart that no prediction of 4 s holds two of them"):
+        cut_segments(SHIP, coarse, coarse.runs, 1.0, 4.0)
