@@ -12,7 +12,7 @@ from shipid.document import short_names
 from shipid.identification.collinearity import digits
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import evaluate
-from shipid.identification.late import interval_of
+from shipid.identification.late import COARSE, interval_of
 from shipid.identification.residuals import build
 from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution
@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 LEAST_ROWS = 0.2  # rows by which the fit is best with earlier commands: below, the log has them in time
 OUTSIDE = 1.0  # of half the interval: a larger change of an estimate is reported
 WORTH = 0.02  # of a factor: a smaller change is not
-COARSE = 1.5  # rows: a longer step of the fit has a warning of its own
 
 
 @dataclass(frozen=True)

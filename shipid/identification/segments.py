@@ -13,7 +13,7 @@ from shipid.data.dataset import Dataset, clock_slack, pieces, sample, stretches
 from shipid.data.windows import without_rows
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, choices
-from shipid.identification.late import Changes, between_rows
+from shipid.identification.late import COARSE, Changes, between_rows, held_over_steps
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -139,6 +139,8 @@ def _cut(
     if between == "between":
         _check_step(vessel, rows, step)
         columns |= between_rows(vessel, rows, grid + step / 2)  # as they are in the middle of each step
+    elif step <= COARSE * float(np.median(np.diff(t))):
+        columns |= held_over_steps(vessel, rows, grid, step)
     commands = {name: columns[name] for name in dynamics(vessel).commands}
     memory = memory_along(vessel, commands, grid) or {}
     result, begin = [], 0

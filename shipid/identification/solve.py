@@ -14,7 +14,7 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
-from shipid.identification.late import interval_of
+from shipid.identification.late import COARSE, interval_of
 from shipid.identification.residuals import Problem, build
 from shipid.identification.settings import BLOCK, Identify, columns_of
 from shipid.identification.start import by_inverse_dynamics, grown
@@ -23,6 +23,8 @@ from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 DISCOUNTS, LEAST = 2, 1e-3  # fits with discounted residuals; least factor on a deviation
+UNEVEN = 0.01  # of the time between rows: a difference above it counts
+FAR = 0.05  # of the time in which a ship goes her length: between rows so far apart, lines miss how she turns
 NEAR = 1e-6  # of a factor: so close to a bound it is at the bound
 ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "base": ("straight", "growing")}
 """Setting `start` -> kinds of initial factors, tried in this order until the search converges."""
@@ -174,7 +176,7 @@ def _identified(
         factors = np.where(np.arange(len(targets)) == weakest, targets, solution.factors)
         result = search(problem, factors, _point(result), progress, before=result.iterations)
         solution = replace(_solution(problem, result, objective_start, time.perf_counter() - begun), dropped=dropped)
-    warning = _blurred(dataset, runs, settings)
+    warning = _blurred(vessel, dataset, runs, settings)
     return replace(solution, warnings=(warning,) if warning else ())
 
 
@@ -211,15 +213,27 @@ def _searched(
     return result, objective_start
 
 
-def _blurred(dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
-    """A warning if the step of the fit is longer than the interval of the log, else no text."""
-    between = interval_of(dataset, runs)
-    if settings.step <= 1.5 * between:
-        return ""
-    return (
-        f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: faster "
-        f"changes of the commands are lost; compare with step {between:.3g}"
-    )
+def _blurred(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
+    """A warning if the step of the fit is longer than the interval of the log or does not divide it, else no text."""
+    between, length = interval_of(dataset, runs), float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
+    if settings.step > COARSE * between:
+        return (
+            f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: "
+            f"faster changes of the commands are lost; compare with step {between:.3g}"
+        )
+    for run in runs:
+        rows = dataset.select([run]).frame
+        times = np.diff(rows["t"].to_numpy())
+        between = float(np.median(times))
+        steps, even = between / settings.step, np.abs(times - between) < UNEVEN * between
+        far = between * float(rows["u"].abs().mean()) >= FAR * length
+        if far and even.mean() > 0.5 and abs(steps - round(steps)) > UNEVEN * steps:
+            return (
+                f"rows of run {run} are {between:.4g} s apart, which steps of {settings.step:g} s do not divide: "
+                "measured values are interpolated to the steps, and the estimates may be off by more than their "
+                f"intervals; compare with step {between / max(round(steps), 1):.4g}"
+            )
+    return ""
 
 
 def _begun(problem: Problem, start: Mapping[str, float] | Solution | None) -> tuple[Array, Point]:

@@ -147,3 +147,17 @@ def test_every_segment_begins_at_a_row_and_no_row_is_left_out() -> None:
     assert np.abs(at.r).max() < 1e-9
     with pytest.raises(DataError, match=r"rows of 'M01' are so far apart that no prediction of 4 s holds two of them"):
         cut_segments(SHIP, coarse, coarse.runs, 1.0, 4.0)
+
+
+def test_an_order_within_a_step_counts_in_that_step() -> None:
+    """A clock that is some hundredths of a second late must not make orders late by a whole step."""
+    lag = {"kind": "first_order", "T": 2.0}
+    ship = SHIP.with_values({"thruster.port.actuator": {"n": lag}})
+    late = changed(DATA, t=DATA.frame["t"].to_numpy() + 0.02 * (DATA.frame["t"].to_numpy() > 0))
+    (one,) = cut_segments(ship, late, late.runs[:1], 1.0, 0.0)
+    (exact,) = cut_segments(ship, DATA, DATA.runs[:1], 1.0, 0.0)
+    there = {name: (one.columns[name][1:-1], exact.columns[name]) for name in DATA.commands}
+    np.testing.assert_array_equal(there["port.n"][0], there["port.n"][1][1 : len(there["port.n"][0]) + 1])
+    alpha, orders = there["port.alpha"]
+    count = len(alpha)
+    np.testing.assert_allclose(alpha, 0.98 * orders[1 : count + 1] + 0.02 * orders[:count], atol=1e-9)

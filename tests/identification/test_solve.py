@@ -85,6 +85,19 @@ def test_a_step_longer_than_the_interval_of_the_log_is_a_warning_of_the_solution
     assert warning.startswith("rows of the log are 1 s apart and commands are held over steps of 2 s: faster")
 
 
+def test_a_step_that_does_not_divide_the_interval_of_the_log_is_a_warning_of_the_solution() -> None:
+    dataset = trials(SHIP, runs=2, steps=60)
+    times = dataset.frame["t"].to_numpy()
+    slower = changed(dataset, t=7.3 * times)
+    (warning,) = identify(SHIP, slower, slower.runs, settings(horizon=0.0)).warnings
+    assert warning.startswith("rows of run M01 are 7.3 s apart, which steps of 1 s do not divide: measured values are")
+    assert warning.endswith("compare with step 1.043")
+    rng = np.random.default_rng(1)
+    jittered = changed(dataset, t=times + rng.uniform(0, 0.05, len(times)))
+    for log, step in ((slower, 0.73), (jittered, 1.0), (changed(dataset, t=0.103 * times), 0.1)):
+        assert identify(SHIP, log, log.runs, settings(horizon=0.0, step=step)).warnings == ()
+
+
 def weaves(name: str, n_rpm: float, duration: float, *, measured: bool) -> Dataset:
     """Zigzags that begin at random times, every 0.1 s, with orders or the angles that the gear has reached."""
     rng = np.random.default_rng(11)
