@@ -5,7 +5,7 @@ predictions are replayed with the recorded orders by one rollout with every pert
 give the sensitivities J of the measured signals. The unknown initial state of every prediction is projected out.
 The candidate adds J^T J to the present information M. Its gain is
 
-    gain = 1/2 log2 det(M + J^T J)_f / det(M)_f     bits,  ( )_f the Schur complement of the factors in focus,
+    gain = 1/2 log2 det(M + J^T J) / det(M)     bits,
 
 the expected information of a linear model with normal errors. The design is local: it holds near the present
 parameters and where the model is valid, so its gain is unreliable for motions unlike the fitted ones (astern, a stop).
@@ -295,67 +295,33 @@ def _projected(by_factor: Array, by_start: Array) -> Array:
     return np.asarray(by_factor.swapaxes(1, 2) @ by_factor - crossed.swapaxes(1, 2) @ np.linalg.pinv(known) @ crossed)
 
 
-def rank(
-    contributions: Sequence[Informed],
-    paths: Sequence[str],
-    present: Array | None = None,
-    focus: Sequence[str] | None = None,
-    by: str = "per_hour",
-) -> pd.DataFrame:
-    """Candidates, best first: `manoeuvre`, `hours`, `gain` [bits], `per_hour` [bits/h], `narrows`, `before`, `after`.
+def rank(contributions: Sequence[Informed], paths: Sequence[str], present: Array | None = None) -> pd.DataFrame:
+    """Candidates: `manoeuvre`, `hours`, `gain` [bits], `per_hour` [bits/h], `narrows`, `before`, `after`.
+
+    Those with the most bits per hour come first. `narrows` is the factor whose standard error falls by the largest
+    ratio, from `before` to `after`.
 
     Parameters
     ----------
     paths : names of the n factors.
-    present : (n, n) information before the manoeuvre; default: a standard deviation of 1 for each factor.
-    focus : factors whose information counts; default: all. by : `per_hour` or `gain`.
-
-    `narrows` is the factor in focus whose standard error falls by the largest ratio, from `before` to `after`.
+    present : (n, n) information before the manoeuvre, to which a standard deviation of 1 of each factor is added;
+        default: that alone.
     """
-    table = _table(contributions, paths, present, focus)
-    return table.sort_values(_criterion(by), ascending=False, ignore_index=True)
-
-
-def _criterion(by: str) -> str:
-    if by not in ("gain", "per_hour"):
-        raise ShipidError(f"manoeuvres are ranked by gain or per_hour, not {by!r}")
-    return by
-
-
-def _table(
-    contributions: Sequence[Informed], paths: Sequence[str], present: Array | None, focus: Sequence[str] | None
-) -> pd.DataFrame:
-    """One row for each candidate in the given order: gain, gain per hour, standard errors before and after."""
-    focused = _focused(paths, focus)
-    present_information = _present(present, len(paths))
-    before, rows = _errors(present_information), []
+    known = np.eye(len(paths)) / UNKNOWN**2 + (0.0 if present is None else present)
+    before, rows = _errors(known), []
     for one in contributions:
-        total = present_information + one.information
-        gain, after = _bits(total, focused) - _bits(present_information, focused), _errors(total)
-        most = focused[int(np.argmax(before[focused] / after[focused]))]
+        total = known + one.information
+        gain, after = _bits(total) - _bits(known), _errors(total)
+        most = int(np.argmax(before / after))
         rate = gain / one.candidate.hours
         rows.append((one.candidate.title, one.candidate.hours, gain, rate, paths[most], before[most], after[most]))
-    return pd.DataFrame(rows, columns=["manoeuvre", "hours", "gain", "per_hour", "narrows", "before", "after"])
+    table = pd.DataFrame(rows, columns=["manoeuvre", "hours", "gain", "per_hour", "narrows", "before", "after"])
+    return table.sort_values("per_hour", ascending=False, ignore_index=True)
 
 
-def _focused(paths: Sequence[str], focus: Sequence[str] | None) -> list[int]:
-    unknown = next((path for path in focus or () if path not in paths), None)
-    if unknown is not None:
-        raise ShipidError(f"{unknown!r} is not among the factors: {choices(unknown, paths)}", path="focus")
-    return [j for j, path in enumerate(paths) if focus is None or path in focus]
-
-
-def _present(present: Array | None, count: int) -> Array:
-    """Present information (n, n) plus a prior of standard deviation `UNKNOWN` on every factor."""
-    return np.eye(count) / UNKNOWN**2 + (0.0 if present is None else present)
-
-
-def _bits(information: Array, focused: list[int]) -> float:
-    """1/2 log2 det [bits] of the Schur complement of the factors in focus."""
-    rest = [j for j in range(len(information)) if j not in focused]
-    whole = np.linalg.slogdet(information)[1]
-    others = np.linalg.slogdet(information[np.ix_(rest, rest)])[1] if rest else 0.0
-    return float((whole - others) / (2 * np.log(2)))
+def _bits(information: Array) -> float:
+    """1/2 log2 det [bits]."""
+    return float(np.linalg.slogdet(information)[1] / (2 * np.log(2)))
 
 
 def _errors(information: Array) -> Array:
