@@ -6,7 +6,6 @@ Series are arrays about zero or between limits, in the unit of the command; the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,6 @@ from shipid.errors import DocumentError
 from shipid.vessel.perturb import uniform
 
 Array = NDArray[np.float64]
-Phases = Literal["schroeder", "optimised"]
 
 STARTS, ROUNDS = 24, 400  # of the search for phases: 0.1 s; eight times as many starts improve it by 2 % at most
 SAMPLES = 32  # per period of the highest harmonic in the search for the peak
@@ -28,20 +26,18 @@ def multisine(
     period: float,
     harmonics: Sequence[int],
     amplitude: float,
-    phases: Phases = "optimised",
     key: tuple[object, ...] = (),
 ) -> Array:
     """Sum (T,) of sines of equal amplitude at harmonics / period [Hz], within +- amplitude at all times, 0 at t = 0.
 
     x(t) = a sum_k sin(2 pi h_k t / period + phi_k) at times (T,) [s]; it repeats after `period` [s]. For a given
-    amplitude limit, a is the larger the lower the crest factor is (see `crest_factor`).
+    amplitude limit, a is the larger the lower the crest factor is, the greatest |x| over the root mean square.
 
-    schroeder : phi_k = -pi k (k - 1) / K, k = 1..K (Schroeder 1970, IEEE Trans. Inf. Theory 16); crest factor near 1.9
-        for successive harmonics, up to 3 for sparse ones.
-    optimised : never a higher crest factor than `schroeder`. From Schroeder's phases and from random phases by `key`,
-        repeat: clip the peaks, keep the phases of the clipped signal, restore the amplitudes (Van der Ouderaa,
-        Schoukens and Renneboog 1988, IEEE Trans. Instrum. Meas. 37). The best result is used. Crest factor 1.4 for 10
-        to 40 harmonics of a wide band; 1.7 to 1.9 for narrow (17..21) and sparse bands.
+    The phases are searched. From those of Schroeder, phi_k = -pi k (k - 1) / K, k = 1..K (1970, IEEE Trans. Inf.
+    Theory 16), and from random phases by `key`, repeat: clip the peaks, keep the phases of the clipped signal, restore
+    the amplitudes (Van der Ouderaa, Schoukens and Renneboog 1988, IEEE Trans. Instrum. Meas. 37). The best result is
+    used: a crest factor of 1.4 for 10 to 40 harmonics of a wide band, 1.7 to 1.9 for narrow (17..21) and sparse bands,
+    where Schroeder's are 1.9 for successive harmonics and up to 3 for sparse ones.
 
     Several commands at once get disjoint harmonics (`deal`), which makes them orthogonal over a period, and are shifted
     in time to begin at 0 each: Morelli's design (2003, AIAA 2003-5807).
@@ -53,8 +49,7 @@ def multisine(
     _check_multisine(time, period, harmonics, amplitude)
     h = np.array(harmonics, dtype=np.int64)
     start = -np.pi * np.arange(len(h)) * np.arange(1, len(h) + 1) / len(h)
-    phi = start if phases == "schroeder" else _optimise(h, start, key)
-    phi = _begin_at_zero(h, phi)
+    phi = _begin_at_zero(h, _optimise(h, start, key))
     shape = np.sin(2 * np.pi * np.outer(time, h) / period + phi).sum(axis=1)
     return np.asarray(amplitude / _peak(h, phi) * shape)
 
@@ -102,15 +97,6 @@ def limit_rate(series: Array, step: float, rate: float) -> Array:
     for now in range(1, len(result)):
         result[now] = result[now - 1] + np.clip(result[now] - result[now - 1], -rate * step, rate * step)
     return result
-
-
-def crest_factor(series: Array) -> Array:
-    """Crest factor: greatest |x| divided by the root mean square of a series (T,), or of each column of (T, S).
-
-    1 for a square wave, sqrt(2) for a sine. Divided by sqrt(2) it is Morelli's relative peak factor, for symmetric
-    peaks.
-    """
-    return np.asarray(np.abs(series).max(axis=0) / np.sqrt(np.mean(np.square(series), axis=0)))
 
 
 def _check_multisine(time: Array, period: float, harmonics: Sequence[int], amplitude: float) -> None:
