@@ -30,7 +30,7 @@ from shipid.identification.outcome import (
 from shipid.identification.residuals import build, predict
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, autocorrelation, statistics
+from shipid.identification.statistics import LinearFit, statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials
 
@@ -378,19 +378,6 @@ def test_digests_know_values_not_names_of_files(log: Dataset) -> None:
     other = log.frame.copy()
     other.loc[3, "u"] += 1e-12
     assert Dataset(other, log.metadata).digest != log.digest
-
-
-def test_autocorrelation_of_what_is_known() -> None:
-    """A first-order autoregression of coefficient a has rho_k = a^k (Box, Jenkins, Time Series Analysis, ch. 3)."""
-    rng, runs = np.random.default_rng(2), []
-    for _ in range(4):
-        x = np.zeros(20000)
-        for i, e in enumerate(rng.normal(size=len(x) - 1)):
-            x[i + 1] = 0.8 * x[i] + e
-        runs.append(x)
-    rho = autocorrelation(runs)
-    assert rho[0] == 1
-    assert np.allclose(rho[1:6], 0.8 ** np.arange(1, 6), atol=0.03)
 
 
 def test_a_profile_keeps_the_ranges_of_the_other_factors(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from scipy import stats
 
 from shipid.errors import ShipidError
-from shipid.identification.statistics import LinearFit, blocks, statistics, whiteness
+from shipid.identification.statistics import LinearFit, autocorrelation, blocks, statistics, whiteness
 from tests.identification.linear import SIGNALS, design, fitted, labels, noise
 
 RUNS, SAMPLES, COUNT = 20, 80, 6
@@ -143,6 +144,25 @@ def test_whiteness_is_that_of_ljung_and_box() -> None:
     assert whiteness(fit)["u"].probability == pytest.approx(stats.chi2.sf(expected, freedom))
 
 
+def test_autocorrelation_is_the_mean_product_of_all_pairs() -> None:
+    """Over runs of different lengths; runs of few rows or without errors count for nothing."""
+    rng = np.random.default_rng(4)
+    runs = [rng.normal(size=count).cumsum() for count in (30, 50)]
+    rho = autocorrelation([runs[0], np.ones(3), np.zeros(40), runs[1]])
+    products = [[run[i] * run[i + lag] for run in runs for i in range(len(run) - lag)] for lag in range(50)]
+    np.testing.assert_allclose(rho, [np.mean(each) / np.mean(products[0]) for each in products], rtol=1e-9)
+
+
+def test_a_run_without_errors_is_no_sign_of_colour() -> None:
+    errors = np.random.default_rng(0).normal(size=60)
+    fit = LinearFit(("p",), np.ones(1), errors, np.ones((60, 1)), np.zeros(60, dtype=int), ("u",) * 60)
+    exact = LinearFit(
+        ("p",), np.ones(1), np.append(errors, np.zeros(20)), np.ones((80, 1)), np.repeat([0, 1], [60, 20]), ("u",) * 80
+    )
+    assert whiteness(exact)["u"].probability == whiteness(fit)["u"].probability
+    assert whiteness(exact)["u"].memory == pytest.approx(whiteness(fit)["u"].memory)
+
+
 @pytest.mark.parametrize("phi", [0.0, 0.8])
 def test_correlated_residuals_are_worth_fewer(phi: float) -> None:
     for colour in statistics(one(phi)).whiteness.values():
@@ -192,6 +212,7 @@ def test_a_prior_narrows_the_interval_but_identifies_nothing() -> None:
     assert estimates.errors[2] == pytest.approx(0.2, rel=1e-3)
     assert not estimates.identifiable[2]
     assert estimates.alone[2] > 10
+    assert re.fullmatch(r"p2 is not identified: \+-\d+ % of its base value, hardly excited", estimates.sentences[2])
 
 
 def test_what_ends_at_a_bound_has_no_interval_and_harms_no_other() -> None:
