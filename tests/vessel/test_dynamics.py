@@ -128,6 +128,23 @@ def test_the_motion_through_the_water_is_that_in_still_water(bundled_vessel: Ves
     np.testing.assert_allclose(difference, [r * v_c, -r * u_c, 0.0], atol=1e-9)
 
 
+def test_place_and_north_are_of_no_account(bundled_vessel: Vessel) -> None:
+    """A frame moved and turned by 0.7 rad, wind and current with it: the motion is the same, turned."""
+    ship, model, rng = bundled_vessel, dynamics(bundled_vessel), np.random.default_rng(1)
+    names = (*model.state, *model.commands, *model.memory, *model.environment)
+    drawn = {name.replace(".", "_"): rng.uniform(0.1, 0.4) for name in names}
+    c, s = np.cos(0.7), np.sin(0.7)
+    moved = {**drawn, "north": drawn["north"] + 1234.5, "east": drawn["east"] - 77.0}
+    moved |= {name: drawn[name] + 0.7 for name in ("psi", "beta_w", "beta_c") if name in drawn}
+    before, after = rates(ship, **drawn), rates(ship, **moved)
+    before |= {
+        "north": c * before["north"] - s * before["east"],
+        "east": s * before["north"] + c * before["east"],
+    }
+    for name in model.state:
+        assert after[name] == pytest.approx(before[name], rel=1e-8, abs=1e-10)
+
+
 def test_commands_and_environment_are_what_the_terms_ask_for() -> None:
     base = load_vessel("gunnerus-28.9")
     model = dynamics(base)
