@@ -28,7 +28,7 @@ def summed_rates(model: Dynamics, inputs: Sequence[Any], tau: Any, drawn: Mappin
 
 @lru_cache(maxsize=32)
 def casadi_scan(
-    model: Dynamics, step: float, num_steps: int, method: Method, every: int, counts: tuple[int, ...] = ()
+    model: Dynamics, step: float, num_steps: int, method: Method, every: int, counts: tuple[int, ...]
 ) -> ca.Function:
     """One sample: ([state, memory, greatest speed], commands, environment, tau, fixed) -> records of the first.
 

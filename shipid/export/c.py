@@ -22,6 +22,7 @@ from shipid.export.model import Model
 from shipid.export.turns import SAME_TURN, Turned, turned
 from shipid.hybrid.bands import FEWEST, LEVELS, Bands
 from shipid.observer import DIVERGED, LOW, MEASURED, ROUNDING, STATES, Bank, bank, filter_function, sizes
+from shipid.physics.grammar import AXES
 from shipid.physics.signals import SIGNALS, row_of, signal_of
 from shipid.simulation.log import column_of
 from shipid.version import __version__
@@ -150,12 +151,11 @@ class VesselParts:
     def groups(self) -> dict[str, tuple[str, ...]]:
         """Names of the entries of each argument."""
         model = self.equations.model
-        axes = ("X", "Y", "Z", "K", "M", "N")
         return {
             "carry": (*model.state, *model.hidden, *(f"actual.{name}" for name in model.memory)),
             "commands": model.commands,
             "environment": model.environment,
-            "loads": tuple(axes[axis] for axis in self.vessel.axes),
+            "loads": tuple(AXES[axis] for axis in self.vessel.axes),
             "parameters": model.parameters,
         }
 

@@ -9,7 +9,7 @@ import casadi as ca
 from casadi import SX
 
 from shipid.physics.frames import skew
-from shipid.physics.grammar import ADDED_MASS, AXES, POSITIVE
+from shipid.physics.grammar import ADDED_MASS, AXES, MOTIONS, POSITIVE
 
 
 def rigid_body(
@@ -38,7 +38,7 @@ def added_mass(**derivatives: Annotated[SX, ADDED_MASS]) -> SX:
     """
     M_A = SX(6, 6)
     for name, value in derivatives.items():
-        row, column = AXES.index(name[0]), "uvwpqr".index(name[2])
+        row, column = AXES.index(name[0]), MOTIONS.index(name[2])
         M_A[row, column] = -value
     return M_A
 

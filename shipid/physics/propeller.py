@@ -41,8 +41,8 @@ def inflow(
     C_1: SX,
     C_2_plus: SX,
     C_2_minus: SX,
-    tau: SX | float = 0.0,
-    C_P: SX | float = 0.0,
+    tau: SX | float,
+    C_P: SX | float,
 ) -> SX:
     """u_P = (1 - w_P) u [m/s], the wake w_P changing with the drift beta_P at the propeller (MMG eqs. 16, 17).
 

@@ -144,7 +144,7 @@ def _together(
     batch: _Batch,
     every: int,
     how: Mapping[str, Any],
-    outputs: Sequence[str] = (),
+    outputs: Sequence[str],
 ) -> dict[str, Array]:
     """Columns (rows, num_samples) of the logs of a batch, from one rollout with the length of the longest."""
     vessel, num_steps = controls.vessel, every * (batch.rows - 1)

@@ -20,12 +20,12 @@ from shipid.document import Document
 from shipid.errors import DocumentError, choices
 from shipid.files import open_file
 from shipid.physics import TERMS
-from shipid.physics.grammar import AXES
+from shipid.physics.grammar import AXES, MOTIONS
 from shipid.physics.inertia import mass
 from shipid.physics.signals import row_of
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import Binding, bindings, units
-from shipid.vessel.ranges import UNUSUAL, contradiction, first_of, out_of_range
+from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, contradiction, first_of, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
@@ -40,7 +40,7 @@ from shipid.vessel.schema import (
 
 MOST_RADIANS = 7.0  # more than a full turn: a larger limit of an actuator is in degrees
 LONGEST_CHAIN = 20  # documents that extend or patch one another
-LEAST_BLOCK, MOST_BLOCK = 0.05, 2.0  # m / (rho L_pp B T): far beyond any ship and its degraded models
+MOST_BLOCK = 2.0  # m / (rho L_pp B T), as LEAST_BLOCK: far beyond any ship and its degraded models
 
 
 @dataclass(frozen=True)
@@ -402,7 +402,7 @@ def _with_a_sense(paths: tuple[str, ...]) -> list[tuple[str, str, str]]:
     chosen = []
     for path in paths:
         group, _, name = path.rpartition(".")
-        axis = group == "added_mass" and AXES["uvwpqr".index(name[2])] == name[0]
+        axis = group == "added_mass" and AXES[MOTIONS.index(name[2])] == name[0]
         if axis or name == "x_fwd" or (".actuator." in path and name in ("low", "high")):
             chosen.append((path, group, name))
     return chosen
