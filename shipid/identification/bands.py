@@ -62,9 +62,9 @@ def refusal(solution: Solution, judged: Statistics, spacing: float) -> str:
     why = short_horizon(solution, judged, spacing)
     if why:
         return why
-    best = judged.covariances.get(judged.chosen)
-    if best is None or not best.trusted:
-        return f"the standard errors are not to be trusted: {best.reason if best else 'no factor is free'}"
+    best = judged.covariances[judged.chosen]
+    if not best.trusted:
+        return f"the standard errors are not to be trusted: {best.reason}"
     open_ = [path for path, error in zip(solution.paths, judged.errors, strict=True) if np.isinf(error)]
     if open_:
         return f"the data do not determine {listed(short_names(open_))}: give priors, or fix some"

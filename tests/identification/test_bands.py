@@ -114,6 +114,12 @@ def test_short_horizons_with_coloured_residuals_are_refused(fitted: tuple[Soluti
     assert "the horizon of 20 s is short against residuals that are correlated over 4 s" in refusal(short, bad, 1.0)
     assert short_horizon(replace(solution, settings=settings(horizon=50.0)), bad, 1.0) == ""
     assert short_horizon(solution, bad, 1.0) == ""  # whole runs
+    best = replace(known.covariances[known.chosen], trusted=False, reason="3 runs")
+    vague = replace(known, covariances={known.chosen: best})
+    assert refusal(solution, vague, 1.0) == "the standard errors are not to be trusted: 3 runs"
+    silent = replace(known, errors=np.where(np.arange(len(FEW)) == 1, np.inf, known.errors))
+    name = FEW[1].rpartition(".")[2]
+    assert refusal(solution, silent, 1.0) == f"the data do not determine {name}: give priors, or fix some"
 
 
 def test_a_level_that_is_none_is_refused_before_the_fit() -> None:

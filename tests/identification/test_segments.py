@@ -8,7 +8,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.identification.residuals import Predictions, build, predict
-from shipid.identification.segments import cut_segments
+from shipid.identification.segments import cut_segments, too_short
 from shipid.identification.settings import Identify
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
@@ -19,11 +19,14 @@ SHIP = load_vessel("gunnerus-28.9")
 DATA = trials(SHIP, runs=2, steps=50)
 
 
-def test_a_run_is_cut_into_horizons_and_its_end_counts_from_half_of_one() -> None:
+@pytest.mark.parametrize("step", [1.0, 0.5, 2.0])
+def test_a_run_is_cut_into_horizons_and_its_end_counts_from_half_of_one(step: float) -> None:
     for horizon, lengths in ((0.0, [50]), (20.0, [20, 20, 10]), (30.0, [30, 20]), (22.0, [22, 22]), (80.0, [50])):
-        segments = cut_segments(SHIP, DATA, DATA.runs, 1.0, horizon)
-        assert [one.num_steps for one in segments if one.run == 0] == lengths
-        assert all(np.allclose(np.diff(one.t), 1.0) for one in segments)
+        segments = cut_segments(SHIP, DATA, DATA.runs, step, horizon)
+        assert [one.num_steps * step for one in segments if one.run == 0] == lengths
+        assert all(np.allclose(np.diff(one.t), step) for one in segments)
+        assert too_short(DATA, DATA.runs, step, horizon) == []
+    assert too_short(DATA, DATA.runs, step, 104.0) == list(DATA.runs)
 
 
 def test_earlier_orders_are_those_before_the_segment_the_latest_first() -> None:
