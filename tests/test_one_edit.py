@@ -21,9 +21,9 @@ from shipid.export.correctors import taken
 from shipid.export.model import model
 from shipid.export.write import export_predictor
 from shipid.hybrid.features import choose_features, group_of
+from shipid.hybrid.mirror import reflection
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.ridge import _reflection
 from shipid.hybrid.stepping import Stepper, free
 from shipid.logs import readers
 from shipid.logs.guess.columns import guess
@@ -160,9 +160,9 @@ def test_the_envelope_reads_in_degrees_beside_what_is_published() -> None:
 def test_a_correction_mirrors_it() -> None:
     rng = np.random.default_rng(1)
     table = {name: rng.normal(size=40) for name in ("u", "v", "r", "propeller.n", "tail.flap")}
-    reflection = _reflection(table, choose_features(table))
-    assert reflection is not None
-    np.testing.assert_array_equal(reflection, np.diag([1, -1, -1, 1, -1]))
+    image = reflection(table, choose_features(table))
+    assert image is not None
+    np.testing.assert_array_equal(image, np.diag([1, -1, -1, 1, -1]))
 
 
 @pytest.fixture

@@ -23,14 +23,13 @@ from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError
 from shipid.hybrid.compensator import Normaliser, unflatten
-from shipid.hybrid.features import Inputs, Memory, choose_features, feature_table, steps_of
+from shipid.hybrid.features import Inputs, Memory, feature_table, steps_of
 from shipid.hybrid.method import Fitted, Index, Task, shared_tables
-from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of
-from shipid.hybrid.units import part_of, taken
+from shipid.hybrid.units import Seen, part_of, taken
 
 Array = NDArray[np.float64]
 LAYERS = ("W_i", "W_h", "b_i", "b_h", "W_1", "c_1", "W_2", "c_2")
@@ -261,18 +260,10 @@ class Recurrent(Searched):
         rows = signals_of(task.windows.select(training).instants(), steps, task.commands)
         along = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
         at = {name: values[training] for name, values in table.items()}
-        normalisers, mirrors = [], []
-        for part in (along, at):
-            features = choose_features(part)
-            image = reflection(part, features) if self.mirror else None
-            values = np.stack([part[key] for key in features], axis=1)
-            both = values if image is None else np.concatenate([values, values @ image])
-            normalisers.append(Normaliser(tuple(features), both.mean(axis=0), both.std(axis=0)))
-            mirrors.append(image)
-        first, second = mirrors
-        if first is None or second is None:
-            return Reader(normalisers[0], normalisers[1], None, steps)
-        return Reader(normalisers[0], normalisers[1], (first, second), steps)
+        past, now = (Seen.of(part, self.mirror) for part in (along, at))
+        if past.reflection is None or now.reflection is None:
+            return Reader(past.normaliser, now.normaliser, None, steps)
+        return Reader(past.normaliser, now.normaliser, (past.reflection, now.reflection), steps)
 
     def _trained(
         self,

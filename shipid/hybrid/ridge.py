@@ -26,14 +26,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from shipid.data.windows import evenly
-from shipid.hybrid.compensator import Compensator, Network, Normaliser
-from shipid.hybrid.features import Inputs, choose_features, group_of
+from shipid.hybrid.compensator import Compensator, Network
+from shipid.hybrid.features import Inputs, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
-from shipid.hybrid.mirror import reflection as _reflection
 from shipid.hybrid.products import gram, hidden, matmul, sums_of_squares
 from shipid.hybrid.search import CLOSING, Search
 from shipid.hybrid.settings import seed_of
 from shipid.hybrid.trials import diverged
+from shipid.hybrid.units import Seen, Units
 
 Mask = NDArray[np.bool_]
 
@@ -49,20 +49,13 @@ ROUNDING = 1e-3  # by which a sum of squares must be greater to be so for sure: 
 
 @dataclass(frozen=True)
 class _Inputs:
-    """Windows as hidden units see them.
+    """Windows as hidden units see them: `values` are (S, d) normalised."""
 
-    values : (S, d) normalised. reflection : (d, d) mirror of normalised inputs, image = values @ it; None without one.
-    groups : the group of each input, (d,).
-    """
-
-    features: dict[str, tuple[str, ...]]
-    normaliser: Normaliser
+    seen: Seen
     values: Tensor
-    reflection: Array | None
-    groups: tuple[str, ...]
 
     def part(self, rows: Tensor) -> _Inputs:
-        """The same with some of the windows."""
+        """The inputs of some of the windows."""
         return replace(self, values=self.values[rows])
 
 
@@ -325,10 +318,10 @@ class _Tuning:
         if not group.names:
             return {}
         point, terms, ridges = self.points[number], self.terms, self.method.path()
-        seen = group.inputs(point)
-        drawn = _draw(seen, point, self.method.units, seed_of(self.task.seed, number))
-        layer = _layer(seen, drawn)  # the same array for all foundations
-        parts = _parts(seen, drawn, group.outputs, self.task.device)
+        inputs = group.inputs(point)
+        units = inputs.seen.draw(point, self.method.units, seed_of(self.task.seed, number))
+        layer = _layer(units)  # the same array for all foundations
+        parts = _parts(inputs.values, units, group.outputs, self.task.device)
         asked = None
         if wanted is not None:
             asked = np.stack([np.isin(range(len(ridges)), wanted[key]) for key in group.names], axis=1)
@@ -341,8 +334,8 @@ class _Tuning:
             verdicts[key] = _Verdict(
                 value=float(errors[place, k] + judges.faster[key]) / (2 * len(self.basis) * judges.count),
                 ridges=_down_to(ridges, judges.share, chosen),
-                params={**point, "mirror": float(seen is group.mirrored), "ridge": ridges[place]},
-                network=partial(_network, seen, layer, parts, columns, scaled[place], self.basis),
+                params={**point, "mirror": float(inputs is group.mirrored), "ridge": ridges[place]},
+                network=partial(_network, inputs.seen, layer, parts, columns, scaled[place], self.basis),
                 left_out=partial(_chosen_without, others[:, :, k], kept, k),
             )
         return verdicts
@@ -461,39 +454,26 @@ def _blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -
     ]
 
 
-def _inputs(table: Mapping[str, Array], device: str, reflection: Array | None = None) -> _Inputs:
+def _inputs(table: Mapping[str, Array], device: str, mirror: bool = False) -> _Inputs:
     """Choose and normalise the inputs; with a mirror, by the windows and their images."""
-    features = choose_features(table)
-    names = tuple(features)
-    seen = np.stack([table[name] for name in names], axis=1)
-    both = seen if reflection is None else np.concatenate([seen, seen @ reflection])
-    normaliser = Normaliser(names, both.mean(axis=0), both.std(axis=0))
-    groups = tuple(group_of(name) for name in names)
-    return _Inputs(features, normaliser, _tensor(normaliser.apply(table), device), reflection, groups)
+    seen = Seen.of(table, mirror)
+    return _Inputs(seen, _tensor(seen.normaliser.apply(table), device))
 
 
 def _mirrored(table: Mapping[str, Array], device: str) -> _Inputs | None:
     """The inputs with their mirror; None where a column has no image in it."""
-    reflection = _reflection(table, choose_features(table))
-    return None if reflection is None else _inputs(table, device, reflection)
+    inputs = _inputs(table, device, mirror=True)
+    return None if inputs.seen.reflection is None else inputs
 
 
-def _draw(seen: _Inputs, point: Mapping[str, float], units: int, seed: int) -> tuple[Array, Array]:
-    """Weights (d, M) and offsets (M,) of hidden units, normal with the spreads of the trial."""
-    scales = np.array([point[f"{group}_scale"] for group in seen.groups])
-    generator = np.random.default_rng(seed)
-    normal = generator.standard_normal((units, len(scales) + 1))
-    return (normal[:, :-1] / scales).T, normal[:, -1] * point["offset"]
-
-
-def _parts(seen: _Inputs, drawn: tuple[Array, Array], outputs: Sequence[Tensor], device: str) -> list[_Part]:
+def _parts(values: Tensor, units: Units, outputs: Sequence[Tensor], device: str) -> list[_Part]:
     """Features of a trial with the targets of x and y: even and odd ones in the mirror, else the same for both."""
-    weight, offset = (_tensor(part, device) for part in drawn)
+    weight, offset = (_tensor(part, device) for part in (units.weight, units.offset))
     size = len(offset) ** 0.5
-    features = hidden(seen.values, weight, offset)
-    if seen.reflection is None:
+    features = hidden(values, weight, offset)
+    if units.reflection is None:
         return _with_axes(features.div_(size), outputs)
-    image = hidden(seen.values, _tensor(seen.reflection, device) @ weight, offset)
+    image = hidden(values, _tensor(units.reflection, device) @ weight, offset)
     even = (features + image).div_(2**0.5 * size)
     odd = features.sub_(image).div_(2**0.5 * size)
     return _with_axes(even, outputs[:1]) + _with_axes(odd, outputs[1:])
@@ -695,16 +675,16 @@ class _ManyRows:
         return self.targets[..., columns] - matmul(self.rows, solved)
 
 
-def _layer(seen: _Inputs, drawn: tuple[Array, Array]) -> tuple[Array, Array]:
+def _layer(units: Units) -> tuple[Array, Array]:
     """Weights (d, M) and offsets (M,) of the hidden layer of a network: the units drawn, and their mirror images."""
-    weight, offset = drawn
-    if seen.reflection is None:
-        return drawn
-    return np.concatenate([weight, seen.reflection @ weight], axis=1), np.concatenate([offset, offset])
+    weight, offset = units.weight, units.offset
+    if units.reflection is None:
+        return weight, offset
+    return np.concatenate([weight, units.reflection @ weight], axis=1), np.concatenate([offset, offset])
 
 
 def _network(
-    seen: _Inputs, layer: tuple[Array, Array], parts: Sequence[_Part], columns: slice, ridge: float, basis: Array
+    seen: Seen, layer: tuple[Array, Array], parts: Sequence[_Part], columns: slice, ridge: float, basis: Array
 ) -> Network:
     """The network whose targets are some columns of a trial, solved with all windows."""
     x, y = (

@@ -22,9 +22,11 @@ MADE_OF = ("mean", "std", "weight", "offset")
 class Seen:
     """Inputs that vary in training, their z-score, and their mirror.
 
+    features : name of each input -> the columns that were equal to it in training.
     reflection : (d, d) of normalised inputs, image = values @ it; None where a column has no image in it.
     """
 
+    features: dict[str, tuple[str, ...]]
     normaliser: Normaliser
     reflection: Array | None
 
@@ -36,7 +38,7 @@ class Seen:
         values = np.stack([table[name] for name in names], axis=1)
         reflection = mirror_of(table, features) if mirror else None
         both = values if reflection is None else np.concatenate([values, values @ reflection])
-        return cls(Normaliser(names, both.mean(axis=0), both.std(axis=0)), reflection)
+        return cls(features, Normaliser(names, both.mean(axis=0), both.std(axis=0)), reflection)
 
     def draw(self, point: Mapping[str, float], count: int, seed: int) -> Units:
         """Draw hidden units with the scales and the offset of a trial."""

@@ -13,9 +13,9 @@ from shipid.data.windows import Instants, Windows, cut_windows
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory, choose_features, group_of
 from shipid.hybrid.method import Case, Task
+from shipid.hybrid.mirror import reflection
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.ridge import _reflection
 from shipid.observer import Observer, observe
 from shipid.study.prepare import at_instants
 from shipid.vessel.load import load_vessel
@@ -135,7 +135,7 @@ def test_a_mirrored_run_gives_mirrored_inputs(dataset: Dataset, known: bool) -> 
     here, there = table(dataset), table(mirrored(dataset))
     assert {group_of(name) for name in here} == {"motion", "wind", "command", "history", "error", "observer"}
     features = choose_features(here)
-    mirror = _reflection(here, features)
+    mirror = reflection(here, features)
     assert mirror is not None
     np.testing.assert_array_equal(mirror @ mirror, np.eye(len(features)))
     image = np.stack([here[name] for name in features], axis=1) @ mirror

@@ -6,6 +6,7 @@ import torch
 
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, choose_features
+from shipid.hybrid.mirror import reflection
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.ridge import (
     SOUND,
@@ -19,7 +20,6 @@ from shipid.hybrid.ridge import (
     _left_out,
     _LeftOut,
     _Piece,
-    _reflection,
     _Verdict,
     _with_axes,
     part_of_runs,
@@ -666,4 +666,4 @@ def test_two_runs_are_enough(columns, targets):
 def test_sides_are_distinguished_from_names(names, mirrored):
     rng = np.random.default_rng(2)
     table = {name: rng.normal(size=60) for name in ("u", "v", "r", *names)}
-    assert (_reflection(table, choose_features(table)) is not None) == mirrored
+    assert (reflection(table, choose_features(table)) is not None) == mirrored
