@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipid.measures.record import Measures
+from shipid.measures.record import NAN, Measures
 from shipid.units import DEGREE
 
 SHORTEST = 100.0  # m: length from which the standards apply
@@ -50,19 +50,10 @@ def criteria(kind: str, measures: Measures, length: float | None) -> list[Criter
         criterion = _judged(
             "stopping ability: track reach (5.3.4)", track, 15.0, "L", measures["track_reach"].why, length
         )
-        note = "; ".join(
-            filter(None, [criterion.note, "up to 20 L where a large displacement makes 15 L impracticable"])
-        )
-        return [
-            Criterion(
-                criterion.name,
-                criterion.value,
-                15.0,
-                "L",
-                criterion.met,
-                note if criterion.met is False else criterion.note,
-            )
-        ]
+        if criterion.met is False:
+            more = "up to 20 L where a large displacement makes 15 L impracticable"
+            criterion = replace(criterion, note="; ".join(filter(None, [criterion.note, more])))
+        return [criterion]
     return []
 
 
@@ -93,7 +84,7 @@ def _zigzag(measures: Measures, length: float | None) -> Iterator[Criterion]:
     label = "initial turning ability: track to 10 deg (5.3.2)"
     yield _judged(label, travelled, 2.5, "L", measures["initial_turning"].why, length)
     speed = measures["approach_speed"].value
-    ratio = length / speed if length and speed > 0 else float("nan")
+    ratio = length / speed if length and speed > 0 else NAN
     for number, paragraph, limit in ((1, "5.3.3.1", first_limit(ratio)), (2, "5.3.3.2", second_limit(ratio))):
         overshoot = measures[f"overshoot_{number}"]
         ordinal = "first" if number == 1 else "second"
@@ -112,7 +103,7 @@ def second_limit(ratio: float) -> float:
 
 
 def _lengths(measures: Measures, name: str, length: float | None) -> float:
-    return measures[name].value / length if length else float("nan")
+    return measures[name].value / length if length else NAN
 
 
 def _wrong(measures: Measures, asked: dict[str, float]) -> str:

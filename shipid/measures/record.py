@@ -12,6 +12,8 @@ from shipid.errors import DataError
 
 Array = NDArray[np.float64]
 
+NAN = float("nan")
+STILL = "the helm is never moved"
 POINTS = 4  # samples of the interpolating polynomial
 HALVINGS = 60
 TOP = 0.2  # share of a rise that is its top
@@ -101,7 +103,7 @@ class Measures(Mapping[str, Measure]):
     def add(self, name: str, value: float, unit: str, why: str) -> None:
         """Add a measure; `why` is kept only if the value is not finite."""
         missing = not np.isfinite(value)
-        self._by_name[name] = Measure(float("nan") if missing else float(value), unit, why if missing else "")
+        self._by_name[name] = Measure(NAN if missing else float(value), unit, why if missing else "")
 
     def __getitem__(self, name: str) -> Measure:
         return self._by_name[name]
@@ -116,7 +118,7 @@ class Measures(Mapping[str, Measure]):
 def value_at(t: Array, values: Array, when: float) -> float:
     """Value at the time `when` [s] by cubic interpolation of the two samples before and after; NaN outside the log."""
     if not t[0] <= when <= t[-1]:
-        return float("nan")
+        return NAN
     first = int(np.clip(np.searchsorted(t, when) - POINTS // 2, 0, max(len(t) - POINTS, 0)))
     near, some = t[first : first + POINTS] - when, values[first : first + POINTS]
     apart = near[:, None] - near + np.eye(len(near))
@@ -132,10 +134,10 @@ def crossing(t: Array, values: Array, level: float, start: float, rising: bool =
     beyond = (values - level) * (1.0 if rising else -1.0)
     here = value_at(t, beyond, start)
     if not here < 0:
-        return start if here >= 0 else float("nan")
+        return start if here >= 0 else NAN
     after = np.flatnonzero((t > start) & (beyond >= 0))
     if not len(after):
-        return float("nan")
+        return NAN
     low, high = max(float(t[after[0] - 1]), start), float(t[after[0]])
     for _ in range(HALVINGS):
         middle = (low + high) / 2
@@ -150,7 +152,7 @@ def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, f
     at least five. So the result does not depend on the sampling interval, and noise is averaged. NaN if the largest
     value is at an end of the interval, because it is then not a maximum.
     """
-    nothing = float("nan"), float("nan")
+    nothing = NAN, NAN
     inside = np.flatnonzero((t >= start) & (t <= end))
     top = int(inside[np.argmax(values[inside])]) if len(inside) else 0
     if top in (0, len(t) - 1) or len(t) < 5:
@@ -177,21 +179,21 @@ def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, f
 def integral(t: Array, values: Array, start: float, end: float) -> float:
     """Integral of values over time from `start` to `end` [s] by the trapezoid rule; NaN if either is NaN."""
     if not start <= end:
-        return float("nan")
+        return NAN
     instants = np.concatenate([[start], t[(t > start) & (t < end)], [end]])
     return float(np.trapezoid(np.interp(instants, t, values), instants))
 
 
 def mean(t: Array, values: Array, start: float, end: float) -> float:
     """Mean of values over the time from `start` to `end` [s]; NaN if end <= start."""
-    return integral(t, values, start, end) / (end - start) if end > start else float("nan")
+    return integral(t, values, start, end) / (end - start) if end > start else NAN
 
 
 def settled(t: Array, values: Array, start: float, end: float, scale: float) -> float:
     """Mean over the last quarter of the time; NaN if it differs from the quarter before by more than 5 % of `scale`."""
     quarter = (end - start) / 4
     before, last = (mean(t, values, end - (i + 1) * quarter, end - i * quarter) for i in (1, 0))
-    return last if abs(last - before) <= STEADY * abs(scale) else float("nan")
+    return last if abs(last - before) <= STEADY * abs(scale) else NAN
 
 
 def departure(t: Array, order: Array, index: int) -> float:
@@ -292,14 +294,14 @@ def helm_over(record: Record) -> HelmOver:
     """
     size = np.abs(record.helm)
     if not size.max() > 0:
-        return HelmOver(float("nan"), 0, 0.0, 1.0)
+        return HelmOver(NAN, 0, 0.0, 1.0)
     angle = float(np.median(size[size >= size.max() / 2]))
     over = size >= angle / 2
     if over[0] and abs(record.r[0]) > STEADY * np.abs(record.r).max():
         same = np.sign(record.helm) == np.sign(record.helm[0])
         over &= np.logical_or.accumulate(~(over & same))  # the helm of an earlier manoeuvre ends at its first release
     if not over.any():
-        return HelmOver(float("nan"), 0, 0.0, 1.0)
+        return HelmOver(NAN, 0, 0.0, 1.0)
     row = int(np.argmax(over))
     start = departure(record.t, record.helm, row) if row else float(record.t[0])
     return HelmOver(start, row, angle, float(np.sign(record.helm[row])))

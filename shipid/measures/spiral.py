@@ -7,13 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from shipid.measures.record import Array, Measures, Record, mean, plateaus, settled
+from shipid.measures.record import NAN, Array, Measures, Record, mean, plateaus, settled
 from shipid.measures.turning import MIDSHIPS
 from shipid.units import DEGREE
 
 LEVEL_HELM = 0.5 * DEGREE  # helm angles closer than this are one level
 LEVEL_RATE = 0.05  # of the largest rate: rates closer than this are one level
-NAN = float("nan")
 
 
 @dataclass(frozen=True, eq=False)

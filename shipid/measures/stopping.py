@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipid.measures.record import Measures, Record, crossing, departure, integral, value_at
-
-NAN = float("nan")
+from shipid.measures.record import NAN, Measures, Record, crossing, departure, integral, value_at
 
 
 def stop(record: Record) -> Measures:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from shipid.measures.record import (
+    NAN,
     STEADY,
+    STILL,
     Array,
     Measures,
     Record,
@@ -21,9 +23,7 @@ from shipid.measures.record import (
 )
 from shipid.units import DEGREE
 
-NAN = float("nan")
 MIDSHIPS = 0.25  # of the helm in the turn: smaller angles count as amidships
-STILL = "the helm is never moved"
 
 
 def turning(record: Record) -> Measures:

@@ -6,13 +6,24 @@ from itertools import pairwise
 
 import numpy as np
 
-from shipid.measures.record import Array, HelmOver, Measures, Record, crossing, extreme, helm_over, integral, value_at
+from shipid.measures.record import (
+    NAN,
+    STILL,
+    Array,
+    HelmOver,
+    Measures,
+    Record,
+    crossing,
+    extreme,
+    helm_over,
+    integral,
+    value_at,
+)
 from shipid.units import DEGREE
 
 ROUND = 5 * DEGREE  # execute headings are usually multiples of it
 MOST = 4  # overshoots that are measured: later ones repeat them
 NEAR = 1.5 * DEGREE  # tolerance of the execute heading at a reversal
-STILL = "the helm is never moved"
 
 
 def zigzag(record: Record, execute_heading: float | None = None, course: float | None = None) -> Measures:
@@ -43,12 +54,12 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
     off = over.side * (record.psi - around)
     angle = _seen(record, off, helm, start) if execute_heading is None else abs(execute_heading)
     executes = _executes(t, off, angle, start)
-    before = float(np.interp(start, t, record.speed)) if np.isfinite(start) else float("nan")
+    before = float(np.interp(start, t, record.speed)) if np.isfinite(start) else NAN
     measures.add("execute", start, "s", STILL)
-    measures.add("helm", helm if helm else float("nan"), "rad", STILL)
+    measures.add("helm", helm if helm else NAN, "rad", STILL)
     measures.add("execute_heading", angle, "rad", "the helm is never reversed")
     measures.add("approach_speed", before, "m/s", STILL)
-    second, third, fourth = (*executes, *[float("nan")] * 3)[:3]
+    second, third, fourth = (*executes, *[NAN] * 3)[:3]
     missing = "the log ends before the {} execute".format
     measures.add("initial_turning", integral(t, record.speed, start, second), "m", missing("second"))
     measures.add("initial_turning_time", second - start, "s", missing("second"))
@@ -58,13 +69,13 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
         why = "the log ends before the heading turns back" if np.isfinite(moment) else missing("next")
         measures.add(f"overshoot_{number}", peak - angle, "rad", why)
         measures.add(f"time_to_check_{number}", turned - moment, "s", why)
-    back = crossing(t, off, 0.0, second, rising=False) if np.isfinite(second) else float("nan")
+    back = crossing(t, off, 0.0, second, rising=False) if np.isfinite(second) else NAN
     measures.add("reach", back - start, "s", "the log ends before the ship is back on its course")
     measures.add("period", fourth - second, "s", missing("fourth"))
-    slowest = float("nan")
+    slowest = NAN
     if np.isfinite(third):
         slowest = min(float(np.interp(third, t, record.speed)), *record.speed[(t >= start) & (t <= third)])
-    measures.add("speed_loss", 1 - slowest / before if before else float("nan"), "-", missing("third"))
+    measures.add("speed_loss", 1 - slowest / before if before else NAN, "-", missing("third"))
     return measures
 
 
@@ -94,7 +105,7 @@ def _executes(t: Array, off: Array, angle: float, start: float) -> list[float]:
 def _legs(executes: list[float], end: float) -> list[tuple[float, float]]:
     """Pairs of an execute and the next one, or the end of the log; at least two, as criteria need two overshoots."""
     legs = list(pairwise([*executes, end]))[:MOST]
-    return legs + [(float("nan"), float("nan"))] * (2 - len(legs))
+    return legs + [(NAN, NAN)] * (2 - len(legs))
 
 
 def _seen(record: Record, off: Array, helm: float, start: float) -> float:
@@ -107,7 +118,7 @@ def _seen(record: Record, off: Array, helm: float, start: float) -> float:
     rows = np.flatnonzero((over != 0) & (record.t >= start))
     pairs = [(a, b) for a, b in pairwise(rows) if over[a] != over[b]]
     if not pairs:
-        return float("nan")
+        return NAN
     full = [_last_full(np.abs(record.helm[: a + 1]), helm) for a, _ in pairs]
     low = float(np.median(np.abs(off[full])))
     high = float(np.median([np.abs(off[row + 1]) for row in full]))
