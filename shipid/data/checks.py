@@ -163,31 +163,31 @@ def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     windows = _turning(stretches)
     if len(windows.seen) < 2:
         return
-    size = _rms(np.concatenate([rows["r"].to_numpy() for rows in stretches]))
-    change, ran = _rms(windows.seen), _rms(windows.integrated)
+    size = rms(np.concatenate([rows["r"].to_numpy() for rows in stretches]))
+    change, ran = rms(windows.seen), rms(windows.integrated)
     if max(size, change / WINDOW) < TURNING:
         yield _row("heading rate", 0.0, "1", 0.0, "too straight to compare heading and rate", ok=True)
         return
     error = windows.seen - windows.integrated
-    noise = _rms(windows.error)
+    noise = rms(windows.error)
     count = len(error)
     chance = noise * np.sqrt(1 + SURE * np.sqrt(2 / count))  # of a mean square of so many
-    noisy = _rms(error) <= chance
+    noisy = rms(error) <= chance
     correlation = float(np.mean(windows.seen * windows.integrated)) / (
         change * ran or 1.0
     )  # not centred: a steady turn counts
     power = float(np.sum(windows.integrated**2))
     scale = float(np.sum(windows.seen * windows.integrated)) / (power or 1.0)
-    spread = _rms(windows.seen - scale * windows.integrated) / np.sqrt(power or 1.0)
+    spread = rms(windows.seen - scale * windows.integrated) / np.sqrt(power or 1.0)
     words = "; wrong sign of r or psi?" if correlation < 0 else ""
     sentence = f"changes of psi and integrals of r correlate by {correlation:.3f}{words}"
     yield _row("heading rate", correlation, "1", CORRELATION, sentence, ok=noisy or correlation >= CORRELATION)
     sentence = f"changes of psi are {scale:.3f} +- {spread:.2g} times the integral of r; degrees or another unit?"
     limit = SCALE_ERROR + SURE * spread
     yield _row("heading scale", scale, "1", limit, sentence, ok=noisy or abs(scale - 1) <= limit)
-    off, by_noise = np.degrees(_rms(error)), np.degrees(noise)
+    off, by_noise = np.degrees(rms(error)), np.degrees(noise)
     sentence = f"changes of psi leave the integral of r by {off:.2g} deg (RMS), {by_noise:.2g} by noise"
-    yield _row("heading error", _rms(error), "rad", HEADING_ERROR * change + chance, sentence)
+    yield _row("heading error", rms(error), "rad", HEADING_ERROR * change + chance, sentence)
     yield from _late(stretches, "heading latency", "heading", "yaw rate", lambda rows: np.unwrap(rows["psi"]), _turned)
 
 
@@ -195,7 +195,8 @@ def _turned(rows: pd.DataFrame) -> Plane:
     return cumulative_integral(rows["t"].to_numpy(), rows["r"].to_numpy()).astype(complex)
 
 
-def _ran(rows: pd.DataFrame) -> Plane:
+def way(rows: pd.DataFrame) -> Plane:
+    """Integral of u, v, psi from the first row of a stretch, north + i east [m]."""
     t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
     rate = (u + 1j * v) * np.exp(1j * psi)
     return cumulative_integral(t, rate.real) + 1j * cumulative_integral(t, rate.imag)
@@ -258,14 +259,14 @@ def _path(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     lengths = [
         cumulative_integral(rows["t"].to_numpy(), speed)[-1] for rows, speed in zip(stretches, speeds, strict=True)
     ]
-    error = _rms(np.concatenate([_drift(rows) for rows in stretches]))
+    error = rms(np.concatenate([_drift(rows) for rows in stretches]))
     duration = sum(float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for rows in stretches)
     distance = sum(lengths) / duration * min(STRETCH, duration) if duration > 0 else 0.0
-    noise = _rms(np.array([_path_noise(rows, speed) for rows, speed in zip(stretches, speeds, strict=True)]))
+    noise = rms(np.array([_path_noise(rows, speed) for rows, speed in zip(stretches, speeds, strict=True)]))
     sentence = f"positions leave integrated velocities by {error:.2g} m (RMS) in {STRETCH:g} s, {distance:.3g} m run"
     yield _row("path", error, "m", PATH_ERROR * distance + SURE / 2 * noise, f"{sentence}; {noise:.2g} m by noise")
     yield from _late(
-        stretches, "path latency", "position", "velocity", lambda rows: rows["north"] + 1j * rows["east"], _ran
+        stretches, "path latency", "position", "velocity", lambda rows: rows["north"] + 1j * rows["east"], way
     )
 
 
@@ -348,5 +349,6 @@ def _within(mine: _Motion, other: _Motion, shared: bool) -> float:
     return float(np.mean(np.isin(mine.keys, other.keys))) if mine.lively else 0.0
 
 
-def _rms(values: Array) -> float:
+def rms(values: Array) -> float:
+    """Root mean square of values of any shape."""
     return float(np.sqrt(np.mean(values**2)))

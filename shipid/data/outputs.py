@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid.data.checks import rms
 from shipid.data.dataset import Dataset, pieces, unit_of
 from shipid.engine.casadi import memory_along, outputs_of
 from shipid.errors import DataError
@@ -67,8 +68,8 @@ def compare_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
             here = (predictions["run"] == run).to_numpy()
             y, f = ordered[name].to_numpy()[here], predictions[name].to_numpy()[here]
             power = float(f @ f)
-            row = {"output": name, "run": str(run), "unit": unit_of(name), "measured": _rms(y), "predicted": _rms(f)}
-            table.append(row | {"scale": float(f @ y) / power if power else np.inf, "error": _rms(y - f)})
+            row = {"output": name, "run": str(run), "unit": unit_of(name), "measured": rms(y), "predicted": rms(f)}
+            table.append(row | {"scale": float(f @ y) / power if power else np.inf, "error": rms(y - f)})
     names = ["output", "run", "unit", "measured", "predicted", "scale", "error"]
     return pd.DataFrame(table, columns=names)
 
@@ -96,7 +97,3 @@ def check_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
             "ok": ok, "sentence": sentence + ("" if ok else words),
         })  # fmt: skip
     return pd.DataFrame(table, columns=["check", "run", "value", "unit", "limit", "ok", "sentence"])
-
-
-def _rms(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from shipid.data.checks import check_dataset
-from shipid.data.dataset import Dataset, cumulative_integral, pieces, pieces_by_run
+from shipid.data.checks import check_dataset, way
+from shipid.data.dataset import Dataset, pieces, pieces_by_run
 from shipid.physics.signals import steers
 from shipid.study.kinds import kinds_of, longest
 
@@ -97,7 +96,7 @@ def _stream(dataset: Dataset) -> tuple[complex, float] | None:
     run, seen, lags = [], [], []
     for _, rows in pieces(dataset):
         t = rows["t"].to_numpy()
-        path, position = _way(rows), rows["north"].to_numpy() + 1j * rows["east"].to_numpy()
+        path, position = way(rows), rows["north"].to_numpy() + 1j * rows["east"].to_numpy()
         last = np.minimum(np.searchsorted(t, t + LAG), len(t) - 1)
         whole = t[last] - t >= 0.5 * LAG
         run.append((path[last] - path)[whole])
@@ -125,18 +124,11 @@ def separation(dataset: Dataset, lag: float) -> float:
     parted = []
     for _, rows in pieces(dataset):
         t = rows["t"].to_numpy()
-        apart = rows["north"].to_numpy() + 1j * rows["east"].to_numpy() - _way(rows)
+        apart = rows["north"].to_numpy() + 1j * rows["east"].to_numpy() - way(rows)
         early = t <= t[-1] - lag
         parted.append(np.interp(t[early] + lag, t, apart) - apart[early])
     every = np.abs(np.concatenate(parted))
     return float(np.sqrt(np.mean(every**2))) if len(every) else 0.0
-
-
-def _way(rows: pd.DataFrame) -> NDArray[np.complex128]:
-    """Integral of u, v, psi from the first row of a stretch, north + i east [m]."""
-    t, psi = rows["t"].to_numpy(), rows["psi"].to_numpy()
-    velocity = (rows["u"].to_numpy() + 1j * rows["v"].to_numpy()) * np.exp(1j * psi)
-    return np.asarray(cumulative_integral(t, velocity.real) + 1j * cumulative_integral(t, velocity.imag))
 
 
 def helm_sense(dataset: Dataset) -> dict[str, float]:
