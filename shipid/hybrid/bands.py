@@ -246,6 +246,12 @@ def turned(errors: Array, ahead: Array) -> tuple[Array, Array]:
     return along, errors[..., 1] * ahead[..., 0] - errors[..., 0] * ahead[..., 1]
 
 
+def chords_of(paths: Array) -> Array:
+    """Three chords (3, S, 2) [m] of paths (T, S, 2) [m] that start at the origin, one for each third of the steps."""
+    ends = np.array([-(-len(paths) * part // 3) - 1 for part in (1, 2, 3)])
+    return np.diff(np.concatenate([np.zeros_like(paths[:1]), paths[ends]]), axis=0)
+
+
 def traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array, length: float) -> Array:
     """What makes a prediction easy or hard, (S, 5), one column for each of `TRAITS`; no trait has a unit.
 
@@ -254,16 +260,13 @@ def traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array,
     turns later [rad]. slip : how far the turn is from what the present yaw rate would give [rad].
     distance : logarithm of 1 + the distance from the windows of training.
     """
-    horizon = len(paths)
-    marks = np.array([-(-horizon * part // 3) - 1 for part in (1, 2, 3)])
-    points = np.concatenate([np.zeros_like(paths[:1]), paths[marks]])
-    chords = np.diff(points, axis=0)
+    chords = chords_of(paths)
     size = lengths(chords)
     cross = chords[:-1, :, 0] * chords[1:, :, 1] - chords[:-1, :, 1] * chords[1:, :, 0]
     dot = (chords[:-1] * chords[1:]).sum(axis=-1) + 0.0  # a ship at rest does not turn: 0 and not -0
     angles = np.arctan2(cross, dot)
     first, second = angles
-    held = columns["r"] * step * horizon * 2 / 3
+    held = columns["r"] * step * len(paths) * 2 / 3
     return np.column_stack(
         [
             np.log(size.sum(axis=0) / length + 0.02),

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.windows import evenly
-from shipid.hybrid.bands import FEWEST, LEVELS, TRAITS, Bands, nearest, track, traits, turned
+from shipid.hybrid.bands import FEWEST, LEVELS, TRAITS, Bands, chords_of, nearest, track, traits, turned
 from shipid.metrics import lengths
 
 Array = NDArray[np.float64]
@@ -92,9 +92,7 @@ def calibrated(
     columns = {name: np.asarray(columns[name], dtype=float)[chosen] for name in {*names, "r"}}
     centres, spread, away = _from_training(runs, np.stack([columns[name] for name in names], axis=1))
     far = max(float(away.max()), 1e-9)
-    thirds = np.array([-(-len(paths) * part // 3) - 1 for part in (1, 2, 3)])
-    chords = np.diff(np.concatenate([np.zeros_like(paths[:1]), paths[thirds]]), axis=0)
-    length = max(float(lengths(chords).sum(axis=0) @ runs.weight), 1e-9)
+    length = max(float(lengths(chords_of(paths)).sum(axis=0) @ runs.weight), 1e-9)
     seen = traits(paths, columns, step, away, length)
     middle = runs.weight @ seen
     deviation = np.sqrt(runs.weight @ (seen - middle) ** 2)
@@ -274,4 +272,4 @@ def _runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _Runs:
 
 def _middle_level(count: int) -> int:
     """Index in `LEVELS` of 0.9, or of the highest level that so many runs can promise."""
-    return int(min(round(90 * 1.0), int(100 * count / (count + 1)))) - 1
+    return min(90, 100 * count // (count + 1)) - 1
