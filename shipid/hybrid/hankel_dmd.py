@@ -101,14 +101,13 @@ def _missed_before(physics: Physics, instants: Instants, delays: int) -> list[Ar
     past = {name: values[first:] for name, values in instants.past.items()}
     given = {name: values for name, values in past.items() if "." in name}
     then = Instants({name: values[0] for name, values in past.items()}, planned=given)
-    stepper = Stepper(replace(physics, horizon=delays), then)
+    before = replace(physics, horizon=delays)
+    stepper = Stepper(before, then)
     residuals = []
     for k in range(delays):
         motion = {name: past[name][k] for name in (*MOTIONS, "psi")}
-        source = past if k + 1 < delays else None
-        after = [instants.columns[name] if source is None else source[name][k + 1] for name in MOTIONS]
-        alone = free(replace(physics, horizon=delays), stepper.at(k, motion))
-        residuals.append((np.stack(after, axis=1) - alone) / physics.step)
+        after = [past[name][k + 1] if k + 1 < delays else instants.columns[name] for name in MOTIONS]
+        residuals.append((np.stack(after, axis=1) - free(before, stepper.at(k, motion))) / physics.step)
     return [np.stack([step[:, axis] for step in residuals]) for axis in range(3)]
 
 

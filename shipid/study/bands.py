@@ -178,7 +178,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
 def worst_frame(results: Results) -> pd.DataFrame:
     """Test runs that pay: share of their paths in the band of the study's level, at the largest N_D, lowest first.
 
-    Columns: model, run, kind, coverage, reach (the greatest error over its band, 1 is the border)).
+    Columns: model, run, kind, coverage, reach (the greatest error over its band, 1 is the border).
     """
     test, rows = results.test, []
     kinds = kinds_of(results.dataset, test.spans, test=test.spans)

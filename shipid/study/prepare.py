@@ -360,7 +360,7 @@ def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset, test: Win
     part = observe(foundation.vessel, others, foundation.observer, calls=calls).select(mine)
     for name, values in part.columns.items():
         whole.columns[name][rest] = values
-    for name in ("innovation", "spread", "weights", "age"):
+    for name in ("innovation", "spread", "weights"):
         getattr(whole, name)[rest] = getattr(part, name)
     return whole
 
