@@ -1,5 +1,6 @@
 """A clean log passes every check; each defect put into it fails the check for it."""
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -7,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.data import checks
-from shipid.data.checks import check_dataset
+from shipid.data.checks import check_dataset, noise_of
 from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 120.0, 0.5)
@@ -176,3 +177,32 @@ def test_a_wrong_wind_turns_with_the_ship(wrong: str, seed: int) -> None:
 def test_a_straight_run_says_nothing_of_its_wind() -> None:
     still = turning(T).assign(psi=1.0, r=0.0, u=5.0, v=0.0, V_w=5.0, beta_w=np.linspace(0, 6, len(T)))
     assert "wind" not in set(check_dataset(as_dataset(still))["check"])
+
+
+def test_the_noise_of_a_straight_signal_is_that_put_into_it() -> None:
+    line = 3.0 + 0.2 * np.arange(4000)
+    noise = np.random.default_rng(0).normal(0, 0.5, len(line))
+    assert noise_of(line + noise) == pytest.approx(0.5, rel=0.05)
+    assert noise_of(line) < 1e-9
+    assert noise_of(noise[:4]) == 0.0  # too few to say
+
+
+@pytest.mark.parametrize(("of_heading", "of_rate"), [(0.01, 0.0), (0.0, 0.02), (0.01, 0.02)])
+def test_the_heading_leaves_the_rate_by_its_noise(of_heading: float, of_rate: float) -> None:
+    t, random = np.arange(0.0, 4000.0, 0.5), np.random.default_rng(1)
+    log = turning(t)
+    log["psi"] += random.normal(0, of_heading, len(t))
+    log["r"] += random.normal(0, of_rate, len(t))
+    row = check_dataset(as_dataset(log)).set_index("check").loc["heading error"]
+    seen, by_noise = map(float, re.findall(r"([\d.]+) deg \(RMS\), ([\d.]+) by noise", str(row["sentence"]))[0])
+    assert by_noise == pytest.approx(seen, rel=0.15)
+    assert row["ok"]
+
+
+def test_noise_of_positions_widens_the_limit_of_the_path() -> None:
+    """5 % of the way, and twice the distance that noise of both coordinates makes between two rows."""
+    t, random = np.arange(0.0, 600.0, 0.5), np.random.default_rng(2)
+    log = turning(t)
+    log[["north", "east"]] += random.normal(0, 2.0, (len(t), 2))
+    row = check_dataset(as_dataset(log)).set_index("check").loc["path"]
+    assert row["limit"] == pytest.approx(0.05 * 30.0 * np.hypot(4.0, 0.5) + 2 * (2 * 2 * 2.0**2) ** 0.5, rel=0.1)

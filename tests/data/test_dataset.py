@@ -10,7 +10,18 @@ import pandas as pd
 import pyarrow.parquet
 import pytest
 
-from shipid.data.dataset import Dataset, in_force, pieces, read_dataset, sample, unit_of, write_dataset
+from shipid.data.dataset import (
+    Dataset,
+    apart_from,
+    cumulative_integral,
+    in_force,
+    pieces,
+    pieces_by_run,
+    read_dataset,
+    sample,
+    unit_of,
+    write_dataset,
+)
 from shipid.errors import DataError
 from tests.logs.conftest import as_dataset, turning
 
@@ -292,3 +303,24 @@ def test_the_digest_changes_with_the_flags_and_the_clock() -> None:
     frame = as_dataset(turning(T)).frame
     kinds = [{"flags": ["break"]}, {"flags": ["despike"]}, {"flags": ["break"], "clock": "run"}]
     assert len({Dataset(frame, metadata).digest for metadata in kinds}) == 3
+
+
+def test_only_angles_are_unwrapped() -> None:
+    """A position that jumps by more than half a turn, as a number, is no angle."""
+    rows = turning(T).assign(north=np.where(T > 5.0, 40.0, 0.0))
+    np.testing.assert_array_equal(sample(rows, T)["north"], rows["north"])
+
+
+def test_the_integral_of_a_straight_rate_is_exact_on_any_clock() -> None:
+    t = 1e3 + np.cumsum(np.random.default_rng(0).uniform(0.1, 3.0, 40))
+    np.testing.assert_allclose(cumulative_integral(t, 2.0 * t), t**2 - t[0] ** 2, rtol=1e-12, atol=1e-6)
+
+
+def test_no_other_run_keeps_a_moment_of_runs_that_are_set_apart() -> None:
+    """On one clock: the run that is set apart stays whole, the other loses what it shares, and is broken there."""
+    middle = turning(T[10:20])
+    log = apart_from(as_dataset(middle, turning(T)), ["a"])
+    by_run = {run: [list(rows["t"]) for rows in parts] for run, parts in pieces_by_run(log).items()}
+    assert by_run == {"a": [list(T[10:20])], "b": [list(T[:10]), list(T[20:])]}
+    separate = as_dataset(middle, turning(T), clock="run")
+    assert apart_from(separate, ["a"]) is separate

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 from typing import ClassVar
 
 import numpy as np
@@ -159,3 +160,10 @@ def test_a_path_that_is_no_number_has_an_infinite_error():
     assert mean_square(paths, paths + 2.0) == 4.0
     paths[1, 1, 0] = np.nan
     assert mean_square(paths, np.zeros((2, 3, 2))) == np.inf
+
+
+def test_with_a_budget_there_is_always_another_trial():
+    method = Counting(trials=3, budget=10.0)
+    assert len(list(islice(points_of(method), 9))) == 9
+    assert len(diverged(method, points_of(method)).trials) == 1
+    assert len(diverged(Counting(trials=3), points_of(Counting(trials=3))).trials) == 3

@@ -42,6 +42,14 @@ def test_a_turning_circle() -> None:
     assert "not 35" in note
 
 
+def test_a_turning_circle_in_a_current_is_not_judged() -> None:
+    slow = judged("turning", 200.0, steady_speed=5.0, current_speed=0.4)["5.3.1"]
+    assert slow[2:] == (True, "")
+    _, _, met, note = judged("turning", 200.0, steady_speed=5.0, current_speed=0.6)["5.3.1"]
+    assert met is None
+    assert "carried the ship at 0.6 m/s" in note
+
+
 def test_a_zigzag() -> None:
     by_claim = judged("zigzag", 200.0, approach_speed=5.0, overshoot_1=19 * DEGREE, overshoot_2=41 * DEGREE)
     assert list(by_claim) == ["5.3.2", "5.3.3.1", "5.3.3.2"]

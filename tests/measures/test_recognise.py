@@ -80,3 +80,12 @@ def test_what_is_no_manoeuvre_says_why() -> None:
     already = run([(0.0, 20), (30.0, 1), (33.0, 20)], 60.0)
     begun = Record(*(getattr(already, name)[200:] for name in ("t", "north", "east", "psi", "u", "v", "r", "helm")))
     assert "turns already" in kinds_of(begun)[1]
+
+
+def test_a_helm_put_amidships_for_long_is_a_pull_out_too() -> None:
+    """A fifth of the time of the turn, 38 s, until the helm is moved again or the log ends."""
+    assert kinds_of(run([(10.0, 20)], 200.0)) == (("turning",), "")
+    assert kinds_of(run([(10.0, 20), (200.0, 0)], 230.0)) == (("turning",), "")
+    assert kinds_of(run([(10.0, 20), (200.0, 0)], 250.0)) == (("turning", "pull-out"), "")
+    assert kinds_of(run([(10.0, 20), (200.0, 0), (230.0, 10)], 300.0)) == (("turning",), "")
+    assert kinds_of(run([(10.0, 20), (200.0, 0), (250.0, 10)], 300.0)) == (("turning", "pull-out"), "")

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from shipid.measures import reverse_spiral, spiral
-from shipid.measures.spiral import levels
+from shipid.measures.record import Record
+from shipid.measures.spiral import _at_zero, levels, rate_levels
 from shipid.units import DEGREE
 from tests.measures.made_records import GAIN, HOLD, LEVELS, RATES, START, every, reverse, stable_spiral
 
@@ -58,3 +59,20 @@ def test_reverse_spiral_finds_the_folds() -> None:
     assert measures["levels"].value == len(RATES)
     assert measures["loop_width"].value == pytest.approx(4 * DEGREE, abs=0.02 * DEGREE)
     assert measures["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)
+
+
+def test_the_helm_of_a_rate_is_that_of_its_last_quarter() -> None:
+    t = np.arange(0.0, 300.0)
+    r, since = (np.floor(t / 100) - 1) * DEGREE, t % 100
+    helm = np.where(since < 74, 9 * DEGREE, 2 * DEGREE)
+    still = np.zeros_like(t)
+    points = rate_levels(Record(t, still, still, np.cumsum(r), still + 5, still, r, helm))
+    np.testing.assert_allclose(points.rate, np.array([-1, 0, 1]) * DEGREE, atol=1e-12)
+    np.testing.assert_allclose(points.helm, 2 * DEGREE)
+
+
+@pytest.mark.parametrize(
+    ("x", "value"), [([2, 1, -1], 3.5), ([2, 1, 0], 3.0), ([0, 1, 2], 5.0), ([2, 0, -1], 4.0), ([2, 1, 1], np.nan)]
+)
+def test_the_value_where_another_changes_its_sign(x: list[float], value: float) -> None:
+    assert _at_zero(np.array(x, dtype=float), np.array([5.0, 4.0, 3.0])) == pytest.approx(value, nan_ok=True)

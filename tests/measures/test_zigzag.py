@@ -98,3 +98,15 @@ def test_a_manoeuvre_after_a_long_pause_is_not_of_the_zigzag() -> None:
     assert last_over(record, over) == 69
     soon = replace(record, t=np.interp(t, [0, 70, 170, 199], [0, 70, 80, 109]))  # amidships for 10 s only
     assert last_over(soon, over) == 184
+
+
+@pytest.mark.parametrize(("heading", "interval"), [(7.0, 0.1), (10.0, 0.5), (12.0, 0.1)])
+def test_the_execute_heading_is_seen_from_a_measured_helm(heading: float, interval: float) -> None:
+    """A steering gear of 2 deg/s: where the helm is half back, the heading is beyond that of the order."""
+    t = clock(200.0)
+    psi, r, order = nomoto(t, zigzag_legs(10 * DEGREE, heading * DEGREE, 6)[0])
+    helm = np.zeros_like(t)
+    for row in range(1, len(t)):
+        helm[row] = helm[row - 1] + np.clip(order[row] - helm[row - 1], -0.02 * DEGREE, 0.02 * DEGREE)
+    record = every(made_record(t, psi, r, helm, np.full_like(t, 5.0), 0 * t), interval)
+    assert zigzag(record)["execute_heading"].value / DEGREE == pytest.approx(heading)

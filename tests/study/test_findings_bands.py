@@ -61,3 +61,20 @@ def test_two_members_of_families_are_no_order() -> None:
     finding = narrower(Widths(drawn, ("moderate", "high")))
     assert finding["verdict"] == "undecided"
     assert finding["evidence"] == "2 models with physics, a trend needs 5"
+
+
+@pytest.mark.parametrize(("power", "expected"), [(1.0, "confirmed"), (-1.0, "refuted")])
+def test_an_order_of_many_models_and_its_opposite_are_seen(power: float, expected: str) -> None:
+    A = {f"model-{k}": float(k) for k in range(1, 9)}
+    widths = {name: value**power * np.array([2.0, 1.0]) for name, value in A.items()}
+    drawn = table(np.random.default_rng(1), Size(runs=20, amounts=(5, 20)), A, widths)
+    finding = narrower(Widths(drawn, tuple(A)))
+    assert finding["verdict"] == expected
+    assert np.sign(finding["numbers"]["least rank correlation of width and A"]) == power
+
+
+@pytest.mark.parametrize(("runs", "interval"), [(4, False), (20, True)])
+def test_a_share_has_an_interval_where_there_are_enough_manoeuvres(runs: int, interval: bool) -> None:
+    finding = kept_promise(np.tile([1.0, 1.0, 1.0, 0.0], runs), np.repeat(np.arange(runs).astype(str), 4), LEVEL)
+    assert ("[" in finding["evidence"]) == interval
+    assert finding["numbers"] == {"share at 90%": 0.75}
