@@ -13,7 +13,6 @@ from scipy.special import betaincinv, stdtrit
 
 from shipid.hybrid.bands import Region
 from shipid.predictor import NO_BAND
-from shipid.study.kinds import kinds_of
 from shipid.study.results import Results
 from shipid.study.verdict import metres, named, span
 
@@ -113,8 +112,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
     of a ship whose kind of manoeuvre is not given. By time ahead: share of the positions at that step alone.
     """
     level, test, rows = results.plan.level, results.test, []
-    kinds = kinds_of(results.dataset, test.spans, test=test.spans)
-    kind = np.array([kinds[str(run)] for run in test.run])
+    kind = np.array([results.kinds[str(run)] for run in test.run])
     speed = np.hypot(test.columns["u"], test.columns["v"])
     edges = np.quantile(speed, np.linspace(0, 1, SPEEDS + 1))
     decimals = max(0, 1 - math.floor(math.log10(max(float(edges[-1]), 1e-3))))  # two digits of the greatest speed
@@ -181,13 +179,12 @@ def worst_frame(results: Results) -> pd.DataFrame:
     Columns: model, run, kind, coverage, reach (the greatest error over its band, 1 is the border).
     """
     test, rows = results.test, []
-    kinds = kinds_of(results.dataset, test.spans, test=test.spans)
     places = {run: test.run == run for run in test.spans}
     for row, region, errors in _largest(results):
         reach = region.reach(errors).max(axis=0)
         for run, mine in places.items():
             inside = float((reach[mine] <= 1).mean())
-            entry = {"model": row["model"], "run": run, "kind": kinds[run], "coverage": inside}
+            entry = {"model": row["model"], "run": run, "kind": results.kinds[run], "coverage": inside}
             rows.append({**entry, "reach": float(reach[mine].max())})
     columns = ["model", "run", "kind", "coverage", "reach"]
     return pd.DataFrame(rows, columns=columns).sort_values(["coverage", "reach"], ascending=[True, False])

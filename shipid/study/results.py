@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
@@ -112,6 +113,11 @@ class Results:
     def complete(self) -> bool:
         """Whether every cell of the plan is there."""
         return len(self.cells) == self.plan.cells
+
+    @cached_property
+    def kinds(self) -> dict[str, str]:
+        """Test run -> kind of manoeuvre; the usual speeds come from the other runs."""
+        return kinds_of(self.dataset, self.test.spans, test=self.test.spans)
 
     @property
     def missing(self) -> str:
@@ -273,8 +279,7 @@ def kinds_frame(results: Results) -> pd.DataFrame:
 
     At the largest N_D; over the seeds that have a result. `all` are the test runs of every kind, if there are several.
     """
-    known = kinds_of(results.dataset, results.test.spans, test=results.test.spans)
-    kinds = np.array([known.get(str(run), "") for run in results.test.run])
+    kinds = np.array([results.kinds.get(str(run), "") for run in results.test.run])
     errors: dict[tuple[str, str, int], list[np.ndarray]] = {("naive", "naive", 0): [results.naive]}
     for model, path in results.physics.items():
         if model != NO_MODEL and np.isfinite(path).all():
