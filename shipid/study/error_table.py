@@ -21,6 +21,7 @@ Metric = Literal["H", "H_90"]
 PLAIN = "none, plain"
 """Pure data-driven prediction without the mirror symmetry of the hull, where the study has it."""
 ALONE = -1  # place of the physics alone in a term
+EXACT = 1e-9  # m: errors below count as this one, which has a logarithm and can be divided by
 Term = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or ALONE
 
 
@@ -29,13 +30,20 @@ class ErrorTable:
     """Errors [m] by test manoeuvre.
 
     amounts : N_D, rising. counts : (R,) windows of each test manoeuvre.
-    A : model -> (R,) mean error of the physics alone. H : model -> (amounts, seeds, R) of the prediction.
+    A : model -> (R,) mean error of the physics alone. H : model -> (amounts, seeds, R) of the prediction. What is below
+        `EXACT`, such as the error of the physics that made the data, is raised to it.
     """
 
     amounts: tuple[int, ...]
     counts: Array
     A: Mapping[str, Array]
     H: Mapping[str, Array]
+
+    def __post_init__(self) -> None:
+        """Raise errors to `EXACT`."""
+        for name in ("A", "H"):
+            raised = {model: np.maximum(values, EXACT) for model, values in getattr(self, name).items()}
+            object.__setattr__(self, name, raised)
 
     @property
     def runs(self) -> int:

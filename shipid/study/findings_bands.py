@@ -25,6 +25,7 @@ from shipid.study.evidence import by_chance, doubling
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
+    SAME_A,
     Finding,
     Verdict,
     every,
@@ -103,6 +104,8 @@ def narrower(widths: Widths) -> Finding:
     if len(models) < FEWEST_MODELS:
         return _finding("B1", "undecided", f"{len(models)} models with physics, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, ALONE) for model in models])
+    if np.isclose(A.min(), A.max()):
+        return _finding("B1", "undecided", SAME_A)
     weights, places = doubling(np.log(A)), range(len(table.amounts))
     slopes = table.compare([[(float(w), m, k) for w, m in zip(weights, models, strict=True)] for k in places])
     order = np.array([[table.mean(model, k) for model in models] for k in places])

@@ -40,6 +40,7 @@ from shipid.study.evidence import FEWEST_RUNS, LEVEL, Contrasts, at_least, by_ch
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
+    SAME_A,
     Finding,
     Verdict,
     every,
@@ -218,6 +219,8 @@ def _S3(grid: Grid) -> Finding:
     if len(models) < FEWEST_MODELS:
         return _finding("S3", "undecided", f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, ALONE) for model in models])
+    if np.isclose(A.min(), A.max()):
+        return _finding("S3", "undecided", SAME_A)
     weights = doubling(np.log(A))
     each = [[(float(w), m, k) for w, m in zip(weights, models, strict=True)] for k in range(len(grid.amounts))]
     last = len(grid.amounts) - 1

@@ -14,6 +14,7 @@ from shipid.units import decimals_of, plural
 
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
 MOST_NAMES = 5  # in one sentence
+SAME_A = "all physics models have the same A, so nothing can rise with it"
 
 
 class Finding(TypedDict):

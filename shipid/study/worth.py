@@ -15,7 +15,6 @@ from shipid.study.plan import NO_MODEL
 
 Array = NDArray[np.float64]
 FEWEST_MODELS = 4  # for a line of H over A
-EXACT = 1e-9  # m: errors below count as this one, which has a logarithm
 
 
 @dataclass(frozen=True)
@@ -87,12 +86,12 @@ def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate
 
 def _crossing(values: Array, limits: tuple[float, float]) -> Array:
     """Where the line through (A, H) of models reaches the H of none, within limits; values (B, 2, models and none)."""
-    logs = np.log(np.maximum(values, EXACT))
+    logs = np.log(values)
     x, y, none = logs[:, 0, :-1], logs[:, 1, :-1], logs[:, 1, -1]
     centred = x - x.mean(axis=1, keepdims=True)
     slope = (centred * y).sum(axis=1) / np.maximum((centred**2).sum(axis=1), 1e-12)
     margin = none - y.mean(axis=1)  # above 0: the models are better than none in the mean
-    low, high = np.log(np.maximum(limits, EXACT))
+    low, high = np.log(limits)
     rising = slope > 1e-9
     at = x.mean(axis=1) + np.divide(margin, slope, out=np.zeros_like(margin), where=rising)
     flat = np.where(margin > 0, high, low)  # no better for being more accurate: all pay, or none does
@@ -116,7 +115,7 @@ def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
 
 def _runs(amounts: Array, values: Array) -> Array:
     """Amounts (B,) at which curves reach a level; values (B, amounts and level)."""
-    logs = np.log(np.maximum(values, EXACT))
+    logs = np.log(values)
     curves, level = np.minimum.accumulate(logs[:, :-1], axis=1), logs[:, -1]
     needed = np.full(len(values), amounts[-1])
     for row, (curve, goal) in enumerate(zip(curves, level, strict=True)):

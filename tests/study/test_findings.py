@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from shipid.study.findings import CLAIMS, findings
@@ -54,6 +55,15 @@ def test_a_gap_shrinks_whichever_model_has_the_larger_error(made: Any) -> None:
     assert shrunk["verdict"] == "confirmed"
     assert shrunk["evidence"].startswith("gap 4.00 m before, 0.10 m after: 3.90 m [3.")
     assert verdicts(made(one(1.0, 5.5, 9.0), alone=alone, runs=RUNS))["R3"] == "refuted"
+
+
+@pytest.mark.filterwarnings("error")
+def test_physics_that_made_the_data_are_no_traceback(made: Any) -> None:
+    """No error at all, alone and compensated: nothing is left to gain, and no number is missing."""
+    results = made(one(0.0, 0.0, 9.0), alone={"good": 0.0, "bad": 0.0}, runs=RUNS)
+    assert verdicts(results) == {"R1": "undecided", "R2": "confirmed", "R3": "undecided", "R4": "confirmed"}
+    assert all(np.isfinite(list(finding["numbers"].values())).all() for finding in findings(results))
+    assert not any("nan" in finding["evidence"] for finding in findings(results))
 
 
 def test_what_another_training_could_turn_round_is_undecided(made: Any) -> None:

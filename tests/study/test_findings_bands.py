@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shipid.study.error_table import ErrorTable
 from shipid.study.findings_bands import Widths, kept_promise, narrower
 from shipid.study.verdict import Verdict
 from tests.study.made_up import Size, table
@@ -78,3 +79,13 @@ def test_a_share_has_an_interval_where_there_are_enough_manoeuvres(runs: int, in
     finding = kept_promise(np.tile([1.0, 1.0, 1.0, 0.0], runs), np.repeat(np.arange(runs).astype(str), 4), LEVEL)
     assert ("[" in finding["evidence"]) == interval
     assert finding["numbers"] == {"share at 90%": 0.75}
+
+
+@pytest.mark.filterwarnings("error")
+def test_no_width_rises_with_an_A_that_all_models_have() -> None:
+    models, hard = tuple("abcde"), np.linspace(0.9, 1.1, 8)
+    widths = {name: hard[None, None] * (k + 1) for k, name in enumerate(models)}
+    same = ErrorTable((10,), np.ones(8), dict.fromkeys(models, 2.0 * hard), widths)
+    finding = narrower(Widths(same, models))
+    assert finding["verdict"] == "undecided"
+    assert "the same A" in finding["evidence"]

@@ -67,6 +67,17 @@ def test_the_paper_by_hand(judged: Any) -> None:
     assert verdicts(by_claim) == {**dict.fromkeys(CLAIMS, "confirmed"), "S7": "not testable"}
 
 
+@pytest.mark.filterwarnings("error")
+def test_physics_that_made_the_data_are_no_traceback(judged: Any) -> None:
+    """No error at all, alone and with five seeds of data: S1 holds, and nothing can rise with A."""
+    exact = {**dict.fromkeys((f"moderate-{k}" for k in (1, 2, 3)), [0.0] * 3), "high-1": [0.0] * 3, "high-2": [9.0] * 3}
+    by_claim = judged({**exact, "none": H["none"]}, seeds=5, alone=dict.fromkeys(ALONE, 0.0))
+    assert by_claim["S1"]["verdict"] == "confirmed"
+    assert by_claim["S3"]["evidence"] == "all physics models have the same A, so nothing can rise with it"
+    for finding in by_claim.values():
+        assert np.isfinite(list(finding["numbers"].values())).all()
+
+
 def test_one_seed_cannot_tell_a_fluctuation(judged: Any) -> None:
     by_claim = judged()
     assert verdicts(by_claim) == {**dict.fromkeys(CLAIMS, "confirmed"), "S4": "undecided", "S7": "not testable"}
