@@ -36,6 +36,7 @@ from shipid.study.verdict import (
     too_few,
     undecided,
     verdict,
+    words,
 )
 
 Array = NDArray[np.float64]
@@ -156,7 +157,7 @@ def _worst(rivals: Rivals) -> tuple[float, str, Verdict]:
     whole = np.stack([(pure - error).mean(axis=0) for error in others])
     over = noise * np.array([np.hypot((pure @ weights).mean(), (error @ weights).mean()) for error in others])
     decided = verdict(every(each.above), some(contrasts(whole, rivals.table.counts, over).below))
-    return float(worst[names.index(NO_MODEL)] / worst.sum()), names[int(worst.argmax())], decided
+    return float(worst[names.index(NO_MODEL)] / worst.sum()), words(names[int(worst.argmax())]), decided
 
 
 def by_step(path: Array, future: Array, run: NDArray[np.str_]) -> Array:

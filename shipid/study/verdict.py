@@ -60,7 +60,7 @@ def undecided(claims: Mapping[str, str], reason: str) -> list[Finding]:
 
 def metres(value: float) -> str:
     """Return a length with two decimals, from 10 m on with one, of a model below 0.1 m with two digits or more."""
-    return f"{value:.{_places(value)}f} m"
+    return f"{_written(value, _places(value))} m"
 
 
 def _places(value: float) -> int:
@@ -70,7 +70,12 @@ def _places(value: float) -> int:
 def interval(low: float, high: float) -> str:
     """Return ` [low, high]`, or nothing where there is no interval."""
     places = _places(max(abs(low), abs(high)))
-    return f" [{low:.{places}f}, {high:.{places}f}]" if np.isfinite([low, high]).all() else ""
+    return f" [{_written(low, places)}, {_written(high, places)}]" if np.isfinite([low, high]).all() else ""
+
+
+def _written(value: float, places: int) -> str:
+    """Return a number with so many decimals, and no minus zero."""
+    return f"{round(value, places) + 0.0:.{places}f}"
 
 
 def measured(differences: Contrasts, index: int) -> str:

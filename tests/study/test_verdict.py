@@ -45,6 +45,7 @@ def test_numbers_in_words() -> None:
     assert metres(9.99) == "9.99 m"
     assert metres(9.996) == "10.0 m"
     assert interval(1.0, 12.0) == " [1.0, 12.0]"
+    assert (metres(-1e-9), interval(-1e-9, 0.5)) == ("0.00 m", " [0.00, 0.50]"), "no minus zero"
     assert [metres(value) for value in (0.42, 0.0423, -0.00423, 0.000423, 1e-6)] == [
         "0.42 m",
         "0.042 m",
