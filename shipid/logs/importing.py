@@ -54,6 +54,7 @@ from shipid.logs.readers import (
     date_texts,
     dated,
     hour_twice,
+    in_points,
     moment_of,
     read_table,
     require_file,
@@ -655,20 +656,19 @@ def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str
     read = form if isinstance(form, TableFormat) else TextFormat()
     text = column.fillna("").astype(str).str.strip()
     missing = text.isin(read.missing)
-    plain = text.str.replace(",", ".", regex=False) if read.decimal == "," else text
-    if read.decimal == "," and (grouped := _grouped(text)) is not None:
+    if read.decimal == "," and read.thousands is None and (grouped := _grouped(text)) is not None:
         message = (
             f"{text.iloc[grouped]!r} has a point, and the decimal is a comma (column {source!r}): is it a mark of "
-            "thousands? Take it out of the log. Is it the decimal of this column? Write a comma there"
+            "thousands? Write [format] thousands = '.'. Is it the decimal of this column? Write a comma there"
         )
         raise DataError(message, file=file, path=f"row {grouped + 1}")
-    signed = plain.mask(missing).replace("-0", "-0.0")  # degrees before minutes: a whole number has no such sign
-    numbers = pd.to_numeric(signed, errors="coerce").to_numpy(dtype=np.float64, copy=True)
+    plain = in_points(text, read.decimal, read.thousands).mask(missing)
+    numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
     bad = np.flatnonzero(~np.isfinite(numbers) & ~missing.to_numpy())
     if len(bad):
         message = (
             f"{text.iloc[bad[0]]!r} is no number (column {source!r}; {len(bad)} such rows): "
-            "correct it, or list it in [format] missing, or check decimal"
+            "correct it, or list it in [format] missing, or check decimal and thousands"
         )
         raise DataError(message, file=file, path=f"row {bad[0] + 1}")
     return numbers

@@ -23,7 +23,7 @@ import pandas as pd
 import pyarrow
 import pyarrow.parquet
 from numpy.typing import NDArray
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from shipid.data.dataset import DATED, Array
 from shipid.errors import DataError
@@ -75,6 +75,7 @@ class TableFormat(Format):
     """Keys of a table of text; `names`, or `header = false` and the numbers 1, 2, ..., where it has no header line."""
 
     decimal: Literal[".", ","] = "."
+    thousands: Literal[",", ".", "'", "’", " ", "\u00a0", "\u202f"] | None = None  # between groups of three digits
     skip_rows: int = Field(default=0, ge=0)
     header: bool = True
     names: tuple[str, ...] | None = Field(default=None, min_length=1)
@@ -84,6 +85,13 @@ class TableFormat(Format):
     def text(self) -> TextFormat:
         """Return how the lines of the table are read."""
         return TextFormat(separator=SEPARATOR, **{name: getattr(self, name) for name in TableFormat.model_fields})
+
+    @field_validator("thousands")
+    @classmethod
+    def _other(cls, thousands: str | None, values: ValidationInfo) -> str | None:
+        if thousands is not None and thousands == values.data.get("decimal"):
+            raise ValueError("must be another sign than decimal")
+        return thousands
 
 
 class TextFormat(TableFormat):
@@ -285,6 +293,22 @@ def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
     """Return dates and times of day, of two columns (N,) of text, as one column of text for `seconds`."""
     text = dates.astype("string").str.strip() + " " + times.astype("string").str.strip().str.replace(",", ".")
     return text.astype(object)
+
+
+def in_points(text: pd.Series[Any], decimal: str, thousands: str | None) -> pd.Series[Any]:
+    """Numbers (N,) as text, with a point for the decimal sign and without marks of thousands between full groups."""
+    if thousands is not None:
+        grouped = text.str.fullmatch(grouped_by(decimal, thousands))
+        whole = text.str.replace(thousands, "", regex=False).where(grouped, "no number")
+        text = text.where(~text.str.contains(thousands, regex=False), whole)
+    text = text.str.replace(",", ".", regex=False) if decimal == "," else text
+    return text.replace("-0", "-0.0")  # degrees before minutes: a whole number has no such sign
+
+
+def grouped_by(decimal: str, thousands: str) -> str:
+    """A regular expression of a number with such marks of thousands."""
+    mark, point = re.escape(thousands), re.escape(decimal)
+    return rf"[+-]?[1-9]\d{{0,2}}(?:{mark}\d{{3}})+(?:{point}\d*)?"
 
 
 def date_texts(parts: list[Array]) -> pd.Series[Any]:

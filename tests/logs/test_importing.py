@@ -596,3 +596,24 @@ def test_only_dates_and_positions_are_in_parts(change: tuple[str, str], path: st
     with pytest.raises(DocumentError) as caught:
         read_mapping(tmp_path / "mapping.toml")
     assert caught.value.path == path
+
+
+@pytest.mark.parametrize(("decimal", "mark"), [(".", ","), (",", "."), (".", "'"), (",", "\u202f")])
+def test_numbers_with_a_mark_of_thousands(decimal: str, mark: str, tmp_path: Path) -> None:
+    log = parted()
+    log["psi"] = [f"{1000.25 * k:,.2f}".replace(",", "#").replace(".", decimal).replace("#", mark) for k in range(10)]
+    log.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=decimal)
+    form = f'[format]\nseparator = ";"\ndecimal = "{decimal}"\nthousands = "{mark}"\n'
+    (tmp_path / "mapping.toml").write_text(PARTED.replace("[clock]", f"{form}[clock]"))
+    dataset = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+    np.testing.assert_allclose(dataset.frame["psi"], 1000.25 * np.arange(10))
+    log["psi"] = f"12{mark}34"  # no group of three
+    log.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=decimal)
+    with pytest.raises(DataError, match="is no number"):
+        import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+
+
+def test_one_sign_is_not_both_decimal_and_thousands(tmp_path: Path) -> None:
+    (tmp_path / "mapping.toml").write_text(PARTED.replace("[clock]", '[format]\nthousands = "."\n[clock]'))
+    with pytest.raises(DocumentError, match=r"format.thousands: .*must be another sign than decimal"):
+        read_mapping(tmp_path / "mapping.toml")

@@ -40,8 +40,10 @@ from shipid.logs.readers import (
     date_texts,
     dated,
     days_by,
+    grouped_by,
     hour_twice,
     in_one_number,
+    in_points,
     moment_of,
     parse_text,
     read_table,
@@ -57,6 +59,7 @@ Rows = NDArray[np.bool_]
 SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looked at in its head and that many blocks
 LONG = 1e4  # rows between two runs that have a clock each
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
+GROUPS = (",", ".", "'", "’", " ", "\u00a0", "\u202f")  # marks of thousands
 MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a comment
 SENTINELS = tuple(sign * value for value in (99.0, 999.0, 9999.0, 99999.0, 999999.0, 999.9, 9999.9) for sign in (-1, 1))
 NOT_AVAILABLE = {"psi": (511.0, 360.0), "speed": (102.3, 51.0), "latitude": (91.0, 90.0), "longitude": (181.0, 180.0)}
@@ -189,8 +192,9 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     else:
         table = read_table(file, model, "time")
         notes = tuple(f"{name!r} is {table.attrs['other'][name]}" for name in table.attrs.get("to save anew", ()))
-    columns, words = _numbers(table, form.get("decimal", "."))
+    columns, words = _numbers(table, form.get("decimal", "."), form.get("thousands"))
     in_parts = _degrees(columns)
+    notes += (f"{form['thousands']!r} is read as a mark of thousands",) if "thousands" in form else ()
     if isinstance(model, TableFormat):
         missing = [*_words_for_nothing(table, columns, model), *_sentinels(table, columns)]
         if missing:
@@ -304,23 +308,24 @@ def _text_format(
     lines: list[str], encoding: str, file: Path, names: tuple[str, ...], separators: tuple[str, ...] = SEPARATORS
 ) -> dict[str, Any]:
     """Return the separator and decimal sign that give most numbers in lines of equal length; the header is above."""
-    best: tuple[float, str, str] = (0.0, "", "")
+    best: tuple[float, str, str, str | None] = (0.0, "", "", None)
     quoted = any('"' in line for line in lines)  # between quotes a decimal comma separates nothing
     for separator in separators:
         rows = [cells(line, separator) for line in lines if line.strip()]
         width, count = Counter(len(row) for row in rows).most_common(1)[0]
         for decimal in (".", ",") if separator != "," or quoted else (".",):
-            share = float(np.mean([_number_share(row, decimal) for row in rows if len(row) == width]))
+            mark = _thousands(rows, decimal)
+            share = float(np.mean([_number_share(row, decimal, mark) for row in rows if len(row) == width]))
             score = share * count / len(rows) * (width > 1) * (1 + width / 1000)
             score *= 0.97 if separator == "whitespace" else 1.0  # names may have blanks
             if score > best[0]:  # the first of equals: tabs are blanks, too
-                best = (score, separator, decimal)
-    score, separator, decimal = best
+                best = (score, separator, decimal, mark)
+    score, separator, decimal, mark = best
     if score < NUMERIC / 2:
         raise DataError("no table of numbers with any separator: export it as CSV", file=file)
     rows = [cells(line, separator) for line in lines]
     width = Counter(len(row) for row in rows if any(row)).most_common(1)[0][0]
-    shares = [_number_share(row, decimal) for row in rows]
+    shares = [_number_share(row, decimal, mark) for row in rows]
     usual = float(np.median([share for row, share in zip(rows, shares, strict=True) if len(row) == width]))
     least = max(NUMERIC / 2, usual - 0.9 / width)  # a header may hold numbers, too, but fewer
     data = next(
@@ -328,6 +333,7 @@ def _text_format(
         next(i for i, row in enumerate(rows) if len(row) == width and shares[i] >= NUMERIC / 2),
     )
     form: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
+    form |= {"thousands": mark} if mark is not None else {}
     if names:
         return form | {"skip_rows": data, "names": list(names)}
     words = {i: line.split() for i, line in enumerate(lines[:data])}
@@ -344,7 +350,7 @@ def _text_format(
     dated_at = _date_and_time(rows[data]) if separator == "whitespace" else None
     if dated_at is not None and heads and len(rows[heads[0]]) == width - 1:  # one name for date and time
         wide = [[*rows[i][:dated_at], "date", *rows[i][dated_at:]] for i in heads if len(rows[i]) == width - 1]
-        if len(wide) == 2 and _is_units(rows[heads[0]]):
+        if len(wide) > 1 and _is_units(rows[heads[0]]):
             pairs = zip(wide[1], ["" if k == dated_at else unit for k, unit in enumerate(wide[0])], strict=True)
             return form | {"skip_rows": data, "names": _distinct([_with_unit(*pair) for pair in pairs])}
         return form | {"skip_rows": data, "names": _distinct(wide[0])}
@@ -355,10 +361,10 @@ def _text_format(
         return form | {"skip_rows": data, "names": _distinct([*rows[heads[0]], ""][:width])}
     if heads and heads[0] == above[0]:
         return form | {"skip_rows": heads[0]}
-    wide = [i for i in range(data) if len(rows[i]) > width and all(rows[i][:width]) and not shares[i]]
-    if wide and not heads:  # a table beside the log ends above this line
-        beside = [""] * (len(rows[wide[-1]]) - width)
-        return form | {"skip_rows": wide[-1] + 1, "names": [*_distinct(rows[wide[-1]][:width]), *beside]}
+    longer = [i for i in range(data) if len(rows[i]) > width and all(rows[i][:width]) and not shares[i]]
+    if longer and not heads:  # a table beside the log ends above this line
+        beside = [""] * (len(rows[longer[-1]]) - width)
+        return form | {"skip_rows": longer[-1] + 1, "names": [*_distinct(rows[longer[-1]][:width]), *beside]}
     return form | {"skip_rows": data, "header": False}
 
 
@@ -438,9 +444,28 @@ def cells(line: str, separator: str) -> list[str]:
     return [cell.strip().strip('"') for cell in row]
 
 
-def _number_share(row: list[str], decimal: str) -> float:
+def _thousands(rows: list[list[str]], decimal: str) -> str | None:
+    """Return the mark of thousands in the cells of lines, where all cells with that mark are numbers in groups.
+
+    1,800 alone may be 1.8: it is 1800 where another number has a decimal point.
+    """
+    held = {cell for row in rows for cell in row if re.fullmatch(r"[+-]?\d[\d.,'’ \u00a0\u202f]*", cell)}
+    whole = any(re.fullmatch(rf"[+-]?\d+{re.escape(decimal)}(\d{{1,2}}|\d{{4,}})", cell) for cell in held)
+    for mark in GROUPS:
+        cells = [cell for cell in held if mark in cell]
+        if mark == decimal or not cells or not all(re.fullmatch(grouped_by(decimal, mark), cell) for cell in cells):
+            continue
+        if mark not in ".," or whole or any(decimal in cell or cell.count(mark) > 1 for cell in cells):
+            return mark
+    return None
+
+
+def _number_share(row: list[str], decimal: str, thousands: str | None = None) -> float:
     """Return the share of cells that are numbers; empty cells are not counted."""
-    cells = [cell.replace(",", ".") if decimal == "," else cell for cell in row if not _NOTHING.fullmatch(cell.lower())]
+    cells = [cell for cell in row if not _NOTHING.fullmatch(cell.lower())]
+    grouped = re.compile(grouped_by(decimal, thousands)) if thousands is not None else None
+    cells = [cell.replace(str(thousands), "") if grouped and grouped.fullmatch(cell) else cell for cell in cells]
+    cells = [cell.replace(",", ".") if decimal == "," else cell for cell in cells]
     return sum(map(_is_number, cells)) / len(cells) if cells else 0.0
 
 
@@ -452,7 +477,7 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[str]]:
+def _numbers(table: pd.DataFrame, decimal: str, thousands: str | None) -> tuple[dict[str, Array], list[str]]:
     """Return the columns that are mostly numbers, and the names of the columns of words."""
     columns: dict[str, Array] = {}
     words = []
@@ -462,8 +487,8 @@ def _numbers(table: pd.DataFrame, decimal: str) -> tuple[dict[str, Array], list[
             words.append(name)
             continue
         if not pd.api.types.is_numeric_dtype(column.dtype):
-            text = column.astype(str).str.strip().replace("-0", "-0.0")
-            column = pd.to_numeric(text.str.replace(",", ".") if decimal == "," else text, errors="coerce")
+            text = in_points(column.astype(str).str.strip(), decimal, thousands)
+            column = pd.to_numeric(text, errors="coerce")
         values = column.to_numpy(dtype=np.float64, na_value=np.nan).copy()
         values[np.isinf(values)] = np.nan
         if np.isnan(values).any() and is_run(name):  # names of runs, as numbers

@@ -145,7 +145,7 @@ def _alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) 
     """Return the files of the commonest columns and format; the others are skipped with a reason."""
 
     def written(log: Sniffed) -> tuple[object, ...]:
-        form = {key: value for key, value in log.form.items() if key not in ("ragged", "missing")}
+        form = {key: value for key, value in log.form.items() if key not in ("ragged", "missing", "thousands")}
         unit = (str(log.clock["from"]), log.clock["unit"])
         return (*sorted((key, str(value)) for key, value in form.items()), unit)
 
@@ -183,6 +183,7 @@ def _joined(logs: list[Sniffed]) -> Sniffed:
     form, clock = dict(first.form), dict(first.clock)
     if any(log.form.get("ragged") for log in logs):
         form["ragged"] = "drop"
+    form |= next(({"thousands": log.form["thousands"]} for log in logs if "thousands" in log.form), {})
     rates = {log.clock.get("every") for log in logs}
     if rates != {None}:
         clock["every"] = float(np.median([log.clock["every"] for log in logs if "every" in log.clock]))

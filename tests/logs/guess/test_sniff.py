@@ -577,7 +577,7 @@ def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -
             [f"14/05/2024 08.{k // 60:02}.{k % 60:02}" for k in range(90)],
             "holds '14/05/2024 08.00.00' in row 1, no number",
         ),
-        ([f'"{k:,.1f}"' for k in range(980, 1070)], "'1,000.0' in row 21: take the mark of thousands out of the log"),
+        ([f'"{k:,.1f}"' for k in range(680, 1070)], "'1,000.0' in row 321: take the mark of thousands out of the log"),
         ([str(k) if k % 9 != 8 else "late" for k in range(90)], "'late' in row 9, no time: remove the 10 such lines"),
         ([str((k + 604_755) % 604_800 * 1000) for k in range(90)], "goes back from 604799 s to 0 s in row 46"),
     ],
@@ -737,3 +737,42 @@ def test_a_second_clock_that_goes_otherwise_is_asked(
     log.to_csv(tmp_path / "log.csv", index=False)
     doubts = sniff(tmp_path / "log.csv").doubts
     assert [doubt.partition(",")[0] for doubt in doubts] == [f"{next(iter(second))!r} is a clock"] * asked
+
+
+@pytest.mark.parametrize(
+    ("decimal", "mark", "separator"),
+    [
+        (".", ",", ";"),
+        (",", ".", ";"),
+        (".", "'", ","),
+        (",", " ", ";"),
+        (",", "\u00a0", "\t"),
+        (".", ",", ","),
+        (".", ",", "\t"),
+    ],
+)
+@pytest.mark.parametrize("digits", [0, 2])
+def test_marks_of_thousands_are_read(decimal: str, mark: str, separator: str, digits: int, tmp_path: Path) -> None:
+    """Also of whole numbers, as 1,800 rpm, where the positions show which sign is the decimal one."""
+
+    def written(value: float) -> str:
+        text = f"{value:,.{digits}f}"
+        return text.replace(",", "#").replace(".", decimal).replace("#", mark)
+
+    large = np.round(7_034_120.4 + 97.3 * T * (-1) ** np.arange(len(T)), digits) if digits else np.round(1800 + 3 * T)
+    table = TABLE.assign(lat=63.4399978 + 1e-5 * T, N=[written(one) for one in large])
+    table.to_csv(tmp_path / "log.csv", index=False, sep=separator, decimal=decimal)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.form.items() >= {"decimal": decimal, "thousands": mark, "separator": separator}.items()
+    np.testing.assert_allclose(sniffed.columns["N"], large)
+    np.testing.assert_allclose(sniffed.columns["lat"], table["lat"])
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_three_decimals_are_no_groups(decimal: str, tmp_path: Path) -> None:
+    """1,800 is 1.8 where nothing in the log says that it is 1800."""
+    table = TABLE.assign(time=TABLE["time"] + 1.0)
+    table.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=decimal, float_format="%.3f")
+    sniffed = sniff(tmp_path / "log.csv")
+    assert "thousands" not in sniffed.form
+    np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
