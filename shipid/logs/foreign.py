@@ -10,6 +10,7 @@ from shipid.logs.workbook import is_workbook
 ENOUGH = 4096  # first bytes that tell
 UNPACK = "unpack it"
 SHEET = "save its sheet as CSV (one header line, one row for each time)"
+OFFICE = "export it as .xlsx, or its sheet as CSV"
 TOPICS = "export the topics as CSV with one clock, or each with its own clock ([file.<name>] of a mapping)"
 
 
@@ -31,12 +32,20 @@ FOREIGN = (
     Foreign(
         rb"PK\x03\x04.{26}[^/\0]{1,80}\.npy", "arrays of NumPy (.npz)", "write them as columns of a CSV or Parquet file"
     ),
+    Foreign(
+        rb"PK\x03\x04(?:.{26}mimetypeapplication/vnd\.oasis|.{0,4000}?(?:word|ppt|visio)/[A-Za-z_])",
+        "a text document, presentation or drawing of an office program (.docx, .odt, .pptx)",
+        "copy its table into a workbook and save that as .xlsx or CSV",
+    ),
+    Foreign(rb"PK\x03\x04.{26}(?:Index/|Index\.zip|preview)", "a document of Apple's Numbers (.numbers)", OFFICE),
     Foreign(rb"PK\x03\x04", "a ZIP archive", UNPACK),
     Foreign(
         rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",
-        "an old Excel workbook (.xls), or one with a password",
+        "an old Excel workbook (.xls) or Word document (.doc), or one with a password",
         "save it as .xlsx without a password, or its sheet as CSV",
     ),
+    Foreign(rb"\{\\rtf", "a text document (.rtf)", "save it as plain text"),
+    Foreign(rb".{4}Standard (?:Jet|ACE) DB\0", "a data base of Access (.mdb, .accdb)", "export its table as CSV"),
     Foreign(rb"\x1f\x8b", "packed by gzip", UNPACK),
     Foreign(rb"BZh[1-9]1AY&SY", "packed by bzip2", UNPACK),
     Foreign(rb"\xfd7zXZ\0", "packed by xz", UNPACK),

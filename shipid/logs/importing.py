@@ -73,6 +73,7 @@ from shipid.logs.repairs import (
     apply_repairs,
     interpolate_at,
 )
+from shipid.logs.workbook import NOT_CALCULATED
 from shipid.physics.signals import is_command, is_output, row_of, wraps
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
@@ -670,6 +671,8 @@ def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str
             f"{text.iloc[bad[0]]!r} is no number (column {source!r}; {len(bad)} such rows): "
             "correct it, or list it in [format] missing, or check decimal and thousands"
         )
+        if text.iloc[bad[0]].startswith("="):
+            message = f"{text.iloc[bad[0]]!r} (column {source!r}; {len(bad)} such rows) is {NOT_CALCULATED}"
         raise DataError(message, file=file, path=f"row {bad[0] + 1}")
     return numbers
 

@@ -53,7 +53,7 @@ from shipid.logs.readers import (
     ways_of,
     widest,
 )
-from shipid.logs.workbook import SEPARATOR, sheet_text, sheets_of
+from shipid.logs.workbook import NOT_CALCULATED, SEPARATOR, sheet_text, sheets_of
 
 Rows = NDArray[np.bool_]
 SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looked at in its head and that many blocks
@@ -228,6 +228,8 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
 
 def _as_number(name: str, text: str) -> str:
     """What to do with a column of words whose name says a quantity and whose texts have a number, such as P12.5."""
+    if text.startswith("="):
+        return f": {text[:40]!r} is {NOT_CALCULATED}"
     quantity = any(meaning and score > 0.6 for meaning, score in fits(name).items())
     remedy = f", such as {text[:40]!r}: write it as a number with a sign"
     return remedy if quantity and re.search(r"\d", text) else ""
@@ -965,6 +967,8 @@ def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
     begin = f"holds {text[:40]!r} in row {row + 1}"
     if re.fullmatch(r"\d{1,3}([,.' \u00a0]\d{3})+([.,]\d*)?", text):
         return f"{begin}: take the mark of thousands out of the log"
+    if text.startswith("="):
+        return f"{begin}, {NOT_CALCULATED}"
     if wrong.all():
         return f"{begin}, no number, date or time of day that can be read: write dates as 2024-05-14 08:00:00"
     what = "a leap second" if re.search(r":60(\D|$)", text) else "a comment" if text[:1] in "#%/;" else "no time"
