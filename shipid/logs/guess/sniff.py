@@ -61,7 +61,16 @@ LONG = 1e4  # rows between two runs that have a clock each
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
 GROUPS = (",", ".", "'", "’", " ", "\u00a0", "\u202f")  # marks of thousands
 MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a comment
-SENTINELS = tuple(sign * value for value in (99.0, 999.0, 9999.0, 99999.0, 999999.0, 999.9, 9999.9) for sign in (-1, 1))
+SENTINELS = tuple(
+    sign * value
+    for value in (
+        *(99.0, 999.0, 9999.0, 99999.0, 999999.0, 9999999.0, 99999999.0, 999.9, 9999.9, 999.25),
+        *(3276.7, 3276.8, 6553.5, 327.67, 327.68, 655.35, 32767.0, 32768.0, 65535.0),  # of 16 bits, as such or scaled
+        *(2147483647.0, 2147483648.0, 4294967295.0),  # of 32 bits
+        *(1e20, 1e30, 9.96921e36, 9.969209968386869e36),  # netCDF
+    )
+    for sign in (-1, 1)
+)
 NOT_AVAILABLE = {"psi": (511.0, 360.0), "speed": (102.3, 51.0), "latitude": (91.0, 90.0), "longitude": (181.0, 180.0)}
 """Meaning -> number [deg, kn] that AIS writes for none (ITU-R M.1371), and the largest of the others."""
 MOST_HEADS = 3  # lines above the data: names in two, and units
@@ -222,6 +231,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     kept = {name: values for name, values in kept.items() if name not in runs}
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
     doubts = tuple(_doubts(table.loc[once], clock, t))
+    doubts += tuple(_minus_ones(columns))
     doubts += () if runs else tuple(_other_clocks(table.loc[once], columns, clock, t))
     return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), says, doubts, in_parts)
 
@@ -631,6 +641,26 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
         if not is_clock(name):
             values[_called(table, name).astype(str).str.strip().isin(texts).to_numpy()] = np.nan
     return list(texts)
+
+
+def _minus_ones(columns: dict[str, Array]) -> Iterator[str]:
+    """Yield a question for each speed, direction or shaft that is -1 and otherwise never negative, nor near it.
+
+    It is no missing value of the whole log: a rudder may be at -1 deg.
+    """
+    for name, values in columns.items():
+        hit = values == -1.0
+        others = values[~hit & np.isfinite(values)]
+        if not hit.any() or len(others) < 2 or others.min() < 0.0:
+            continue
+        meant = fits(name).keys()
+        lost = bool({"speed", "V_w"} & meant and np.any(others % 1))  # whole knots may be one astern
+        lost |= bool({"psi", "course", "beta_w"} & meant and others.max() > 180.0)
+        lost |= "n" in meant and others.min() > 10.0
+        if lost:
+            span = f"{others.min():g} to {others.max():g}"
+            remedy = "Then take it out of the log, or list it in [format] missing if no other column has such a value"
+            yield f"{name!r} is -1 in {int(hit.sum())} rows and {span} in the others: is there no value? {remedy}"
 
 
 def _restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, int], dict[str, Array] | None]:

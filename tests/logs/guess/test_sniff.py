@@ -776,3 +776,37 @@ def test_three_decimals_are_no_groups(decimal: str, tmp_path: Path) -> None:
     sniffed = sniff(tmp_path / "log.csv")
     assert "thousands" not in sniffed.form
     np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
+
+
+@pytest.mark.parametrize(
+    "value", ["32767", "-32768", "65535", "-999.25", "1e+20", "2147483647", "9.96921e+36", "327.67"]
+)
+def test_what_recorders_write_for_no_value_is_missing(value: str, tmp_path: Path) -> None:
+    """The largest number of an integer of 16 or 32 bits, perhaps in tenths, and what netCDF and well logs have."""
+    table = TABLE.assign(rudder=np.sin(T)).astype(object)
+    table.loc[4:7, "rudder"] = value
+    table.to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert value in sniffed.form["missing"]
+    assert np.flatnonzero(np.isnan(sniffed.columns["rudder"])).tolist() == [4, 5, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("name", "others", "asked"),
+    [
+        ("SOG", 5.0 + 0.1 * T, True),
+        ("SOG", np.floor(T), False),  # one knot astern
+        ("heading", 300.0 + T, True),
+        ("heading", 3.0 + T, False),
+        ("shaft rpm", 140.0 + T, True),
+        ("shaft rpm", T, False),
+        ("rudder", 5.0 + T, False),
+    ],
+)
+def test_minus_one_is_asked_where_nothing_else_is_negative(
+    name: str, others: np.ndarray, asked: bool, tmp_path: Path
+) -> None:
+    values = np.where(np.isin(np.arange(len(T)), (3, 11)), -1.0, others)
+    TABLE.drop(columns="psi").assign(**{name: values}).to_csv(tmp_path / "log.csv", index=False)
+    doubts = sniff(tmp_path / "log.csv").doubts
+    assert [doubt.partition(" and ")[0] for doubt in doubts] == [f"{name!r} is -1 in 2 rows"] * asked
