@@ -319,7 +319,10 @@ def _ticks(rows: pd.DataFrame) -> dict[str, list[Any]]:
     """Ticks of A where the rows are, far enough apart to read; a strip is named."""
     known = rows[rows.A.notna()]
     room, values = 0.06 * float(rows.y.max()), [0.0]
-    for tick in TICKS:
+    largest = max(float(known.A.max()), 1e-6)
+    decade = math.floor(math.log10(largest))
+    scale = decade - 1 if decade < 0 else max(decade - 3, 0)  # a model in a basin errs by centimetres
+    for tick in (float(f"{tick}e{scale}") for tick in TICKS):
         if tick <= known.A.max() and all(abs(math.sqrt(tick) - math.sqrt(other)) > room for other in values):
             values.append(float(tick))
     strips = rows[rows.A.isna()]
@@ -412,8 +415,9 @@ def _stage(rows: pd.DataFrame, counts: Sequence[int], span: tuple[float, float],
 
 def _heights(most: float) -> list[float]:
     """About five round heights up to the highest bar."""
-    step = min((s for s in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if most / s <= 6), default=most)
-    return [round(step * k, 3) for k in range(int(most / step) + 1)]
+    steps = (float(f"{digit}e{decade}") for decade in range(-6, 7) for digit in (1, 2, 5))
+    step = next((step for step in steps if most / step <= 6), most)
+    return [float(f"{step * k:.6g}") for k in range(int(most / step) + 1)]
 
 
 def _rival(rows: pd.DataFrame) -> str:

@@ -139,6 +139,21 @@ def test_two_methods_on_the_same_physics_do_not_hide_each_other(simulation):
     assert "another method" not in error_map(simulation).how
 
 
+@pytest.mark.parametrize("factor", [0.001, 0.02, 1.0, 1000.0])
+def test_axes_have_ticks_at_any_size_of_error(simulation, factor):
+    lengths = ["A", "A_90", "H", "H_90", "rms"]
+    cells = simulation.cells.assign(**{name: factor * simulation.cells[name] for name in lengths})
+    models = simulation.models.assign(A=factor * simulation.models.A)
+    views = error_map(replace(simulation, cells=cells, models=models)).views
+    axis = views["0"][0].figure.layout.yaxis
+    words = [word for word in axis.ticktext if word != "no model"]
+    assert len(words) >= 4
+    np.testing.assert_allclose([float(word) ** 0.5 for word in words], axis.tickvals[: len(words)])
+    heights = views["1"][0].figure.layout.yaxis.tickvals
+    assert 3 <= len(heights) <= 7
+    assert len(set(heights)) == len(heights)
+
+
 def test_of_several_models_without_physics_the_rival_has_its_name(simulation):
     """Another may err less than all models with physics: H is not below that of every pure data-driven model."""
     better = simulation.cells[simulation.cells.model.eq("no model")].assign(model="none + plain", H=0.01)
