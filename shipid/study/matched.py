@@ -130,9 +130,8 @@ def _beside(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[p
         matched, words = _counterparts(mine[key], theirs[key], pairs)
         called |= matched
         notes += words
-        theirs = theirs[theirs[key].isin(matched)].assign(
-            **{key: theirs[key].map(matched), f"{key} there": theirs[key]}
-        )
+        names = theirs[key].map(matched).astype(mine[key].dtype)  # of none: pandas would make them numbers
+        theirs = theirs[theirs[key].isin(matched)].assign(**{key: names, f"{key} there": theirs[key]})
     both = mine.merge(theirs, on=KEYS, suffixes=("_first", "_other")).sort_values("N_D", kind="stable")
     if not (both["N_D"] > 0).any():
         remedy = _remedy(first, other, bool((theirs["N_D"] > 0).any()))

@@ -181,6 +181,14 @@ def test_nothing_in_common_is_one_line(made: Made, tiny_run: Path) -> None:
         compare([tiny_run, tiny_run])
 
 
+def test_no_name_in_common_is_one_line(made: Made) -> None:
+    one, other = made(grid(H)), made(grid(H))
+    names = {"good": "few", "bad": "many", "none": "none"}
+    renamed = other.cells.assign(family=other.cells["family"].map(names), method="mine")
+    with pytest.raises(ShipidError, match=r"no cell of .* family few, many, none; method mine; .*--pair FIRST=OTHER"):
+        compare_results([placed(one, "a"), placed(replace(other, cells=renamed), "b")])
+
+
 def test_seeds_are_those_of_the_document(made: Made) -> None:
     """Another world adds 1000 to every seed; its cells match all the same."""
     one = made(grid(H), runs=8)
