@@ -34,7 +34,8 @@ def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> 
 
     result = Table(box=box.SIMPLE_HEAD)
     for column in columns:
-        result.add_column(Text(visible(column)))  # as text: rich would take [m] for markup
+        # As text: rich would take [m] for markup. Folded: in a narrow terminal it would cut 5.067 to "5.…".
+        result.add_column(Text(visible(column)), overflow="fold")
     for row in rows:
         result.add_row(*(Text(visible(str(cell))) for cell in row))
     return result

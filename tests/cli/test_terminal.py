@@ -19,6 +19,20 @@ def test_a_table_prints_text_as_it_is(capsys: pytest.CaptureFixture[str]) -> Non
     assert "[bold]4" in out
 
 
+def test_a_narrow_table_loses_no_digit() -> None:
+    from rich.console import Console
+
+    from shipid.cli.terminal import table
+
+    console = Console(width=24, record=True)
+    console.print(
+        table(["criterion", "value", "limit", "verdict"], [["tactical diameter", "5.067", "4.512", "not met"]])
+    )
+    printed = console.export_text()
+    assert "…" not in printed
+    assert sum(character.isdigit() for character in printed) == 8
+
+
 def test_digits() -> None:
     from shipid.cli.terminal import digits
 
