@@ -362,8 +362,8 @@ def difference_map(content: ReportContent) -> Figure | None:
         title="On the map of physics and data",
         takeaway=_takeaway_map(frame),
         how="Each cell is a model, by its A from below, at an N_D: H with less H without what is compared. Blue is a "
-        "gain, orange a loss, paler the nearer to 0; bold where the 95 % interval over test runs is free of 0. "
-        "The interval is in the table below." + _left_out(_frame(content, "memory"), kept),
+        "gain, orange a loss, grey neither, paler the nearer to 0; bold where the 95 % interval over test runs is free "
+        "of 0. The interval is in the table below." + _left_out(_frame(content, "memory"), kept),
         alternative=f"Cells with the difference of H for {counted(len(kept), 'model')} by A and N_D. "
         "The numbers are in the table below.",
         height=90 + CELL * max(group.model.nunique() for group in groups),
@@ -387,7 +387,7 @@ def _cells(frame: pd.DataFrame, span: float) -> Plot:
         base=[y - 0.45 for _, y, _ in places],
         width=[0.94] * len(places),
         marker={
-            "color": [category(0 if float(row["difference"]) < 0 else 1) for *_, row in places],
+            "color": [_gain_or_loss(float(row["difference"])) for *_, row in places],
             "opacity": [round(0.08 + 0.62 * share, 3) for share in shares],
         },
         customdata=[f"{label(str(row['with']))}, N_D = {row['N_D']}: {_interval(row)}" for *_, row in places],
@@ -415,6 +415,11 @@ def _cells(frame: pd.DataFrame, span: float) -> Plot:
         showgrid=False,
     )
     return Plot([boxes, words], layout(x, y, hovermode="closest", barmode="overlay"))
+
+
+def _gain_or_loss(difference: float) -> str:
+    """Colour of a difference of H [m]: blue is a gain, orange a loss, and neither is grey."""
+    return category(0) if difference < 0 else category(1) if difference > 0 else MUTED
 
 
 def _written(row: dict[Any, Any]) -> str:

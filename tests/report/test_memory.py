@@ -159,6 +159,14 @@ def test_the_map_has_a_cell_for_each_model_and_amount(past: ReportContent) -> No
     assert boxes.marker.opacity[2] == max(boxes.marker.opacity)
 
 
+def test_no_difference_is_no_loss(past: ReportContent) -> None:
+    """Where validation takes no memory, both methods are the same."""
+    none = past.frames["memory"].assign(difference=0.0, low=0.0, high=0.0)
+    figure = memory.difference_map(replace(past, frames={**past.frames, "memory": none}))
+    assert figure is not None
+    assert set(figure.views["0"][0].figure.data[0].marker.color) == {"var(--muted)"}
+
+
 def test_no_minus_before_a_zero(past: ReportContent) -> None:
     sums = past.frames["memory"].assign(difference=-0.00001, low=-0.1, high=0.1)
     figure = memory.difference_map(replace(past, frames={**past.frames, "memory": sums}))
