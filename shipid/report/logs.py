@@ -69,11 +69,17 @@ def envelope(content: ReportContent) -> Figure | None:
         title="What the inputs cover",
         takeaway=_takeaway(frame),
         how="Bar: smallest to largest value at the instants of prediction; dot: mean. The table below has the numbers."
+        + (" D_ and a number: so many runs, to train and to validate." if _counted_sets(frame) else "")
         + (compared if frame["set"].eq(PUBLISHED).any() else ""),
         alternative="Ranges of the inputs per set; the table below holds the same numbers.",
         height=24 * frame["set"].nunique() + 74,
         views={"": panels},
     )
+
+
+def _counted_sets(frame: pd.DataFrame) -> bool:
+    """Whether some sets are called by their number of runs, such as D_10."""
+    return bool(frame["set"].str.fullmatch(r"D_\d+").any())
 
 
 def _ranges(mine: pd.DataFrame) -> Plot:

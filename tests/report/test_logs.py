@@ -27,6 +27,13 @@ def test_the_test_lies_on_top_in_another_colour(simulation):
     assert "var(--category-1)" not in colours[:-4]
 
 
+def test_the_names_of_the_sets_are_explained(simulation):
+    explained = "D_ and a number: so many runs, to train and to validate."
+    assert explained in envelope(simulation).how
+    named = simulation.envelope.assign(set=simulation.envelope["set"].str.replace("D_", "train "))
+    assert explained not in envelope(replace(simulation, envelope=named)).how
+
+
 def test_what_the_test_asks_beyond_training_is_named():
     columns = ["set", "quantity", "unit", "min", "mean", "max"]
     rows = [
