@@ -136,7 +136,7 @@ def plane(x: str, y: str, spans: Sequence[tuple[float, float]] = ()) -> dict[str
     # Margins are fixed: automatic ones and equal axes chase each other.
     right = axis(x, scaleanchor="y", scaleratio=1, nticks=6, automargin=False, **ranges[0])
     up = axis(y, nticks=8, automargin=False, **ranges[1])
-    return layout(right, up, hovermode="closest", margin={"l": 60, "r": 12, "t": 12, "b": 44})
+    return layout(right, up, hovermode="closest", margin={"l": 70, "r": 12, "t": 12, "b": 44})
 
 
 def apart(places: Sequence[float], gap: float, most: float) -> list[float]:

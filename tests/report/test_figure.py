@@ -8,6 +8,11 @@ from hypothesis import strategies as st
 from shipid.report.figure import apart, axis, label, layout, line, logarithmic, plane
 
 
+def test_tick_names_of_a_map_of_kilometres_leave_room_for_its_title():
+    """ "−8000" has five signs of 8 px; a gap of 8 px and a line of 15 px follow."""
+    assert plane("east [m]", "north [m]")["margin"]["l"] >= 5 * 8 + 8 + 15 + 4
+
+
 def test_names_of_the_user_are_text_for_plotly():
     assert label("<b>a & b</b>") == "&lt;b&gt;a &amp; b&lt;/b&gt;"
     assert line("<b>", [0.0], [1.0], [])["name"] == "&lt;b&gt;"
