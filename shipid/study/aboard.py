@@ -283,10 +283,12 @@ def _held(instants: pd.DataFrame, band: Band, bands: Bands) -> list[str]:
     held = reach <= instants["factor"].to_numpy()
     of = "" if band.kind is None else f" of the kind {band.kind!r}"
     adapts = "" if band.rate is None else f", adapting at {band.rate:g}"
-    inside = f"{held[promised].mean():.0%} of the {promised.sum()}" if promised.any() else "none of the 0"
+    inside = "all in alarm, where nothing is promised"
+    if promised.any():
+        inside = f"{held[promised].mean():.0%} of the {promised.sum()} without alarm, where it is promised"
     lines = [
         f"band of {band.level:.0%}{of}{adapts}: it held {held[judged].mean():.0%} of the {judged.sum()} whole "
-        f"paths that can be judged, {inside} without alarm, where it is promised"
+        f"paths that can be judged, {inside}"
     ]
     if promised.any():
         _, most = share_interval(held[promised], instants["run"].to_numpy()[promised])
