@@ -178,7 +178,9 @@ def _cells(units: Iterable[Unit]) -> int:
 
 def _write_data(plan: Plan, folder: Path) -> None:
     """Store the runs of a study."""
-    write_dataset(obtain(plan), folder / store.DATASET)
+    dataset = obtain(plan)
+    store.check_place(folder, plan)
+    write_dataset(dataset, folder / store.DATASET)
     seals.write_seal(folder, DATA, [folder / store.DATASET])
 
 
@@ -207,6 +209,7 @@ def _mended(folder: Path, claims: Claims) -> list[str]:
 
 def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
     """Store what all batches share, so that a report needs nothing else."""
+    store.check_place(folder, plan)
     fixed = {one.name: prepared.test_paths[one.name] for one in prepared.foundations if not one.fitted}
     store.write_test(folder, prepared.test, fixed, prepared.naive)
     write_json(
@@ -251,6 +254,7 @@ def _shared(
     yield Event("start", done=cells, total=plan.cells)
     wait = WAIT
     while True:
+        store.check_place(folder, plan)
         if known >= units.keys():  # unless another process has just mended some of them
             known = store.finished_keys(folder, units)
             cells = _cells(units[key] for key in known)
@@ -264,6 +268,7 @@ def _shared(
         )
         for unit, results in compute(units[key] for key in free):
             try:
+                store.check_place(folder, plan)
                 claims.holder.check(unit.key)
                 if isinstance(results, str):
                     raise TakenOver(results)

@@ -76,6 +76,23 @@ def open_folder(folder: Path, plan: Plan) -> None:
     sweep_run(folder)
 
 
+def check_place(folder: Path, plan: Plan) -> None:
+    """Raise ResultError where the folder is no longer that of the run: it may be moved, removed or replaced meanwhile.
+
+    Call it before each write: else the results of two plans mix, or a part of them appears at the old place.
+    """
+    try:
+        record = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+        same = record["digest"] == plan.digest
+    except FileNotFoundError:
+        same = (folder / STUDY).exists()
+    except (OSError, ValueError, TypeError, KeyError):  # a file server that is slow, or a damage: it says nothing else
+        return
+    if not same:
+        message = "was moved, removed or replaced while this run worked in it: what was finished is where it is now"
+        raise ResultError(f"{message}; `shipid study resume` goes on there", file=folder)
+
+
 def sweep_run(folder: Path) -> None:
     """Remove what processes that are gone were writing into the folder of a run."""
     for place in (folder, *(folder / name for name in ("cells", "predictions", "batches", seals.FOLDER, JOURNALS))):

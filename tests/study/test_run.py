@@ -389,6 +389,28 @@ def test_folder_of_another_study_is_refused(tmp_path: Path, tiny_run: Path) -> N
         next(run_study(other, tiny_run))
 
 
+@pytest.mark.parametrize("at", ["note", "start", "cell"])
+@pytest.mark.parametrize("replaced", [False, True])
+def test_a_folder_that_is_moved_or_replaced_gets_nothing_more(
+    replaced: bool, at: str, tmp_path: Path, tiny_run: Path
+) -> None:
+    """Before, the results of the old plan were stored among those of the new one, and all cells computed twice."""
+    events = events_here(tiny_plan(tmp_path), tmp_path / "run")
+    while next(events).kind != at:
+        pass
+    (tmp_path / "run").rename(tmp_path / "moved")
+    other = events_here(tiny_plan(tmp_path, {"truth.seed": 99}), tmp_path / "run")
+    if replaced:
+        while next(other).kind != "start":
+            pass
+    with pytest.raises(ResultError, match="was moved, removed or replaced while this run worked in it"):
+        list(events)
+    assert not list((tmp_path / "run").rglob("*.npz" if not replaced else "cells/*"))
+    other.close()
+    run_here(tiny_plan(tmp_path), tmp_path / "moved")
+    assert numbers(tmp_path / "moved") == numbers(tiny_run)
+
+
 def test_folder_with_other_things_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "photos"
     folder.mkdir()
