@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import atexit
 import ctypes
+import errno
 import hashlib
 import logging
 import os
@@ -19,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from shipid.errors import ShipidError
+from shipid.errors import ShipidError, is_utf_8
 
 PROBE_LIMIT, LIMIT = 10.0, 120.0  # s that a compiler may take: for a probe of two lines, for a model
 
@@ -150,6 +151,8 @@ def folder(wanted: str, probe: bytes) -> Path | None:
     reasons: list[str] = []
     for kept in (Path(wanted) / "shipid", None):
         try:
+            if not is_utf_8(str(kept or tempfile.gettempdir())):  # threadpoolctl ends where it meets such a library
+                raise OSError(errno.EILSEQ, "a name that is not UTF-8")
             place = _passing() if kept is None else _kept(kept)
             with tempfile.TemporaryDirectory(dir=place) as inside:
                 trial = Path(inside) / "probe.so"

@@ -118,7 +118,9 @@ def refuse(reason: str) -> None:
 def _folder() -> Path | None:
     """Folder of compiled libraries in the user's cache; None if none can be loaded here."""
     probed = _probed()
-    wanted = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    wanted = os.environ.get("XDG_CACHE_HOME", "")
+    if not os.path.isabs(wanted):  # as its specification says
+        wanted = os.path.join(os.path.expanduser("~"), ".cache")
     return None if probed is None else libraries.folder(wanted, probed[1])
 
 

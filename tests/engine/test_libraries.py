@@ -19,6 +19,7 @@ from shipid.engine.libraries import NoLibrary, build, load, run_compiler, strang
 from shipid.engine.native import Target, compiler
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
+from shipid.hybrid.device import vectors
 from shipid.vessel.load import load_vessel
 from tests.engine.conftest import QUICK
 
@@ -251,6 +252,34 @@ def test_a_compiler_that_cannot_be_started_is_a_reason(tmp_path: Path) -> None:
     reason, _ = run_compiler([str(tmp_path / "none")])
     assert reason is not None
     assert reason.startswith("cannot be started")
+
+
+def test_a_cache_whose_name_is_not_utf_8_is_not_used(
+    numbers: Callable[..., np.ndarray],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    tmp_path: Path,
+) -> None:
+    """Before, what limits the threads of a BLAS ended in a traceback: it reads the names of all libraries."""
+    monkeypatch.setenv("XDG_CACHE_HOME", f"{tmp_path}/j\udce4ger")
+    forget()
+    with caplog.at_level(logging.WARNING):
+        numbers()
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert "not kept for the next run" in line
+    assert "a name that is not UTF-8" in line
+    assert "\udce4" not in Path("/proc/self/maps").read_text(errors="surrogateescape")
+    vectors()
+
+
+def test_a_relative_cache_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As the specification of XDG_CACHE_HOME says: else each working folder would get a cache."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", "cache")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    forget()
+    assert native._folder() == tmp_path / "home" / ".cache" / "shipid"
+    assert not (tmp_path / "cache").exists()
 
 
 def test_without_a_home_it_works(numbers: Callable[..., np.ndarray], monkeypatch: pytest.MonkeyPatch) -> None:
