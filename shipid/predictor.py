@@ -21,7 +21,7 @@ from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrated
 from shipid.hybrid.method import Case, Corrector, Index, Method, Task
-from shipid.hybrid.methods import METHODS, kind_of
+from shipid.hybrid.methods import METHODS, kind_of, listed
 from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.observer import AGE, Observer
 from shipid.physics.signals import SIGNALS, measurable
@@ -283,6 +283,9 @@ class Predictor:
             raise ResultError(
                 f"written in format {header.get('format')}, this shipid reads {FORMAT}: run the study again", file=file
             )
+        kind: Any = header.get("method")
+        if isinstance(kind, str) and kind not in METHODS:
+            raise ResultError(f"made by the method {kind!r}, which is not known here: {listed(kind)}", file=file)
         _check_arrays(arrays, file)
         if not _named([header.get("corrector"), header.get("bands")]):
             raise ResultError("damaged: run the study again", file=file)
@@ -299,8 +302,8 @@ class Predictor:
                     None if header["observer"] is None else Observer(**header["observer"]),
                     known.path,
                 ),
-                method=header["method"],
-                corrector=METHODS[header["method"]].corrector.from_arrays(header["corrector"], arrays),
+                method=kind,
+                corrector=METHODS[kind].corrector.from_arrays(header["corrector"], arrays),
                 limits=known.limits,
                 provenance=known.provenance,
                 commands=known.commands,
@@ -406,11 +409,12 @@ def fit(
 
     Raises
     ------
-    DataError : an argument of another type; physics and windows differ in horizon or step; the windows hold too short
-        a past, lack a command of the vessel or are too few to be split; the physics has an observer; the physics or the
-        training diverges.
+    DataError : an argument of another type; a method that has no name in `METHODS`; physics and windows differ in
+        horizon or step; the windows hold too short a past, lack a command of the vessel or are too few to be split; the
+        physics has an observer; the physics or the training diverges.
     """
     of_class("method", method, Method, "such as PathDrawn()", DataError)
+    kind = kind_of(method)
     of_class("physics", physics, Physics, "such as Physics(vessel, horizon=60, step=1.0)", DataError)
     of_class("windows", windows, Windows, "as of `cut_windows`", DataError)
     one_of("commands", commands, get_args(Commands), DataError)
@@ -424,7 +428,7 @@ def fit(
         steps = math.ceil(method.past / windows.step - 1e-9)
         raise DataError(f"the method needs a past of {method.past:g} s: cut windows with past = {steps}")
     if physics.vessel is None and not method.meets_none:
-        raise DataError(f"the method {kind_of(method)!r} needs a vessel: the physics has none")
+        raise DataError(f"the method {kind!r} needs a vessel: the physics has none")
     if physics.observer is not None:
         raise DataError("windows hold no estimates of an observer: run a study, or fit the method on a Task with them")
     if physics.vessel is not None:
@@ -460,7 +464,7 @@ def fit(
     bands, reason = bands_of(left_out, windows, limits, kinds)
     if bands is None:
         provenance["no_band"] = reason
-    return Predictor(physics, kind_of(method), corrector, limits, provenance, commands, bands=bands)
+    return Predictor(physics, kind, corrector, limits, provenance, commands, bands=bands)
 
 
 def read_bands(file: str | os.PathLike[str]) -> tuple[Bands | None, str]:

@@ -199,6 +199,8 @@ def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
         ({"horizon": None}, "damaged"),
         ({"limits": {"u": [1.0]}}, "damaged"),
         ({"corrector": 3}, "damaged"),
+        ({"method": "knn"}, r"the method 'knn', which is not known here: .*\(one that you wrote needs the script"),
+        ({"method": None}, "damaged"),
         ({"0.basis": None}, "missing in the saved compensator"),
         ({"0.mean": np.zeros(3)}, "do not fit together"),
         ({"0.std": np.zeros(1)}, "'0.std' must be above 0"),

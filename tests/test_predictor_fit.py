@@ -107,6 +107,18 @@ class Shared(Method):
         return {}
 
 
+def test_a_method_without_a_name_is_refused_before_it_is_fitted() -> None:
+    """A class that a user wrote, or one derived from a method of shipid: what it gave could not be saved."""
+
+    class Mine(PathDrawn):
+        def fit(self, task: Task) -> dict[str, Fitted]:
+            raise AssertionError(task)
+
+    for method, name in ((Shared(), "Shared"), (Mine(), "Mine")):
+        with pytest.raises(DataError, match=rf"the method {name} has no name yet: write .*METHODS\['mine'\] = {name}$"):
+            fit(method, NONE, WINDOWS)
+
+
 def test_folds_are_by_run() -> None:
     """Every run in turn, a fifth of the runs, or those that are named; training and validation share no run."""
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from shipid.document import parse
-from shipid.errors import DocumentError, choices
+from shipid.errors import DataError, DocumentError, choices
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.calibrator import Calibrator
 from shipid.hybrid.forest import Forest
@@ -36,12 +36,20 @@ METHODS: dict[str, type[Method]] = {
 def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> Method:
     """Return the method of a kind with settings; DocumentError with the path for a wrong kind, key or value."""
     if kind not in METHODS:
-        hint = f"{choices(kind, METHODS)} (one that you wrote needs the script that puts it into METHODS)"
-        raise DocumentError(f"{kind!r} is no kind of method: {hint}", path=f"{path}.kind")
+        raise DocumentError(f"{kind!r} is no kind of method: {listed(kind)}", path=f"{path}.kind")
     method: Method = parse(METHODS[kind], dict(settings), None, path)
     return method
 
 
+def listed(kind: str) -> str:
+    """Return the names of the methods that there are, as the remedy where `kind` is none of them."""
+    return f"{choices(kind, METHODS)} (one that you wrote needs the script that puts it into METHODS)"
+
+
 def kind_of(method: Method) -> str:
-    """Return the name under which the class of a method is listed."""
-    return next(name for name, kind in METHODS.items() if type(method) is kind)
+    """Return the name under which the class of a method is listed; DataError where it has none."""
+    kind = next((name for name, kind in METHODS.items() if type(method) is kind), None)
+    if kind is None:
+        name = type(method).__name__
+        raise DataError(f"the method {name} has no name yet: write shipid.hybrid.methods.METHODS['mine'] = {name}")
+    return kind
