@@ -164,6 +164,9 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "read_cells": (lambda: shipid.read_cells(ANY), "folder must be a path"),
     "write_pages": (lambda: shipid.write_pages(ANY), "folder must be a path"),
     "guess": (lambda: shipid.guess(ANY), "path must be a path"),
+    "guess.names": (lambda: shipid.guess("log.csv", SHIP), "names must be a name, or several names"),  # type: ignore[arg-type]
+    "guess.vessel": (lambda: shipid.guess("log.csv", vessel="mariner"), "vessel must be a Vessel, as of `load_vessel`"),  # type: ignore[arg-type]
+    "guess.frame": (lambda: shipid.guess("log.csv", frame="nwu"), "frame 'nwu' is not known"),  # type: ignore[arg-type]
     "export_predictor": (lambda: export_predictor(ANY, "c", "x"), "give a Predictor, as of `fit` or `Predictor.load`"),
     "export_vessel": (lambda: export_vessel(ANY, "c", ANY), "out must be a path"),
     "run_study": (lambda: next(shipid.run_study(ANY, "run")), "plan must be a Plan, as of"),

@@ -32,6 +32,7 @@ from shipid.physics import TERMS, Term, signals
 from shipid.physics.frames import force_at
 from shipid.physics.signals import Signal
 from shipid.predictor import fit
+from shipid.simulation.approach import Controls
 from shipid.simulation.truth import Truth, check_truth, simulate
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import Published, build_plan
@@ -197,6 +198,39 @@ def test_a_guess_proposes_the_component_of_the_row_beside_azimuth_units(tmp_path
     assert names["throttle"] == "jet.throttle"
     assert names["azimuth"] == "thruster.alpha"
     assert names["shaft rpm"] == "thruster.n"
+
+
+def with_jets(*names: str) -> Vessel:
+    """A ship that jets alone drive: no shaft, so no manoeuvre by the helm."""
+    document = load_vessel("gunnerus-28.9").document
+    jets = {name: {"kind": "jet", "x": -13.0, "F_max": 6e4} for name in names}
+    return check_vessel({**document, "thruster": jets}, "under jets")
+
+
+@pytest.mark.usefixtures("jet")
+@pytest.mark.parametrize(
+    ("columns", "names"), [(("throttle",), ("main",)), (("throttle port", "throttle stbd"), ("port", "starboard"))]
+)
+def test_a_guess_names_the_commands_of_a_vessel_without_a_shaft(
+    tmp_path: Path, columns: tuple[str, ...], names: tuple[str, ...]
+) -> None:
+    log = as_bridge(si_log()).drop(columns=["rudder", "rpm"])
+    for place, column in enumerate(columns):
+        log[column] = 0.5 + 0.1 * np.sin((1 + place) * log["time"])
+    log.to_csv(tmp_path / "log.csv", index=False)
+    proposal = guess(tmp_path / "log.csv", vessel=with_jets(*names))
+    found = {column.name: column.source for column in proposal.columns if "." in column.name}
+    assert found == {f"{name}.throttle": column for name, column in zip(names, columns, strict=True)}
+    assert not [question for question in proposal.questions if "throttle" in str(question)]
+
+
+@pytest.mark.usefixtures("jet")
+def test_a_manoeuvre_by_shaft_and_helm_names_those_that_a_vessel_without_a_shaft_takes() -> None:
+    with pytest.raises(DocumentError, match=r"needs a shaft speed `n`, in .* the kinds `turning` and `steps` order"):
+        Controls.of(with_jets("main"))
+    assert Controls(with_jets("main")).effects == ((), {})
+    truth = Truth(**SHALLOWS, manoeuvre=[{"kind": "steps", "throttle": (0.2, 0.8)}])
+    assert simulate(truth, with_jets("main"))["main.throttle"].between(0.2, 0.8).all()
 
 
 def shallow_drag(

@@ -45,6 +45,7 @@ class Controls:
     drives : shaft speed commands that push the vessel ahead; DocumentError where there is none.
     helm : angle command -> +1 or -1, the sign that turns the ship to starboard; angles without effect are left out;
         DocumentError where no angle turns the vessel.
+    effects : the same two, empty where there is none: a ship under sail or water jets, one without a rudder.
     differential : whether no angle turns the vessel, but the difference of shafts that drive it does.
     """
 
@@ -65,12 +66,25 @@ class Controls:
     @property
     def drives(self) -> tuple[str, ...]:
         """Shaft speeds that push the vessel ahead."""
+        if not self._driving[0]:
+            message = f"no command drives {self.vessel.name} ahead: a manoeuvre needs a shaft speed `n`"
+            if self.commands:
+                message += (
+                    ", in the manoeuvres of a study ([[truth.manoeuvre]]) the kinds `turning` and `steps` order each "
+                    "command by itself"
+                )
+            raise DocumentError(message, file=self.vessel.file, path="thruster")
         return self._driving[0]
+
+    @property
+    def effects(self) -> tuple[tuple[str, ...], Mapping[str, float]]:
+        """What `drives` and `helm` give, empty where there is none."""
+        return self._driving[0], self._turning if self._driving[0] else {}
 
     @property
     def helm(self) -> Mapping[str, float]:
         """Angle command -> sign that turns the ship to starboard."""
-        if not self._turning:
+        if self.drives and not self._turning:
             what = ": a manoeuvre needs that of a rudder or an azimuth unit"
             if self.differential:
                 what = (
@@ -84,11 +98,11 @@ class Controls:
     @property
     def differential(self) -> bool:
         """Whether no angle turns the vessel, but the difference of two shafts that drive it ahead does."""
-        return not self._turning and {1.0, -1.0} <= set(self._driving[1])
+        return not self.effects[1] and {1.0, -1.0} <= set(self._driving[1])
 
     @cached_property
     def _driving(self) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """Shaft speeds that push the vessel ahead, and the sides to which those that turn her, too, turn her."""
+        """Shaft speeds that push the vessel ahead, if any, and the sides to which some of them turn her, too."""
         vessel = self.vessel
         idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
         if not np.isfinite(idle).all():
@@ -98,9 +112,6 @@ class Controls:
             raise DocumentError(f"{message}: mend the term or its numbers", file=vessel.file)
         ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in self.commands if is_shaft(name)}
         drives = tuple(name for name, rates in ahead.items() if rates[0] - idle[0] > NOTHING)
-        if not drives:
-            message = f"no command drives {vessel.name} ahead: a manoeuvre needs a shaft speed `n`"
-            raise DocumentError(message, file=vessel.file, path="thruster")
         yaw = [ahead[name][2] - idle[2] for name in drives]
         return drives, tuple(float(np.sign(change)) for change in yaw if abs(change) > NOTHING)
 

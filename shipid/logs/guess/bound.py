@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
 from shipid.logs.guess.words import numbered, parts_of, side_of, words_of_side
-from shipid.physics.signals import is_command, is_shaft, row_of, signal_of
+from shipid.physics.signals import is_command, is_shaft, row_of, signal_of, steers
 from shipid.simulation.approach import Controls
 from shipid.vessel.load import Vessel
 
@@ -23,11 +23,12 @@ GUESSED = 0.4  # confidence of a tunnel thruster whose name says no unit, and of
 def name_commands(state: State, vessel: Vessel) -> None:
     """Rename the commands and outputs of the draft to those of the vessel; ask where the log lacks a command.
 
-    Raises DocumentError for a vessel that no command drives or turns.
+    Where some shafts drive the vessel, the others are idle, and so are angles that do not turn her.
     """
     controls = Controls(vessel)
-    helm = () if controls.differential else tuple(controls.helm)
-    idle = {name for name in controls.commands if name not in controls.drives and name not in helm}
+    drives, helm = controls.effects
+    without = {name for name in controls.commands if (is_shaft(name) or steers(name)) and name not in (*drives, *helm)}
+    idle = without if drives else set()
     _drop_guesses(state, {signal_of(name) for name in controls.commands})
     _take_tunnels(state, [name for name in controls.commands if name in idle and is_shaft(name)])
     components: dict[str, str] = {}
@@ -37,7 +38,7 @@ def name_commands(state: State, vessel: Vessel) -> None:
         drafted = [one for one in state.suggestions if is_command(one.name) and signal_of(one.name) == signal]
         for name, one in _pairs(state, wanted, drafted, idle, vessel):
             components.setdefault(one.name.partition(".")[0], name.partition(".")[0])
-            named.append(_with_sign(state, replace(one, name=name), {} if controls.differential else controls.helm))
+            named.append(_with_sign(state, replace(one, name=name), helm))
         missing = [name for name in wanted if name not in {one.name for one in named}]
         named += [stopped for name in missing for stopped in _missing(state, name, idle, vessel)]
     used = {one.source for one in named}

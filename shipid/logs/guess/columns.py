@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
-from shipid.arguments import path_of
+from shipid.arguments import names_of, of_class, one_of, path_of
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
@@ -90,6 +91,11 @@ def guess(
     ------
     DataError : if the log cannot be read, has no clock, no heading or no position, or does not move as in that frame.
     """
+    names = names_of("names", names, DataError)
+    if vessel is not None:
+        of_class("vessel", vessel, Vessel, "as of `load_vessel`, or None", DataError)
+    if frame is not None:
+        one_of("frame", frame, get_args(Frame), DataError)
     source = read_source(path_of("path", path, DataError), names)
     sniffed = source.sniffed
     columns = evidence.filled(sniffed.t, sniffed.columns.items())
