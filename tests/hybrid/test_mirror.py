@@ -45,6 +45,19 @@ def test_words_inside_names_are_sides_too() -> None:
     np.testing.assert_array_equal(matrix, [[0.0, 1.0], [1.0, 0.0]])
 
 
+@pytest.mark.parametrize(("port", "starboard"), [("p", "s"), ("ps", "sb"), ("Prt", "Stbd"), ("jet_bb", "jet_stb")])
+def test_short_words_for_sides_are_sides_too(port: str, starboard: str) -> None:
+    """Else each shaft would be its own image, and no difference of shafts could turn the ship."""
+    names = (f"{port}.n", f"{starboard}.n", f"{port}.alpha", f"{starboard}.alpha")
+    matrix = reflection(table(*names), features(*names))
+    np.testing.assert_array_equal(matrix, np.kron(np.diag([1.0, -1.0]), [[0.0, 1.0], [1.0, 0.0]]))
+
+
+def test_units_at_the_ends_stand_on_the_middle_line() -> None:
+    names = ("fore.n", "fore.alpha", "aft.n", "aft.alpha")
+    np.testing.assert_array_equal(reflection(table(*names), features(*names)), np.diag([1.0, -1.0, 1.0, -1.0]))
+
+
 def test_one_input_may_stand_for_several_columns() -> None:
     """Shafts that turn alike are one input: its image is itself."""
     shaft = RNG.normal(size=20)
@@ -59,6 +72,8 @@ def test_one_input_may_stand_for_several_columns() -> None:
         ("u", "port.alpha"),  # the other unit is not measured
         ("u", "bow.n"),  # a tunnel drives sideways by its shaft
         ("u", "port-tunnel.n", "starboard-tunnel.n"),
+        ("u", "m1.n", "m2.n"),  # which of them is to port, no name says
+        ("u", "port.n", "left.n", "starboard.n", "right.n"),
     ],
 )
 def test_inputs_without_an_image_have_no_mirror(names: tuple[str, ...]) -> None:
@@ -75,3 +90,6 @@ def test_a_column_left_out_must_be_its_image() -> None:
     here = table("u") | {"port.n": np.full(20, 2.0), "starboard.n": np.full(20, 2.0)}
     np.testing.assert_array_equal(reflection(here, features("u")), [[1.0]])
     assert reflection({**here, "port.n": np.full(20, 1.0)}, features("u")) is None
+    for other, mirrored in ((2.0, True), (1.0, False)):  # names without a side
+        unsided = {"u": here["u"], "m1.n": np.full(20, 2.0), "m2.n": np.full(20, other)}
+        assert (reflection(unsided, features("u")) is not None) == mirrored
