@@ -132,7 +132,12 @@ def _with_term(key: str) -> tuple[Vessel, str]:
     group, kind = key.split(".")
     path = {"hull": key, "wind": "wind"}.get(group, f"{group}.{kind}")
     base = load_vessel(next(iter(documents.bundled("models"))))
-    return check_vessel(documents.replace(base.document, {path: _made_up(key)}), "made up"), path
+    lacking = {
+        f"{SHARED[name]}.{name}": 0.5 + uniform(key, name)
+        for name in (parameter.name for parameter in term_parameters(TERMS[key]))
+        if name in SHARED and name not in base.document[SHARED[name]]
+    }
+    return check_vessel(documents.replace(base.document, {path: _made_up(key), **lacking}), "made up"), path
 
 
 def _made_up(key: str) -> dict[str, Any]:
@@ -149,7 +154,7 @@ def _made_up(key: str) -> dict[str, Any]:
             block[name] = [0.0, 45.0, 90.0, 135.0, 180.0] if name.endswith("_deg") else [0.0, 0.7, 0.9, 0.4, 0.0]
             block[name] = WHOLE_CIRCLE.get(name, block[name])
         elif name not in SHARED:
-            block[name] = 0.5 + uniform(key, name)
+            block[name] = (-1 if name == "x_aft" else 1) * (0.5 + uniform(key, name))
     return block
 
 

@@ -233,6 +233,26 @@ def test_a_manoeuvre_by_shaft_and_helm_names_those_that_a_vessel_without_a_shaft
     assert simulate(truth, with_jets("main"))["main.throttle"].between(0.2, 0.8).all()
 
 
+def kite(
+    nu_r: Any, *, x_aft: Annotated[Any, "m"], x_fwd: Annotated[Any, "m"], k: Annotated[Any, "-"],
+    U_0: Annotated[Any, "m s^-1"], rho_a: Annotated[Any, "kg m^-3"],
+) -> Any:  # fmt: skip
+    """X = -k 1/2 rho_a (x_fwd - x_aft)^2 U_0 u: numbers that the first bundled vessel lacks, or that have an order."""
+    return ca.vertcat(-k * 0.5 * rho_a * (x_fwd - x_aft) ** 2 * U_0 * nu_r[0], ca.SX(5, 1))
+
+
+def test_the_laws_make_up_a_vessel_for_any_numbers_of_a_term(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(TERMS, "thruster.kite", Term(kite))
+    for cached in CACHES:
+        cached.cache_clear()
+    test_laws.test_mirror_port_starboard("thruster.kite", 0)
+    test_laws.test_zero_at_rest("thruster.kite")
+    test_laws.test_froude_scaling("thruster.kite", 0)
+    monkeypatch.undo()
+    for cached in CACHES:
+        cached.cache_clear()
+
+
 def shallow_drag(
     nu_r: Any, depth: Any, *, c: Annotated[Any, "-"], L_pp: Annotated[Any, "m"], T: Annotated[Any, "m"],
     rho: Annotated[Any, "kg m^-3"],

@@ -53,11 +53,12 @@ def test_a_command_can_be_drawn_checked_and_guessed(name: str) -> None:
 
 
 def test_commands_are_recognised_by_their_last_name() -> None:
-    assert [is_shaft(name) for name in COMMANDS] == [True, False, False, False]
-    assert [steers(name) for name in COMMANDS] == [False, True, True, False]
-    assert [mirror_sign(name) for name in COMMANDS] == [1, -1, -1, 1]
-    assert [neutral(name) for name in COMMANDS] == [0.0, 0.0, 0.0, 0.8]
-    assert units(COMMANDS) == dict(zip(COMMANDS, ("rev/s", "rad", "rad", "-"), strict=True))
+    commands = ("port.n", "port.alpha", "port.delta", "port.pitch")
+    assert [is_shaft(name) for name in commands] == [True, False, False, False]
+    assert [steers(name) for name in commands] == [False, True, True, False]
+    assert [mirror_sign(name) for name in commands] == [1, -1, -1, 1]
+    assert [neutral(name) for name in commands] == [0.0, 0.0, 0.0, 0.8]
+    assert units(commands) == dict(zip(commands, ("rev/s", "rad", "rad", "-"), strict=True))
     assert (signal_of("port.n"), signal_of("u")) == ("n", "u")
 
 
