@@ -116,6 +116,13 @@ def _least(step: float, horizon: float) -> float:
     return max(LEAST_STEPS * step, round(horizon / step) * step / 2 if horizon else 0.0)
 
 
+def near_a_row(t: Array, instants: Array, step: float) -> NDArray[np.bool_]:
+    """Whether a row at t (N,) [s] of the log lies within half a step of each of some instants [s]."""
+    after = np.abs(t[np.clip(np.searchsorted(t, instants), 0, len(t) - 1)] - instants)
+    before = np.abs(t[np.clip(np.searchsorted(t, instants) - 1, 0, len(t) - 1)] - instants)
+    return np.asarray(np.minimum(after, before) <= step / 2 + clock_slack(t))
+
+
 def _cut(
     vessel: Vessel,
     rows: Mapping[str, NDArray[Any]],
@@ -133,9 +140,7 @@ def _cut(
         return []
     grid = t[0] + step * np.arange(count + 1)
     columns = sample(rows, grid)
-    near = np.abs(t[np.clip(np.searchsorted(t, grid), 0, len(t) - 1)] - grid)
-    before = np.abs(t[np.clip(np.searchsorted(t, grid) - 1, 0, len(t) - 1)] - grid)
-    measured = np.minimum(near, before) <= step / 2 + clock_slack(t)
+    measured = near_a_row(t, grid, step)
     if between == "between":
         _check_step(vessel, rows, step)
         columns |= between_rows(vessel, rows, grid + step / 2)  # as they are in the middle of each step

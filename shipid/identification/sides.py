@@ -18,6 +18,7 @@ from scipy.special import stdtr
 
 from shipid.data.dataset import Dataset
 from shipid.identification.free_run import MEASURED
+from shipid.identification.segments import near_a_row
 from shipid.physics.signals import steers
 from shipid.units import DEGREE
 from shipid.vessel.dynamics import dynamics
@@ -33,7 +34,7 @@ COLUMNS = ("group", "side", "rows", "u", "v", "r", "r_error", "turning", "error"
 
 
 def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
-    """Errors of free runs: `group`, `side` (`starboard`, `port`, none), `rows`, RMS `u`, `v`, `r`, `turning`.
+    """Errors of free runs at rows: `group`, `side` (`starboard`, `port`, none), `rows`, RMS `u`, `v`, `r`, `turning`.
 
     u, v [m/s], r, its standard error r_error [rad/s]. turning, error : relative error of the change of heading [1], its
     standard error. pieces : free runs with rows of the group, of which both are.
@@ -46,7 +47,7 @@ def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset)
     helm = _helm(vessel, dataset, log)
     begin = ~log.duplicated(["run", "piece"])
     away = {name: mine[name].to_numpy() - log[name].to_numpy() for name in ("u", "v", "r")}
-    seen = ~begin.to_numpy() & np.isfinite(away["r"])
+    seen = ~begin.to_numpy() & np.isfinite(away["r"]) & _measured(dataset, log)
     r, speed = log["r"].to_numpy(), np.hypot(log["u"].to_numpy(), log["v"].to_numpy())
     pieces = log.groupby(["run", "piece"], sort=False).ngroup().to_numpy()
     rows = [
@@ -61,6 +62,15 @@ def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset)
         if mask.sum() >= FEWEST
     ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _measured(dataset: Dataset, log: pd.DataFrame) -> NDArray[np.bool_]:
+    """Instants (N,) of the free runs at which there is a row of the log: between far rows it is only interpolated."""
+    seen, steps = np.zeros(len(log), dtype=bool), log.groupby(["run", "piece"], sort=False)["t"].diff()
+    for run, rows in log.groupby("run", sort=False):
+        t = dataset.frame.loc[dataset.frame["run"] == run, "t"].to_numpy()
+        seen[rows.index] = near_a_row(t, rows["t"].to_numpy(), float(steps[rows.index].median()))
+    return seen
 
 
 def _turned(away: Array, r: Array, pieces: NDArray[np.integer[Any]]) -> dict[str, float]:

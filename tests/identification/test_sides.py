@@ -141,3 +141,19 @@ def test_a_turning_that_one_piece_shows_has_no_error_beside_it() -> None:
     lone = groups.assign(error=np.inf)
     assert {row[-1] for row in shown(lone) if row[1] == "port"} == {"-14.0"}
     assert not any("inf" in cell for row in shown(lone) for cell in row)
+
+
+def test_instants_between_far_rows_are_none() -> None:
+    """What is interpolated between two rows is no measurement: a prediction that is right at the rows has no error."""
+    t = STEP * np.arange(ROWS)
+    at_row = np.arange(ROWS) % 4 == 0
+    r = 0.03 * np.sign(np.sin(2 * np.pi * t / 50) + 1e-3)
+    motion = {"run": "A", "piece": (t // 20).astype(int), "t": t, "u": 1.0, "v": 0.0}
+    turns = {"measured": r, "after": np.where(at_row, r, 1.2 * r)}
+    series = pd.concat([pd.DataFrame({**motion, "r": values, "model": name}) for name, values in turns.items()])
+    still = dict.fromkeys(("north", "east", "psi", "u", "v", "r"), 0.0)
+    frame = pd.DataFrame({"run": "A", "t": t, **still, "rudder.delta": 0.1, "propeller.n": 10.0, "flags": 0})
+    groups = by_group(series, "after", SHIP, Dataset(frame[at_row], {"clock": "run", "flags": []}))
+    whole = groups[groups["group"] == "all"]
+    assert whole["rows"].sum() == at_row.sum() - series["piece"].nunique()  # a piece begins at its first row
+    assert (whole[["r", "turning"]].abs() < 1e-12).all(axis=None)
