@@ -8,6 +8,7 @@ fitted signal (for example the position) are left out.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -26,6 +27,8 @@ from shipid.simulation.log import aboard, horizontal
 from shipid.vessel.dynamics import Dynamics
 
 Array = NDArray[np.float64]
+THRUST = re.compile(r"thruster\.[^.]+\.(?:k_T|(?:K_T|K_T_astern|C_T)\..+|k_P|k_J|T_nn|T_nu|T_uu|dT_nu)")
+"""Parameters in which the thrust of azimuth units and screws is linear."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +72,8 @@ class Layout:
 
 
 def is_thrust(path: str) -> bool:
-    """Whether a parameter is a thrust coefficient, which `thrust_scale` multiplies."""
-    parts = path.split(".")
-    return parts[-1] == "k_T" or "K_T" in parts[-2:-1]
+    """Whether a parameter is a thrust coefficient of any kind of thruster, which `thrust_scale` multiplies."""
+    return THRUST.fullmatch(path) is not None
 
 
 @dataclass(frozen=True, eq=False)

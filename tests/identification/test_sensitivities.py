@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pytest
 
 from shipid.engine.rollout import rollout
 from shipid.identification.sensitivities import Layout, is_thrust, run_machine, variation
 from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import load_vessel
+from shipid.vessel.load import Vessel, load_vessel
+from tests.drawn_ships import drawn_ship
 
 SHIP = load_vessel("gunnerus-28.9")
 PATH = "hull.derivatives.N_ur"
@@ -22,6 +26,30 @@ def test_thrust_coefficients_are_recognised() -> None:
     assert is_thrust("thruster.propeller.K_T.J")
     assert not is_thrust("thruster.port.D_p")
     assert not is_thrust("hull.mmg.R_0")
+
+
+@pytest.mark.parametrize("kind", ["azimuth", "propeller", "controllable_pitch", "four_quadrant", "quadratic"])
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_thrust_of_every_kind_is_linear_in_its_coefficients(kind: str, sense: float) -> None:
+    ships = (drawn_ship(seed) for seed in range(100))
+    ship, name = next((one, name) for one in ships for name, block in thrusters(one) if block["kind"] == kind)
+    ship = ship.with_values({f"thruster.{name}.k_drag": 0.0}) if kind == "propeller" else ship
+
+    def thrust(scale: float) -> float:
+        values = [value * (scale if is_thrust(path) else 1.0) for path, value in ship.parameters.items()]
+        model = dynamics(ship)
+        state = [{"u": 1.0, "v": 0.2, "r": 0.01}.get(one, 0.0) for one in (*model.state, *model.hidden)]
+        orders = [sense if one.endswith((".n", ".pitch")) else 0.1 for one in model.commands]
+        memory = [orders[list(model.commands).index(one)] for one in model.memory]
+        shown = model.measured(state, memory, orders, [0.0] * len(model.environment), values)
+        return float(shown[list(model.outputs).index(f"{name}.thrust")])
+
+    assert thrust(1.0) != 0.0
+    assert thrust(1.2) == pytest.approx(1.2 * thrust(1.0), rel=1e-12)
+
+
+def thrusters(ship: Vessel) -> list[tuple[str, dict[str, Any]]]:
+    return list(ship.document["thruster"].items())
 
 
 def test_only_states_that_influence_a_signal_are_integrated() -> None:
