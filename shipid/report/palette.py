@@ -70,15 +70,16 @@ def styles(content: ReportContent) -> Mapping[str, Style]:
     frame, span = families(content), accuracy_range(content)
     kinds = [kind for kind in pd.unique(frame.family) if kind != DATA_DRIVEN]
     result: dict[str, Style] = {}
+    seen: set[tuple[str, str]] = set()  # family and A: of several methods on one model the first is filled
     for index, row in enumerate(frame.itertuples()):
         if row.family == DATA_DRIVEN:
             result[str(row.model)] = _without_physics(sum(style.colour == INK for style in result.values()))
             continue
         colour = category(index) if span is None else _by_accuracy(float(str(row.A)), span)
         symbol = SYMBOLS[kinds.index(row.family) % len(SYMBOLS)]
-        # Of several methods on one model the first is filled.
-        before = frame[:index]
-        again = span is not None and (before.family.eq(row.family) & before.A.eq(row.A)).any()
+        model = (str(row.family), str(row.A))
+        again = span is not None and model in seen
+        seen.add(model)
         result[str(row.model)] = Style(colour, f"{symbol}-open" if again else symbol, 2.0)
     return result
 
