@@ -29,7 +29,8 @@ def test_horizontal_velocities_are_those_of_the_rotation() -> None:
 
 def test_a_level_ship_logs_the_velocities_of_its_body() -> None:
     level = {name: np.array([value]) for name, value in (("u", 2.0), ("v", -0.3), ("r", 0.05))}
-    assert {name: values[0] for name, values in horizontal(level).items()} == {"u": 2.0, "v": -0.3, "r": 0.05}
+    for turned in (horizontal(level), aboard(level)):
+        assert {name: values[0] for name, values in turned.items()} == {"u": 2.0, "v": -0.3, "r": 0.05}
 
 
 def test_names_sort_as_they_count() -> None:
