@@ -43,11 +43,12 @@ def test_a_later_fix_changes_no_earlier_row(seed: int, extrapolate: bool) -> Non
     assert not np.array_equal(one, other)
 
 
+@pytest.mark.parametrize("even", [True, False])
 @pytest.mark.parametrize("seed", range(3))
-def test_fixes_between_rows_reach_no_row_before_them(seed: int) -> None:
+def test_fixes_between_rows_reach_no_row_before_them(seed: int, even: bool) -> None:
     """Fixes on another clock: whatever comes at a fix and later, rows before it hold what they held."""
     rng = np.random.default_rng(seed)
-    rows = np.arange(80.0)
+    rows = np.arange(80.0) + (0.0 if even else rng.uniform(-0.4, 0.4, 80))
     fixes = np.cumsum(rng.uniform(2.0, 6.0, 60)) - 3.0
     heights = rng.normal(size=len(fixes))
     one = causal_columns(as_dataset(turning(rows).assign(u=np.interp(rows, fixes, heights))), ["u"]).frame["u"]
@@ -56,6 +57,14 @@ def test_fixes_between_rows_reach_no_row_before_them(seed: int) -> None:
         data = as_dataset(turning(rows).assign(u=np.interp(rows, fixes, changed)))
         before = rows < fixes[first]
         np.testing.assert_array_equal(causal_columns(data, ["u"]).frame["u"][before], one[before])
+
+
+def test_on_an_uneven_clock_a_line_between_two_fixes_has_no_bend() -> None:
+    """Fixes in every fifth row: a fix is seen with the row after it, and the row before the fix is then known."""
+    rng = np.random.default_rng(0)
+    t, rows = np.cumsum(rng.uniform(0.2, 3.0, 51)), np.arange(6, 51)
+    known = last_known(t, np.interp(t, t[::5], rng.normal(size=11)))
+    np.testing.assert_array_equal(known[rows], (rows - 1) // 5 * 5 - 1)
 
 
 @pytest.mark.parametrize("step", [0.5, 2.0])
