@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.study.error_table import ErrorTable
-from shipid.study.findings_bands import Widths, kept_promise, narrower
+from shipid.study.findings_bands import Widths, _width_table, kept_promise, narrower
 from shipid.study.verdict import Verdict
 from tests.study.made_up import Size, table
 
@@ -89,3 +93,27 @@ def test_no_width_rises_with_an_A_that_all_models_have() -> None:
     finding = narrower(Widths(same, models))
     assert finding["verdict"] == "undecided"
     assert "the same A" in finding["evidence"]
+
+
+def test_widths_are_means_of_each_manoeuvre_where_every_model_has_a_band() -> None:
+    """At N_D = 5 the model without physics has none, so that amount of data is left out."""
+    run, names = np.array(["a", "a", "b"]), ("good", "none")
+    rows = [
+        {"cell": f"{name}-{N}", "foundation": name, "method": "drawn", "N_D": N, "seed": 0}
+        for name in names
+        for N in (5, 20)
+    ]
+    paths = {str(row["cell"]): np.zeros((2, 3, 2)) for row in rows}
+    results: Any = SimpleNamespace(
+        cells=pd.DataFrame(rows),
+        plan=SimpleNamespace(judged="drawn", plain=None),
+        test=SimpleNamespace(run=run, future=np.ones((2, 3, 2))),
+        paths=paths,
+        physics={"good": np.zeros((2, 3, 2))},
+    )
+    widths = {cell: np.array([1.0, 3.0, 7.0]) for cell in paths if cell != "none-5"}
+    drawn = _width_table(results, ["good"], widths)
+    assert drawn.amounts == (20,)
+    np.testing.assert_array_equal(drawn.counts, [2, 1])
+    for name in names:
+        np.testing.assert_array_equal(drawn.H[name], [[[2.0, 7.0]]])
