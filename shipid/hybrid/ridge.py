@@ -142,12 +142,12 @@ class _Group:
         return self.mirrored if point["mirror"] and self.mirrored is not None else self.plain
 
     def part(self, rows: Tensor) -> _Group:
-        """The same with some of the windows; means and spreads of inputs stay those of all."""
+        """The group with some of the windows; means and spreads of inputs stay those of all."""
         mirrored = None if self.mirrored is None else self.mirrored.part(rows)
         return _Group(self.names, [side[rows] for side in self.outputs], self.plain.part(rows), mirrored)
 
     def only(self, names: Sequence[str], terms: int) -> _Group:
-        """The same for some of the foundations; `terms` is r."""
+        """The group for some of the foundations; `terms` is r."""
         columns = [self.names.index(name) * terms + term for name in names for term in range(terms)]
         return replace(self, names=tuple(names), outputs=[side[:, columns] for side in self.outputs])
 

@@ -300,7 +300,7 @@ class _Trial:
 
 
 def _between(trial: _Trial) -> _Trial:
-    """The same trial with commands that change between the rows, as they are in the middle of each step."""
+    """The trial with commands that change between the rows, as they are in the middle of each step."""
     windows, planned = trial.windows, {name: values.copy() for name, values in trial.windows.planned.items()}
     middle = windows.t + windows.step * (np.arange(windows.horizon)[:, None] + 0.5)
     for run, rows in pieces(trial.dataset):
@@ -313,7 +313,7 @@ def _between(trial: _Trial) -> _Trial:
 
 
 def _in_current(trial: _Trial, V_c: float, beta_c: float) -> _Trial:
-    """The same trial in a steady current [m/s, rad]."""
+    """The trial in a steady current [m/s, rad]."""
     vessel, windows = trial.vessel, trial.windows
     if "current" not in vessel.document:
         vessel = vessel.with_values({"current.kind": "uniform"})

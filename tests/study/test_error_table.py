@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.study.error_table import ALONE, error_table, intervals_frame
+from shipid.study.error_table import ALONE, _by_run, error_table, intervals_frame
 from shipid.study.evidence import TRAINING, WORTH
 from tests.study.byhand import grid
 
@@ -72,3 +72,14 @@ def test_intervals_are_about_the_mean_over_seeds_and_more_seeds_narrow_them(made
     expected = np.hypot(hard.std(ddof=1) / np.sqrt(8), noise)
     widths = [(frame["high"] - frame["low"]).to_numpy() for frame in (one, four)]
     np.testing.assert_allclose(widths[1] / widths[0], expected[1] / expected[0])
+
+
+@pytest.mark.parametrize("run", ["aabbb", "ababa", "abab", "bbaa"])
+def test_both_errors_are_taken_in_each_manoeuvre(run: str) -> None:
+    """Also where manoeuvres have as many windows, which are then taken all at once."""
+    path, place = np.random.default_rng(0).normal(size=(4, len(run), 2)), np.array([name == "b" for name in run], int)
+    error = np.hypot(path[..., 0], path[..., 1])
+    parts = [error[:, place == k] for k in (0, 1)]
+    true = np.zeros_like(path)
+    np.testing.assert_allclose(_by_run(path, true, place), [part.mean() for part in parts])
+    np.testing.assert_allclose(_by_run(path, true, place, "H_90"), [np.quantile(part, 0.9) for part in parts])
