@@ -174,7 +174,8 @@ def gain(content: ReportContent) -> Figure | None:
         takeaway=_takeaway_gain(frame),
         how="Above: H (15) with (solid) and without (dotted) what is compared, over the same test windows, mean over "
         "the seeds that both have. Below: the difference, with over without, with its 95 % interval from "
-        "draws of the test runs with replacement, both rivals on the same runs, or Student's where that is wider. "
+        "draws of the test runs with replacement, both rivals on the same runs, or Student's where that is wider, with "
+        "what another training would give. "
         "Windows of one run are alike, so runs are drawn whole; with fewer than five runs there is none. Every "
         "interval is for one comparison alone: of many, one in twenty excludes 0 by chance."
         + _left_out(frame, models)

@@ -113,9 +113,9 @@ def methods(content: ReportContent | MethodsContent) -> Figure | None:
         "All methods see the same windows, folds and known quantities. Left: H (15) of each family. Right: H less "
         f"that of {reference} over the cells in which both have a result, mean over members, seeds and "
         f"{counted(max(worlds, 1), 'world')}; the 95 % interval comes from a bootstrap over test runs, each drawn with "
-        "all its windows and cells, or Student's where that is wider; with fewer than five runs there is none. An "
-        "interval is for one comparison alone: of many, one in twenty excludes 0 by chance. A cell without a result is "
-        "counted in the table, not averaged.",
+        "all its windows and cells, or Student's where that is wider, with what another training would give; with "
+        "fewer than five runs there is none. An interval is for one comparison alone: of many, one in twenty excludes "
+        "0 by chance. A cell without a result is counted in the table, not averaged.",
         alternative="Dots of the position error of each method by family, and of the difference to one of them with "
         "intervals. The numbers are in the table below.",
         height=MARGIN + ROW * len(order),

@@ -230,3 +230,15 @@ def training_noise(H: Sequence[Array]) -> float:
             squares += float(np.square(values / values.mean() - 1).sum())
             freedom += len(values) - 1
     return float(np.sqrt(squares / freedom))
+
+
+def training_error(H: Sequence[Array], trained: Sequence[NDArray[np.bool_]] | None = None) -> float:
+    """Standard error [m] that training alone gives a mean over cells of equal weight, from H by seed of each model.
+
+    trained : which cells another training would change, as H; default all.
+    """
+    if trained is None:
+        trained = [np.ones(len(values), dtype=bool) for values in H]
+    cells = sum(map(len, H))
+    squares = sum(values.mean() ** 2 * moved.sum() for values, moved in zip(H, trained, strict=True))
+    return training_noise(H) * float(np.sqrt(squares)) / max(cells, 1)

@@ -21,7 +21,7 @@ from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError, ShipidError, choices
 from shipid.metrics import over_time, position_error
 from shipid.study.differences import document_differences
-from shipid.study.evidence import Contrasts, contrasts, contrasts_apart, training_noise
+from shipid.study.evidence import Contrasts, contrasts, contrasts_apart, training_error
 from shipid.study.plan import NO_MODEL, WORLDS, Plan
 from shipid.study.results import Results, read_results
 from shipid.study.verdict import manoeuvres, shown, too_few
@@ -297,9 +297,9 @@ def _training(groups: Sequence[pd.DataFrame], side: str, alike: Sequence[NDArray
             continue
         cells = part.assign(H=part[f"H_{side}"].astype(float), differs=~same)
         models = [one for _, one in cells.groupby(f"foundation_{side}", sort=False)]
-        noise = training_noise([one["H"].to_numpy() for one in models])
-        shares = sum((one["H"].mean() / len(models) / len(one)) ** 2 * one["differs"].sum() for one in models)
-        training[row] = noise * np.sqrt(shares)
+        training[row] = training_error(
+            [one["H"].to_numpy() for one in models], [one["differs"].to_numpy() for one in models]
+        )
     return training
 
 

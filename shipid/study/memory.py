@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -14,7 +15,7 @@ from shipid.metrics import over_time, position_error
 from shipid.observer import bank, observe
 from shipid.predictor import Predictor
 from shipid.study import store
-from shipid.study.evidence import contrasts
+from shipid.study.evidence import contrasts, training_error
 from shipid.study.plan import Foundation, Way
 from shipid.study.prepare import known_by_then
 from shipid.study.results import Results, shown_runs, with_gaps
@@ -118,14 +119,20 @@ def _observed(foundations: Sequence[Foundation]) -> Iterator[tuple[Foundation, F
 def memory_frame(results: Results) -> pd.DataFrame:
     """H [m] of both members of every pair at every N_D, and their difference with its interval by `contrasts`.
 
+    What another training would give is in the interval, as in those of findings.
+
     Columns: comparison, added, model (the foundation without), without, with, N_D (0: physics alone), A [m] of the
     foundation without, H_without, H_with, difference, low, high [m], runs, better (test runs with a lower error), seeds
     (that both have), differs.
     """
-    rows, differences = list[dict[str, Any]](), list[Array]()
+    rows, differences, training = list[dict[str, Any]](), list[Array](), list[float]()
     runs, place = np.unique(results.test.run, return_inverse=True)
     counts = np.bincount(place).astype(float)
-    for pair, N_D, before, after, seeds in _errors(results):
+    learns = {way.name for way in results.plan.methods if way.method.compensates}
+    for pair, N_D, first, second in _errors(results):
+        before, after, seeds = first.mean(axis=0), second.mean(axis=0), len(first)
+        apart = [training_error([one.mean(axis=1)]) for one in (first, second)] if pair.without[1] in learns else [0.0]
+        training.append(math.hypot(*apart))
         sums = np.bincount(place, after - before)
         differences.append(sums / counts)
         rows.append(
@@ -137,7 +144,7 @@ def memory_frame(results: Results) -> pd.DataFrame:
         )
     frame = pd.DataFrame(rows)
     if rows:
-        judged = contrasts(np.stack(differences), counts)
+        judged = contrasts(np.stack(differences), counts, np.array(training))
         frame["low"], frame["high"] = judged.low, judged.high
     return frame
 
@@ -150,8 +157,9 @@ def memory_time_frame(results: Results) -> pd.DataFrame:
     """
     shown = np.isin(results.test.run, shown_runs(results))
     parts, largest = [], int(results.cells["N_D"].max())
-    for pair, N_D, before, after, _ in _errors(results):
+    for pair, N_D, first, second in _errors(results):
         if N_D in (0, largest):
+            before, after = first.mean(axis=0), second.mean(axis=0)
             names = {key: value for key, value in _names(pair, results.plan.label).items() if key != "added"}
             columns = {"run": results.test.run[shown], "t": results.test.t[shown]}
             columns |= {"error_without": before[shown], "error_with": after[shown]}
@@ -170,8 +178,8 @@ def _names(pair: Pair, label: Callable[[str, str], str]) -> dict[str, Any]:
     return named | {"without": words[0], "with": words[1]}
 
 
-def _errors(results: Results) -> Iterator[tuple[Pair, int, Array, Array, int]]:
-    """Pair, N_D, mean error over the horizon (S,) [m] of both over the seeds that both have, and how many these are."""
+def _errors(results: Results) -> Iterator[tuple[Pair, int, Array, Array]]:
+    """Pair, N_D, and of both the mean error over the horizon (seeds, S) [m], for the seeds that both have."""
     cells: dict[tuple[str, str, int], dict[int, str]] = {}
     for row in results.rows:
         if row["cell"] in results.paths:
@@ -190,15 +198,15 @@ def _errors(results: Results) -> Iterator[tuple[Pair, int, Array, Array, int]]:
             alone = [results.physics.get(name) for name, _ in (pair.without, pair.remembering)]
             finite = [path for path in alone if path is not None and np.isfinite(path).all()]
             if len(finite) == 2:
-                before, after = (over_time(position_error(path, results.test.future)) for path in finite)
-                yield pair, 0, before, after, 1
+                before, after = (over_time(position_error(path, results.test.future))[None] for path in finite)
+                yield pair, 0, before, after
             continue
         for N_D in amounts:
             first, second = cells.get((*pair.without, N_D), {}), cells.get((*pair.remembering, N_D), {})
             seeds = sorted(first.keys() & second.keys())
             if seeds:
-                both = [np.mean([error(one[seed]) for seed in seeds], axis=0) for one in (first, second)]
-                yield pair, N_D, both[0], both[1], len(seeds)
+                both = [np.stack([error(one[seed]) for seed in seeds]) for one in (first, second)]
+                yield pair, N_D, both[0], both[1]
 
 
 def _accuracy(results: Results, foundation: str, N_D: int) -> float:

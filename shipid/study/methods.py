@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pandas as pd
 
 from shipid.arguments import of_class
 from shipid.metrics import over_time, position_error
-from shipid.study.evidence import contrasts, mean_errors, over_worlds
+from shipid.study.evidence import contrasts, mean_errors, over_worlds, training_error
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results
 
@@ -47,16 +48,18 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
     """A row per cell, as `compared` takes it.
 
     Columns: condition, world, foundation, family, method, N_D, seed, status, H, H_90, end (mean error at the end of the
-    horizon) [m], seconds (core-seconds), trials, and `sums`, `counts`: test run -> sum over its windows of the mean
-    error over the horizon [m], and number of windows. Without a result the errors are not numbers.
+    horizon) [m], seconds (core-seconds), trials, trained (whether the method learns), and `sums`, `counts`: test run ->
+    sum over its windows of the mean error over the horizon [m], and number of windows. Without a result the errors are
+    not numbers.
     """
+    learns = {way.name: way.method.compensates for way in results.plan.methods}
     runs, place = np.unique(results.test.run, return_inverse=True)
     counts = {str(run): int(count) for run, count in zip(runs, np.bincount(place), strict=True)}
     rows = []
     for row in results.rows:
         kept = {name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")}
         kept |= {"condition": condition, "world": world, "end": np.nan, "sums": {}, "counts": counts}
-        kept |= {"seconds": row["seconds"], "trials": len(row["trials"])}
+        kept |= {"seconds": row["seconds"], "trials": len(row["trials"]), "trained": learns[row["method"]]}
         if row["cell"] in results.paths:
             error = position_error(results.paths[row["cell"]], results.test.future)
             sums = np.bincount(place, over_time(error))
@@ -74,8 +77,9 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     test runs, without what another training would give; not a number with fewer than five. `difference` is H less that
     of the method `reference` over the `pairs` of cells in which both have one, every cell with the same weight, with a
     95 % interval `low`, `high` as of `contrasts`, over test runs: all windows and cells of a run, in its world, are
-    drawn together. `better` counts test runs with a lower error. `least`, `greatest`: the difference by world;
-    `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. The family `with physics` is all of
+    drawn together, and what another training would give is in it. `better` counts test runs with a lower error.
+    `least`, `greatest`: the difference by world; `world_low`, `world_high`: Student's 95 % interval over worlds, from
+    three on. The family `with physics` is all of
     them but `none`.
     """
     frames = [cells, cells[cells["family"] != NO_MODEL].assign(family=EVERY)]
@@ -139,7 +143,8 @@ def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapp
     if not keys:
         return row
     values, weights = np.array(list(sums.values())), np.array(list(counts.values()), dtype=float)
-    judged = contrasts((values / weights)[None, :], weights)
+    training = math.hypot(*(_training(side, keys, less) for side in (mine, theirs)))
+    judged = contrasts((values / weights)[None, :], weights, training)
     worlds = list(dict.fromkeys(world for world, _ in sums))
     means = np.array([_mean(sums, counts, world) for world in worlds])
     row |= {"difference": float(values.sum() / weights.sum()), "worlds": len(worlds)}
@@ -148,6 +153,23 @@ def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapp
     if len(worlds) >= LEAST:
         row["world_low"], row["world_high"] = over_worlds(means)
     return row
+
+
+def _training(
+    cells: Mapping[Any, Mapping[str, Any]],
+    keys: Sequence[tuple[str, str, int]],
+    less: Mapping[Any, Mapping[str, float]],
+) -> float:
+    """Standard error [m] that training alone gives the mean H of some cells; what is alike in both adds nothing."""
+    models: dict[tuple[str, str], list[tuple[str, str, int]]] = {}
+    for key in keys:
+        models.setdefault(key[:2], []).append(key)
+    H = [np.array([cells[key]["H"] for key in model], dtype=float) for model in models.values()]
+    moved = [
+        np.array([cells[key]["trained"] and any(less[key].values()) for key in model], dtype=bool)
+        for model in models.values()
+    ]
+    return training_error(H, moved)
 
 
 def _mean(sums: Mapping[tuple[str, str], float], counts: Mapping[tuple[str, str], float], world: str) -> float:

@@ -13,7 +13,7 @@ from shipid.report.section import drawn
 from shipid.report.sections import SECTIONS
 from shipid.study import memory
 from shipid.study.contents import report_content
-from shipid.study.evidence import FEWEST_RUNS, contrasts
+from shipid.study.evidence import FEWEST_RUNS, contrasts, training_error
 from shipid.study.results import Results, read_results
 from tests.study.tiny import run_here, tiny_plan
 
@@ -159,6 +159,11 @@ def test_intervals_are_those_of_contrasts(results: Results) -> None:
     frame = memory.memory_frame(results).set_index(["comparison", "model"])
     row = frame.loc[("observer: physics alone", "wrong-2")]
     assert (row["low"], row["high"]) == pytest.approx((judged.low[0], judged.high[0]))
+    trained = memory.memory_frame(results).query("N_D > 0 and seeds == 1")
+    assert len(trained)
+    for one in trained.itertuples():
+        noise = np.hypot(*(training_error([np.array([H])]) for H in (one.H_without, one.H_with)))
+        assert one.high - one.low > 2 * 2.77 * noise, "Student's, four degrees of freedom: what training would give"
 
 
 def test_the_page_shows_it(results: Results) -> None:
