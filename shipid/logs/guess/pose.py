@@ -88,7 +88,13 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         remedy = "name the columns with --names, or map by hand"
         if name is not None:
             remedy = f"{name!r} holds {state.words[name][:40]!r}, no number: write it as a number with a sign"
+        both = [one for one, text in state.words.items() if re.search(r"\d.*[NS].*\d.*[EWO]|[NS].*\d.*[EWO].*\d", text)]
+        if both and not pairs:
+            remedy = f"{both[0]!r} holds {state.words[both[0]][:40]!r}: write latitude and longitude in two columns"
         raise DataError(f"no column can be the {missing}: {remedy}", file=file)
+    if is_magnetic(best.heading):
+        how = f"{best.heading!r} is of a magnetic compass: where are its variation and deviation taken out?"
+        state.ask(("psi", "v"), f"{how} A `heading_offset` is one for all courses")
     if best.misfit > POOR and not state.numbered:
         state.ask(
             ("psi", "north", "east", "u", "v", "r"),

@@ -73,6 +73,7 @@ SENTINELS = tuple(
 )
 NOT_AVAILABLE = {"psi": (511.0, 360.0), "speed": (102.3, 51.0), "latitude": (91.0, 90.0), "longitude": (181.0, 180.0)}
 """Meaning -> number [deg, kn] that AIS writes for none (ITU-R M.1371), and the largest of the others."""
+LONG_WIDTH = 8  # cells, at most, of a row with one value: time, name, value, unit, quality and the like
 MOST_HEADS = 3  # lines above the data: names in two, and units
 FEWEST_TIMES, OFF = (
     10,
@@ -333,6 +334,7 @@ def _text_format(
             if score > best[0]:  # the first of equals: tabs are blanks, too
                 best = (score, separator, decimal, mark)
     score, separator, decimal, mark = best
+    _refuse_long([cells(line, separator) for line in lines if line.strip()] if separator else [], file)
     if score < NUMERIC / 2:
         raise DataError("no table of numbers with any separator: export it as CSV", file=file)
     rows = [cells(line, separator) for line in lines]
@@ -375,9 +377,28 @@ def _text_format(
         return form | {"skip_rows": heads[0]}
     longer = [i for i in range(data) if len(rows[i]) > width and all(rows[i][:width]) and not shares[i]]
     if longer and not heads:  # a table beside the log ends above this line
-        beside = [""] * (len(rows[longer[-1]]) - width)
+        beside = [""] * (max(len(row) for row in rows[longer[-1] + 1 :]) - width)
         return form | {"skip_rows": longer[-1] + 1, "names": [*_distinct(rows[longer[-1]][:width]), *beside]}
     return form | {"skip_rows": data, "header": False}
+
+
+def _refuse_long(rows: list[list[str]], file: Path) -> None:
+    """Raise DataError where a row has one value, and a cell that says of what, as historians write."""
+    width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
+    held = [row for row in rows if len(row) == width][1:]
+    for place in range(width if 3 <= width <= LONG_WIDTH else 0):
+        column = [row[place] for row in held]
+        told = {next(filter(None, fits(cell)), "") for cell in {*column}} - {""}
+        if any(map(_is_number, column)) or len(told) < 3 or len({*column}) > len(column) / 2:
+            continue
+        if np.mean([one != other for one, other in itertools.pairwise(column)]) > 0.5:  # the tags take turns
+            first = ", ".join(map(repr, list(dict.fromkeys(column))[:3]))
+            message = (
+                f"a row for each value, called {first} and so on: write a row for each time with a column for each"
+            )
+            raise DataError(
+                f"{message}, such as with pandas: pivot_table(index=..., columns=..., values=...)", file=file
+            )
 
 
 def _called_in(heads: list[list[str]]) -> list[str]:
@@ -989,7 +1010,9 @@ def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
     """Say which text in a clock is no time; empty where a cell is empty."""
     wrong = ~np.isfinite(values)
     if not wrong.any():
-        return ""
+        text = str(_called(table, name).iloc[0]).strip()
+        short = re.fullmatch(r"\d([.,]\d+)?[eE]\+?\d+", text) and np.any(np.diff(values) == 0)
+        return f"holds {text!r} in row 1, with too few digits: export it with all of them" if short else ""
     row = int(np.argmax(wrong))
     text = str(_called(table, name).iloc[row]).strip()
     if _NOTHING.fullmatch(text.lower()):
@@ -999,6 +1022,8 @@ def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
         return f"{begin}: take the mark of thousands out of the log"
     if text.startswith("="):
         return f"{begin}, {NOT_CALCULATED}"
+    if wrong.all() and re.fullmatch(r"\d{1,2}:\d\d[.,]\d+", text):
+        return f"{begin}, without the hour, as Excel shows times: show them as hh:mm:ss.000, and export again"
     if wrong.all():
         return f"{begin}, no number, date or time of day that can be read: write dates as 2024-05-14 08:00:00"
     what = "a leap second" if re.search(r":60(\D|$)", text) else "a comment" if text[:1] in "#%/;" else "no time"

@@ -204,3 +204,16 @@ def test_a_degree_of_latitude_is_sixty_miles() -> None:
     state = state_of({"lat": np.array([60.0, 60.5, 61.0]), "lon": np.array([5.0, 5.0, 6.0])}, np.arange(3.0))
     assert plane(state, "lat", "lon", on_globe=True)[1] == pytest.approx(30 * 1852, rel=5e-3)
     np.testing.assert_array_equal(plane(state, "lat", "lon", on_globe=False), [60 + 5j, 60.5 + 5j, 61 + 6j])
+
+
+def test_a_heading_of_a_magnetic_compass_alone_is_asked() -> None:
+    columns = {"north": NORTH, "east": EAST, "magnetic heading": DEG}
+    assert any("is of a magnetic compass" in question.sentence for question in chosen(columns).questions)
+    assert not any("magnetic" in one.sentence for one in chosen({**columns, "heading": DEG}).questions)
+
+
+def test_a_position_of_one_column_has_its_remedy() -> None:
+    state = state_of({"heading": DEG, "x": DEG}, T)
+    state.words = {"mode": "AUTO 1", "Position": "63°26.400'N 010°24.000'E"}
+    with pytest.raises(DataError, match=r"'Position' holds .*: write latitude and longitude in two columns"):
+        choose_pose(state, FILE)

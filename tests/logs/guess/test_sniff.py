@@ -579,6 +579,11 @@ def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -
         ),
         ([f'"{k:,.1f}"' for k in range(680, 1070)], "'1,000.0' in row 321: take the mark of thousands out of the log"),
         ([str(k) if k % 9 != 8 else "late" for k in range(90)], "'late' in row 9, no time: remove the 10 such lines"),
+        ([f"{1.715e12 + 500 * k:.5E}" for k in range(90)], "'1.71500E+12' in row 1, with too few digits: export it"),
+        (
+            [f"{k // 60:02}:{k % 60:02}.5" for k in range(90)],
+            "'00:00.5' in row 1, without the hour, as Excel shows times",
+        ),
         ([str((k + 604_755) % 604_800 * 1000) for k in range(90)], "goes back from 604799 s to 0 s in row 46"),
     ],
 )
@@ -810,3 +815,21 @@ def test_minus_one_is_asked_where_nothing_else_is_negative(
     TABLE.drop(columns="psi").assign(**{name: values}).to_csv(tmp_path / "log.csv", index=False)
     doubts = sniff(tmp_path / "log.csv").doubts
     assert [doubt.partition(" and ")[0] for doubt in doubts] == [f"{name!r} is -1 in 2 rows"] * asked
+
+
+@pytest.mark.parametrize("more", ["", ",192"])
+def test_a_row_for_each_value_is_named(more: str, tmp_path: Path) -> None:
+    """As historians write: what the value is stands in a cell beside it."""
+    tags = ("GPS1.LAT", "GPS1.LON", "GYRO1.HDG", "STG.RUDDER")
+    rows = [f"2024-05-14 08:00:{t:02},{tag},{t + k / 7:.3f}{more}" for t in range(50) for k, tag in enumerate(tags)]
+    with pytest.raises(
+        DataError, match=r"a row for each value, called 'GPS1.LAT', 'GPS1.LON', .*: write a row for each"
+    ):
+        sniff(log_of(tmp_path, [f"Timestamp,Tag,Value{',Quality' * bool(more)}", *rows]))
+
+
+def test_a_header_longer_than_its_rows_keeps_its_names(tmp_path: Path) -> None:
+    """As LabVIEW writes: a column of comments has a name and no cells."""
+    lines = text().splitlines()
+    sniffed = sniff(log_of(tmp_path, [f"{lines[0]},,Comment", *lines[1:]]))
+    assert list(sniffed.columns) == ["N", "psi"]
