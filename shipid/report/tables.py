@@ -162,7 +162,7 @@ def kinds(content: ReportContent) -> Table | None:
         f"{row['kind']}: {number(row['mean'])} m, at the end {number(row['end'])} m ({row['model']})"
         for row in best.to_dict("records")
     ]
-    takeaway = f"Least error with data: {'; '.join(parts)}." if parts else "No cell has a result."
+    takeaway = f"Least error with data: {'; '.join(parts)}." if parts else "No model with data has a result."
     return _table("kinds", "Errors by kind of run", takeaway, shown, KINDS)
 
 

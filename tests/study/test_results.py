@@ -6,6 +6,7 @@ import shlex
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,6 +21,7 @@ from shipid.study import store
 from shipid.study.contents import report_content
 from shipid.study.plan import build_plan, read_plan
 from shipid.study.results import Results, read_cells, read_results
+from tests.study.byhand import grid
 
 
 @pytest.fixture(scope="module")
@@ -126,6 +128,19 @@ def test_the_report_does_not_depend_on_when_a_log_was_recorded(read: Results) ->
         pd.testing.assert_frame_equal(content.frames[name], frame)
     assert [one.t for one in content.snapshots] == [one.t for one in expected.snapshots]
     assert content.over_time["t"].min() >= 0.0
+
+
+def test_physics_alone_is_not_said_to_have_data(made: Any) -> None:
+    methods = [
+        {"name": "drawn", "kind": "path-drawn", "families": ["bad"]},
+        {"name": "alone", "kind": "alone", "families": ["good"]},
+    ]
+    read = made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0)}), changes={"method": methods})
+    alone = read.cells["model"].eq("good")
+    lost = replace(read, cells=read.cells.assign(method=read.cells["method"].mask(alone, "alone")))
+    rows = frames.kinds_frame(lost)
+    assert set(rows.loc[rows["source"].eq("cooperative"), "model"]) == {"bad"}
+    assert set(rows.loc[rows["source"].eq("physics"), "model"]) == {"good", "bad"}
 
 
 def test_the_heading_at_the_end_does_not_depend_on_where_north_is(read: Results) -> None:
