@@ -31,7 +31,7 @@ from shipid.report.figure import (
 from shipid.report.gain import gain, unplotted
 from shipid.report.palette import INK, MUTED, level
 from shipid.report.section import Section
-from shipid.report.selection import data_driven, left_out, overview, spread, trained
+from shipid.report.selection import data_driven, left_out, overview, same_physics, spread, trained
 from shipid.report.wording import counted, listed, metres, number, shortened
 
 HEIGHT, THICK = 580, 26  # of the plot and at most of a cell [px]
@@ -139,21 +139,16 @@ def _rows(content: ReportContent) -> pd.DataFrame:
     Of several methods on the same physics, which have one place, the first: the one judged, where it is among them.
     """
     frame = overview(content)
-    frame = frame[~_same_physics(frame)].reset_index(drop=True)
+    frame = frame[~same_physics(frame)].reset_index(drop=True)
     top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
     without = frame.A.isna()
     strips = top * (1.05 + 0.06 * without.cumsum())
     return frame.assign(y=np.sqrt(frame.A).where(~without, strips))
 
 
-def _same_physics(frame: pd.DataFrame) -> pd.Series[bool]:
-    """Which models have the physics of one before: the same family and A."""
-    return frame.A.notna() & frame.duplicated(["family", "A"])
-
-
 def _beside(content: ReportContent) -> str:
     """Sentence on the methods whose place on the map another has; empty if there are none."""
-    beside = overview(content).loc[lambda frame: _same_physics(frame), "model"]
+    beside = overview(content).loc[lambda frame: same_physics(frame), "model"]
     return f" Not on the map, where another method has their place: {listed(list(beside), 6)}." if len(beside) else ""
 
 

@@ -14,7 +14,7 @@ import pandas as pd
 from plotly.colors import sample_colorscale
 
 from shipid.report.content import DATA_DRIVEN, ReportContent
-from shipid.report.selection import FEW_MODELS, exemplars, families
+from shipid.report.selection import FEW_MODELS, exemplars, families, same_physics
 
 INK, MUTED, GRID, TRUTH, NAIVE = "var(--ink)", "var(--muted)", "var(--grid)", "var(--truth)", "var(--muted)"
 LEVELS = 24
@@ -69,17 +69,15 @@ def styles(content: ReportContent) -> Mapping[str, Style]:
     """Style of every model: colour by A for many models, Okabe-Ito for few, thick ink for the pure data-driven."""
     frame, span = families(content), accuracy_range(content)
     kinds = [kind for kind in pd.unique(frame.family) if kind != DATA_DRIVEN]
+    same = same_physics(frame).to_numpy()
     result: dict[str, Style] = {}
-    seen: set[tuple[str, str]] = set()  # family and A: of several methods on one model the first is filled
     for index, row in enumerate(frame.itertuples()):
         if row.family == DATA_DRIVEN:
             result[str(row.model)] = _without_physics(sum(style.colour == INK for style in result.values()))
             continue
         colour = category(index) if span is None else _by_accuracy(float(str(row.A)), span)
         symbol = SYMBOLS[kinds.index(row.family) % len(SYMBOLS)]
-        model = (str(row.family), str(row.A))
-        again = span is not None and model in seen
-        seen.add(model)
+        again = span is not None and same[index]  # of several methods on one model the first is filled
         result[str(row.model)] = Style(colour, f"{symbol}-open" if again else symbol, 2.0)
     return result
 

@@ -36,6 +36,11 @@ def families(content: ReportContent) -> pd.DataFrame:
     return frame.sort_values(["last", "A"], kind="stable", ignore_index=True).drop(columns="last")
 
 
+def same_physics(frame: pd.DataFrame) -> pd.Series[bool]:
+    """Which rows of `families` have the physics of one before, and another method: the same family and A."""
+    return frame.A.notna() & frame.duplicated(["family", "A"])
+
+
 def data_driven(content: ReportContent) -> str | None:
     """Name of the pure data-driven model, if the study has one."""
     frame = families(content)
