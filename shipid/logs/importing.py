@@ -49,6 +49,7 @@ from shipid.logs.mapping import (
 from shipid.logs.readers import (
     Format,
     Progress,
+    SheetFormat,
     TableFormat,
     TextFormat,
     date_texts,
@@ -671,7 +672,7 @@ def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str
             f"{text.iloc[bad[0]]!r} is no number (column {source!r}; {len(bad)} such rows): "
             "correct it, or list it in [format] missing, or check decimal and thousands"
         )
-        if text.iloc[bad[0]].startswith("="):
+        if isinstance(form, SheetFormat) and text.iloc[bad[0]].startswith("="):
             message = f"{text.iloc[bad[0]]!r} (column {source!r}; {len(bad)} such rows) is {NOT_CALCULATED}"
         raise DataError(message, file=file, path=f"row {bad[0] + 1}")
     return numbers
