@@ -105,7 +105,9 @@ def engine() -> str:
     if command is None:
         return "casadi"
     version = (compiler_version(command).splitlines() or ["?"])[0]
-    return f"native, {version}, {target().lanes} lanes"
+    wanted = target()
+    missing = ", no libmvec" if wanted.fused and not wanted.prefix else ""  # other functions round otherwise
+    return f"native, {version}, {wanted.lanes} lanes{missing}"
 
 
 def refuse(reason: str) -> None:

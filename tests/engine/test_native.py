@@ -242,3 +242,16 @@ def test_a_machine_without_a_compiler_is_told_once(
         native._probed.cache_clear()
     (line,) = [record.getMessage() for record in caplog.records]
     assert line == "engine 'native' is not used, others are slower: there is no C compiler (gcc, cc or clang)"
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_the_engine_says_where_vector_functions_are_missing(found: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Others round otherwise: a run that goes on without them notes it, as it does for another compiler."""
+    if native.compiler() is None or not native.target().fused:
+        pytest.skip("no compiler, or no processor with vector functions")
+    monkeypatch.setattr(native, "build", lambda *_: None if found else "ld: cannot find -lmvec")
+    native.target.cache_clear()
+    try:
+        assert native.engine().endswith(" lanes" if found else " lanes, no libmvec")
+    finally:
+        native.target.cache_clear()
