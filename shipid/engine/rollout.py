@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -295,9 +296,9 @@ def _channels(
     columns = []
     for name in names:
         if name not in given:
-            raise DataError(
-                f"{what} {name!r} is needed by {vessel.name} and missing: {choices(name, given)}", file=vessel.file
-            )
+            close = get_close_matches(name, [str(other) for other in given if other not in names], n=1)
+            remedy = f"did you mean {close[0]!r}?" if close else f"give an array {shapes[0]}"
+            raise DataError(f"{what} {name!r} is needed by {vessel.name} and missing: {remedy}", file=vessel.file)
         column = numbers(f"{what} {name!r}", given[name])
         if column.shape not in shapes:
             raise ShipidError(f"{what} {name!r} must be {' or '.join(map(str, shapes))}: {column.shape}")

@@ -279,6 +279,17 @@ def test_a_missing_channel_is_named(bundled_vessel: Vessel, draw_inputs: Draw, g
     assert bundled_vessel.name in str(caught.value)
 
 
+def test_a_channel_that_is_left_out_comes_with_what_to_give(draw_inputs: Draw) -> None:
+    """What else was given is no remedy, though its name be alike: `port.n` is a command of this vessel, too."""
+    vessel = load_vessel("gunnerus-28.9")
+    given = draw_inputs(vessel, 2)
+    with pytest.raises(DataError, match=r"environment 'V_w' is needed by .* and missing: give an array \(2,\)$"):
+        rollout(vessel, given["start"], given["commands"], step=1.0, num_steps=2)
+    del given["commands"]["starboard.n"]
+    with pytest.raises(DataError, match=r"command 'starboard.n' is needed by .* and missing: give an array \(2,\)$"):
+        rollout(vessel, **given, step=1.0, num_steps=2)
+
+
 def test_wind_that_is_off_is_not_asked_for(draw_inputs: Draw) -> None:
     base = load_vessel("gunnerus-28.9")
     given = draw_inputs(base, 2)
