@@ -182,6 +182,17 @@ def test_folders_of_quick_in_the_documentation_are_those_that_the_command_makes(
     assert set(re.findall(r"results/quick-[0-9a-f]{8}", text)) - any_run == {QUICK.strip('"')}
 
 
+@pytest.mark.slow
+def test_the_page_of_manoeuvres_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its blocks go on from each other; the helmsman of the last one keeps the heading that its comment says."""
+    monkeypatch.chdir(tmp_path)
+    space: dict[str, Any] = {}
+    for block in blocks("manoeuvres.md"):
+        exec(block, space)
+    assert shipid.read_dataset("manoeuvres.parquet").runs == ["starboard first", "port first"]
+    assert space["path"]["psi"][-1].item() == pytest.approx(0.5, abs=0.01)
+
+
 def test_frames_of_the_documentation_are_drawn() -> None:
     space: dict[str, Any] = {}
     exec(blocks("python.md")[3], space)
