@@ -118,6 +118,8 @@ class Predictor:
     ) -> Array | Banded:
         """Return paths (T, S, 2) [m] in the frame (11); with a level, also the band around them.
 
+        They are not numbers where a column that training or the vessel takes is none at the instant.
+
         Parameters
         ----------
         instants : what is known at the instants of prediction.
@@ -144,8 +146,10 @@ class Predictor:
             ) from error
         except (ValueError, TypeError, IndexError) as error:
             raise DataError(f"the arrays of the instants and of the predictor do not fit together ({error})") from error
-        if predicted is paths:  # the prediction is the caller's to change, too
+        lost = self._lost(instants)
+        if predicted is paths or lost.any():  # the prediction is the caller's to change, too
             predicted = predicted.copy()
+            predicted[:, lost] = np.nan
         if level is None:
             return predicted
         return Banded(
@@ -170,6 +174,15 @@ class Predictor:
     def alone(self, instants: Instants) -> Array:
         """Return the paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for pure data-driven."""
         return self.physics.paths(self._known(instants))
+
+    def _lost(self, instants: Instants) -> Array:
+        """Instants (S,) with an input that is no number: a tree, or an input that stands for two, hides it."""
+        taken = set(self.limits)
+        if self.vessel is not None:
+            model = dynamics(self.vessel)
+            taken |= {*model.commands, *model.environment}
+        finite = [np.isfinite(values) for name, values in instants.columns.items() if name in taken]
+        return ~np.all(finite, axis=0) if finite else np.zeros(len(instants), dtype=bool)
 
     def _paths(self, paths: Array, instants: Instants) -> Array:
         """The paths as numbers; DataError unless they are (T, S, 2), of this horizon and these instants."""

@@ -17,12 +17,14 @@ from shipid.data.windows import Instants, Windows, cut_windows
 from shipid.errors import DataError
 from shipid.hybrid.alone import Alone, Unchanged
 from shipid.hybrid.features import Memory
+from shipid.hybrid.forest import Forest
 from shipid.hybrid.method import Fitted, Method, Task
+from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.predictor import Predictor, _folds, fit
-from shipid.vessel.load import load_vessel
+from shipid.vessel.load import Vessel, load_vessel
 from tests.export.strange import bands_of
 
 HORIZON, SMALL = 5, PathDrawn(trials=1, units=8, terms=2)
@@ -198,6 +200,21 @@ def test_a_column_of_another_shape_is_named(predictor: Predictor, change: dict[s
     """Before, one value was taken for all instants."""
     with pytest.raises(DataError, match=message):
         predictor.predict(Instants({**WINDOWS.columns, **change}))
+
+
+@pytest.mark.parametrize("vessel", [None, load_vessel("gunnerus-28.9")])
+@pytest.mark.parametrize("method", [Forest(trials=1), OneStep(trials=1, units=8)])
+def test_an_input_that_is_no_number_gives_no_path(method: Method, vessel: Vessel | None) -> None:
+    """Trees send it to one side, and of two shafts that turn alike one is an input: the path would look sound."""
+    pytest.importorskip("sklearn", reason="comes with the extra `forest`")
+    made = fit(method, Physics(vessel, HORIZON, 1.0), WINDOWS)
+    instants = WINDOWS.instants()
+    for name in ("u", "starboard.n"):
+        columns = {key: np.array(values) for key, values in instants.columns.items()}
+        columns[name][3] = np.nan
+        paths, rest = made.predict(replace(instants, columns=columns)), np.arange(len(WINDOWS)) != 3
+        assert np.isnan(paths[:, 3]).all(), name
+        np.testing.assert_allclose(paths[:, rest], made.predict(instants)[:, rest], rtol=1e-12)
 
 
 def test_only_instants_are_predicted_from(predictor: Predictor) -> None:
