@@ -161,7 +161,8 @@ class HankelDMD(Searched):
 
     Parameters
     ----------
-    delays : how far back the law may look [s]; each is tried with every ridge, and judged by the path.
+    delays : how far back the law may look [s]; each is a trial, with every ridge, and judged by the path. `trials`
+        therefore has no effect.
     ridge : weight of the squared weights of normalised inputs; 8 from low to high.
     mirror : whether every step counts with its image of port and starboard too, where the inputs allow it.
     samples : validation windows that a trial is judged on, at most.

@@ -28,7 +28,8 @@ def share_interval(held: Array, run: Array) -> tuple[float, float]:
 
     Windows of one run are alike: the number of windows is reduced until their variance is that between runs, and is
     never below the number of runs. Source: Korn and Graubard (1998), Survey Methodology 24. For one window a run it is
-    the exact interval.
+    the exact interval. A run with most of the windows makes the share, and so lies near it: runs of unequal length
+    count as so many of equal length as would make as certain a mean (Kish 1965), and scatter at least all alike.
 
     Parameters
     ----------
@@ -38,12 +39,15 @@ def share_interval(held: Array, run: Array) -> tuple[float, float]:
     sizes = np.bincount(place)
     runs, windows = len(sizes), len(held)
     share = float(np.mean(held))
-    count, tail = float(runs), (1 - CONFIDENCE) / 2
+    alike = float(np.square(sizes / windows).sum())
+    worth = 1 / alike  # runs
+    count, tail = worth, (1 - CONFIDENCE) / 2
     if runs > 1 and 0 < share < 1:
         excess = np.bincount(place, held - share)
         variance = runs / (runs - 1) * float((excess**2).sum()) / windows**2
+        variance = max(variance, alike * float((np.bincount(place, held) / sizes).var(ddof=1)))
         freedom = (stdtrit(max(windows - 1, 1), tail) / stdtrit(runs - 1, tail)) ** 2
-        count = float(np.clip(freedom * share * (1 - share) / max(variance, 1e-12), runs, windows))
+        count = float(np.clip(freedom * share * (1 - share) / max(variance, 1e-12), worth, windows))
     inside = share * count
     low = 0.0 if inside == 0 else float(betaincinv(inside, count - inside + 1, tail))
     high = 1.0 if inside >= count else float(betaincinv(inside + 1, count - inside, 1 - tail))
