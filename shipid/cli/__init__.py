@@ -65,7 +65,10 @@ def _check_utf_8(arguments: Sequence[str]) -> None:
     """Raise ShipidError for an argument that is not UTF-8: documents, pages and tables could not name such a file."""
     for argument in arguments:
         if not is_utf_8(argument):
-            raise ShipidError("is not UTF-8: rename the file or folder, or write the text in UTF-8", path=argument)
+            words = "is not UTF-8: rename the file or folder, or write the text in UTF-8"
+            if (system := sys.getfilesystemencoding()) != "utf-8":
+                words = f"cannot be read in this locale ({system}): set LC_ALL=C.UTF-8, and no PYTHONUTF8=0"
+            raise ShipidError(words, path=argument)
 
 
 def _before(

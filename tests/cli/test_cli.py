@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -197,3 +198,14 @@ def test_an_argument_that_is_not_utf_8_is_refused_before_any_work() -> None:
     code, _, error = ended("study", "run", os.fsdecode(b"caf\xe9.toml"))
     assert code == 1
     assert error == "error: caf\\udce9.toml: is not UTF-8: rename the file or folder, or write the text in UTF-8\n"
+
+
+def test_a_locale_that_cannot_read_an_argument_is_named() -> None:
+    """Before, a name that is UTF-8 was said not to be."""
+    environment = os.environ | {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    command = [sys.executable, "-m", "shipid", "study", "run", "café.toml".encode()]
+    result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    if "no such file" in result.stderr:
+        pytest.skip("a system whose names are UTF-8 in every locale")
+    assert result.stderr.endswith(": cannot be read in this locale (ascii): set LC_ALL=C.UTF-8, and no PYTHONUTF8=0\n")
+    assert len(result.stderr.splitlines()) == 1
