@@ -137,10 +137,11 @@ def step_of(horizon: float, log_step: float) -> float:
     """Step of the predictor [s]: a round number, no shorter than the log's; without a log, 0, orders are constant.
 
     At most a thirtieth of the horizon, a twelfth of the time in which the ship runs her length: recorded orders change
-    within it.
+    within it. Where rows are further apart than half of the horizon, the step is their distance, and two steps are the
+    horizon.
     """
     most = min(horizon / (LOGGED_STEPS if log_step else STEPS), LONGEST_STEP)
-    return min(max(_round_down(most), log_step), horizon / 2)
+    return max(min(_round_down(most), horizon / 2), log_step)
 
 
 def _ahead(horizon: float, steps: int, step: float, why: str) -> Choice:
@@ -164,7 +165,7 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     step = step_of(horizon, seen.step)
     steps = max(round(horizon / step), 2)
     usable = _usable(dataset, steps, step, data)
-    method = _method(first.length, step, float(seen.runs.loc[usable, "duration"].median()) - horizon)
+    method = _method(first.length, step, float(seen.runs.loc[usable, "duration"].median()) - steps * step)
     past = _past(method)
     held = _held(dataset, steps, step, past)
     if len(held) > LEAST_RUNS:
@@ -174,7 +175,7 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     runs = seen.runs.loc[usable]
     interval = max(step, seen.step, _round_up(float(runs["duration"].sum()) / MOST_WINDOWS))
     tests = typical_runs(runs)
-    true_path = _path(seen, dataset, horizon)
+    true_path = _path(seen, dataset, steps * step)
     others = [name for name in usable if name not in tests]
     how: dict[str, Any] = {"ahead": steps * step, "step": step, "path": true_path.value}
     looks = {named: first_look(vessel, dataset, others, **how) for named, vessel in vessels.items()}

@@ -118,10 +118,10 @@ def test_horizon_leaves_most_of_a_short_run() -> None:
 
 @pytest.mark.parametrize("horizon", [1.0, 15.0, 60.0, 300.0])
 @pytest.mark.parametrize("log_step", [0.05, 0.5, 5.0])
-def test_step_is_no_finer_than_the_log_and_leaves_two(horizon: float, log_step: float) -> None:
+def test_step_is_no_finer_than_the_log_and_leaves_two_if_it_can(horizon: float, log_step: float) -> None:
+    """Between rows far apart there is no true path to predict: then two rows are the horizon."""
     step = step_of(horizon, log_step)
-    assert step <= horizon / 2
-    assert step >= min(log_step, horizon / 2)
+    assert log_step <= step <= max(log_step, horizon / 2)
 
 
 def test_recorded_orders_need_finer_steps_than_constant_ones() -> None:
