@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from shipid.errors import ShipidError, is_utf_8
+from shipid.errors import ShipidError, is_utf_8, visible
 
 PROBE_LIMIT, LIMIT = 10.0, 120.0  # s that a compiler may take: for a probe of two lines, for a model
 
@@ -165,10 +165,10 @@ def folder(wanted: str, probe: bytes) -> Path | None:
             reason = f"{wanted}: {error.strerror or str(error).rpartition(': ')[2]}"
         if reason is None:
             if reasons:
-                log.warning("compiled equations are not kept for the next run: %s", reasons[0])
+                log.warning("compiled equations are not kept for the next run: %s", visible(reasons[0]))
             return place
         reasons.append(reason)
-    log.warning("engine 'native' is not used, others are slower: %s", reasons[-1])
+    log.warning("engine 'native' is not used, others are slower: %s", visible(reasons[-1]))
     return None
 
 

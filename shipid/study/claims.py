@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import getpass
 import json
+import math
 import os
 import random
 import secrets
@@ -73,7 +74,9 @@ class Claims:
         self._me = self._folder / f".{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
         self._mine: set[str] = set()
         self._apart: set[str] = set()  # claims that are no links
-        self._ahead: dict[tuple[int, int], float] = {}  # file and its time in the future -> when that was first seen
+        self._seen: dict[tuple[int, int], float] = {}  # file and its time, which says nothing -> when it was first seen
+        self._clock: float | None = None  # time of the file system less that of a clock that nobody sets
+        self._set = -math.inf  # when, by the latter, the former was last set forward
         self._lock, self._stop = threading.RLock(), threading.Event()
         since = datetime.now(UTC).isoformat(timespec="seconds")
         owner = {"host": socket.gethostname(), "owner": _user(), "process": os.getpid(), "since": since}
@@ -82,6 +85,7 @@ class Claims:
 
     def __enter__(self) -> Claims:
         self._sign_in()
+        self._renew_all()
         threading.Thread(target=self._renew, daemon=True).start()
         return self
 
@@ -257,10 +261,13 @@ class Claims:
         except OSError:
             return False
         age = self._now() - status.st_mtime
-        if age < -LATE:  # the clock was set back: a living process renews its file with the time of now
-            first = self._ahead.setdefault((status.st_ino, status.st_mtime_ns), time.monotonic())
-            return time.monotonic() - first > LATE
-        return age > LATE
+        if abs(age) <= LATE:
+            return False
+        if age > 0 and time.monotonic() - self._set > LATE:
+            return True
+        # The clock was set back, or just now forward: a living process renews its file with the time of now.
+        first = self._seen.setdefault((status.st_ino, status.st_mtime_ns), time.monotonic())
+        return time.monotonic() - first > LATE
 
     def _now(self) -> float:
         """Time at which this process last renewed its file."""
@@ -279,10 +286,19 @@ class Claims:
 
     def _renew(self) -> None:
         while not self._stop.wait(RENEWED):
-            with self._lock:
-                for file in (self._me, *map(self._file, self._apart)):
-                    with suppress(OSError):
-                        os.utime(file)
+            self._renew_all()
+
+    def _renew_all(self) -> None:
+        """Give all files of this process the time of now; see whether the clock was set since the last time."""
+        with self._lock:
+            for file in (self._me, *map(self._file, self._apart)):
+                with suppress(OSError):
+                    os.utime(file)
+            with suppress(OSError):
+                clock = self._me.stat().st_mtime - time.monotonic()
+                if self._clock is not None and clock - self._clock > RENEWED:
+                    self._set = time.monotonic()
+                self._clock = clock
 
     def _file(self, unit: str) -> Path:
         return self._folder / unit

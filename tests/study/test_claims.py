@@ -86,6 +86,30 @@ def test_a_claim_of_before_the_clock_was_set_back_is_taken_over_when_nobody_rene
         assert mine.take("a")
 
 
+def test_a_claim_is_not_taken_over_because_the_clock_was_set_forward(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after the sleep of a computer: who renews first sees the others late by hours, and watches them instead."""
+    clock = [1000.0]
+    monkeypatch.setattr(claims.time, "monotonic", lambda: clock[0])
+    utime = os.utime
+    with Claims(tmp_path) as slow, Claims(tmp_path) as mine:
+        assert slow.take("a")
+        monkeypatch.setattr(os, "utime", lambda file: utime(file, (time.time() + 7200, time.time() + 7200)))
+        clock[0] += claims.RENEWED
+        mine._renew_all()
+        for _ in range(3):
+            assert not mine.take("a")
+            clock[0] += claims.LATE - 5
+            slow._renew_all()
+        mine._renew_all()
+        later = time.time() + 7200 + claims.LATE + 5
+        monkeypatch.setattr(os, "utime", lambda file: utime(file, (later, later)))
+        clock[0] += claims.LATE + 5
+        mine._renew_all()
+        assert mine.take("a"), "it is renewed no more"
+
+
 def test_the_number_of_a_process_says_nothing_on_another_system(tmp_path: Path) -> None:
     """A container may have the name of this host and other numbers: its claim is late before it is taken over."""
     process = os.fork()
