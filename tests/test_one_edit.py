@@ -187,7 +187,7 @@ def test_the_jet_of_the_page_obeys_the_laws() -> None:
     test_laws.test_zero_at_rest("thruster.jet")
     test_laws.test_finite_at_rest("thruster.jet")
     test_laws.test_derivative_is_finite_difference("thruster.jet", 0)
-    test_laws.test_froude_scaling("thruster.jet", 0)
+    test_laws.test_forces_follow_the_units("thruster.jet", test_laws.FROUDE)
 
 
 @pytest.mark.usefixtures("jet")
@@ -247,7 +247,7 @@ def test_the_laws_make_up_a_vessel_for_any_numbers_of_a_term(monkeypatch: pytest
         cached.cache_clear()
     test_laws.test_mirror_port_starboard("thruster.kite", 0)
     test_laws.test_zero_at_rest("thruster.kite")
-    test_laws.test_froude_scaling("thruster.kite", 0)
+    test_laws.test_forces_follow_the_units("thruster.kite", test_laws.FROUDE)
     monkeypatch.undo()
     for cached in CACHES:
         cached.cache_clear()
@@ -289,7 +289,7 @@ def test_the_depth_obeys_the_laws() -> None:
     test_laws.test_zero_at_rest("hull.shallow")
     test_laws.test_finite_at_rest("hull.shallow")
     test_laws.test_derivative_is_finite_difference("hull.shallow", 0)
-    test_laws.test_froude_scaling("hull.shallow", 0)
+    test_laws.test_forces_follow_the_units("hull.shallow", test_laws.FROUDE)
     test_laws.test_lowered_equals_casadi("hull.shallow")
 
 
