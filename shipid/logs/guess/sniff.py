@@ -75,10 +75,8 @@ NOT_AVAILABLE = {"psi": (511.0, 360.0), "speed": (102.3, 51.0), "latitude": (91.
 """Meaning -> number [deg, kn] that AIS writes for none (ITU-R M.1371), and the largest of the others."""
 LONG_WIDTH = 8  # cells, at most, of a row with one value: time, name, value, unit, quality and the like
 MOST_HEADS = 3  # lines above the data: names in two, and units
-FEWEST_TIMES, OFF = (
-    10,
-    0.02,
-)  # times of a second clock, or steps of the first; share of its span that it may go otherwise
+FEWEST_TIMES = 10  # of a second clock that are compared with the first
+APART, OFF = 10, 0.02  # steps of the first clock, and share of its span, by which a second one may go otherwise
 LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
 REPEATED = 0.05  # share of the rows that may repeat the row before, at most
 WIDE = 0.9  # share of every second byte that is 0, in text of two bytes a character
@@ -388,17 +386,14 @@ def _refuse_long(rows: list[list[str]], file: Path) -> None:
     held = [row for row in rows if len(row) == width][1:]
     for place in range(width if 3 <= width <= LONG_WIDTH else 0):
         column = [row[place] for row in held]
-        told = {next(filter(None, fits(cell)), "") for cell in {*column}} - {""}
-        if any(map(_is_number, column)) or len(told) < 3 or len({*column}) > len(column) / 2:
+        quantities = {next(filter(None, fits(cell)), "") for cell in {*column}} - {""}
+        if any(map(_is_number, column)) or len(quantities) < 3 or len({*column}) > len(column) / 2:
             continue
         if np.mean([one != other for one, other in itertools.pairwise(column)]) > 0.5:  # the tags take turns
             first = ", ".join(map(repr, list(dict.fromkeys(column))[:3]))
-            message = (
-                f"a row for each value, called {first} and so on: write a row for each time with a column for each"
-            )
-            raise DataError(
-                f"{message}, such as with pandas: pivot_table(index=..., columns=..., values=...)", file=file
-            )
+            message = f"a row for each value, called {first} and so on: write a row for each time, a column for each"
+            how = "such as with pandas: pivot_table(index=..., columns=..., values=...)"
+            raise DataError(f"{message}, {how}", file=file)
 
 
 def _called_in(heads: list[list[str]]) -> list[str]:
@@ -600,11 +595,11 @@ def _in_columns(
     since = seconds(texts)
     if not np.isfinite(since).all():
         return None
-    rate = None if np.all(np.diff(since) > 0) else _rate(since)
-    if rate is None and not np.all(np.diff(since) > 0):
-        return None
     keys = {"from": times, "unit": "date"} | ({"date": day} if day is not None else {})
-    return (keys, since) if rate is None else (keys | {"every": rate[0]}, rate[1])
+    if np.all(np.diff(since) > 0):
+        return keys, since
+    rate = _rate(since)
+    return None if rate is None else (keys | {"every": rate[0]}, rate[1])
 
 
 def _sides(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
@@ -845,7 +840,7 @@ def _other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[st
             continue
         since = clock_seconds(values, _unit_of_clock(name, values)) if name in columns else values
         off = float(np.ptp(since - times))
-        if off > max(FEWEST_TIMES * float(np.median(np.diff(t))), OFF * float(times[-1] - times[0])):
+        if off > max(APART * float(np.median(np.diff(t))), OFF * float(times[-1] - times[0])):
             how = f"{name!r} is a clock, too, and goes otherwise than that of the rows: they part by {off:.3g} s"
             yield f"{how}. Are the columns beside it of its times? Then write them to another file ([file.<name>])"
 
