@@ -60,13 +60,40 @@ def friction(speed: float, length: float, nu: float) -> float:
 
 
 def form_factor(L: float, B: float, T: float, C_b: float) -> float:
-    """Form factor k [-] of Watanabe, at least 0: viscous resistance is (1 + k) times that of friction."""
-    return max(-0.095 + 25.6 * C_b / ((L / B) ** 2 * math.sqrt(B / T)), 0.0)
+    """Form factor k [-] of Watanabe, at least 0: viscous resistance is (1 + k) times that of friction.
+
+    Beamier ships than L / B = 3 have the factor of that, which the square would make twice as large at 2.2.
+    """
+    return max(-0.095 + 25.6 * C_b / (max(L / B, 3.0) ** 2 * math.sqrt(B / T)), 0.0)
 
 
 def wetted_surface(L: float, B: float, T: float, C_b: float) -> float:
     """S [m^2] of Mumford."""
     return 1.025 * L * (C_b * B + 1.7 * T)
+
+
+def motora(L: float, B: float, T: float, C_b: float) -> tuple[float, float, float]:
+    """Added mass in surge and sway over the mass [-], and radius of gyration of the added yaw inertia [m].
+
+    Regressions by Zhou, Sheng and Feng (1983, Ship Engineering 6, 21-29) of the charts of Motora (1959).
+    """
+    ratio, d = L / B, T / B
+    m_x = (
+        0.398
+        + 11.97 * C_b * (1 + 3.73 * d)
+        - 2.89 * C_b * ratio * (1 + 1.13 * d)
+        + 0.175 * C_b * ratio**2 * (1 + 0.54 * d)
+        - 1.107 * ratio * d
+    ) / 100
+    m_y = (
+        0.882
+        - 0.54 * C_b * (1 - 1.6 * d)
+        - 0.156 * ratio * (1 - 0.673 * C_b)
+        + 0.826 * d * ratio * (1 - 0.678 * d)
+        - 0.638 * C_b * d * ratio * (1 - 0.669 * d)
+    )
+    gyration = L / 100 * (33 - 76.85 * C_b * (1 - 0.784 * C_b) + 3.43 * ratio * (1 - 0.63 * C_b))
+    return m_x, m_y, gyration
 
 
 def correlation_allowance(L: float) -> float:

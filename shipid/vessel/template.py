@@ -29,6 +29,7 @@ from shipid.vessel.regressions import (
     correlation_allowance,
     form_factor,
     friction,
+    motora,
     thrust_polynomial,
     wave_resistance,
     wetted_surface,
@@ -36,7 +37,9 @@ from shipid.vessel.regressions import (
 
 RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
-LEAST_YAW = 0.005  # of Clarke's N_rdot: a tenth of what ships have
+BEAMY = 0.5  # of the charts' yaw inertia: where Clarke's formula, which falls with the beam, gives less, charts do
+ROUNDING = 1e-9  # of the quotient of two numbers as people write them, such as 5.4 / 3
+SHORTEST = 3.0  # length / beam of the ships behind most formulae
 PROPULSORS = ("propeller-rudder", "azimuth", "differential")
 MODEL, TYPICAL = 10.0, 160.0  # m: a shorter ship is taken for a model of one as long as the second number
 STEERING = 65 / 28  # deg/s: 35 deg on one side to 30 on the other in 28 s, SOLAS II-1/29
@@ -46,6 +49,10 @@ DIAMETERS = (0.35, 1.0)  # of the draught
 AZIMUTH_DIAMETER, SCALES = 0.6, (0.1, 5.0)  # of the draught; of k_T: the speed of an engine gives a hundredth
 FULL = 0.75  # block coefficient of bulk carriers and tankers, whose screws are small for the draught
 J_MOST, FASTEST = 1.5, 1e3  # largest J of a propeller's polynomial, as in the document; rev/s
+SIMILAR = dict.fromkeys(
+    ("block", "length / beam", "beam / draught", "block x beam / length"),
+    ": for another ship, take a similar vessel and change it (`shipid vessel list`)",
+)  # remedy, by what is outside the formulae
 LARGEST_SCREW, STRONG_PITCH = 10.5, 1.2  # m; P / D from which a larger screw is the likelier guess
 
 # Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51, 339-351: C_Dt, C_Dl of bow and stern, delta, kappa
@@ -185,6 +192,11 @@ def _remarks(given: Particulars) -> Iterator[str]:
             f"{given.length:g} m counts as a model at a scale of {given.reduction:.3g}: give the scale by --scale; "
             "it sets how fast rudder or azimuth turns"
         )
+    if given.length / given.beam < SHORTEST:
+        yield (
+            f"length / beam = {given.length / given.beam:.3g}: most formulae are of ships from {SHORTEST:g} on, and "
+            "are rougher here"
+        )
     if given.rpm is None:
         unknown = "The shaft speed is a guess" if given.propeller_diameter else "Diameter and shaft speed are guesses"
         yield f"{unknown}: give the shaft speed at {given.service:.3g} m/s by --rpm"
@@ -210,15 +222,10 @@ def _check(given: Particulars) -> None:
     if given.ship_type not in WIND:
         raise ShipidError(f"ship type {given.ship_type!r}: {choices(given.ship_type, WIND)}")
     for what, value, low, high in _ranges(given):
-        if not low <= value <= high:
-            raise ShipidError(f"{what} = {value:.3g}: the formulae hold for {low:g} to {high:.3g}")
-    if _yaw_inertia(given) < LEAST_YAW:  # linear in beam / length
-        least = 0.33 / (0.33 * given.beam / given.length + _yaw_inertia(given) - LEAST_YAW)
-        raise ShipidError(
-            f"length / beam = {given.length / given.beam:.3g}: with this block coefficient and beam / draught Clarke's "
-            f"formula gives an added yaw inertia from {math.ceil(100 * least) / 100:g} on: take a similar vessel "
-            "and change it (`shipid vessel list`)"
-        )
+        if not low * (1 - ROUNDING) <= value <= high * (1 + ROUNDING):
+            raise ShipidError(
+                f"{what} = {value:.3g}: the formulae hold for {low:g} to {high:.3g}{SIMILAR.get(what, '')}"
+            )
 
 
 def _ranges(given: Particulars) -> Iterator[tuple[str, float, float, float]]:
@@ -227,8 +234,9 @@ def _ranges(given: Particulars) -> Iterator[tuple[str, float, float, float]]:
     yield "beam [m]", given.beam, 0.1, 80.0
     yield "draught [m]", given.draught, 0.02, 30.0
     yield "block", given.block, 0.4, 0.9
-    yield "length / beam", given.length / given.beam, 3.0, 9.0
+    yield "length / beam", given.length / given.beam, 2.0, 9.0
     yield "beam / draught", given.beam / given.draught, 1.8, 6.0
+    yield "block x beam / length", given.block * given.beam / given.length, 0.04, 0.3
     yield "speed [m/s]", given.service, 0.1, 0.4 * math.sqrt(GRAVITY * given.length)
     yield "shafts", given.units, 1, 2
     for what, value, low, high in (
@@ -263,26 +271,34 @@ def inertia(given: Particulars) -> Values:
 
 
 def added_mass(given: Particulars) -> Values:
-    """Clarke et al. (1983); surge by Soeding, in Brix (1993)."""
+    """Clarke et al. (1983), surge by Soeding, in Brix (1993); of a beamy ship Motora's charts.
+
+    Clarke's regressions are of ships four times as long as their beam and more. Of a beamier one they give a yaw
+    inertia near 0 or below, and couple sway and yaw too much.
+    """
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
     prime = -math.pi * (T / L) ** 2 * given.rho / 2 * L**3
+    yaw = prime * L**2 * (1 / 12 + 0.017 * C_b * B / T - 0.33 * B / L)
+    m = given.rho * given.volume
+    m_x, m_y, k_zz = motora(L, B, T, C_b)
+    if -yaw < BEAMY * m * k_zz**2:
+        charts, symmetric = "Motora's charts, by Zhou et al. (1983)", "a beamy ship counts as alike fore and aft"
+        return {
+            "X_udot": Value(-m * m_x, "kg", charts),
+            "Y_vdot": Value(-m * m_y, "kg", charts),
+            "Y_rdot": Value(0.0, "kg m", symmetric),
+            "N_vdot": Value(0.0, "kg m", symmetric),
+            "N_rdot": Value(-m * k_zz**2, "kg m^2", charts),
+        }
     clarke = "Clarke et al. (1983)"
+    surge = m / (math.pi * math.sqrt(L**3 / given.volume) - 14)
     return {
-        "X_udot": Value(-_surge_mass(given), "kg", "-m / (pi sqrt(L^3 / volume) - 14), Soeding in Brix (1993)"),
+        "X_udot": Value(-surge, "kg", "-m / (pi sqrt(L^3 / volume) - 14), Soeding in Brix (1993)"),
         "Y_vdot": Value(prime * (1 + 0.16 * C_b * B / T - 5.1 * (B / L) ** 2), "kg", clarke),
         "Y_rdot": Value(prime * L * (0.67 * B / L - 0.0033 * (B / T) ** 2), "kg m", clarke),
         "N_vdot": Value(prime * L * (1.1 * B / L - 0.041 * B / T), "kg m", clarke),
-        "N_rdot": Value(prime * L**2 * _yaw_inertia(given), "kg m^2", clarke),
+        "N_rdot": Value(yaw, "kg m^2", clarke),
     }
-
-
-def _yaw_inertia(given: Particulars) -> float:
-    B = given.beam
-    return 1 / 12 + 0.017 * given.block * B / given.draught - 0.33 * B / given.length
-
-
-def _surge_mass(given: Particulars) -> float:
-    return given.rho * given.volume / (math.pi * math.sqrt(given.length**3 / given.volume) - 14)
 
 
 def hull(given: Particulars) -> Values:

@@ -53,7 +53,10 @@ def test_a_vessel_beyond_the_formulae_is_one_line(tmp_path: Path) -> None:
     sizes = ("--length", 100, "--beam", 5, "--draught", 2, "--block", 0.6)
     status, _, err = ended("vessel", "new", *sizes, "--out", tmp_path / "ship.toml")
     assert status == 1
-    assert err == "error: length / beam = 20: the formulae hold for 3 to 9\n"
+    assert err == (
+        "error: length / beam = 20: the formulae hold for 2 to 9: for another ship, take a similar vessel and change "
+        "it (`shipid vessel list`)\n"
+    )
 
 
 @pytest.mark.parametrize("name", ["two\nlines", 'quotes " and \\', "Ærø ⚓"])

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import elliprd
 
 from shipid.vessel.regressions import (
     correlation_allowance,
     form_factor,
     friction,
+    motora,
     thrust_coefficient,
     thrust_polynomial,
     wave_resistance,
@@ -38,6 +40,38 @@ def test_surface_and_form_of_published_ships() -> None:
     assert wetted_surface(*KCS) == pytest.approx(9539, rel=0.05)
     assert 0.15 < form_factor(*KVLCC2) < 0.35
     assert 0.05 < form_factor(*KCS) < 0.15
+
+
+@pytest.mark.parametrize(
+    ("sizes", "m_x", "m_y", "J_z"),
+    [
+        (KVLCC2, 0.022 / 0.2936, 0.223 / 0.2936, 0.011 / 0.2936),
+        ((175.0, 25.4, 8.5, 0.559), 0.000238 / 0.00792, 0.007049 / 0.00792, 0.000419 / 0.00792),
+    ],
+    ids=["KVLCC2", "S-175"],
+)
+def test_added_masses_of_published_ships(
+    sizes: tuple[float, float, float, float], m_x: float, m_y: float, J_z: float
+) -> None:
+    """Over the mass, J_z over m L^2 too: Yasukawa and Yoshimura (2015), table 3; Son and Nomoto (1982)."""
+    surge, sway, gyration = motora(*sizes)
+    assert surge == pytest.approx(m_x, rel=0.15)
+    assert sway == pytest.approx(m_y, rel=0.05)
+    assert (gyration / sizes[0]) ** 2 == pytest.approx(J_z, rel=0.12)
+
+
+@pytest.mark.parametrize("ratio", [2.0, 2.5, 3.0])
+def test_added_masses_of_a_beamy_ship_are_near_those_of_an_ellipsoid(ratio: float) -> None:
+    """The submerged half of an ellipsoid has those of the whole one, exactly (Lamb 1932, articles 114 and 373)."""
+    a, b, c = 0.5, 0.5 / ratio, 0.4 / ratio  # half length, half beam, draught
+    alpha, beta = (
+        2 / 3 * a * b * c * elliprd(*others, axis) for axis, others in ((a**2, (b**2, c**2)), (b**2, (a**2, c**2)))
+    )
+    far = (a**2 - b**2) ** 2 * (beta - alpha) / (2 * (a**2 - b**2) + (a**2 + b**2) * (alpha - beta))
+    surge, sway, gyration = motora(1.0, 2 * b, c, np.pi / 6)
+    assert surge == pytest.approx(alpha / (2 - alpha), rel=0.4)
+    assert 1.0 < sway / (beta / (2 - beta)) < 1.6  # a ship's sides are flatter
+    assert gyration == pytest.approx(np.sqrt(far / 5), rel=0.35)
 
 
 def test_waves_matter_for_a_fast_ship_alone() -> None:
