@@ -135,7 +135,8 @@ PHRASES: dict[str, str] = {
         "angle, thruster azimuth, azimut, azimut winkel, gondel winkel, schottel winkel, asimut, asimut vinkel, "
         "alpha t, nozzle angle, thrust angle, thruster direction, pod azimuth, azimuth vinkel, azi dir, angle "
         "azimut, angle propulseur, angulo azimut, angolo azimut, ruderpropeller winkel, azimut hoek, azimuth "
-        "hoek, azimuth winkel"
+        "hoek, azimuth winkel, outboard, outboard angle, outboard steering angle, drive angle, stern drive "
+        "angle, sterndrive angle, jet angle, waterjet angle"
     ),
     "n": (
         "n, rpm, shaft, shaft rpm, shaft speed, prop rpm, propeller rpm, propeller speed, prop speed, engine rpm, "
