@@ -136,7 +136,7 @@ PHRASES: dict[str, str] = {
         "alpha t, nozzle angle, thrust angle, thruster direction, pod azimuth, azimuth vinkel, azi dir, angle "
         "azimut, angle propulseur, angulo azimut, angolo azimut, ruderpropeller winkel, azimut hoek, azimuth "
         "hoek, azimuth winkel, outboard, outboard angle, outboard steering angle, drive angle, stern drive "
-        "angle, sterndrive angle, jet angle, waterjet angle"
+        "angle, sterndrive angle, jet angle, waterjet angle, asd, asd angle, z drive, z drive angle, zdrive angle"
     ),
     "n": (
         "n, rpm, shaft, shaft rpm, shaft speed, prop rpm, propeller rpm, propeller speed, prop speed, engine rpm, "
