@@ -166,7 +166,7 @@ class Bands:
         if not number or not 0 < level <= LEVELS[-1]:
             shown = f"{level:g}" if number else repr(level)
             raise DataError(f"{shown} is no level of a band: give a share above 0 and up to 0.99, such as 0.9")
-        if kind is not None and kind not in self.kinds:
+        if kind is not None and not (isinstance(kind, str) and kind in self.kinds):
             raise DataError(f"no run of the kind {kind!r} calibrated this band: {choices(kind, self.kinds)}")
         if not self.promises(level, kind):
             raise DataError(too_few(level, self.runs if kind is None else self.kinds[kind], kind))

@@ -84,8 +84,9 @@ def test_too_few_runs_are_one_sentence() -> None:
     mixed.region(made_.paths, made_.columns, 1.0, 0.9, kind="turning")
     with pytest.raises(DataError, match=r"needs 9 runs or more of the kind 'zigzag' to calibrate it: there are 4"):
         mixed.region(made_.paths, made_.columns, 1.0, 0.9, kind="zigzag")
-    with pytest.raises(DataError, match="no run of the kind 'spiral' calibrated this band"):
-        bands.region(made_.paths, made_.columns, 1.0, 0.9, kind="spiral")
+    for kind in ("spiral", ["zigzag"], np.array(["zigzag", "turning"])):
+        with pytest.raises(DataError, match="calibrated this band"):
+            mixed.region(made_.paths, made_.columns, 1.0, 0.8, kind=kind)
 
 
 def test_arrays_rebuild_it() -> None:
