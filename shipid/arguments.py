@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import os
 from collections.abc import Iterable, Mapping
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from shipid.errors import ShipidError, choices
 
 Kind = type[ShipidError]
+MULTIPLE = 1e-6  # of a step: by so much less or more a time is still a multiple
 
 
 def whole_number(name: str, value: Any, least: int = 0, error: Kind = ShipidError) -> int:
@@ -40,6 +42,13 @@ def positive(name: str, value: Any, error: Kind = ShipidError) -> float:
     if not 0 < number < np.inf or isinstance(value, bool):
         raise error(f"{name} must be a number above 0 and finite, not {value!r}")
     return number
+
+
+def steps_in(time: float, step: float) -> int:
+    """Number of steps [s] that a time [s] consists of; 0 where it is no multiple of the step."""
+    ratio = time / step
+    count = round(ratio) if math.isfinite(ratio) else 0
+    return count if abs(ratio - count) <= MULTIPLE * count else 0
 
 
 def one_of(name: str, value: Any, valid: Iterable[str], error: Kind = ShipidError) -> None:

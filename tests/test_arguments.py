@@ -11,7 +11,7 @@ import pytest
 import torch
 
 import shipid
-from shipid.arguments import names_of, number, numbers, of_class, one_of, positive, whole_number
+from shipid.arguments import names_of, number, numbers, of_class, one_of, positive, steps_in, whole_number
 from shipid.errors import DataError, ShipidError
 from shipid.export.write import export_predictor, export_vessel
 from shipid.vessel.dynamics import dynamics
@@ -39,6 +39,22 @@ def test_a_number_of_any_type_is_a_float(value: Any) -> None:
 def test_anything_else_is_no_positive_number(value: Any) -> None:
     with pytest.raises(ShipidError, match="step must be a number above 0 and finite, not"):
         positive("step", value)
+
+
+@pytest.mark.parametrize(
+    ("time", "step", "steps"),
+    [
+        (30.0, 1.0, 30),
+        (0.3, 0.1, 3),
+        (1.0, 0.3333333, 3),
+        (1.0, 0.3333, 0),
+        (0.4, 1.0, 0),
+        (1.0, 0.3, 0),
+        (9.0, 1e-320, 0),
+    ],
+)
+def test_a_time_consists_of_whole_steps_up_to_the_digits_that_one_writes(time: float, step: float, steps: int) -> None:
+    assert steps_in(time, step) == steps
 
 
 def test_an_unknown_name_comes_with_those_that_are_valid() -> None:

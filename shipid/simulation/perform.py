@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.arguments import by_name, names_of, numbers, one_of, positive
+from shipid.arguments import by_name, names_of, numbers, one_of, positive, steps_in
 from shipid.engine.casadi import orders_of, outputs_of
 from shipid.engine.engines import named
 from shipid.engine.integrate import Method
@@ -81,14 +81,14 @@ def perform(
     between = step if interval is None else positive("interval", interval)
     if duration is not None:
         duration = positive("duration", duration)
-    every = round(between / step)
-    if every < 1 or abs(every * step - between) > 1e-9 * step * every:
+    every = steps_in(between, step)
+    if not every:
         raise ShipidError(f"interval {between:g} s must be a multiple of step {step:g} s")
     names = [one.name or number for one, number in zip(manoeuvres, run_names(len(manoeuvres)), strict=True)]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DocumentError(f"two runs are named {twice!r}", path="manoeuvre.name")
-    rows = [_rows(one.length if duration is None else duration, step * every) for one in manoeuvres]
+    rows = [_rows(one.length if duration is None else duration, between) for one in manoeuvres]
     environment = {} if environment is None else environment
     by_name("environment", environment, "a name to a number or an array")
     weather = _weather(vessel, environment, len(manoeuvres), every * (max(rows) - 1) + 1)
@@ -204,7 +204,7 @@ def _held(commands: Mapping[str, Array]) -> dict[str, Array]:
 
 def _rows(length: float, interval: float) -> int:
     """Number of rows of a log of `length` [s] with rows every `interval` [s], first row included; at least 2."""
-    return max(int(length / interval + 1e-9), 1) + 1
+    return max(steps_in(length, interval) or int(length / interval), 1) + 1
 
 
 def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: int, instants: int) -> dict[str, Array]:

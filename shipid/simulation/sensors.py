@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from shipid.arguments import steps_in
 from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
 from shipid.physics.signals import wraps
@@ -68,8 +69,8 @@ def _check_columns(sensors: Mapping[str, Sensor], columns: list[str]) -> None:
 def _log(run: str, rows: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int) -> pd.DataFrame:
     """Measured log of one run."""
     step = _step(run, rows["t"].to_numpy())
-    stride = round(interval / step)
-    if stride < 1 or abs(interval / step - stride) > SAME * stride:
+    stride = steps_in(interval, step)
+    if not stride:
         message = f"{interval:g} s between logged rows must be a multiple of the record's step, {step:g} s"
         raise DocumentError(message, path="interval")
     log = rows.iloc[::stride].copy()

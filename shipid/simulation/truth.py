@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from shipid.arguments import of_class
+from shipid.arguments import of_class, steps_in
 from shipid.checked import Checked
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, choices
@@ -74,7 +74,7 @@ class Truth(Checked, BaseModel):
 
     @model_validator(mode="after")
     def _fits(self) -> Truth:
-        if abs(self.interval / self.step - round(self.interval / self.step)) > 1e-9 * self.interval / self.step:
+        if not steps_in(self.interval, self.step):
             raise ValueError(f"interval {self.interval:g} s must be a multiple of step {self.step:g} s")
         if self.duration < self.interval:
             raise ValueError(f"duration {self.duration:g} s holds no interval of {self.interval:g} s")
@@ -184,7 +184,7 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     environment, chi = _weather(truth, vessel)
     keys = [(truth.seed, "manoeuvre", number) for number in range(truth.manoeuvres)]
     if truth.gusts is not None and "V_w" in environment:
-        instants = np.arange(round(truth.length / truth.step) + 1, dtype=float)
+        instants = np.arange(steps_in(truth.length, truth.step) + 1, dtype=float)
         mean = environment["V_w"]
         environment["V_w"] = mean + gusts.series(truth.gusts, mean, truth.step * instants, keys)
     try:

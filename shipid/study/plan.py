@@ -18,7 +18,7 @@ import tomlkit
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
 
 from shipid import document as documents
-from shipid.arguments import by_name
+from shipid.arguments import by_name, steps_in
 from shipid.data.windows import Commands, PathSource
 from shipid.document import Document
 from shipid.engine.integrate import Method as Integrator
@@ -115,8 +115,7 @@ class Prediction(Strict):
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Prediction:
-        steps = self.ahead / self.step
-        if abs(steps - round(steps)) > 1e-6 * steps or not 2 <= round(steps) <= MOST_STEPS:
+        if not 2 <= steps_in(self.ahead, self.step) <= MOST_STEPS:
             most = f"{MOST_STEPS:,}"
             raise ValueError(f"ahead = {self.ahead:g} s must be 2 to {most} steps of {self.step:g} s")
         return self

@@ -202,6 +202,16 @@ def test_gusts_are_logged_and_felt() -> None:
     assert np.abs(gusty["v"] - steady["v"]).max() > 1e-3
 
 
+@pytest.mark.parametrize("step", [0.3333333, 0.33333334])
+@pytest.mark.parametrize("sensors", [{}, {"u": {}}])
+def test_a_step_may_have_the_digits_that_one_writes(step: float, sensors: dict[str, Any]) -> None:
+    """Gusts, rows of the log and the rows that a sensor sees are as many as with a step of 1/3 s."""
+    how = {"duration": 20.0, "wind_speed": (5.0, 6.0), "gusts": {"kind": "npd"}, "sensors": sensors}
+    ours, exact = (simulate(truth(step=one, interval=1.0, **how), SHIP) for one in (step, 1 / 3))
+    assert len(ours) == len(exact) == 6 * 21
+    np.testing.assert_allclose(ours["u"], exact["u"], atol=1e-5)
+
+
 def test_a_current_carries_every_ship_at_its_speed() -> None:
     ship = SHIP.with_values({"current.kind": "uniform", "wind.off": True})
     still = simulate(truth(duration=10.0), ship)
