@@ -61,16 +61,22 @@ class Spot(NamedTuple):
     words: str
 
 
+class Map(NamedTuple):
+    """The models by A, see `_rows`, each N_D, what there is at both, and the least and greatest H [m]."""
+
+    rows: pd.DataFrame
+    counts: list[int]
+    spots: list[Spot]
+    span: tuple[float, float]
+
+
 def error_map(content: ReportContent) -> Figure | None:
     """H over A and N_D; None where there is a single N_D or fewer than two physics models."""
-    rows = _rows(content)
-    counts = sorted({int(size) for size in content.cells.N_D})
-    means = trained(content).merge(rows[["model"]])
-    if len(counts) < 2 or (rows.A.notna() & rows.family.ne(DATA_DRIVEN)).sum() < 2 or means.empty:
+    drawn = _map(content)
+    if drawn is None:
         return None
-    spots = _spots(content, means, rows)
-    span = (float(means.H.min()), float(means.H.max()))
-    pieces, bounds = _pieces(rows, counts, spots, content.frames.get("intervals"))
+    rows, _, spots, span = drawn
+    pieces, bounds = _pieces(drawn, content.frames.get("intervals"))
     many = [f"{FEWEST * width:.0f}" for width in NEIGHBOURS]
     lined = f" Lines of equal error follow H, averaged over neighbouring models where there are {many[0]} or more, and "
     lined += f"over neighbouring N_D where there are {many[1]} or more. No line is drawn beside a cell without a "
@@ -94,8 +100,8 @@ def error_map(content: ReportContent) -> Figure | None:
         "the table of cells.",
         height=HEIGHT,
         views={
-            "0": [Panel(_flat(rows, counts, spots, span, pieces, bounds))],
-            "1": [Panel(_bars(rows, counts, spots, span))],
+            "0": [Panel(_flat(drawn, pieces, bounds))],
+            "1": [Panel(_bars(drawn))],
         },
         controls=[Control("View", ["map", "bars"])],
         chips=([Chip("iso", "lines of equal H", INK, width=1.5)] if pieces else [])
@@ -106,31 +112,37 @@ def error_map(content: ReportContent) -> Figure | None:
 
 def cells_map(content: ReportContent, *, id: str, title: str, scale: str, how: str) -> Figure | None:
     """Another quantity than H over A and N_D, which the content holds in the place of H; None as for `error_map`."""
-    rows = _rows(content)
-    counts = sorted({int(size) for size in content.cells.N_D})
-    means = trained(content).merge(rows[["model"]])
-    if len(counts) < 2 or (rows.A.notna() & rows.family.ne(DATA_DRIVEN)).sum() < 2 or means.empty:
+    drawn = _map(content)
+    if drawn is None:
         return None
-    spots = [spot._replace(words=_plainly(spot)) for spot in _spots(content, means, rows)]
-    span = (float(means.H.min()), float(means.H.max()))
-    good = [spot for spot in spots if math.isfinite(spot.H)]
-    best, worst = min(good, key=lambda spot: spot.H), max(good, key=lambda spot: spot.H)
-    low, high = (f"{metres(spot.H)} ({spot.model}, N_D = {spot.size})" for spot in (best, worst))
+    drawn = drawn._replace(spots=[spot._replace(words=_plainly(spot)) for spot in drawn.spots])
+    low, high = _ends(drawn.spots)
     return Figure(
         id=id,
         title=title,
         takeaway=f"The {scale.partition(' [')[0]} goes from {low} to {high}.",
         how=how,
-        alternative=f"Cells of {scale} for {counted(len(rows), 'model')} by A and N_D. The numbers are in a table.",
+        alternative=f"Cells of {scale} for {counted(len(drawn.rows), 'model')} by A and N_D. "
+        "The numbers are in a table.",
         height=HEIGHT,
-        views={"": [Panel(_flat(rows, counts, spots, span, [], []))]},
-        scale=Scale(scale, *span, "--heat"),
+        views={"": [Panel(_flat(drawn, [], []))]},
+        scale=Scale(scale, *drawn.span, "--heat"),
     )
 
 
 def _plainly(spot: Spot) -> str:
     """Hover text of a quantity that is not H."""
     return f"<b>{label(spot.model)}</b>, N_D = {spot.size}<br>{metres(spot.H)}"
+
+
+def _map(content: ReportContent) -> Map | None:
+    """What the map shows; None where there is a single N_D or fewer than two physics models."""
+    rows = _rows(content)
+    counts = sorted({int(size) for size in content.cells.N_D})
+    means = trained(content).merge(rows[["model"]])
+    if len(counts) < 2 or (rows.A.notna() & rows.family.ne(DATA_DRIVEN)).sum() < 2 or means.empty:
+        return None
+    return Map(rows, counts, _spots(content, means, rows), (float(means.H.min()), float(means.H.max())))
 
 
 def _rows(content: ReportContent) -> pd.DataFrame:
@@ -204,10 +216,9 @@ def _reaches(y: Floats, most: float) -> tuple[Floats, Floats]:
     return np.insert(half, 0, ends[0]), np.append(half, ends[1])
 
 
-def _pieces(
-    rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], intervals: pd.DataFrame | None
-) -> tuple[Pieces, Pieces]:
+def _pieces(drawn: Map, intervals: pd.DataFrame | None) -> tuple[Pieces, Pieces]:
     """Lines of equal H through the physics models, level [m] and points (N_D, y); those of the ends of its interval."""
+    rows, counts, spots, _ = drawn
     physics = rows[rows.A.notna() & rows.family.ne(DATA_DRIVEN)]
     x, y = np.asarray(counts, dtype=float), physics.y.to_numpy(dtype=float)
     errors = {(spot.model, spot.size): spot.H for spot in spots}
@@ -223,53 +234,46 @@ def _pieces(
         every = [(height, piece) for height in levels for piece in contour(x, y, heights, height)]
         return [(height, piece) for height, piece in every if np.ptp(piece[:, 0]) >= np.diff(x).min()]
 
-    drawn = lines(mean)
+    through = lines(mean)
     if intervals is None:
-        return drawn, []
+        return through, []
     keys = [(str(model), int(size)) for model, size in zip(intervals.model, intervals.N_D, strict=True)]
     ends = [over(dict(zip(keys, intervals[side], strict=True))) for side in ("low", "high")]
-    named = {height for height, _ in drawn}  # a dotted line without its line is taken for that of another
-    return drawn, [piece for end in ends for piece in lines(end) if piece[0] in named]
+    named = {height for height, _ in through}  # a dotted line without its line is taken for that of another
+    return through, [piece for end in ends for piece in lines(end) if piece[0] in named]
 
 
-def _flat(
-    rows: pd.DataFrame,
-    counts: Sequence[int],
-    spots: list[Spot],
-    span: tuple[float, float],
-    pieces: Pieces,
-    bounds: Pieces,
-) -> Plot:
+def _flat(drawn: Map, pieces: Pieces, bounds: Pieces) -> Plot:
+    """Cells at A and N_D, hatched or crossed where they are of no use, under lines of equal H."""
+    rows, counts, spots, span = drawn
     top, widths = float(rows.y.max()) * 1.04, _widths(counts)
     most = THICK / 2 * top / (HEIGHT - MARGIN["t"] - MARGIN["b"])
     y = rows.y.to_numpy(dtype=float)
     low, high = _reaches(y, most)
     good, bad = [s for s in spots if math.isfinite(s.H)], [s for s in spots if not math.isfinite(s.H)]
-    cells = marks(
-        "bar",
-        x=[spot.size for spot in good],
-        y=[round(low[spot.row] + high[spot.row], 4) for spot in good],
-        base=[round(y[spot.row] - low[spot.row], 4) for spot in good],
-        width=[widths[spot.size] for spot in good],
-        marker={
-            "color": [f"var(--heat-{level(spot.H, span)})" for spot in good],
-            "line": {"width": 0.5, "color": MUTED},
-        },
+
+    def boxes(some: Sequence[Spot], marker: Mapping[str, Any], **options: Any) -> Trace:
+        return marks(
+            "bar",
+            x=[spot.size for spot in some],
+            y=[round(low[spot.row] + high[spot.row], 4) for spot in some],
+            base=[round(y[spot.row] - low[spot.row], 4) for spot in some],
+            width=[widths[spot.size] for spot in some],
+            marker=marker,
+            **options,
+        )
+
+    shades = [f"var(--heat-{level(spot.H, span)})" for spot in good]
+    cells = boxes(
+        good,
+        {"color": shades, "line": {"width": 0.5, "color": MUTED}},
         customdata=[spot.words for spot in good],
         hovertemplate="%{customdata}<extra></extra>",
     )
-    worse = [spot for spot in good if spot.worse]
-    hatched = marks(
-        "bar",
-        x=[spot.size for spot in worse],
-        y=[round(low[spot.row] + high[spot.row], 4) for spot in worse],
-        base=[round(y[spot.row] - low[spot.row], 4) for spot in worse],
-        width=[widths[spot.size] for spot in worse],
-        marker={
-            "color": "rgba(0,0,0,0)",
-            "line": {"width": 1.2, "color": INK},
-            "pattern": {"shape": "/", "fgcolor": "#000000", "size": 8, "solidity": 0.16},
-        },
+    lattice = {"shape": "/", "fgcolor": "#000000", "size": 8, "solidity": 0.16}
+    hatched = boxes(
+        [spot for spot in good if spot.worse],
+        {"color": "rgba(0,0,0,0)", "line": {"width": 1.2, "color": INK}, "pattern": lattice},
         hoverinfo="skip",
     )
     failed = marks(
@@ -349,8 +353,9 @@ def _isolines(pieces: Pieces) -> tuple[list[Trace], list[dict[str, Any]]]:
     return traces, names
 
 
-def _bars(rows: pd.DataFrame, counts: Sequence[int], spots: list[Spot], span: tuple[float, float]) -> Plot:
+def _bars(drawn: Map) -> Plot:
     """One box per model and N_D, as in the paper's Fig. 8, drawn obliquely: heights of the front are true."""
+    rows, counts, spots, span = drawn
     depth = {size: len(counts) - 1 - i for i, size in enumerate(counts)}
     back = BACK * span[1]
     traces = []
@@ -421,14 +426,20 @@ def _rival(rows: pd.DataFrame) -> str:
     return "pure data-driven" if len(pure) < 2 else f"{pure.iloc[0]} (pure data-driven)"
 
 
+def _ends(spots: Sequence[Spot]) -> tuple[str, str]:
+    """The least and the greatest H, each with its model and N_D."""
+    good = [spot for spot in spots if math.isfinite(spot.H)]
+    ends = min(good, key=lambda spot: spot.H), max(good, key=lambda spot: spot.H)
+    least, greatest = (f"{metres(spot.H)} ({spot.model}, N_D = {spot.size})" for spot in ends)
+    return least, greatest
+
+
 def _takeaway(rows: pd.DataFrame, spots: list[Spot]) -> str:
     """Where H is lowest and highest, and up to which A physics helped at every N_D."""
     pure = set(rows.model[rows.family == DATA_DRIVEN])
     accuracy = dict(zip(rows.model, rows.A, strict=True))
     good = [spot for spot in spots if math.isfinite(spot.H)]
-    best, worst = min(good, key=lambda s: s.H), max(good, key=lambda s: s.H)
-    text = f"H runs from {metres(best.H)} ({best.model}, N_D = {best.size}) to {metres(worst.H)} ({worst.model}, "
-    text += f"N_D = {worst.size})"
+    text = "H runs from {} to {}".format(*_ends(spots))
     judged = {spot.size for spot in good if spot.model in pure}
     physics = [spot for spot in good if spot.model not in pure and spot.size in judged]
     worse, rival = [spot for spot in physics if spot.worse], _rival(rows)
