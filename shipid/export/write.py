@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 
 from shipid.arguments import of_class, one_of, path_of
 from shipid.engine.integrate import Method
@@ -13,15 +15,27 @@ from shipid.export.blocks import Precision
 from shipid.export.c import Files, c_name, predictor_files, vessel_files
 from shipid.export.casadi import band_function, listing_of, predictor_function, vessel_function, write_function
 from shipid.export.fmu import Packed, predictor_unit, vessel_unit, write_fmu
-from shipid.export.model import Exportable, model
+from shipid.export.model import Exportable, Model, model
 from shipid.export.onnx import write_onnx
 from shipid.files import write_together
 from shipid.vessel.load import Vessel
 
-Target = Literal["c", "fmu", "casadi", "onnx"]
-TARGETS: tuple[str, ...] = get_args(Target)
 EXAMPLE = "main.c"
-ENDINGS = {"fmu": ".fmu", "casadi": ".casadi", "onnx": ".onnx"}
+
+
+@dataclass(frozen=True)
+class Target:
+    """A form in which a predictor or a vessel is written for others; both functions return the files they wrote.
+
+    predictor : (model, name, file, single). vessel : (vessel, name, integrator, file, single); None where a vessel has
+    nothing for it. ending : of the file; empty where the target is a folder. single : whether it can have numbers in
+    single precision.
+    """
+
+    predictor: Callable[[Model, str, Path, bool], list[Path]]
+    vessel: Callable[[Vessel, str, Method, Path, bool], list[Path]] | None = None
+    ending: str = ""
+    single: bool = False
 
 
 def export_predictor(
@@ -44,19 +58,7 @@ def export_predictor(
     if not hasattr(predictor, "corrector"):
         raise DocumentError(f"give a Predictor, as of `fit` or `Predictor.load`, not {type(predictor).__name__}")
     target, file, title = _checked(to, out, single, name)
-    kept = model(predictor)
-    if target == "c":
-        return _folder(predictor_files(kept, title, Precision(single)), file)
-    if target == "fmu":
-        return _fmu(predictor_unit(kept, title), file)
-    if target == "casadi":
-        band = band_function(kept, f"{title}_band")
-        band_file = file.with_name(f"{file.stem}-band{file.suffix}")
-        for old in (band_file, listing_of(band_file)):
-            old.unlink(missing_ok=True)
-        written = write_function(*predictor_function(kept, title), file)
-        return written if band is None else [*written, *write_function(*band, band_file)]
-    return [write_onnx(kept, title, file, single=single)]
+    return target.predictor(model(predictor), title, file, single)
 
 
 def export_vessel(
@@ -76,31 +78,29 @@ def export_vessel(
     """
     target, file, title = _checked(to, out, single, name)
     one_of("integrator", integrator, get_args(Method))
-    if target == "onnx":
-        raise DocumentError("a vessel has no networks for ONNX: export it to c, fmu or casadi", path="--to")
-    if target == "c":
-        return _folder(vessel_files(vessel, title, integrator, Precision(single)), file)
-    if target == "fmu":
-        return _fmu(vessel_unit(vessel, title, integrator), file)
-    return write_function(*vessel_function(vessel, title, integrator), file)
+    if target.vessel is None:
+        *others, last = (other for other, one in TARGETS.items() if one.vessel is not None)
+        remedy = f"export it to {', '.join(others)} or {last}"
+        raise DocumentError(f"a vessel has no networks, and {to} takes nothing else: {remedy}", path="--to")
+    return target.vessel(vessel, title, integrator, file, single)
 
 
-def _checked(to: str, out: str | os.PathLike[str], single: bool, name: str | None) -> tuple[str, Path, str]:
+def _checked(to: str, out: str | os.PathLike[str], single: bool, name: str | None) -> tuple[Target, Path, str]:
     """The target, the file or folder, and the name that begins every public name."""
     if name is not None:
         of_class("name", name, str, "such as 'gunnerus'", DocumentError)
-    if to not in TARGETS:
+    target, file = TARGETS.get(str(to)), path_of("out", out)
+    if target is None:
         raise DocumentError(f"no such target: {choices(str(to), TARGETS)}", path="--to")
-    if single and to not in ("c", "onnx"):
+    if single and not target.single:
         raise DocumentError(f"{to} is always in double precision: leave --single out", path="--single")
-    file = path_of("out", out)
-    if to == "c" and file.exists() and not file.is_dir():
-        raise DocumentError("is a file: the target c takes a folder", file=file, path="--out")
-    if to != "c" and file.is_dir():
+    if not target.ending and file.exists() and not file.is_dir():
+        raise DocumentError(f"is a file: the target {to} takes a folder", file=file, path="--out")
+    if target.ending and file.is_dir():
         raise DocumentError(f"is a folder: the target {to} takes a file", file=file, path="--out")
-    if to in ENDINGS and file.suffix != ENDINGS[to]:
-        raise DocumentError(f"the target {to} is a file that ends in {ENDINGS[to]}", file=file, path="--out")
-    return to, file, c_name(name or file.stem)
+    if target.ending and file.suffix != target.ending:
+        raise DocumentError(f"the target {to} is a file that ends in {target.ending}", file=file, path="--out")
+    return target, file, c_name(name or file.stem)
 
 
 def _folder(files: Files, folder: Path) -> list[Path]:
@@ -115,3 +115,36 @@ def _fmu(unit: Packed, file: Path) -> list[Path]:
     except ShipidError as error:
         raise ShipidError(error.message, file=file) from None
     return [file]
+
+
+def _functions(kept: Model, title: str, file: Path) -> list[Path]:
+    """Write a predictor as a CasADi function and, in a file beside it, its band; that of an earlier one is removed."""
+    band = band_function(kept, f"{title}_band")
+    band_file = file.with_name(f"{file.stem}-band{file.suffix}")
+    for old in (band_file, listing_of(band_file)):
+        old.unlink(missing_ok=True)
+    written = write_function(*predictor_function(kept, title), file)
+    return written if band is None else [*written, *write_function(*band, band_file)]
+
+
+TARGETS: dict[str, Target] = {
+    "c": Target(
+        lambda kept, title, file, single: _folder(predictor_files(kept, title, Precision(single)), file),
+        lambda ship, title, rule, file, single: _folder(vessel_files(ship, title, rule, Precision(single)), file),
+        single=True,
+    ),
+    "fmu": Target(
+        lambda kept, title, file, _: _fmu(predictor_unit(kept, title), file),
+        lambda ship, title, rule, file, _: _fmu(vessel_unit(ship, title, rule), file),
+        ".fmu",
+    ),
+    "casadi": Target(
+        lambda kept, title, file, _: _functions(kept, title, file),
+        lambda ship, title, rule, file, _: write_function(*vessel_function(ship, title, rule), file),
+        ".casadi",
+    ),
+    "onnx": Target(
+        lambda kept, title, file, single: [write_onnx(kept, title, file, single=single)], None, ".onnx", single=True
+    ),
+}
+"""Name of a target, as after `--to`, -> how it is written."""
