@@ -11,7 +11,7 @@ import io
 import math
 import re
 import stat
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
@@ -454,7 +454,7 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
     if not len(table):
         raise _nothing_left(form, file)
     names, table = _named_columns(table, form, file)
-    table, again = _without_headers(table, names, form, file)
+    table, again = _without_headers(table, names, source, form, file)
     table, ragged = _without_ragged(table, names, source, form, file)
     table.columns = pd.Index(names)
     table.attrs["ragged"] = sorted([*again, *ragged])
@@ -498,7 +498,7 @@ def _named_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[l
 
 
 def _without_headers(
-    table: pd.DataFrame, names: list[str], form: TextFormat, file: Path
+    table: pd.DataFrame, names: list[str], source: Path | io.StringIO, form: TextFormat, file: Path
 ) -> tuple[pd.DataFrame, list[int]]:
     """Return the rows that do not repeat the header, and the line numbers of the others; refuse them if so declared.
 
@@ -512,7 +512,7 @@ def _without_headers(
         again = again & table.iloc[:, index].str.strip().eq(names[index]).to_numpy(dtype=bool, na_value=False)
     if not again.any():
         return table, []
-    lines = [int(number) + 1 + form.skip_rows for number in table.index[again]]
+    lines = _line_numbers(table.index[again], source, form)
     if form.ragged == "refuse":
         more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
         message = f"repeats the header{more}: remove the line, split the log there, or set [format] ragged = 'drop'"
@@ -534,7 +534,7 @@ def _without_ragged(
         wrong |= np.isin(table.index, list(short))
     for index in beyond:
         wrong |= table.iloc[:, index].fillna("").str.strip().ne("").to_numpy()
-    lines = [int(number) + 1 + form.skip_rows for number in table.index[wrong]]
+    lines = _line_numbers(table.index[wrong], source, form)
     if len(lines) > len(table) / 2:
         message = f"not a table with this separator: {len(lines)} of {len(table)} lines have another number of cells "
         raise DataError(f"{message}than the header: check separator and skip_rows", file=file, path="format.separator")
@@ -555,22 +555,33 @@ def _without_ragged(
 def _short_lines(source: Path | io.StringIO, form: TextFormat, asked: set[int], width: int) -> dict[int, int]:
     """Return number -> count of cells of the lines asked for that have fewer than `width` cells.
 
-    Lines are counted from 0 after those that are skipped. To pandas, a cell that is not there is an empty one.
+    Lines are counted as by `_lines`. To pandas, a cell that is not there is an empty one.
     """
-    if not asked:
-        return {}
     short = {}
+    for place, (_, line) in enumerate(_lines(source, form) if asked else ()):
+        if place in asked:
+            whole = re.sub(r'"[^"]*"', "", line)
+            count = len(whole.split() if form.separator == "whitespace" else whole.split(form.separator))
+            if count < width:
+                short[place] = count
+    return short
+
+
+def _line_numbers(places: Iterable[int], source: Path | io.StringIO, form: TextFormat) -> list[int]:
+    """Return the numbers in the log, from 1, of lines counted as by `_lines`."""
+    if form.comment is None:
+        return [int(place) + 1 + form.skip_rows for place in places]
+    asked = set(places)
+    return [number for place, (number, _) in enumerate(_lines(source, form) if asked else ()) if place in asked]
+
+
+def _lines(source: Path | io.StringIO, form: TextFormat) -> Iterator[tuple[int, str]]:
+    """Yield number, from 1, and text of the lines that pandas takes for rows: neither skipped nor a comment."""
     text = io.StringIO(source.getvalue()) if isinstance(source, io.StringIO) else source.open(encoding=form.encoding)
     with text:
-        lines = (line for index, line in enumerate(text) if index >= form.skip_rows)
-        kept = (line for line in lines if form.comment is None or not line.startswith(form.comment))
-        for number, line in enumerate(kept):
-            if number in asked:
-                whole = re.sub(r'"[^"]*"', "", line)
-                count = len(whole.split() if form.separator == "whitespace" else whole.split(form.separator))
-                if count < width:
-                    short[number] = count
-    return short
+        for number, line in enumerate(text, start=1):
+            if number > form.skip_rows and (form.comment is None or not line.startswith(form.comment)):
+                yield number, line
 
 
 def _large_text(

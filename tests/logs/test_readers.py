@@ -407,6 +407,16 @@ def test_a_short_line_is_refused_or_left_out(tmp_path: Path) -> None:
     assert table.attrs["ragged"] == [3]
 
 
+@pytest.mark.parametrize(("wrong", "said"), [("2", "1 cells"), ("2,3,4", "3 cells"), ("a,b", "repeats the header")])
+def test_the_number_of_a_wrong_line_counts_the_comments_before_it(tmp_path: Path, wrong: str, said: str) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text(f"recorder 7\n# of a day\na,b\n0,1\n# noon\n{wrong}\n3,4\n4,5\n")
+    with pytest.raises(DataError, match=f"line 6: {said}"):
+        read_table(file, TextFormat(comment="#", skip_rows=1), "a")
+    table = read_table(file, TextFormat(comment="#", skip_rows=1, ragged="drop"), "a")
+    assert table.attrs["ragged"] == [6]
+
+
 @pytest.mark.parametrize(("kind", "remedy"), [("parquet", "not a Parquet file"), ("mat", "not a MATLAB file")])
 def test_another_format_than_declared(kind: str, remedy: str, log: pd.DataFrame, tmp_path: Path) -> None:
     log.to_csv(tmp_path / "log")
