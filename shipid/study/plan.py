@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import tomlkit
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
@@ -144,6 +144,28 @@ class BandsBlock(Strict):
     )
 
 
+class Role(NamedTuple):
+    """What a family must be that `[claims]` gives a role.
+
+    pair : the role that must be given, too. unlike : roles before this one that the same family may not have.
+    single : why the family may have one member only; empty: it may have any number.
+    """
+
+    pair: str = ""
+    unlike: tuple[str, ...] = ()
+    single: str = ""
+
+
+ROLES: dict[str, Role] = {
+    "accurate": Role("inaccurate", single="the findings compare one model with one"),
+    "inaccurate": Role("accurate", ("accurate",), single="the findings compare one model with one"),
+    "moderate": Role("high"),
+    "high": Role("moderate", ("moderate",)),
+    "nominal": Role(unlike=("moderate", "high"), single="the nominal row is the base as it is"),
+}
+"""Name of a role, a key of `[claims]`, -> what its family must be."""
+
+
 class Claims(Strict):
     """`[claims]`: the families, and the method, that findings speak of: R1-R4, S1-S7, and B1-B2 in both."""
 
@@ -158,16 +180,16 @@ class Claims(Strict):
 
     @model_validator(mode="after")
     def _pairs(self) -> Claims:
-        for one, other in (("accurate", "inaccurate"), ("moderate", "high")):
-            if (getattr(self, one) is None) != (getattr(self, other) is None):
-                raise ValueError(f"give both `{one}` and `{other}`, or neither")
+        lone = next((name for name in self.roles if ROLES[name].pair not in ("", *self.roles)), None)
+        if lone is not None:
+            one, other = (name for name in ROLES if name in (lone, ROLES[lone].pair))
+            raise ValueError(f"give both `{one}` and `{other}`, or neither")
         return self
 
     @property
     def roles(self) -> dict[str, str]:
         """Role -> family, of the roles that are given."""
-        every = ("accurate", "inaccurate", "moderate", "high", "nominal")
-        return {role: getattr(self, role) for role in every if getattr(self, role) is not None}
+        return {role: getattr(self, role) for role in ROLES if getattr(self, role) is not None}
 
     @property
     def not_judged(self) -> set[str]:
@@ -990,21 +1012,15 @@ def _check_claims(study: Study, models: Sequence[Foundation], file: Path) -> Non
         message = f"{study.claims.method!r} is not a method: {choices(study.claims.method, names)}"
         raise DocumentError(message, file=file, path="claims.method")
     roles = study.claims.roles
-    for role in ("accurate", "inaccurate", "nominal"):
-        count = families.count(roles.get(role, ""))
-        if count > 1:
-            use = (
-                "the nominal row is the base as it is"
-                if role == "nominal"
-                else "the findings compare one model with one"
-            )
-            raise DocumentError(f"{roles[role]!r} has {count} members: {use}", file=file, path=f"claims.{role}")
-    rivals = (("accurate", "inaccurate"), ("moderate", "high"), ("moderate", "nominal"), ("high", "nominal"))
-    for one, other in rivals:
-        if one in roles and roles[one] == roles.get(other):
-            raise DocumentError(
-                f"the same family as claims.{one}: name two different families", file=file, path=f"claims.{other}"
-            )
+    for role, family in roles.items():
+        single, count = ROLES[role].single, families.count(family)
+        if single and count > 1:
+            raise DocumentError(f"{family!r} has {count} members: {single}", file=file, path=f"claims.{role}")
+    for role, family in roles.items():
+        same = next((other for other in ROLES[role].unlike if roles.get(other) == family), None)
+        if same is not None:
+            message = f"the same family as claims.{same}: name two different families"
+            raise DocumentError(message, file=file, path=f"claims.{role}")
     nominal = next((model for model in models if model.family == roles.get("nominal")), None)
     if nominal is not None and nominal.variant is not None and nominal.variant.values:
         message = f"{nominal.name!r} is perturbed: the nominal model must be the base as it is"
