@@ -615,14 +615,13 @@ def _brought(
     """Interpolate a channel at instants t [s]; NaN between samples more than max_gap [s] apart, unless it is held."""
     known = np.isfinite(values)
     times, values = times[known], values[known]
-    after = np.clip(np.searchsorted(times, t, side="right"), 1, len(times) - 1) if len(times) > 1 else np.zeros(len(t))
     if how == "previous":
         held = np.searchsorted(times, t + clock_slack(times), side="right") - 1
         return values[np.clip(held, 0, len(values) - 1)]
     if len(times) == 1:
         return np.full(len(t), values[0])
     result = np.interp(t, times, np.unwrap(values) if how == "angle" else values)
-    index = after.astype(int)
+    index = np.clip(np.searchsorted(times, t, side="right"), 1, len(times) - 1)
     if how == "short way":  # from 180 to -180 deg, or from 360 to 0: nothing else is changed, a wrong value stays one
         step = values[index] - values[index - 1]
         share = (t - times[index - 1]) / (times[index] - times[index - 1])

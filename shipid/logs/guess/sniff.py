@@ -251,7 +251,6 @@ def _sample(file: Path, encoding: str, size: int) -> str:
             return stream.read().decode(encoding, "replace")
         text = stream.read(4 * BLOCK).decode(encoding, "ignore").rpartition("\n")[0]
         wide = encoding.startswith("utf-16")
-        mark = text[:0]
         stream.seek(0)
         order = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}.get(stream.read(2), encoding) if wide else encoding
         for index in range(1, BLOCKS + 1):
@@ -259,7 +258,7 @@ def _sample(file: Path, encoding: str, size: int) -> str:
             stream.seek(start - start % 4)
             block = stream.read(BLOCK).decode(order, "ignore")
             text += "\n" + block.partition("\n")[2].rpartition("\n")[0]
-        return mark + text
+        return text
 
 
 def _format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
@@ -318,20 +317,8 @@ def _encoding(head: bytes, file: Path) -> str:
 def _text_format(
     lines: list[str], encoding: str, file: Path, names: tuple[str, ...], separators: tuple[str, ...] = SEPARATORS
 ) -> dict[str, Any]:
-    """Return the separator and decimal sign that give most numbers in lines of equal length; the header is above."""
-    best: tuple[float, str, str, str | None] = (0.0, "", "", None)
-    quoted = any('"' in line for line in lines)  # between quotes a decimal comma separates nothing
-    for separator in separators:
-        rows = [cells(line, separator) for line in lines if line.strip()]
-        width, count = Counter(len(row) for row in rows).most_common(1)[0]
-        for decimal in (".", ",") if separator != "," or quoted else (".",):
-            mark = _thousands(rows, decimal)
-            share = float(np.mean([_number_share(row, decimal, mark) for row in rows if len(row) == width]))
-            score = share * count / len(rows) * (width > 1) * (1 + width / 1000)
-            score *= 0.97 if separator == "whitespace" else 1.0  # names may have blanks
-            if score > best[0]:  # the first of equals: tabs are blanks, too
-                best = (score, separator, decimal, mark)
-    score, separator, decimal, mark = best
+    """Return the keys of [format] of a text, or of a sheet, by its first lines; the header is above the data."""
+    score, separator, decimal, mark = _marks(lines, separators)
     _refuse_long([cells(line, separator) for line in lines if line.strip()] if separator else [], file)
     if score < NUMERIC / 2:
         raise DataError("no table of numbers with any separator: export it as CSV", file=file)
@@ -378,6 +365,26 @@ def _text_format(
         beside = [""] * (max(len(row) for row in rows[longer[-1] + 1 :]) - width)
         return form | {"skip_rows": longer[-1] + 1, "names": [*_distinct(rows[longer[-1]][:width]), *beside]}
     return form | {"skip_rows": data, "header": False}
+
+
+def _marks(lines: list[str], separators: tuple[str, ...]) -> tuple[float, str, str, str | None]:
+    """Return the separator, decimal sign and mark of thousands that give most numbers in lines of equal length.
+
+    Before them stands their share of numbers, less for lines of another length; 0 where there are none.
+    """
+    best: tuple[float, str, str, str | None] = (0.0, "", "", None)
+    quoted = any('"' in line for line in lines)  # between quotes a decimal comma separates nothing
+    for separator in separators:
+        rows = [cells(line, separator) for line in lines if line.strip()]
+        width, count = Counter(len(row) for row in rows).most_common(1)[0]
+        for decimal in (".", ",") if separator != "," or quoted else (".",):
+            mark = _thousands(rows, decimal)
+            share = float(np.mean([_number_share(row, decimal, mark) for row in rows if len(row) == width]))
+            score = share * count / len(rows) * (width > 1) * (1 + width / 1000)
+            score *= 0.97 if separator == "whitespace" else 1.0  # names may have blanks
+            if score > best[0]:  # the first of equals: tabs are blanks, too
+                best = (score, separator, decimal, mark)
+    return best
 
 
 def _refuse_long(rows: list[list[str]], file: Path) -> None:
@@ -784,8 +791,9 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
     if called and called[0] in finite:
         first = clock_seconds(first, _unit_of_clock(called[0], first))
-    fault = f"{called[0]!r} {_unread(table, called[0], first) or _fault(first)}" if called else "none rises"
-    fault = fault if called else "none rises from row to row"
+    fault = (
+        f"{called[0]!r} {_unread(table, called[0], first) or _fault(first)}" if called else "none rises from row to row"
+    )
     raise DataError(f"no column can be the clock: {fault}", file=file)
 
 
