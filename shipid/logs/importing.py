@@ -896,15 +896,15 @@ def _parted(log: Imported, name: str) -> Iterator[pd.DataFrame]:
 
 def _distinct(runs: Iterable[pd.DataFrame]) -> Iterator[pd.DataFrame]:
     """Yield runs with a number after a name that was there already."""
-    seen: Counter[str] = Counter()
+    taken: set[str] = set()
     for rows in runs:
-        name = str(rows["run"].iloc[0])
-        seen[name] += 1
-        yield (
-            rows
-            if seen[name] == 1
-            else rows.assign(run=pd.Series(f"{name} ({seen[name]})", index=rows.index, dtype="str"))
-        )
+        name = called = str(rows["run"].iloc[0])
+        number = 1
+        while called in taken:
+            number += 1
+            called = f"{name} ({number})"
+        taken.add(called)
+        yield rows if called == name else rows.assign(run=pd.Series(called, index=rows.index, dtype="str"))
 
 
 def _named(rows: pd.DataFrame, run: str) -> pd.DataFrame:

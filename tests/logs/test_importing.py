@@ -391,6 +391,9 @@ def test_files_are_parted_by_a_column_and_by_pauses(plain_mapping: Write, tmp_pa
         dataset = import_log(read_mapping(plain_mapping(f"\n[parts]\n{keys}\n")), log)
         assert dataset.runs == names
         assert len(dataset.frame) == len(table)
+    table.assign(run=np.repeat(["a", "a (2)", "b", "a"], -(-len(table) // 4))[: len(table)]).to_csv(log, index=False)
+    dataset = import_log(read_mapping(plain_mapping('\n[parts]\nfrom = "run"\n')), log)
+    assert dataset.runs == ["log a", "log a (2)", "log b", "log a (3)"]  # whatever names the log has itself
     missing = plain_mapping('\n[parts]\nfrom = "runn"\n')
     with pytest.raises(DataError, match="did you mean"):
         import_log(read_mapping(missing), log)
