@@ -96,6 +96,13 @@ def test_runs_of_one_name_are_told_apart_by_their_files() -> None:
     assert same.runs == ["log 1 a", "log 1 b", "log 2 a", "log 2 b"]
 
 
+def test_no_two_runs_of_files_have_one_name_with_the_name_of_the_file() -> None:
+    parts = recording(1, ("1 a", "b")), recording(2, ("a", "b"), begin=1000.0)
+    whole, _ = join({Path("day.parquet"): parts[0], Path("day 1.parquet"): parts[1]})
+    assert len(whole.runs) == 4
+    assert whole.runs == ["1 day 1 a", "1 day b", "2 day 1 a", "2 day 1 b"]
+
+
 def test_positions_have_the_first_origin() -> None:
     """A minute of latitude is a nautical mile, 1852 m, within half a per cent."""
     there = recording(2, ("c",), begin=900.0, origin={"latitude": 54.0 + 1 / 60, "longitude": 10.0})
