@@ -276,5 +276,4 @@ class Modules(Searched):
         weights = weights.reshape(len(ridges), len(modules), -1)
         alarm = Alarm.fit(table, units.normaliser, self.centres, task.windows.run[steps.window[chosen]])
         weights = weights[0] if len(ridges) == 1 else weights
-        hyperparameters = {**point}
-        return ModulesCorrector(task.commands, modules, units, weights, alarm, self.limit, self.fade, hyperparameters)
+        return ModulesCorrector(task.commands, modules, units, weights, alarm, self.limit, self.fade, dict(point))

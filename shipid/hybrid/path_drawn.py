@@ -8,16 +8,15 @@ Rahimi and Recht (2007); leave-one-out from the hat matrix: Allen (1974).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from math import exp, log
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
 from pydantic import Field, PositiveInt
 
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.settings import Probability, Scale, Searched, spread
+from shipid.hybrid.trials import ridges_of, value_at
 
 RIDGES = 9  # of a range
 KINDS = ("history", "error", "observer")  # of memory
@@ -126,19 +125,17 @@ class PathDrawn(Searched):
 
     def points(self) -> Iterator[dict[str, float]]:
         """Return the trials: a value of everything searched but the ridge, and `mirror`, 1 or 0; endless by budget."""
-        ranges = {name: pair for name, pair in self.ranges().items() if name != "ridge"}
+        ranges = [name for name in self.ranges() if name != "ridge"]
         fixed = {name: value for name in self.SEARCHED if not isinstance(value := getattr(self, name), tuple)}
         for number, shares in enumerate(spread(len(ranges) + 1, None if self.budget else self.trials)):
             point = {**fixed, "mirror": float(shares[0] < self.mirror)}
             if self.choose:
                 point["memory"] = float(number % len(self.memories))
-            for share, (name, (low, high)) in zip(shares[1:], ranges.items(), strict=True):
-                point[name] = exp(log(low) + share * (log(high) - log(low)))
-            yield point
+            yield point | {name: value_at(self, name, share) for share, name in zip(shares[1:], ranges, strict=True)}
 
     def path(self) -> list[float]:
         """Return the ridges that every trial is solved with, evenly spread by their logarithm."""
-        return [self.ridge] if isinstance(self.ridge, float) else [float(r) for r in np.geomspace(*self.ridge, RIDGES)]
+        return ridges_of(self.ridge, RIDGES)
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""

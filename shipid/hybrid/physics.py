@@ -23,7 +23,7 @@ from shipid.vessel.load import Vessel
 Array = np.ndarray
 MOTION = ("u", "v", "r", "psi")
 WORTH_COMPILING = 20_000  # steps of single windows: who asks for so many at once, in training or on a log, asks again
-Inputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
+RolloutInputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
 """Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
 
 
@@ -215,7 +215,7 @@ class Physics:
             north, east = north + ages * drift[0], east + ages * drift[1]
         return result, (north, east)
 
-    def _inputs(self, instants: Instants) -> Inputs:
+    def _inputs(self, instants: Instants) -> RolloutInputs:
         """Start, commands, environment, slow force and drift of a rollout; what has no column is zero."""
         check_instants(instants)
         model = dynamics(self.ship)

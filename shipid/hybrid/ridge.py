@@ -32,7 +32,7 @@ from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, sh
 from shipid.hybrid.products import gram, hidden, matmul, sums_of_squares
 from shipid.hybrid.search import CLOSING, Search
 from shipid.hybrid.settings import seed_of
-from shipid.hybrid.trials import diverged
+from shipid.hybrid.trials import diverged, used
 from shipid.hybrid.units import Seen, Units
 
 Mask = NDArray[np.bool_]
@@ -217,7 +217,7 @@ class _Tuning:
 
     def __init__(self, task: Task, method: PathDrawn) -> None:
         self.task, self.method, self.inputs = task, method, method.inputs(task.commands)
-        self.windows = np.unique(np.concatenate([part for fold in task.folds for part in fold]))
+        self.windows = used(task)
         self.targets = task.targets
         sound = {key: paths for key, paths in self.targets.items() if np.isfinite(paths[:, self.windows]).all()}
         self.names = list(sound)

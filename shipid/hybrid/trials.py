@@ -27,11 +27,11 @@ def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> 
     fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in ranges and name not in idle}
     most = None if method.budget else method.trials
     for shares in spread(max(len(ranges), 1), most if ranges else 1):
-        point = {name: _within(method, name, share) for share, name in zip(shares, ranges, strict=False)}
+        point = {name: value_at(method, name, share) for share, name in zip(shares, ranges, strict=False)}
         yield {**fixed, **point}
 
 
-def _within(method: Searched, name: str, share: float) -> float:
+def value_at(method: Searched, name: str, share: float) -> float:
     """The value of a searched setting at a share of its range; inside the range, whatever the rounding."""
     low, high = method.ranges()[name]
     if name in method.LINEAR:
