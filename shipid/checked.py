@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import BaseModel, ValidationError
 
-from shipid.document import parse
+from shipid.document import check_numbers, parse
 from shipid.errors import DocumentError
 
 if TYPE_CHECKING:
@@ -26,9 +26,12 @@ else:
                 remedy = f"write the name of each argument: {names}" if names else "it takes no arguments"
                 raise DocumentError(remedy, path=f"{cls.__name__}({values[0]!r})")
             try:
-                return super().__call__(**given)
+                made = super().__call__(**given)
             except ValidationError as error:
                 refused = error
+            else:
+                check_numbers(given, made, None, cls.__name__)
+                return made
             parse(cls, given, None, cls.__name__)
             raise refused  # what a constructor alone refuses
 

@@ -336,9 +336,7 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
 
     try:
         parsed = model.__pydantic_validator__.validate_python(data)  # what `model_validate` does, see `checked.Checked`
-        for path, value in taken_for_numbers(data, parsed):
-            where = ".".join(filter(None, (prefix, path)))
-            raise DocumentError(f"{value!r}: must be a number", file=file, path=where)
+        check_numbers(data, parsed, file, prefix)
         return parsed
     except ValidationError as error:
         problems = error.errors(include_url=False)
@@ -366,6 +364,13 @@ def suits(model: Any, data: Any) -> bool:
     except ValidationError:
         return False
     return True
+
+
+def check_numbers(data: Any, parsed: Any, file: Path | str | None, prefix: str) -> None:
+    """Raise DocumentError for a truth value or a text that pydantic has taken for a number."""
+    for path, value in taken_for_numbers(data, parsed):
+        where = ".".join(filter(None, (prefix, path)))
+        raise DocumentError(f"{value!r}: must be a number", file=file, path=where)
 
 
 def taken_for_numbers(data: Any, parsed: Any, path: str = "") -> Iterator[tuple[str, Any]]:

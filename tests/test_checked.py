@@ -42,6 +42,9 @@ def test_an_unknown_argument_and_one_without_a_name_are_one_line(kind: Any) -> N
     ("kind", "given", "line"),
     [
         (shipid.PathDrawn, {"trials": 0}, "PathDrawn.trials: 0: must be above 0"),
+        (shipid.PathDrawn, {"trials": True}, "PathDrawn.trials: True: must be a number"),
+        (shipid.PathDrawn, {"memory": {"error": [4.0, "8"]}}, "PathDrawn.memory.error.1: '8': must be a number"),
+        (Memory, {"error": True}, "Memory.error: True: must be a number"),
         (Memory, {"history": (2.0, -1.0)}, "Memory.history: -1.0: must be above 0"),
         (Identify, {"parameters": "hull.*"}, "Identify.parameters: 'hull.*': must be a list"),
         (Family, {"name": "a", "perturb": [{"parameters": ["hull.*"]}]}, "Family.perturb.0: `parameters` and"),
