@@ -362,17 +362,16 @@ def _output(x: SX) -> SX:
     return ca.vertcat(x[0] + c * x[11] - s * x[12], x[1] + s * x[11] + c * x[12], x[2] + x[13], x[3:6] + x[14:17])
 
 
-def begin(filters: Bank, measured: Array, commands: Array, memory: Array | None = None) -> Array:
-    """States (n, K) at the first instant: measured (6,), commands (nc,) and actuators' memory (nm,).
+def begin(filters: Bank, measured: Array, commands: Array) -> Array:
+    """States (n, K) at the first instant: measured (6,) and commands (nc,), which every actuator has reached.
 
-    What is missing (NaN) is zero with a wide spread. Default memory: every actuator has reached its order.
+    What is missing (NaN) is zero with a wide spread.
     """
     model, wide = filters.model, np.array([1e3, 1e3, np.pi, 5.0, 1.0, 0.1])
     missing = ~np.isfinite(measured) | ~np.isin(MEASURED, filters.settings.measured)
     x = np.zeros(len(STATES))
     x[:6] = np.where(missing, 0.0, measured)
-    if memory is None:
-        memory = np.asarray(commands)[[model.commands.index(name) for name in model.memory]]
+    memory = np.asarray(commands)[[model.commands.index(name) for name in model.memory]]
     columns = []
     for first in filters.first:
         deviations = first.copy()

@@ -37,7 +37,9 @@ _BAND = {
     "ahead_x": ("-", "unit vector of the track, ahead"),
     "ahead_y": ("-", "unit vector of the track, to starboard"),
 }
-LARGEST_STEP = 0.1  # s: of a vessel inside a communication step, scaled by the size of the ship
+LARGEST_STEP = (
+    0.1  # s: of a ship of 30 m or more inside a communication step; of a shorter one by the root of the length
+)
 
 
 @dataclass(frozen=True)
@@ -71,14 +73,11 @@ def described(name: str) -> str:
     return f"{word}, {component}" if component else word
 
 
-def vessel_unit(vessel: Vessel, name: str, method: Method, largest: float | None = None) -> Packed:
-    """The FMU of a vessel: commands, weather and loads in, motion out.
-
-    largest : internal step [s] at most; default 0.1 s for a ship of 30 m, by the square root of the length.
-    """
+def vessel_unit(vessel: Vessel, name: str, method: Method) -> Packed:
+    """The FMU of a vessel: commands, weather and loads in, motion out."""
     parts = VesselParts(vessel, name, method, Precision())
     groups = parts.groups()
-    largest = largest or round(LARGEST_STEP * min(1.0, ((vessel.length or 30.0) / 30.0) ** 0.5), 4)
+    largest = round(LARGEST_STEP * min(1.0, ((vessel.length or 30.0) / 30.0) ** 0.5), 4)
     variables = [
         Variable(key, "output", "continuous",
                  parts.unit("carry", key), described(key) if not key.startswith("actual.")

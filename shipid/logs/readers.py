@@ -730,9 +730,9 @@ def _mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
     return table
 
 
-def _vectors(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple[str, np.ndarray[Any, Any]]]:
+def _vectors(variables: dict[str, Any]) -> Iterable[tuple[str, np.ndarray[Any, Any]]]:
     """Dotted name and values of every numeric vector, structs and matrices opened."""
-    for name, value in _opened(variables, prefix):
+    for name, value in _opened(variables):
         if isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.number) and not np.iscomplexobj(value):
             if value.ndim == 1:
                 yield name, value.astype(float)
@@ -742,7 +742,7 @@ def _vectors(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple[str,
                 )
 
 
-def _opened(variables: dict[str, Any], prefix: str) -> Iterable[tuple[str, Any]]:
+def _opened(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
     """Dotted name and value of every variable, structs opened."""
     for key, value in variables.items():
         if key.startswith("__"):
@@ -758,7 +758,7 @@ def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str, str]]:
 
     The last is empty where nothing has to be saved anew.
     """
-    for name, value in _opened(variables, ""):
+    for name, value in _opened(variables):
         last = name.rpartition(".")[2]
         cells = list(value.flat) if isinstance(value, np.ndarray) and value.dtype == object else value
         if isinstance(value, np.ndarray) and value.dtype.names:  # a datetime, a table: scipy does not open them

@@ -50,6 +50,7 @@ TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from 
 FEW = 3  # windows
 MODEST = 5.0  # factor
 NEWTON = 3  # steps of the search for a current
+FASTEST = 40.0  # m/s: above the speed of any ship
 STRONG = 0.7  # of the median speed: a stronger current is none
 UNITS = (60.0, 1 / 60.0)  # rev/s read as rpm, and rpm as rev/s
 ALIKE = 1.5  # factor within which a speed is explained by a unit
@@ -501,7 +502,7 @@ def _steady_speeds(vessel: Vessel, windows: Windows, turned: Array) -> tuple[flo
     return float(np.median(u[-1, straight])), held
 
 
-def steady_speed(vessel: Vessel, commands: Mapping[str, float], most: float = 40.0) -> float:
+def steady_speed(vessel: Vessel, commands: Mapping[str, float]) -> float:
     """Speed [m/s] that a vessel holds straight ahead in calm water with commands [SI]; 0 where they do not drive it."""
 
     def surge(speed: float) -> float:
@@ -509,7 +510,7 @@ def steady_speed(vessel: Vessel, commands: Mapping[str, float], most: float = 40
 
     if surge(1e-3) <= 0:
         return 0.0
-    low, high = 1e-3, most
+    low, high = 1e-3, FASTEST
     for _ in range(50):
         middle = (low + high) / 2
         low, high = (middle, high) if surge(middle) > 0 else (low, middle)
