@@ -22,12 +22,13 @@ def export(
     name: Annotated[str | None, typer.Option(help="name in the source; default from --out")] = None,
 ) -> None:
     """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""
+    from shipid.document import bundled
     from shipid.errors import DocumentError, choices
     from shipid.export.write import EXAMPLE, export_predictor, export_vessel
     from shipid.predictor import Predictor
     from shipid.vessel.load import load_vessel
 
-    if what.endswith(".npz") or Path(what).is_dir():
+    if what.endswith(".npz") or (what not in bundled("models") and Path(what).is_dir()):
         if integrator is not None:
             raise DocumentError("a predictor keeps that of its study: leave it out", path="--integrator")
         written = export_predictor(Predictor.load(what), to, out, single=single, name=name)

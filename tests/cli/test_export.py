@@ -14,6 +14,14 @@ def test_a_bundled_vessel_is_written(tmp_path):
     assert (tmp_path / "ship" / "ship.h").is_file()
 
 
+def test_a_bundled_vessel_is_written_into_a_folder_of_its_name_again_and_again(tmp_path, monkeypatch):
+    """Before, the folder of the first export was taken for the results of a study."""
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        result = CliRunner().invoke(app, ["export", "mariner", "--to", "c", "--out", "mariner"])
+        assert result.exit_code == 0, result.exception
+
+
 def test_a_cell_that_is_not_there_is_one_line(tmp_path):
     result = CliRunner().invoke(app, ["export", str(tmp_path / "no.npz"), "--to", "c", "--out", str(tmp_path)])
     assert result.exit_code == 1
