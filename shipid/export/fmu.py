@@ -743,11 +743,12 @@ FMI2_STATUS FMI2(fmi2SetString)(fmi2Component c, const fmi2ValueReference vr[], 
     return n ? refuse((Instance *)c, fmi2Error, "there are no strings") : fmi2OK;
 }
 
-/* A state is what changes: the model, the phase and the time. */
+/* A state is what changes: the model, the phase, the time, and which variables the importer has set. */
 typedef struct {
     Model model;
     Phase phase;
     double time;
+    unsigned char set[NUM_REALS];
 } Kept;
 
 FMI2_STATUS FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state);
@@ -760,6 +761,7 @@ FMI2_STATUS FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state)
     kept->model = self->model;
     kept->phase = self->phase;
     kept->time = self->time;
+    memcpy(kept->set, self->set, sizeof kept->set);
     *state = kept;
     return fmi2OK;
 }
@@ -773,6 +775,7 @@ FMI2_STATUS FMI2(fmi2SetFMUstate)(fmi2Component c, fmi2FMUstate state)
     self->model = kept->model;
     self->phase = kept->phase;
     self->time = kept->time;
+    memcpy(self->set, kept->set, sizeof self->set);
     return fmi2OK;
 }
 

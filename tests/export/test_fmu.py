@@ -290,6 +290,31 @@ def test_an_actuator_begins_where_the_importer_says_else_at_its_order(ship, fold
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("taken", ["at its begin", "at its end", "as bytes"])
+def test_a_state_of_the_initialisation_knows_which_actuators_have_a_start_value(taken, ship, folder):
+    """Before, those of the moment counted: an actuator forgot its start value, or one that was taken back stayed."""
+    one, other = Instance(ship, folder).begin(), Instance(ship, folder, "b").begin()
+    order = next(name for name in one.at if f"actual.{name}" in one.at)
+    one.set(**{order: 0.3})
+    if taken == "at its begin":
+        state = one.fmu.getFMUstate()
+        one.set(**{f"actual.{order}": 0.05})
+        one.fmu.setFMUstate(state)
+    else:
+        one.set(**{f"actual.{order}": 0.05})
+        state = one.fmu.getFMUstate()
+        one.fmu.reset()
+        if taken == "as bytes":
+            state = other.fmu.deSerializeFMUstate(one.fmu.serializeFMUstate(state))
+            one, other = other, one
+        one.fmu.setFMUstate(state)
+    one.fmu.exitInitializationMode()
+    assert one.get(f"actual.{order}") == [0.3 if taken == "at its begin" else 0.05]
+    for each in (one, other):
+        each.fmu.freeInstance()
+
+
+@pytest.mark.slow
 def test_ten_copies_do_not_know_each_other(ship, folder):
     copies = [Instance(ship, folder, f"copy {i}").begin() for i in range(10)]
     for i, one in enumerate(copies):
