@@ -628,15 +628,22 @@ FMI2_STATUS FMI2(fmi2EnterInitializationMode)(fmi2Component c)
     return fmi2OK;
 }
 
+/* In the initialisation outputs follow what has been set until then. */
+static fmi2Status follow(Instance *self)
+{
+    const char *message = self->phase == INITIALIZING ? Model_begin(&self->model, self->set, self->time) : 0;
+    return message ? refuse(self, fmi2Error, "%s", message) : fmi2OK;
+}
+
 FMI2_STATUS FMI2(fmi2ExitInitializationMode)(fmi2Component c);
 FMI2_STATUS FMI2(fmi2ExitInitializationMode)(fmi2Component c)
 {
     Instance *self = (Instance *)c;
-    const char *message;
+    fmi2Status status;
     if (self->phase != INITIALIZING) return refuse(self, fmi2Error, "there is no initialisation to end");
+    status = follow(self);
     self->phase = STEPPING;
-    message = Model_begin(&self->model, self->set, self->time);
-    return message ? refuse(self, fmi2Error, "%s", message) : fmi2OK;
+    return status;
 }
 
 FMI2_STATUS FMI2(fmi2Terminate)(fmi2Component c);
@@ -664,6 +671,7 @@ FMI2_STATUS FMI2(fmi2GetReal)(fmi2Component c, const fmi2ValueReference vr[], si
     size_t i;
     for (i = 0; i < n; ++i)
         if (vr[i] >= NUM_REALS) return refuse(self, fmi2Error, "there is no real variable %u", vr[i]);
+    if (follow(self) != fmi2OK) return fmi2Error;
     for (i = 0; i < n; ++i) value[i] = self->model.values[vr[i]];
     return fmi2OK;
 }
@@ -692,6 +700,7 @@ FMI2_STATUS FMI2(fmi2GetInteger)(fmi2Component c, const fmi2ValueReference vr[],
 {
     Instance *self = (Instance *)c;
     size_t i;
+    if (follow(self) != fmi2OK) return fmi2Error;
     for (i = 0; i < n; ++i) {
         if (vr[i]) return refuse(self, fmi2Error, "there is no integer variable %u", vr[i]);
         value[i] = self->model.status;
@@ -704,6 +713,7 @@ FMI2_STATUS FMI2(fmi2GetBoolean)(fmi2Component c, const fmi2ValueReference vr[],
 {
     Instance *self = (Instance *)c;
     size_t i;
+    if (follow(self) != fmi2OK) return fmi2Error;
     for (i = 0; i < n; ++i) {
         if (vr[i] + 1 > NUM_BOOLEANS) return refuse(self, fmi2Error, "there is no boolean variable %u", vr[i]);
         value[i] = Model_boolean(&self->model, vr[i]);

@@ -290,6 +290,29 @@ def test_an_actuator_begins_where_the_importer_says_else_at_its_order(ship, fold
 
 
 @pytest.mark.slow
+def test_outputs_of_the_initialisation_follow_what_has_been_set(ship, aboard, folder):
+    """Before, a tool that read them there, as FMI allows, had paths of 0 m without an alarm."""
+    with zipfile.ZipFile(aboard) as archive:
+        archive.extractall(folder / "aboard")
+    one = Instance(aboard, folder / "aboard").begin()
+    for u in (4.0, 9.0):  # limits: 0 to 8 m/s
+        one.set(**{"u": u, "propeller.n": 1.2, "rudder.delta": 0.1})
+        alarm, path = one.fmu.getBoolean([0]), one.get("x[1]", "x[6]", "y[6]", "instant")
+        assert alarm == [u > 8]
+        assert 3 * u < path[0] < 6 * u
+    one.fmu.exitInitializationMode()
+    assert one.get("x[1]", "x[6]", "y[6]", "instant") == path
+    assert one.fmu.getInteger([0]) == [2]
+    one.fmu.freeInstance()
+    two = Instance(ship, folder).begin()
+    order = next(name for name in two.at if f"actual.{name}" in two.at)
+    for value in (0.3, 0.2):
+        two.set(**{order: value})
+        assert two.get(f"actual.{order}") == [value]
+    two.fmu.freeInstance()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("taken", ["at its begin", "at its end", "as bytes"])
 def test_a_state_of_the_initialisation_knows_which_actuators_have_a_start_value(taken, ship, folder):
     """Before, those of the moment counted: an actuator forgot its start value, or one that was taken back stayed."""
