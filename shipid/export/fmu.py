@@ -321,10 +321,11 @@ static const char *Model_step(Model *self, double t, double h)
     const double largest = self->values[{total - 1}];
     const double count = ceil(h / largest - 1e-9);
     double before[{max(1, sizes["carry"])}];
-    long k, steps = count < 1 ? 1 : (long)count;
+    long k, steps;
     (void)t;
     if (!(largest > 0)) return "solver.step must be above 0";
     if (!(count < 1e9)) return "the communication step needs too many steps of solver.step";
+    steps = count < 1 ? 1 : (long)count;
     memcpy(before, self->values, sizeof before);
     for (k = 0; k < steps; ++k) {{
         self->status = {name}_step({given}, h / (double)steps);

@@ -27,7 +27,7 @@ from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
-from tests.export.compiled import FLAGS, compiler
+from tests.export.compiled import FLAGS, SANITIZERS, compile_, compiler
 from tests.export.strange import drawn, network_of
 
 SECONDS = 60.0
@@ -78,6 +78,34 @@ def test_the_sources_compile_without_a_warning(aboard, tmp_path):
         command = [compiler(), *FLAGS, *more, "-c", "path.c", "-o", "path.o"]
         result = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True)
         assert result.returncode == 0, result.stderr[:1000]
+
+
+STEPS_OF_NO_LENGTH = """
+#include "ship.c"
+int main(void)
+{
+    const double steps[] = {0, -1, 1e-300, 1e300};
+    const fmi2ValueReference last = NUM_REALS - 1; /* solver.step */
+    fmi2CallbackFunctions call = {0, 0, 0, 0, 0};
+    fmi2Component c = fmi2Instantiate("a", fmi2CoSimulation, guid, "", &call, 0, 0);
+    int i;
+    if (!c || fmi2EnterInitializationMode(c) || fmi2ExitInitializationMode(c)) return 1;
+    for (i = 0; i < 4; ++i)
+        if (fmi2SetReal(c, &last, 1, &steps[i]) || fmi2DoStep(c, 0, 0.1, 0) != (i < 3 ? fmi2Discard : fmi2OK)) return 2;
+    fmi2FreeInstance(c);
+    return 0;
+}
+"""
+
+
+def test_an_internal_step_of_no_length_is_refused(ship, tmp_path):
+    """Before, the number of steps, which is infinite, was made a whole number first: C does not say what that gives."""
+    with zipfile.ZipFile(ship) as archive:
+        archive.extractall(tmp_path)
+    (tmp_path / "sources" / "main.c").write_text(STEPS_OF_NO_LENGTH)
+    compile_([compiler()], tmp_path / "sources", *SANITIZERS, "-fsanitize=float-cast-overflow", "-o", "main", "main.c")
+    result = subprocess.run([tmp_path / "sources" / "main"], capture_output=True, text=True)
+    assert (result.returncode, result.stderr[:1000]) == (0, "")
 
 
 def test_a_long_past_is_not_on_the_stack(tmp_path):
