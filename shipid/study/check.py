@@ -16,6 +16,7 @@ WORDS = {
     "missing": "missing: `shipid study resume` computes it again",
     "damaged": "damaged: `shipid study resume` computes it again",
     "edited": "changed after it was written: put it back, or delete it and resume",
+    "unreadable": "cannot be read ({}): let this user read it, or delete it and resume",
 }
 
 
@@ -47,7 +48,7 @@ def _checked(folder: Path, plan: Plan, part: str = "") -> Checked:
     if part:
         store.stored_plan(folder)  # says what was edited
     faults = seals.faults(folder)
-    lines = [f"{folder / fault.file}: {WORDS[fault.kind]}" for fault in faults]
+    lines = [f"{folder / fault.file}: {WORDS[fault.kind].format(fault.reason)}" for fault in faults]
     if plan.parts:
         return Checked(lines, faults)
     done = sum(len(unit.pairs) for unit in store.finished(folder, plan.units))

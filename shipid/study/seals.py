@@ -25,11 +25,15 @@ FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results
 
 @dataclass(frozen=True)
 class Fault:
-    """A file that is not what was written: `missing`, `damaged` (it cannot be read) or `edited`."""
+    """A file that is not what was written: `missing`, `damaged` (no whole file of its kind) or `edited`.
+
+    `unreadable`: the system does not let this user read it, or the disk fails; it may be whole, and `reason` says why.
+    """
 
     seal: str
     file: str
     kind: str
+    reason: str = ""
 
 
 def seal_file(folder: Path, name: str) -> Path:
@@ -84,6 +88,9 @@ def check(folder: Path) -> None:
 
 def wrong(folder: Path, fault: Fault) -> ResultError:
     """The error for a file that is not as it was written."""
+    if fault.kind == "unreadable":
+        remedy = "let this user read it, or delete it and continue with `shipid study resume`"
+        return ResultError(f"cannot be read ({fault.reason}): {remedy}", file=folder / fault.file)
     if fault.kind != "edited":
         return ResultError("missing or damaged: continue with `shipid study resume`", file=folder / fault.file)
     message = "was changed after it was written: put it back, or delete it and continue with `shipid study resume`"
@@ -93,13 +100,14 @@ def wrong(folder: Path, fault: Fault) -> ResultError:
 def mend(folder: Path) -> Iterator[str]:
     """Remove the seals of files that are missing or damaged, so that they are computed again; yield a sentence each.
 
-    Raises ResultError, before anything is removed, for a file that can be read and is not what was written.
+    Raises ResultError, before anything is removed, for a file that can be read and is not what was written, and for one
+    that cannot be read: on a file server, or of another user, it may be whole.
     """
     if damaged := faults(folder):
         again = faults(folder)  # another process may just have written some of these files
         damaged = [fault for fault in damaged if fault in again]
     for fault in damaged:
-        if fault.kind == "edited":
+        if fault.kind in ("edited", "unreadable"):
             raise wrong(folder, fault)
         if (folder / fault.file).is_dir():
             raise ResultError("is a folder where a file belongs: remove it and resume", file=folder / fault.file)
@@ -119,8 +127,11 @@ def _faults(folder: Path, seal: Path) -> Iterator[Fault]:
         known = [(digest, path) for digest, path in lines]
         whole = known and all(len(digest) == 64 and _inside(path) for digest, path in known)
         whole = whole and known[0][1] == FIRST.get(name, f"batches/{name}.json")
-    except (OSError, ValueError):
+    except (FileNotFoundError, ValueError):
         known, whole = [], False
+    except OSError as error:
+        yield Fault(name, f"{FOLDER}/{seal.name}", "unreadable", error.strerror or str(error))
+        return
     if not whole:
         yield Fault(name, f"{FOLDER}/{seal.name}", "damaged")
         return
@@ -128,8 +139,13 @@ def _faults(folder: Path, seal: Path) -> Iterator[Fault]:
         try:
             if _digest(folder / path) != digest:
                 yield Fault(name, path, "edited" if _readable(folder / path) else "damaged")
-        except OSError:
-            yield Fault(name, path, "damaged" if (folder / path).exists() else "missing")
+        except (FileNotFoundError, NotADirectoryError):
+            yield Fault(name, path, "missing")
+        except OSError as error:
+            if os.path.isdir(folder / path):
+                yield Fault(name, path, "damaged")
+            else:
+                yield Fault(name, path, "unreadable", error.strerror or str(error))
 
 
 def _inside(path: str) -> bool:

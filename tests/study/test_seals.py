@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -81,6 +84,32 @@ def test_what_cannot_be_read_is_computed_again(kind: str, pattern: str, folder: 
     (words,) = list(seals.mend(folder))
     assert "computed again" in words
     assert seals.faults(folder) == []
+
+
+@pytest.mark.parametrize("number", [errno.EACCES, errno.EIO, errno.ESTALE])
+@pytest.mark.parametrize("pattern", ["cells/*.npz", "dataset.parquet"])
+def test_what_the_system_does_not_give_may_be_whole_and_is_not_removed(
+    number: int, pattern: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files of another user, a disk or a file server with an error."""
+    file = sorted(folder.glob(pattern))[0]
+    before, digest = sorted(folder.rglob("*")), seals._digest
+
+    def refused(asked: Path) -> str:
+        if asked == file:
+            raise OSError(number, os.strerror(number), str(asked))
+        return digest(asked)
+
+    monkeypatch.setattr(seals, "_digest", refused)
+    words = re.escape(f"cannot be read ({os.strerror(number)})")
+    for look in (lambda: list(seals.mend(folder)), lambda: seals.check(folder)):
+        with pytest.raises(ResultError, match=words) as caught:
+            look()
+        assert caught.value.file == str(file)
+    assert sorted(folder.rglob("*")) == before
+    check = check_folder(folder)
+    assert [fault.kind for fault in check.faults] == ["unreadable"]
+    assert check.lines[0].startswith(f"{file}: cannot be read ({os.strerror(number)}): ")
 
 
 def test_a_table_with_any_byte_of_its_notes_changed_is_an_edit_or_damage_and_no_traceback(tmp_path: Path) -> None:
