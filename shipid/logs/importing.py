@@ -30,6 +30,7 @@ from shipid.data.dataset import (
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices, is_utf_8
 from shipid.logs.mapping import (
+    SIDES,
     Clock,
     Column,
     FileClock,
@@ -40,6 +41,7 @@ from shipid.logs.mapping import (
     Source,
     clock_seconds,
     degrees_in_parts,
+    degrees_in_text,
     degrees_of,
     is_dated,
     names_of,
@@ -333,7 +335,8 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
     uses = Counter((one.file or "", source) for one in mapping.columns.values() for source in names_of(one.source))
     for name, column in mapping.columns.items():
         table, times, form, other = files[column.file or ""]
-        parts = [_numbers(table, one, form, other, f"columns.{name}.from") for one in names_of(column.source)]
+        sides = SIDES.get(name, "") if column.unit == "deg" and isinstance(column.source, str) else ""
+        parts = [_numbers(table, one, form, other, f"columns.{name}.from", sides) for one in names_of(column.source)]
         numbers = parts[0]
         if column.unit == "ddmm":
             numbers = _of_minutes(numbers, other, f"columns.{name}.unit")
@@ -644,8 +647,13 @@ def _column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Series[
     return log.iloc[:, names.index(source)]
 
 
-def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str) -> NDArray[np.float64]:
-    """Turn a column into numbers, NaN where it is missing; text that is no number raises with its row."""
+def _numbers(
+    log: pd.DataFrame, source: str, form: Format, file: Path, path: str, sides: str = ""
+) -> NDArray[np.float64]:
+    """Turn a column into numbers, NaN where it is missing; text that is no number raises with its row.
+
+    With the letters of its `sides` it is a position in degrees, which may be written as 59°26'12.3"N.
+    """
     column = _column(log, source, file, path)
     if pd.api.types.is_numeric_dtype(column.dtype):
         numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
@@ -665,10 +673,13 @@ def _numbers(log: pd.DataFrame, source: str, form: Format, file: Path, path: str
         raise DataError(message, file=file, path=f"row {grouped + 1}")
     plain = in_points(text, read.decimal, read.thousands).mask(missing)
     numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
+    if sides and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
+        numbers = degrees_in_text(in_points(text, read.decimal, None).mask(missing), sides)
     bad = np.flatnonzero(~np.isfinite(numbers) & ~missing.to_numpy())
     if len(bad):
+        what = f"no number and no position with {' or '.join(sides)}" if sides else "no number"
         message = (
-            f"{text.iloc[bad[0]]!r} is no number (column {source!r}; {len(bad)} such rows): "
+            f"{text.iloc[bad[0]]!r} is {what} (column {source!r}; {len(bad)} such rows): "
             "correct it, or list it in [format] missing, or check decimal and thousands"
         )
         if isinstance(form, SheetFormat) and text.iloc[bad[0]].startswith("="):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from pydantic import Field, SerializeAsAny
 
@@ -61,6 +63,15 @@ EPOCHS = {"datenum": 719529.0, "excel": 25569.0, "mjd": 40587.0, "jd": 2440587.5
 or not: IAU resolution B1 of 1997)."""
 AGAIN = {"s of day": DAY, "s of week": 7 * DAY}
 """Unit of a clock in seconds that begins again -> after how many seconds."""
+SIDES = {"latitude": "NS", "longitude": "EW"}
+"""Column of a position on the Earth -> the letters of its sides in a text, that of positive numbers first."""
+_BOTH = re.compile(r"([^A-Za-z]*\d[^A-Za-z]*[NS])[\s,;/]*([^A-Za-z]+[EW])|([NS][^A-Za-z]+?)[\s,;/]*([EW][^A-Za-z]+)")
+"""A text that holds a latitude and a longitude, each with its letter behind it or before it."""
+_ANGLE = re.compile(
+    r"([NSEW]?)\s*([+-]?)(\d+(?:\.\d*)?)\s*"
+    r"(?:[°º˚:\s-]\s*(?:(\d+(?:\.\d*)?)\s*(?:['′’´:\s-]\s*(?:(\d+(?:\.\d*)?)\s*(?:[\"″”]|'')?)?)?)?)?[\s,]*([NSEW]?)"
+)
+"""An angle as text: side or sign, degrees, perhaps minutes and seconds, side."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
 ESTIMATED = ("u", "v", "r")
 Manoeuvre = Literal[
@@ -316,6 +327,36 @@ def degrees_in_parts(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
     for part, share in zip(parts[1:], (60.0, 3600.0), strict=False):
         degrees = degrees + np.where(np.abs(part) < 60.0, np.abs(part), np.nan) / share
     return np.asarray(np.where(np.any(np.signbit(parts), axis=0), -degrees, degrees), dtype=np.float64)
+
+
+def degrees_in_text(texts: pd.Series[Any], sides: str) -> NDArray[np.float64]:
+    """Texts (N,) such as 59°26'12.3"N, N59 26.205 or 5926.205N in degrees; NaN for a text that says no angle.
+
+    `sides` are the letters of this angle, "NS" or "EW", that of positive numbers first: a text with both a latitude and
+    a longitude says the one that they name. All texts have a letter or none has. Where one has four digits before the
+    point or more, all that are one number are degrees and minutes in one, with six or more also seconds.
+    """
+    upper = texts.astype(str).str.strip().str.upper()
+    both = upper.str.extract(rf"^\s*(?:{_BOTH.pattern})\s*$")
+    first, second = both[0].fillna(both[2]), both[1].fillna(both[3])
+    parts = upper.mask(first.notna(), first if sides == SIDES["latitude"] else second)
+    found = parts.str.extract(rf"^\s*(?:{_ANGLE.pattern})$").fillna("")
+    before, sign, *numbers, behind = (found[place] for place in range(6))
+    letter = before + behind
+    values = [pd.to_numeric(one, errors="coerce").to_numpy(dtype=np.float64) for one in numbers]
+    digits = numbers[0].str.partition(".")[0].str.len()
+    alone = np.isnan(values[1])
+    degrees = degrees_in_parts([values[0], *(np.nan_to_num(one) for one in values[1:])])
+    packed = int(digits[alone].max()) if alone.any() else 0
+    if packed > 3:
+        minutes = degrees_of(values[0]) if packed < 6 else degrees_of(values[0] // 100.0) + values[0] % 100.0 / 3600.0
+        degrees = np.where(alone, minutes if packed < 8 else np.nan, degrees)
+    one_letter = letter.isin([*sides]) if letter.ne("").any() else letter.eq("")
+    whole = np.isnan(values[1]) | (values[0] % 1 == 0) & (np.isnan(values[2]) | (values[1] % 1 == 0))
+    right = one_letter.to_numpy() & whole & ~(letter.ne("") & sign.ne("")).to_numpy()
+    right &= degrees <= (90.0 if sides == SIDES["latitude"] else 360.0)
+    minus = sign.eq("-").to_numpy() | letter.eq(sides[1]).to_numpy()
+    return np.asarray(np.where(right, np.where(minus, -degrees, degrees), np.nan), dtype=np.float64)
 
 
 def is_dated(unit: str) -> bool:

@@ -561,6 +561,24 @@ def test_dates_and_angles_in_several_columns(side: float, tmp_path: Path) -> Non
     np.testing.assert_allclose(dataset.frame["north"], metres, atol=0.02)
 
 
+@pytest.mark.parametrize("large", [False, True])
+def test_positions_as_text(large: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(readers, "LARGE", 0 if large else readers.LARGE)
+    mapping = PARTED.replace('["lat", "lat min", "lat s"]', '"place"').replace('["lon", "lon min"]', '"place"')
+    (tmp_path / "mapping.toml").write_text(mapping)
+    log = parted()
+    minutes = [f"{1.8e-2 + 6e-4 * row:.6f}" for row in range(10)]
+    log["place"] = [f"33°{one}'S 000°07.5'W" for one in minutes]
+    log.to_csv(tmp_path / "log.csv", index=False)
+    dataset = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+    assert dataset.metadata["origin"] == pytest.approx({"latitude": -33.0003, "longitude": -0.125})
+    np.testing.assert_allclose(dataset.frame["north"], -110.9e3 * 1e-5 * np.arange(10), atol=0.02)
+    log.loc[4, "place"] = "33°18.0'N"
+    log.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=r"row 5: .*33°18.0'N.* is no number and no position with E or W"):
+        import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+
+
 @pytest.mark.parametrize(
     ("change", "row", "said"),
     [

@@ -8,11 +8,21 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.document import bundled
 from shipid.errors import DocumentError
-from shipid.logs.mapping import EPOCHS, INPUTS, UNITS, clock_seconds, is_dated, read_mapping, to_si
+from shipid.logs.mapping import (
+    EPOCHS,
+    INPUTS,
+    UNITS,
+    clock_seconds,
+    degrees_in_text,
+    is_dated,
+    read_mapping,
+    to_si,
+)
 from shipid.logs.repairs import REPAIRS, Despike
 
 Write = Callable[..., Path]
@@ -173,3 +183,39 @@ def test_columns_are_interpolated_where_their_instants_differ(plain_mapping: Wri
     late = plain_mapping(replace=('from = "N"', 'from = "N"\nlatency = 0.5'))
     late.write_text(late.read_text().replace("[clock]", "[clock]\nmax_gap = 3.0"))
     assert read_mapping(late).resamples
+
+
+@pytest.mark.parametrize(
+    ("text", "sides", "degrees"),
+    [
+        ("59°26'12.3\"N", "NS", 59 + 26 / 60 + 12.3 / 3600),
+        ("010° 36' 12.3″ W", "EW", -(10 + 36 / 60 + 12.3 / 3600)),
+        ("S33 51.2", "NS", -(33 + 51.2 / 60)),
+        ("-33 51.2", "NS", -(33 + 51.2 / 60)),
+        ("59-26.205n", "NS", 59 + 26.205 / 60),
+        ("59:26:12", "NS", 59 + 26 / 60 + 12 / 3600),
+        ("5926.205,N", "NS", 59 + 26.205 / 60),
+        ("00036.205W", "EW", -36.205 / 60),
+        ("0103612W", "EW", -(10 + 36 / 60 + 12 / 3600)),
+        ("103.75° E", "EW", 103.75),
+        ("59°26.2'N 010°36'W", "NS", 59 + 26.2 / 60),
+        ("59°26.2'N 010°36'W", "EW", -10.6),
+        ("N59 26.2, W010 36.0", "EW", -10.6),
+        ("5926.2N/01036.0W", "EW", -10.6),
+        ("59°26'E", "NS", np.nan),  # another side
+        ("-33°51'S", "NS", np.nan),
+        ("59 61.0N", "NS", np.nan),
+        ("59.5°26'N", "NS", np.nan),
+        ("95°N", "NS", np.nan),
+        ("10°36'O", "EW", np.nan),  # Ost, or ouest
+        ("---", "NS", np.nan),
+    ],
+)
+def test_a_position_as_text_in_degrees(text: str, sides: str, degrees: float) -> None:
+    np.testing.assert_allclose(degrees_in_text(pd.Series([text]), sides), [degrees], rtol=1e-13)
+
+
+def test_positions_as_text_have_a_letter_in_all_rows_or_in_none_and_one_way_of_writing() -> None:
+    assert np.isnan(degrees_in_text(pd.Series(["33 51.2 S", "33 51.2"]), "NS")).tolist() == [False, True]
+    degrees = degrees_in_text(pd.Series(["00959.9E", "01000.1E", "959.9E"]), "EW")
+    np.testing.assert_allclose(degrees, [9 + 59.9 / 60, 10 + 0.1 / 60, 9 + 59.9 / 60])

@@ -172,7 +172,8 @@ def _columns(guess: Guess) -> Iterator[str]:
         yield from (f"# ! {finding.kind} ({_percent(finding.confidence)}): {finding.sentence}" for finding in findings)
     for column in guess.columns:
         yield f"\n[columns.{_key(column.name)}]    # {_percent(column.confidence)}{_mark(column)}: {column.evidence}"
-        source = guess.sniffed.in_parts.get(column.source, column.source)
+        parts = guess.sniffed.in_parts.get(column.source, (column.source,))
+        source = parts[0] if len(parts) == 1 else parts
         yield from _lines({"from": source, "unit": column.unit, **column.extra})
     unused = [*(f"column {name!r} is not used: {why}" for name, why in guess.unused.items()), *guess.sniffed.notes]
     if unused:

@@ -22,7 +22,16 @@ from shipid.errors import DataError
 from shipid.logs.foreign import foreign
 from shipid.logs.guess.words import fits, is_run, parts_of, units_in
 from shipid.logs.importing import even_clock, repeated_rows, rounding_of
-from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, degrees_in_parts, names_of, since_midnight
+from shipid.logs.mapping import (
+    AGAIN,
+    EPOCHS,
+    SIDES,
+    clock_seconds,
+    degrees_in_parts,
+    degrees_in_text,
+    names_of,
+    since_midnight,
+)
 from shipid.logs.readers import (
     DAY,
     DAY_OF,
@@ -202,6 +211,9 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         notes = tuple(f"{name!r} is {table.attrs['other'][name]}" for name in table.attrs.get("to save anew", ()))
     columns, words = _numbers(table, form.get("decimal", "."), form.get("thousands"))
     in_parts = _degrees(columns)
+    rarely = [name for name, values in columns.items() if np.isnan(values).mean() > 0.5]
+    in_text, letters = _in_text(table, [*words, *rarely], form.get("decimal", "."))
+    columns |= dict(in_text.values())
     notes += (f"{form['thousands']!r} is read as a mark of thousands",) if "thousands" in form else ()
     if isinstance(model, TableFormat):
         missing = [*_words_for_nothing(table, columns, model), *_sentinels(table, columns)]
@@ -209,6 +221,9 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
             form["missing"] = [*model.missing, *missing]
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
     made = {name: degrees_in_parts([columns[part] for part in parts]) for name, parts in in_parts.items()}
+    made |= {name: values for name, (source, values) in in_text.items() if name != source}
+    in_parts |= {name: (in_text[name][0],) for name in made.keys() & in_text.keys()}
+    words = [name for name in words if name not in columns]
     runs, since = _restarts(table, columns)
     clock, t, once = _clock_once(table, columns if since is None else columns | since, file)
     columns = {name: values[once] for name, values in (columns | made).items()}
@@ -232,7 +247,9 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     doubts = tuple(_doubts(table.loc[once], clock, t))
     doubts += tuple(_minus_ones(columns))
     doubts += () if runs else tuple(_other_clocks(table.loc[once], columns, clock, t))
-    return Sniffed(form, clock, t, kept, notes + empty, seams, runs, _sides(table, words), says, doubts, in_parts)
+    return Sniffed(
+        form, clock, t, kept, notes + empty, seams, runs, letters | _sides(table, words), says, doubts, in_parts
+    )
 
 
 def _as_number(name: str, text: str) -> str:
@@ -557,6 +574,31 @@ def _degrees(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
         if len(parts) > 1 and not _is_whole(columns[parts[-1]], 60.0):
             found[" + ".join(parts)] = tuple(parts)
     return found
+
+
+def _in_text(
+    table: pd.DataFrame, names: list[str], decimal: str
+) -> tuple[dict[str, tuple[str, Array]], frozenset[str]]:
+    """Name -> column of text and degrees (N,) of each latitude and longitude in it, and the letters of their sides.
+
+    A column that holds both is called `Position latitude` and `Position longitude`.
+    """
+    found: dict[str, tuple[str, Array]] = {}
+    letters: set[str] = set()
+    for name in filter(None, names):
+        texts = in_points(_called(table, name).astype(str).str.strip(), decimal, None)
+        meant = [one for one in SIDES if fits(name).get(one, 0.0) > 0.5]
+        read = {one: degrees_in_text(texts, SIDES[one]) for one in meant or SIDES}
+        known = {one: values for one, values in read.items() if np.mean(np.isfinite(values)) > 0.5}
+        lettered = meant or bool(
+            np.nanmax(np.abs(read["latitude"] - read["longitude"]), initial=0.0)
+        )  # a time of day may be both
+        if len(known) != len(read) or not lettered:
+            continue
+        found |= {name if meant else f"{name} {one}": (name, values) for one, values in known.items()}
+        for one in known:
+            letters |= {letter for letter in SIDES[one] if texts.str.contains(letter, case=False).any()}
+    return found, frozenset(letters)
 
 
 def _is_whole(values: Array, most: float) -> bool:

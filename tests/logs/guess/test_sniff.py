@@ -685,6 +685,34 @@ def test_degrees_and_minutes_in_columns(
 
 
 @pytest.mark.parametrize(
+    ("names", "made"),
+    [
+        (("Latitude", "Longitude"), {}),
+        (("Position",), {"Position latitude": ("Position",), "Position longitude": ("Position",)}),
+        (("Latitude", "remark"), {}),
+    ],
+)
+@pytest.mark.parametrize("nothing", ["", "---"])
+def test_positions_as_text(
+    names: tuple[str, ...], made: dict[str, tuple[str, ...]], nothing: str, tmp_path: Path
+) -> None:
+    degrees = -33.3 + 1e-4 * T
+    south = [f"{-one:.0f}°{-one % 1 * 60:.5f}'S" for one in degrees]
+    texts = [south, [f"010°{one % 1 * 60:.5f}'E" for one in degrees]]
+    texts = [[f"{one} {other}" for one, other in zip(*texts, strict=True)]] if len(names) == 1 else texts
+    texts[0][3] = nothing
+    TABLE.assign(**dict(zip(names, texts, strict=True))).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.in_parts == made
+    assert sniffed.sides == ({"S", "E"} if names[-1] != "remark" else {"S"})
+    latitude = sniffed.columns["Position latitude" if made else "Latitude"]
+    np.testing.assert_allclose(np.delete(latitude, 3), np.delete(degrees, 3), atol=1e-7)
+    assert np.isnan(latitude[3])
+    assert ("remark" in sniffed.words) == ("remark" in names)
+    assert not any("Latitude" in note or "Position" in note for note in sniffed.notes)
+
+
+@pytest.mark.parametrize(
     ("above", "names"),
     [
         ("time,GPS,\n,N,psi\n", ["time", "GPS N", "GPS psi"]),
