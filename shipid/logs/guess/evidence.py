@@ -22,6 +22,7 @@ WINDOW, STEPS, MOST = 10.0, 4, 1500  # s; steps and windows
 FALSE_STEP = np.radians(20.0)  # of a heading between two rows
 FEW = 30  # values: fewer may be round by chance
 HOLE = 3.0  # times the usual step
+LIVELY = 0.1  # of the larger changes over a window: in one of less nothing happens
 NEAR_TURN, NEIGHBOURS = 0.6, 9  # of a turn, that many steps together make when they lead across 360
 
 
@@ -88,10 +89,14 @@ def fit(seen: Complex, integrated: Complex) -> Fit:
 
 
 def robust(seen: Complex, integrated: Complex) -> NDArray[np.bool_]:
-    """Return which windows have no outlier in their unexplained change, (W,): spikes and jumps are left out."""
+    """Return which windows have no outlier in their unexplained change, (W,): spikes and jumps are left out.
+
+    What is usual say those in which something changes: a rounded heading of a straight course fits anything.
+    """
     scale = fit(seen, integrated).scale
-    miss = np.abs(seen - scale * integrated)
-    return np.asarray(miss <= 6.0 * np.median(miss) + 1e-9)
+    miss, size = np.abs(seen - scale * integrated), np.abs(integrated)
+    moving = size >= LIVELY * np.percentile(size, 90)
+    return np.asarray(miss <= 6.0 * np.median(miss[moving]) + 1e-9)
 
 
 def agreement(track: Complex, psi: Array) -> complex:
@@ -134,11 +139,11 @@ def shift(t: Array, seen: NDArray[np.generic], integrated: NDArray[np.generic], 
         return 0.0, 0.0
     change = chosen.change(seen)
     delays = np.arange(-longest, longest + usual / 2, max(usual / 2, longest / 40))
-    left = []
-    for delay in delays:
-        moved = _at(t, integrated, t[chosen.last] - delay) - _at(t, integrated, t[chosen.first] - delay)
-        keep = robust(change, moved)
-        left.append(float(np.mean(np.abs(change[keep] - fit(change[keep], moved[keep]).scale * moved[keep]) ** 2)))
+    # the same windows for all delays, or one that fits worse leaves out more
+    moved = [_at(t, integrated, t[chosen.last] - one) - _at(t, integrated, t[chosen.first] - one) for one in delays]
+    keep = np.any([robust(change, one) for one in moved], axis=0)
+    change = change[keep]
+    left = [float(np.mean(np.abs(change - fit(change, one[keep]).scale * one[keep]) ** 2)) for one in moved]
     best, none = int(np.argmin(left)), int(np.argmin(np.abs(delays)))
     return float(delays[best]), 1.0 - left[best] / left[none] if left[none] > 0 else 0.0
 
