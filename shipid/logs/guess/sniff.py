@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.foreign import foreign
-from shipid.logs.guess.words import fits, is_run, parts_of, units_in
+from shipid.logs.guess.words import fits, is_run, known_words, parts_of, units_in
 from shipid.logs.importing import even_clock, repeated_rows, rounding_of
 from shipid.logs.mapping import (
     AGAIN,
@@ -67,6 +67,7 @@ from shipid.logs.workbook import NOT_CALCULATED, SEPARATOR, sheet_text, sheets_o
 Rows = NDArray[np.bool_]
 SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looked at in its head and that many blocks
 LONG = 1e4  # rows between two runs that have a clock each
+ELSEWHERE = ("cp932", "gb18030", "cp949", "cp1251")  # encodings of texts whose words no other one shows
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
 GROUPS = (",", ".", "'", "’", " ", "\u00a0", "\u202f")  # marks of thousands
 MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a comment
@@ -321,13 +322,18 @@ def _encoding(head: bytes, file: Path) -> str:
             return order
     if b"\0" in head:
         raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
-    for encoding in ("utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8", "cp1252"):
-        try:
-            # the last character may be cut
-            head[:-4].decode(encoding) if len(head) > 4 else head.decode(encoding)
-            return encoding
-        except UnicodeDecodeError:
-            continue
+    begin = head[:-4] if len(head) > 4 else head  # the last character may be cut
+    utf8 = "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8"
+    with suppress(UnicodeDecodeError):
+        begin.decode(utf8)
+        return utf8
+    words = {one: known_words(begin.decode(one, "ignore")) for one in ELSEWHERE}
+    best = max(ELSEWHERE, key=lambda one: words[one])
+    if words[best] > 1:
+        return best
+    with suppress(UnicodeDecodeError):
+        begin.decode("cp1252")
+        return "cp1252"
     return "latin-1"
 
 

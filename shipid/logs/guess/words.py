@@ -195,7 +195,8 @@ OTHERS = (
     "a x, a y, a z, pressure, humidity, voltage, current, set, drift, load, wave, wave height, height, altitude, "
     "alt, age, quality, status, mode, alarm, xte, cross track error, dist, distance, waypoint, index, row, count, "
     "id, no, nr, tunnel thruster, roll acc, pitch acc, x force, y force, variation, deviation, magnetic "
-    "variation, geoid, force, mass, current speed, current direction, z, depth m, engine torque"
+    "variation, geoid, force, mass, current speed, current direction, z, depth m, engine torque, ae rpm, aux "
+    "engine rpm, auxiliary engine rpm, generator rpm"
 )
 """Phrases of columns that no dataset takes."""
 ORDERS = frozenset(
@@ -230,7 +231,7 @@ SOURCES = frozenset(
 UNIT_PARTS = frozenset(
     (
         "cm cmps cms deg degs dpm dps feet ft grad kmh kn knm kw nm knots kt kts min mm mmps mms mph mps ms nmi pct "
-        "rad rads rps sec"
+        "rad rads sec"
     ).split()
 )
 """Parts that are a unit at the end of a name."""
@@ -273,7 +274,64 @@ SYNONYMS |= {
     "strahler": "thruster",
     "propulsor": "thruster",
 }
+SYNONYMS |= {"rps": "rpm"}  # the unit is read from the name itself
 SYNONYMS |= {"transverse": "trans", "lateral": "lat", "forward": "fwd", "velocities": "vel", "degrees": "deg"}
+TRANSLATED = {
+    "latitude": "緯度 纬度 위도 широта",
+    "longitude": "経度 經度 经度 경도 долгота",
+    "heading": "船首方位角 船首方位 船首角 方位角 方位 艏向角 艏向 船艏向 船首向 首向 航向角 "
+    "선수방위각 선수방위 선수각 헤딩 방위각",
+    "gyro": "ジャイロ 陀螺 罗经 자이로 гирокомпас",
+    "magnetic": "磁気 磁 자기 магнитный",
+    "kurs": "針路 航向 침로 курс",
+    "course over ground": "対地針路 对地航向 對地航向 航迹向 航迹角 대지침로 путевой_угол",
+    "speed": "船速 速力 速度 航速 선속 속력 속도 скорость",
+    "speed over ground": "対地速力 対地速度 対地船速 对地航速 对地速度 對地航速 대지속력 대지속도",
+    "speed through water": "対水速力 対水速度 対水船速 对水航速 对水速度 대수속력 대수속도",
+    "surge speed": "前後速度 纵向速度 纵荡速度 종방향속도 전후속도",
+    "sway speed": "左右速度 横方向速度 横向速度 横荡速度 횡방향속도 좌우속도",
+    "yaw rate": "回頭角速度 旋回角速度 回頭率 旋回率 回頭速度 旋回速度 ヨーレート ヨー角速度 转艏角速度 转首角速度 "
+    "艏摇角速度 首摇角速度 回转角速度 转头角速度 转向角速度 转向率 转艏率 艏摇率 회두각속도 선회각속도 선회율 회두율 "
+    "угловая_скорость скорость_поворота",
+    "rudder angle": "舵角 타각 угол_перекладки_руля угол_руля положение_руля",
+    "rudder": "ラダー 舵 러더 руль",
+    "rudder order": "舵令 명령타 지령타",
+    "propeller": "プロペラ 螺旋桨 螺旋槳 推进器 프로펠러 винта",
+    "engine": "エンジン 機関 发动机 엔진",
+    "main engine": "主機 主机 主機関 주기관 주기 гд",
+    "shaft": "軸 轴 축 вала",
+    "rpm": "回転数 回転速度 转速 轉速 회전수 회전속도 частота_вращения обороты",
+    "thruster": "スラスタ スラスター 侧推 쓰러스터 스러스터",
+    "bow thruster": "バウスラスタ バウスラスター 艏侧推 선수쓰러스터 바우스러스터",
+    "azimuth": "アジマス 全回转 아지무스",
+    "wind speed": "風速 风速 풍속 скорость_ветра",
+    "wind direction": "風向 风向 풍향 направление_ветра",
+    "true wind speed": "真風速 真风速 진풍속",
+    "true wind direction": "真風向 真风向 진풍향",
+    "relative": "相対 相对 相對 상대",
+    "true": "真 绝对 истинный истинная",
+    "roll": "横揺れ角 横揺れ ロール角 ロール 横摇角 横摇 横倾角 횡동요각 횡동요 롤 крен",
+    "pitch angle": "縦揺れ角 縦揺れ ピッチ角 纵摇角 纵摇 纵倾角 종동요각 종동요 дифферент",
+    "roll rate": "横揺れ角速度 横摇角速度 횡동요각속도",
+    "pitch rate": "縦揺れ角速度 纵摇角速度 종동요각속도",
+    "acceleration": "加速度 가속도 ускорение",
+    "current speed": "流速 潮流 海流 유속 조류 течения",
+    "value": "の 的 의 値 值 값 計 计 データ 数据 信号 신호 センサ センサー 传感器 센서",
+    "thrust": "推力 スラスト 추력",
+    "torque": "トルク 扭矩 转矩 토크",
+    "power": "馬力 出力 功率 출력 마력 мощность",
+    "depth": "水深 수심 глубина",
+    "draft": "喫水 吃水 흘수 осадка",
+    "time": "時刻 時間 日時 日付 时间戳 时间 时刻 日期 시간 시각 일시 날짜 время дата",
+    "order": "指令 命令 設定 设定 명령 지령 задание",
+    "actual": "実 实际 실제 фактический",
+    "angle": "角度 角 각도 угол",
+    "port": "左舷 左 좌현 левый левого",
+    "starboard": "右舷 右 우현 правый правого",
+}
+"""Known words -> words of East Asian scripts and of Cyrillic, `_` for a blank in them."""
+WIDE = str.maketrans("（）［］【】〔〕／，：％　", "()[][][]/,:% ")
+"""Signs of East Asian width, as they are written elsewhere."""
 WHOLE = dict.fromkeys(
     (
         "bt bowthruster bowthr bugstrahler bugstrahlruder querstrahler querstrahlruder boegschroef baugpropell "
@@ -292,7 +350,12 @@ LEAST = 0.45  # share of a name that a phrase explains, before the name counts a
 
 def parts_of(name: str) -> tuple[str, ...]:
     """Return the parts of a name in lower case, without text in brackets; accents and Greek are spelt out."""
+    name = name.translate(WIDE)
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name))
+    if not bare.isascii():
+        bare = _translations()[0].sub(_translation, unicodedata.normalize("NFKC", bare))
+        bare = re.sub(r"[\u0400-\uffff]+", " unknownword ", bare)
+    bare = re.sub(r"\b([MA])/E\b", r"\1E", bare)  # main or auxiliary engine, and no electrical speed
     text = unicodedata.normalize("NFKD", "".join(_spelt(bare, place) for place in range(len(bare))))
     text = "".join(letter for letter in text if not unicodedata.combining(letter))
     whole = [word for word in re.split(r"[^A-Za-z0-9]+", text) if word]
@@ -302,6 +365,24 @@ def parts_of(name: str) -> tuple[str, ...]:
         for part in ([word] if word.lower() in _vocabulary() | UNIT_PARTS else _EDGE.split(word.replace("StB", "Stb")))
     ]
     return tuple(SYNONYMS.get(part, part) for word in words for part in _cut(word))
+
+
+@cache
+def _translations() -> tuple[re.Pattern[str], dict[str, str]]:
+    """A regular expression of all words of other scripts, longer ones first, and word -> known words."""
+    pairs = [(word.replace("_", " "), known) for known, words in TRANSLATED.items() for word in words.split()]
+    words = {unicodedata.normalize("NFKC", word): known for word, known in pairs}
+    longest = sorted(words, key=lambda word: -len(word))
+    return re.compile("|".join(map(re.escape, longest)), re.IGNORECASE), words
+
+
+def _translation(found: re.Match[str]) -> str:
+    return f" {_translations()[1][found[0].lower()]} "
+
+
+def known_words(text: str) -> int:
+    """How many different words of other scripts are in a text: few if it is read in a wrong encoding."""
+    return len({*_translations()[0].findall(text)})
 
 
 def _spelt(text: str, place: int) -> str:
@@ -314,6 +395,7 @@ def _spelt(text: str, place: int) -> str:
 
 def units_in(name: str) -> list[str]:
     """Return what a name has in brackets, after a blank and a slash as in `Schub / kN`, or after a comma."""
+    name = name.translate(WIDE)
     after = _AFTER.search(name)
     return [*re.findall(r"[\[(]([^\])]*)[\])]", name), *([after.group(1).strip()] if after else [])]
 
@@ -390,7 +472,7 @@ def is_magnetic(name: str) -> bool:
 
 def side_of(name: str) -> str | None:
     """Return the side or place in a name, such as `port`; None if there is none."""
-    bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name))  # 1/s is no starboard
+    bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name.translate(WIDE)))  # 1/s is no starboard
     parts = set(parts_of(name)) | set(re.split(r"[^a-z]+", bare.lower()))
     for side, words in SIDE_WORDS.items():
         if len(parts - {""}) > 1 and set(words.split("|")) & parts:

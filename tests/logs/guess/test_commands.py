@@ -156,7 +156,9 @@ def test_a_fast_engine_is_asked_for_its_gear(name: str, top: float, asked: bool)
     assert any("is there a gear? Write factor = 1 / its ratio" in one.sentence for one in state.questions) == asked
 
 
-@pytest.mark.parametrize("name", ["rpm", "engine_rpm", "engineRPM", "me rpm", "propellerpm", "ME RPM", "MERPM"])
+@pytest.mark.parametrize(
+    "name", ["rpm", "engine_rpm", "engineRPM", "me rpm", "propellerpm", "ME RPM", "MERPM", "M/E RPM"]
+)
 def test_turns_of_an_engine_are_not_electrical(name: str) -> None:
     state = chosen({name: 400 + 50 * np.sin(T)})
     assert not any("poles" in question.sentence for question in state.questions)

@@ -113,6 +113,27 @@ def test_encodings(encoding: str, expected: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("names", "encoding"),
+    [
+        (("時刻", "船首方位", "舵角"), "cp932"),
+        (("时间", "艏向", "舵角"), "gb18030"),
+        (("시간", "선수방위", "타각"), "cp949"),
+        (("Время", "Курс", "Угол руля"), "cp1251"),
+        (("時刻", "船首方位", "舵角"), "utf-8"),
+    ],
+)
+def test_encodings_of_other_scripts(names: tuple[str, ...], encoding: str, tmp_path: Path) -> None:
+    table = TABLE.set_axis(names, axis=1)
+    (tmp_path / "log.csv").write_bytes(text(table=table).encode(encoding))
+    sniffed = sniff(tmp_path / "log.csv")
+    assert (sniffed.form["encoding"], sniffed.clock["from"]) == (encoding, names[0])
+    assert tuple(sniffed.columns) == names[1:]
+    pd.testing.assert_frame_equal(
+        read_table(tmp_path / "log.csv", TextFormat(encoding=encoding), names[0]), table.astype(str)
+    )
+
+
+@pytest.mark.parametrize(
     ("clock", "unit", "t"),
     [
         ((1000 * T).astype(int), "ms", T),
