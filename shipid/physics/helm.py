@@ -39,27 +39,32 @@ class Helmsman:
 
 @lru_cache
 def zigzag(commands: tuple[str, ...]) -> Helmsman:
-    """Zigzag: reverse the helm when the heading has changed from the approach course by the execute heading.
+    """Zigzag: reverse the helm when the heading has changed from the original heading by the execute heading.
 
-    Inputs: each command as first executed; `course` of the approach [rad]; `execute_heading` [rad], the change of
-    heading at which the helm is first reversed, > 0 to starboard. Memory `side`: +1 as first executed, -1 reversed.
-    The order is reversed in the first step that starts at or beyond the execute heading.
+    The original heading is that at the first order (MSC.137(76), 4.2.6). Inputs: each command as first executed;
+    `executed`, 0 before the first order and 1 from it on; `execute_heading` [rad], the change of heading at which the
+    helm is first reversed, > 0 to starboard. Memory `side`: +1 as first executed, -1 reversed; `executed`, whether the
+    first order was given, and `original` [rad], the heading at which it was. The order is reversed in the first step
+    that starts at or beyond the execute heading.
     """
 
+    def original(signals: Named, memory: Named) -> Any:
+        return ca.if_else(memory["executed"] > 0, memory["original"], signals["psi"])
+
     def side(signals: Named, inputs: Named, memory: Named) -> Any:
-        turned = memory["side"] * (signals["psi"] - inputs["course"]) * inputs["execute_heading"]
+        turned = memory["side"] * (signals["psi"] - original(signals, memory)) * inputs["execute_heading"]
         return ca.if_else(turned >= inputs["execute_heading"] ** 2, -memory["side"], memory["side"])
 
     def orders(signals: Named, inputs: Named, memory: Named) -> Named:
         return _steered(commands, inputs, side(signals, inputs, memory))
 
-    return Helmsman(
-        "zigzag",
-        {**units(commands), "course": "rad", "execute_heading": "rad"},
-        {"side": 1.0},
-        orders=orders,
-        advance=lambda signals, inputs, memory, _dt: {"side": side(signals, inputs, memory)},
-    )
+    def advance(signals: Named, inputs: Named, memory: Named, _dt: Any) -> Named:
+        now = {"original": original(signals, memory), "executed": inputs["executed"]}
+        return {"side": side(signals, inputs, memory), **now}
+
+    inputs = {**units(commands), "executed": "-", "execute_heading": "rad"}
+    memory = {"side": 1.0, "original": 0.0, "executed": 0.0}
+    return Helmsman("zigzag", inputs, memory, orders=orders, advance=advance)
 
 
 @lru_cache

@@ -295,10 +295,11 @@ class PullOut(HelmOver):
 
 
 class Zigzag(HelmOver):
-    """The helm is reversed each time the heading has changed from the course by the execute heading."""
+    """The helm is reversed each time the heading has changed from that at the first order by the execute heading."""
 
     execute_heading_deg: Annotated[
-        Positive | None, Field(description="deg off the course, to either side; absent: as the helm")
+        Positive | None,
+        Field(description="deg off the heading at the first order, to either side; absent: as the helm"),
     ] = None
 
     @property
@@ -311,9 +312,9 @@ class Zigzag(HelmOver):
         return helm.zigzag(controls.commands)
 
     def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
-        """Name -> (T,) [SI]: first helm angle, shaft speeds, course and execute heading (inputs of the helmsman)."""
-        headings = {"course": self.course_deg, "execute_heading": self.sense * self.reversal_deg}
-        more = {name: np.full(len(t), value * DEGREE) for name, value in headings.items()}
+        """Name -> (T,) [SI]: first helm angle, shaft speeds, whether executed, execute heading: for the helmsman."""
+        reversal = np.full(len(t), self.sense * self.reversal_deg * DEGREE)
+        more = {"executed": np.where(_from(self.execute_at, t), 1.0, 0.0), "execute_heading": reversal}
         return super().inputs(controls, t, speed) | more
 
 

@@ -228,7 +228,7 @@ def test_actuators_of_a_helmsman_begin_at_his_first_order(draw_inputs: Draw) -> 
     commands = dynamics(vessel).commands
     given = draw_inputs(vessel, 2)
     orders = {name: np.linspace(1.0, 2.0, 6)[:, None] * values for name, values in given["commands"].items()}
-    helm = {"course": np.zeros(2), "execute_heading": np.full(2, 9.0)}
+    helm = {"executed": np.ones(2), "execute_heading": np.full(2, 9.0)}
     given["commands"] = {name: orders[name] for name in commands} | helm
     path = rollout(vessel, **given, helmsman=zigzag(commands), step=1.0, num_steps=6, engine="casadi")
     np.testing.assert_allclose(path["actual.port.n"][0, 0], orders["port.n"][0])

@@ -72,8 +72,9 @@ def sailing(solution: Solution) -> Vessel:
 
 @lru_cache
 def late_helmsman(commands: tuple[str, ...]) -> Helmsman:
-    """The zigzag's, who reacts to the heading of `LATE` ago."""
+    """The zigzag's, who reacts to the heading of `LATE` ago, and counts from the course that was ordered, 0."""
     prompt = helm.zigzag(commands)
+    ordered = {"original": 0.0, "executed": 1.0}
 
     def past(signals: Named) -> Named:
         return {**signals, "psi": signals["psi"] - LATE * signals["r"]}
@@ -82,8 +83,8 @@ def late_helmsman(commands: tuple[str, ...]) -> Helmsman:
         "late zigzag",
         prompt.inputs,
         prompt.memory,
-        orders=lambda signals, given, memory: prompt.orders(past(signals), given, memory),
-        advance=lambda signals, given, memory, dt: prompt.advance(past(signals), given, memory, dt),  # type: ignore[misc]
+        orders=lambda signals, given, memory: prompt.orders(past(signals), given, memory | ordered),
+        advance=lambda signals, given, memory, dt: prompt.advance(past(signals), given, memory | ordered, dt),  # type: ignore[misc]
     )
 
 
@@ -101,7 +102,7 @@ def simulated(vessel: Vessel, log: Mapping[str, np.ndarray], run: str) -> Measur
     inputs = {
         "propeller.n": log["propeller.n"][:-1, None],
         "rudder.delta": helm_over[:, None],
-        "course": np.zeros(1),
+        "executed": np.ones(1),
         "execute_heading": np.full(1, side * trial["execute_heading"].value),
     }
     start = {name: log[name][:1] for name in model.state}

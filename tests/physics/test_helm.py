@@ -35,15 +35,29 @@ def test_one_helmsman_per_set_of_commands(make: Any) -> None:
     ("turned", "side", "after"), [(0.1, 1, 1), (0.2, 1, -1), (0.3, 1, -1), (0.1, -1, -1), (-0.2, -1, 1)]
 )
 def test_zigzag_reverses_at_the_execute_heading(first: int, turned: float, side: int, after: int) -> None:
-    """With execute heading 0.2 rad either side of a course of 1 rad; the mirror image does the mirror image."""
-    inputs = {"port.n": 2.0, "port.alpha": -0.3 * first, "rudder.delta": 0.4 * first, "course": 1.0}
+    """With execute heading 0.2 rad either side of a heading of 1 rad; the mirror image does the mirror image."""
+    inputs = {"port.n": 2.0, "port.alpha": -0.3 * first, "rudder.delta": 0.4 * first, "executed": 1.0}
     inputs["execute_heading"] = 0.2 * first
-    seen, memory = {"psi": 1.0 + turned * first * 1.0000001}, {"side": ca.DM(side)}
+    seen = {"psi": ca.DM(1.0 + turned * first * 1.0000001)}
+    memory = {"side": ca.DM(side), "original": ca.DM(1.0), "executed": ca.DM(1.0)}
     helmsman = zigzag(COMMANDS)
     ordered = numbers(helmsman.orders(seen, inputs, memory))
     assert ordered == {"port.n": 2.0, "port.alpha": -0.3 * first * after, "rudder.delta": 0.4 * first * after}
     assert helmsman.advance is not None
-    assert numbers(helmsman.advance(seen, inputs, memory, 0.1)) == {"side": after}
+    assert numbers(helmsman.advance(seen, inputs, memory, 0.1)) == {"side": after, "original": 1.0, "executed": 1.0}
+
+
+@pytest.mark.parametrize("psi", [-0.7, 0.0, 0.7])
+def test_zigzag_counts_from_the_heading_at_the_first_order(psi: float) -> None:
+    """However far wind has turned her before: nothing is reversed then, and the heading is kept from the order on."""
+    helmsman, seen = zigzag(COMMANDS), {"psi": ca.DM(psi)}
+    inputs = {"port.n": 2.0, "port.alpha": -0.3, "rudder.delta": 0.4, "execute_heading": 0.2}
+    memory = {name: ca.DM(value) for name, value in helmsman.memory.items()}
+    assert helmsman.advance is not None
+    for executed in (0.0, 1.0):
+        assert numbers(helmsman.orders(seen, inputs | {"executed": executed}, memory))["rudder.delta"] == 0.4
+        after = numbers(helmsman.advance(seen, inputs | {"executed": executed}, memory, 0.1))
+        assert after == {"side": 1.0, "original": psi, "executed": executed}
 
 
 def test_yaw_rate_law() -> None:

@@ -10,6 +10,8 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DocumentError
+from shipid.measures.recognise import record_of
+from shipid.measures.zigzag import zigzag
 from shipid.simulation.manoeuvre import (
     KINDS,
     CrashStop,
@@ -75,6 +77,28 @@ def test_zigzag_reverses_at_the_execute_heading_within_one_step() -> None:
         one_step = 0.1 * np.abs(log["r"]).max() / DEGREE
         assert (beyond >= -1e-9).all()
         assert (beyond <= one_step).all()
+
+
+@pytest.mark.parametrize("side", ["starboard", "port"])
+@pytest.mark.parametrize("beta", [45.0, 90.0, 135.0])
+def test_a_zigzag_counts_from_the_heading_at_the_first_order(side: str, beta: float) -> None:
+    """Wind turns the ship by 2 to 44 deg before it: the zigzag begins to the side asked for, about that heading."""
+    chosen = Zigzag(n_rpm=145, angle_deg=10, side=side, execute_at=60, duration=160)  # type: ignore[arg-type]
+    log = one(SHIP, chosen, environment={"V_w": 20.0, "beta_w": beta * DEGREE})
+    psi, order, r = (log[name].to_numpy() / DEGREE for name in ("psi", "port.alpha", "r"))
+    executes = np.flatnonzero(np.diff(order)) + 1
+    first, sense = executes[0], 1.0 if side == "starboard" else -1.0
+    assert log["t"][first] == pytest.approx(60.0)
+    assert abs(psi[first]) > 1
+    helm = -order[executes] / 10  # the azimuths turn the other way
+    np.testing.assert_allclose(helm, sense * (-1.0) ** np.arange(len(executes)))
+    assert len(executes) >= 4
+    beyond = helm[:-1] * (psi[executes[1:]] - psi[first]) - 10
+    assert (beyond >= 0).all()
+    assert (beyond <= 0.1 * np.abs(r).max()).all()
+    measures = zigzag(record_of({name: log[name].to_numpy() for name in log if name != "run"}))
+    assert measures["execute_heading"].value == pytest.approx(10 * DEGREE)
+    assert 0 < measures["overshoot_1"].value < 2 * DEGREE
 
 
 def test_zigzag_takes_the_ordered_helm_and_side_first() -> None:
