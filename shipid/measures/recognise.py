@@ -27,7 +27,9 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     The helm is the mean of the angle commands that move, by a quarter of the one that moves most or more: a bow unit
     parked across, or the offset of a rudder at rest, is no helm. Each has the sign that turns the ship to starboard:
     that in `helm`, angle command -> +1 or -1, where the vessel is known; else the sign of the sum of angle times change
-    of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start.
+    of yaw rate. The shaft is the mean of the shaft speeds that are ahead at the start and later astern, else of those
+    that later stop, else of those that are not 0 at the start: a tunnel thruster that runs all the time is none of them
+    in a stop.
 
     Raises
     ------
@@ -42,12 +44,19 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     moved = {name: float(np.ptp(angle)) for name, angle in angles.items() if known.get(name, 0.0) and angle.any()}
     least = MIDSHIPS * max(moved.values(), default=0.0)
     helms = [known[name] * angles[name] for name, size in moved.items() if size >= least]
-    running = [shaft for shaft in shafts if shaft[0] != 0]
+    running = _running(shafts)
     return Record(
         **states,
         helm=np.mean(helms, axis=0) if helms else np.zeros(len(states["t"])),
         shaft=np.mean(running, axis=0) if running else None,
     )
+
+
+def _running(shafts: list[Array]) -> list[Array]:
+    """Shaft speeds that drive the ship, as `record_of` says."""
+    ahead = [shaft for shaft in shafts if shaft[0] > 0]
+    astern, stopped = ([shaft for shaft in ahead if below(shaft.min(), 0)] for below in (np.less, np.less_equal))
+    return astern or stopped or [shaft for shaft in shafts if shaft[0] != 0]
 
 
 def _commands(columns: Mapping[str, Array], wanted: Callable[[str], bool]) -> dict[str, Array]:

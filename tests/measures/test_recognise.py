@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DataError
-from shipid.measures import turning, zigzag
+from shipid.measures import stop, turning, zigzag
 from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.record import Record
 from shipid.units import DEGREE
@@ -42,6 +42,20 @@ def test_shafts_that_run_and_columns_that_lack() -> None:
     del given["psi"]
     with pytest.raises(DataError, match="psi: missing column"):
         record_of(given)
+
+
+@pytest.mark.parametrize("tunnel", [-9.0, -0.5, 0.5, 9.0])
+@pytest.mark.parametrize("astern", [-1.0, 0.0])
+def test_a_tunnel_that_runs_during_a_stop_is_no_shaft_of_it(tunnel: float, astern: float) -> None:
+    """In revolutions it may be faster than the screw: the mean of both never went astern, or was so from the start."""
+    record = every(RECORDS["stop"](), 0.5)
+    assert record.shaft is not None
+    shaft = np.maximum(record.shaft, astern)
+    given = columns(record) | {"screw.n": shaft, "bow.n": np.full(len(record.t), tunnel)}
+    seen = record_of(given)
+    np.testing.assert_array_equal(seen.shaft, shaft)
+    assert stop(seen)["execute"].value == START
+    assert kinds_of(seen)[0] == (("stop",) if astern < 0 else ())
 
 
 def run(legs: list[tuple[float, float]], end: float) -> Record:
