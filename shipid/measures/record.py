@@ -23,6 +23,7 @@ LEFT = 0.05  # of the rise of an angle in motion: how near to the level before i
 LOOSE = 0.1  # of that rise: how far values may scatter about a level and the line after it
 FEWEST_LINE = 3  # rows of an angle in motion that show its rate
 FEWEST_ROWS = 16  # in which to look for where an angle leaves its level
+FULL = 0.95  # of the helm angle: the helm is all the way over
 STEADY = 0.05  # relative change over a stretch that counts as none
 
 
@@ -289,22 +290,33 @@ class HelmOver:
 def helm_over(record: Record) -> HelmOver:
     """The first execute of a record.
 
-    A helm that is over in the first row counts as executed there if the ship does not turn yet. Otherwise it belongs to
-    an earlier manoeuvre, and the next execute counts.
+    A helm that is over in the first row counts as executed there if the ship does not turn yet, unless she still does
+    not turn where it is first put all the way over: until then it held her course, as against wind. If she turns, it
+    belongs to an earlier manoeuvre, and the next execute counts.
     """
-    size = np.abs(record.helm)
+    size, rate = np.abs(record.helm), np.abs(record.r)
     if not size.max() > 0:
         return HelmOver(NAN, 0, 0.0, 1.0)
-    angle = float(np.median(size[size >= size.max() / 2]))
+    angle = _angle(size)
     over = size >= angle / 2
-    if over[0] and abs(record.r[0]) > STEADY * np.abs(record.r).max():
+    if over[0] and rate[0] > STEADY * rate.max():
         same = np.sign(record.helm) == np.sign(record.helm[0])
         over &= np.logical_or.accumulate(~(over & same))  # the helm of an earlier manoeuvre ends at its first release
+    elif over[0]:
+        angle = _angle(size[int(np.argmax(rate > STEADY * rate.max())) :])
+        full = int(np.argmax(size >= FULL * angle))
+        if full and np.interp(departure(record.t, record.helm, full), record.t, rate) <= STEADY * rate.max():
+            over[:full] = False
     if not over.any():
         return HelmOver(NAN, 0, 0.0, 1.0)
     row = int(np.argmax(over))
     start = departure(record.t, record.helm, row) if row else float(record.t[0])
     return HelmOver(start, row, angle, float(np.sign(record.helm[row])))
+
+
+def _angle(size: Array) -> float:
+    """Helm angle [rad] of a manoeuvre: the median of the sizes above half of the largest."""
+    return float(np.median(size[size >= size.max() / 2]))
 
 
 def released(record: Record, over: HelmOver) -> int:

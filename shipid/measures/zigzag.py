@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from shipid.measures.record import (
+    FULL,
     NAN,
     STILL,
     Array,
@@ -52,7 +53,7 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
     t = record.t
     around = value_at(t, record.psi, start) if course is None else course
     off = over.side * (record.psi - around)
-    angle = _seen(record, off, helm, start) if execute_heading is None else abs(execute_heading)
+    angle = _seen(record, off, over) if execute_heading is None else abs(execute_heading)
     executes = _executes(t, off, angle, start)
     before = float(np.interp(start, t, record.speed)) if np.isfinite(start) else NAN
     measures.add("execute", start, "s", STILL)
@@ -108,14 +109,16 @@ def _legs(executes: list[float], end: float) -> list[tuple[float, float]]:
     return legs + [(NAN, NAN)] * (2 - len(legs))
 
 
-def _seen(record: Record, off: Array, helm: float, start: float) -> float:
+def _seen(record: Record, off: Array, execute: HelmOver) -> float:
     """Execute heading [rad]: change of heading from the course at which the helm is reversed.
 
     It is between the last row with the old helm and the next row, or slightly before because of the delay of the helm:
     the multiple of 5 deg there, else the last whole degree.
     """
+    helm = execute.angle
     over = np.where(np.abs(record.helm) >= helm / 2, np.sign(record.helm), 0.0)
-    rows = np.flatnonzero((over != 0) & (record.t >= start))
+    rows = np.flatnonzero(over)
+    rows = rows[rows >= execute.row]
     pairs = [(a, b) for a, b in pairwise(rows) if over[a] != over[b]]
     if not pairs:
         return NAN
@@ -130,5 +133,5 @@ def _seen(record: Record, off: Array, helm: float, start: float) -> float:
 
 def _last_full(size: Array, helm: float) -> int:
     """Last row with at least 95 % of the helm angle [rad]; the last row if there is none."""
-    full = np.flatnonzero(size >= 0.95 * helm)
+    full = np.flatnonzero(size >= FULL * helm)
     return int(full[-1]) if len(full) else len(size) - 1
