@@ -31,6 +31,7 @@ CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, an
 PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose speed settles over some 20
 SETTLED = 1e-3  # m/s, rad/s: greatest change of a velocity over the last chunk, and greatest yaw rate
 SLOW = 0.02  # s: the same in U^2 / L, for a large and slow ship: her speed is then right to about 1 %
+STRAIGHT = 0.02  # rad in a ship length: a large and slow ship that turns less goes straight
 CREEPING = 0.02  # Froude number: a ship that is slower, or at rest, is taken for one of it
 KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
 LENGTH, FASTEST = 100.0, 100.0  # m, of a ship whose document does not say; m/s
@@ -214,6 +215,7 @@ def steady(controls: Controls, n: Array, *, step: float, method: Method, engine:
 
     Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s (large and slow ships: by
     0.02 s U^2 / L), with the helm amidships, or held on course by a helmsman. Position and heading are then set to 0.
+    With the helm amidships she goes straight if she turns by less than 0.001 rad/s, and 0.02 rad in a ship length.
 
     Raises
     ------
@@ -290,7 +292,8 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
         moving = moving[unsettled]  # steady samples are frozen: no result may depend on the other samples
         if not len(moving):
             if not held:
-                _check_straight(vessel, n, state["r"])
+                straight = np.minimum(SETTLED, STRAIGHT * reached / asked.length)
+                _check_straight(vessel, n, np.abs(state["r"]) >= straight)
             helm = _held(controls, model, state, memory, orders) if held else {}
             anew = ("north", "east", "psi", *(name for name in model.hidden if name.startswith("waves.")))
             kept = {name: values for name, values in memory.items() if not name.startswith(f"{HELM}.")}
@@ -354,8 +357,7 @@ def _held(
     return {name: given[name] for name in controls.helm}
 
 
-def _check_straight(vessel: Vessel, n: Array, r: Array) -> None:
-    turning = np.abs(r) >= SETTLED
+def _check_straight(vessel: Vessel, n: Array, turning: NDArray[np.bool_]) -> None:
     if turning.any():
         raise NotStraight(
             f"{vessel.name} turns with the helm amidships at {_rpm(n, turning)} rpm, so it has no straight approach: "

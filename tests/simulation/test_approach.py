@@ -7,7 +7,15 @@ import pytest
 from scipy.optimize import fsolve
 
 from shipid.errors import DocumentError, ShipidError
-from shipid.simulation.approach import Controls, NotStraight, acceleration, helm_effect, steady, thrust_sharing
+from shipid.simulation.approach import (
+    Controls,
+    NotStraight,
+    acceleration,
+    balanced_shaft,
+    helm_effect,
+    steady,
+    thrust_sharing,
+)
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.template import Particulars, first_guess
@@ -150,6 +158,15 @@ def test_a_vessel_that_turns_with_the_helm_amidships_has_no_straight_approach() 
     lame = Controls.of(SHIP.with_values({"thruster.starboard.off": True}))
     with pytest.raises(ShipidError, match="turns with the helm amidships at 120 rpm"):
         steady(lame, np.array([2.0]), step=0.1, method="rk4", engine="casadi")
+
+
+@pytest.mark.parametrize("speed", [3.0, 2.0, 0.5])
+def test_a_large_ship_that_turns_goes_no_straighter_because_she_is_slow(speed: float) -> None:
+    """7 deg in a ship length at any speed: at 2 m/s that is less than 0.001 rad/s."""
+    controls = Controls.of(load_vessel("esso-190k"))
+    n = balanced_shaft(controls, speed)
+    with pytest.raises(NotStraight, match="turns with the helm amidships"):
+        steady(controls, np.array([n]), step=1.0, method="euler", engine="casadi")
 
 
 LAGS = {"thruster.port.actuator.alpha": {"kind": "first_order", "T": 0.5, "rate": 0.21}}
