@@ -323,7 +323,7 @@ def hull(given: Particulars) -> Values:
         "N_v": Value(s * (0.5 + 2.4 * T / L), "prime", clarke),
         "N_r": Value(s * (0.25 + 0.039 * B / T - 0.56 * B / L), "prime", clarke),
         "N_|v|v": Value(0.96 * slender - 0.066, "prime", f"0.96 (1 - C_b) T / B - 0.066, {kijima}"),
-        "N_|r|r": Value(0.5 * full - 0.09, "prime", f"0.5 C_b B / L - 0.09, {kijima}"),
+        "N_|r|r": Value(min(0.5 * full - 0.09, 0.0), "prime", f"0.5 C_b B / L - 0.09, at most 0, {kijima}"),
         "N_vrr": Value(0.5 * C_b * T / B - 0.05, "prime", f"0.5 C_b T / B - 0.05, {kijima}"),
         "N_vvr": Value(
             -(57.5 * full**2 - 18.4 * full + 1.6), "prime", f"-(57.5 (C_b B / L)^2 - 18.4 C_b B / L + 1.6), {kijima}"

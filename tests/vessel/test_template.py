@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.simulation.approach import Controls, acceleration
 from shipid.simulation.manoeuvre import TurningCircle, Zigzag
@@ -115,6 +116,21 @@ def test_two_screws_without_a_rudder_turn_the_ship_by_their_difference() -> None
             assert acceleration(proposal.vessel, given.service, orders)[2] * (port - starboard) > 0
     with pytest.raises(ShipidError, match="--shafts: two screws steer by their difference"):
         first_guess(replace(MARINER, propulsor="differential", shafts=1), "m", "m.toml")
+
+
+@pytest.mark.parametrize(("beam", "block"), [(18.0, 0.88), (15.0, 0.85), (16.0, 0.75)])
+def test_a_wide_and_full_ship_that_turns_on_the_spot_settles(beam: float, block: float) -> None:
+    """A barge under opposite screws: Kijima's N_rr changes its sign at C_b B / L = 0.18, and would spin her up."""
+    given = Particulars(length=60.0, beam=beam, draught=4.0, block=block, speed=3.0, propulsor="differential")
+    guess = first_guess(given, "barge", "barge.toml")
+    model, n = dynamics(guess.vessel), np.full(1, guess.n / 2)
+    rest, calm = ({name: np.zeros(1) for name in names} for names in (model.state, model.environment))
+    orders = {"port.n": n, "starboard.n": -n}
+    path = rollout(guess.vessel, rest, orders, calm, step=0.5, num_steps=7200, every=1200, method="rk4")
+    assert not path.diverged.any()
+    r = np.rad2deg(path["r"][:, 0, 0])
+    assert 0.05 < r[-1] < 1
+    assert r[-1] == pytest.approx(r[-2], rel=0.02)
 
 
 @pytest.mark.parametrize("propulsor", ["propeller-rudder", "azimuth", "differential"])
