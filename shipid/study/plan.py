@@ -733,9 +733,9 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
     if not repeat and not conditions:
         return {}
     names = [condition.name for condition in conditions]
-    for place, name in enumerate(names):
-        if name in names[:place]:
-            raise DocumentError(f"two conditions are called {name!r}", file=file, path=f"condition.{place}.name")
+    for place in range(len(names)):
+        if twice := _twice(names[: place + 1]):
+            raise DocumentError(f"two conditions are called {twice}", file=file, path=f"condition.{place}.name")
     bare = {key: value for key, value in plan.document.items() if key not in OF_PARTS}
     turns = [dict(zip(repeat, values, strict=True)) for values in product(*repeat.values())]
     parts: dict[str, Part] = {}
@@ -890,7 +890,7 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
     foundations: list[Foundation] = []
     for index, family in enumerate(families):
         assert family.base is not None  # written out by resolve
-        if family.name == NO_MODEL:
+        if family.name.lower() == NO_MODEL:
             message = "this name is taken by the foundation without physics"
             raise DocumentError(message, file=file, path=f"family.{index}.name")
         vessel = _vessel(family.base, file, f"family.{index}.base", known)
@@ -911,11 +911,24 @@ def _foundations(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Fo
             foundations.append(
                 Foundation(name, family.name, variant.member, variant, vessel, described, settings, observer)
             )
-    names = [foundation.name for foundation in foundations]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise DocumentError(f"two models would have the name {twice!r}: rename a family", file=file, path="family")
+    if twice := _twice([foundation.name for foundation in foundations]):
+        raise DocumentError(f"two models would be called {twice}: rename a family", file=file, path="family")
     return (*foundations, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
+
+
+def _twice(names: Sequence[str]) -> str:
+    """The first two names that would be one file, in words; empty where there are none.
+
+    Many file systems do not tell capitals from small letters: the files of one model would replace those of the other.
+    """
+    first: dict[str, str] = {}
+    for name in names:
+        key = name.lower()
+        if key in first:
+            same = first[key]
+            return repr(name) if same == name else f"{same!r} and {name!r}, which are one file on many systems"
+        first[key] = name
+    return ""
 
 
 def _root(families: Sequence[Family], index: int, file: Path) -> int:
@@ -966,8 +979,8 @@ def _methods(study: Study, foundations: Sequence[Foundation], file: Path) -> tup
     families = list(dict.fromkeys(foundation.family for foundation in foundations))
     for index, block in enumerate(study.method):
         path = f"method.{index}"
-        if block.name in (way.name for way in ways):
-            raise DocumentError(f"two methods are called {block.name!r}", file=file, path=f"{path}.name")
+        if twice := _twice([*(way.name for way in ways), block.name]):
+            raise DocumentError(f"two methods are called {twice}", file=file, path=f"{path}.name")
         try:
             method = method_of(block.kind, block.settings, path)
         except DocumentError as error:

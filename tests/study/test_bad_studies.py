@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -47,7 +48,7 @@ BROKEN = {
     "parameters-without-factor": ("family.wrong.perturb.0", "are needed together"),
     "negative-mass": ("family.wrong", "inertia.m: -410931.81"),
     "family-called-none": ("family.none.name", "taken by the foundation without physics"),
-    "family-called-like-a-member": ("family", "two models would have the name 'wrong-1'"),
+    "family-called-like-a-member": ("family", "two models would be called 'wrong-1'"),
     "two-families-of-one-name": ("family.1.name", "two families are called 'right'"),
     "family-with-a-slash": ("family.a/b.name", "'a/b'"),
     "no-families": ("family", "must have 1 or more"),
@@ -133,6 +134,21 @@ def test_broken(name: str) -> None:
     assert line.startswith(str(FOLDER / f"{name}.toml") + ": ")
     assert (caught.value.path or "") == path
     assert remedy in line
+
+
+@pytest.mark.parametrize(
+    ("changes", "path", "names"),
+    [
+        ({"family.right.name": "WRONG-2"}, "family", "'WRONG-2' and 'wrong-2'"),
+        ({"method": [{"name": name, "kind": "alone"} for name in ("a", "b", "A")]}, "method.A.name", "'a' and 'A'"),
+        ({"condition": [{"name": "Held"}, {"name": "held"}]}, "condition.held.name", "'Held' and 'held'"),
+    ],
+)
+def test_names_that_differ_in_capitals_alone_are_one_file(changes: dict[str, Any], path: str, names: str) -> None:
+    """Where a file system does not tell them apart, the cells of one would be those of the other."""
+    with pytest.raises(DocumentError, match=f"called {names}, which are one file on many systems") as caught:
+        read_plan(FOLDER / "plain.toml", changes)
+    assert caught.value.path == path
 
 
 @pytest.mark.parametrize("name", ["nowhere.toml", "./nowhere.toml", "quik"])
