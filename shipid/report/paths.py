@@ -155,7 +155,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
                     continue
                 which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
                 at = counts.index(size) if source == "cooperative" else -1
-                paths.append([which, at, *tracks.columns(points), _rounded(_end_error(window, points), 0.001)])
+                paths.append([which, at, *tracks.columns(points), _rounded(_end_error(window, points), 1e-6)])
                 if (model, source, size) in window.bands:
                     paths[-1] += tracks.columns(window.bands[model, source, size])
             wind = None if window.wind is None else [round(value, 3) for value in window.wind]

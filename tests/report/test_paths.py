@@ -33,6 +33,16 @@ def test_windows_hold_truth_and_paths_closer_than_a_pixel(full_scale, away):
             assert end == pytest.approx(np.hypot(*(source.paths[key] - source.truth)[-1]), abs=0.0051)
 
 
+def test_end_errors_of_a_ship_model_keep_the_digits_that_the_page_writes(full_scale):
+    """Errors of tenths of a millimetre: rounded to millimetres they were 0.00 m and 0.0080 m on the page."""
+    first = full_scale.snapshots[0]
+    key = next(iter(first.paths))
+    for error in (0.0004, 0.0079):
+        moved = first.truth + np.array([error, 0.0])
+        (run,) = paths.window_data(replace(full_scale, snapshots=[replace(first, paths={key: moved})]))["runs"]
+        assert run[0]["paths"][0][4] == pytest.approx(error, abs=1e-6)
+
+
 def test_points_that_are_no_numbers_are_gaps():
     tracks = paths._Tracks()
     sound = tracks.columns(np.array([[0.0, 0.0], [1.2345, -2.0]]))
