@@ -149,9 +149,12 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     sentences = [(f"{'; '.join(caveats)}.", "cells")] if caveats else []
     largest = int(rows["N_D"].max()) if len(rows) else 0
     best = best_model(results)
+    meets = {name for name, way in results.plan.pairs if way.name == results.plan.judged}
     judged_by = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
     if len(rows) and not judged_by.compensates:
         return [*sentences, (_nothing_learns(results, rows[rows["N_D"] == largest]), "cells")]
+    if len(rows) and meets == {NO_MODEL}:
+        return [*sentences, (_apart(results, largest), "cells")]
     if best is None:
         where = f" at {runs(largest)}" if largest else ""
         return [*sentences, (f"No cell with physics has a result{where}, so there is no conclusion yet.", "cells")]
@@ -171,7 +174,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
         spoken = f"The study has {len(learning)} methods that learn from data; the other sentences speak of "
         sentences.append((f"{spoken}{results.plan.judged!r}, the one that the study judges by.", "cells"))
         sentences += which if len(learning) < MANY else []
-    sentences += [(text, chart) for text in _physics_or_none(case, judged)]
+    sentences += [(text, chart) for text in _physics_or_none(case, judged, NO_MODEL in meets)]
     known = case.at(largest)
     known = known[known["A"] > 0]  # an exact model has no error that could be left
     if len(known):
@@ -190,11 +193,25 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
 
 def _nothing_learns(results: Results, rows: pd.DataFrame) -> str:
     """What physics alone reaches, where the method that the study judges by learns nothing from data."""
-    errors = sorted(zip(rows["H"], rows["model"], strict=True))[:SHOWN]
-    shown = ", ".join(f"{model} {metres(H)}" for H, model in errors)
-    least = f" (the least of {len(rows)})" if len(rows) > SHOWN else ""
     begins = f"The method {results.plan.judged!r} learns nothing from data. Mean errors of physics alone"
-    return f"{begins}, {_ahead(results)} ahead{least}: {shown}."
+    return f"{begins}, {_ahead(results)} ahead{_least(rows.set_index('model')['H'])}."
+
+
+def _apart(results: Results, amount: int) -> str:
+    """What methods without physics reach, and what physics alone, where no method that learns has physics."""
+    cells = results.cells[(results.cells["status"] == "ok") & (results.cells["N_D"] == amount)]
+    pure = cells["foundation"] == NO_MODEL
+    learned, alone = (cells[which].groupby(by)["H"].mean() for which, by in ((pure, "method"), (~pure, "foundation")))
+    begins = "No method that learns from data has physics in this study. Mean errors"
+    physics = f"; of physics alone{_least(alone)}" if len(alone) else ""
+    return f"{begins} {_ahead(results)} ahead, with {runs(amount)} and without physics{_least(learned)}{physics}."
+
+
+def _least(errors: pd.Series[float]) -> str:
+    """The least of some errors [m] by name, as the end of a sentence."""
+    shown = errors.sort_values(kind="stable")[:SHOWN]
+    of = f" (the least of {len(errors)})" if len(errors) > SHOWN else ""
+    return f"{of}: {', '.join(f'{name} {metres(value)}' for name, value in shown.items())}"
 
 
 def _has_map(table: pd.DataFrame) -> bool:
@@ -348,8 +365,14 @@ def _caveats(results: Results) -> list[str]:
     return sentences
 
 
-def _physics_or_none(case: Case, judged: bool) -> list[str]:
-    """Which physics models, compensated, beat none and which harm, at the smallest and the largest amount of data."""
+def _physics_or_none(case: Case, judged: bool, planned: bool) -> list[str]:
+    """Which physics models, compensated, beat none and which harm, at the smallest and the largest amount of data.
+
+    judged, planned : whether every cell without physics has a result, and whether the study has such cells.
+    """
+    if not planned:
+        method = repr(case.results.plan.judged)
+        return [f"The method {method} has no cell without physics, so it is unknown whether physics harms."]
     if not judged:
         where = runs(case.largest)
         return [f"Not every cell has a result without physics, so it is unknown whether physics harms at {where}."]

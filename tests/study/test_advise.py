@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.report.section import declared
@@ -116,7 +117,26 @@ def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
     methods = [{"name": "drawn", "kind": "path-drawn", "families": ["good", "bad"]}]
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0)}), changes={"method": methods}))
     assert "With 30 runs, good (best in validation; 2.00 m mean error alone)" in advice
+    assert "The method 'drawn' has no cell without physics, so it is unknown whether physics harms." in advice
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (None, None)})))
     assert "Not every cell has a result without physics, so it is unknown whether physics harms at 30 runs." in advice
+
+
+def test_methods_without_physics_are_answered_with_their_errors(made: Any) -> None:
+    """No method joins physics and data: that no cell with physics has a result would be untrue."""
+    methods = [{"name": name, "kind": "path-drawn", "families": ["none"]} for name in ("drawn", "other")]
+    methods += [{"name": "alone", "kind": "alone"}]
+    results = made(grid({"none": (4.0, 3.0)}), changes={"method": methods}, claims=None, planned=8)
+    (row,) = results.cells[results.cells["N_D"] == 30].to_dict("records")
+    further = [{**row, "method": "other", "model": "none + other", "H": 2.5}]
+    further += [{**row, "method": "alone", "foundation": "good", "model": "good + alone", "family": "good", "H": 2.0}]
+    results = replace(results, cells=pd.concat([results.cells, pd.DataFrame(further)], ignore_index=True))
+    advice = text(results)
+    assert "no conclusion" not in advice
+    assert (
+        "No method that learns from data has physics in this study. Mean errors 8 s ahead, with 30 runs and without "
+        "physics: other 2.50 m, drawn 3.00 m; of physics alone: good 2.00 m."
+    ) in advice
 
 
 def test_data_that_did_not_help_is_reported(made: Any) -> None:
