@@ -89,8 +89,8 @@ def error_map(content: ReportContent) -> Figure | None:
         id="map",
         title="Physics and data: the map",
         takeaway=_takeaway(rows, spots),
-        how="Each cell is a model, at its A on a square-root scale, trained on N_D manoeuvres; colour is H, mean over "
-        f"seeds. Hatched: H is not below that of {_rival(rows)} at the same N_D."
+        how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
+        + (f" Hatched: H is not below that of {_rival(rows)} at the same N_D." if _pure(rows) else "")
         + (lined if pieces else "")
         + " The bars show the same cells, models in the order of A; the front row is the largest N_D."
         + left_out(content)
@@ -420,10 +420,15 @@ def _heights(most: float) -> list[float]:
     return [float(f"{step * k:.6g}") for k in range(int(most / step) + 1)]
 
 
+def _pure(rows: pd.DataFrame) -> list[str]:
+    """The models without physics."""
+    return [str(name) for name in rows.model[rows.family == DATA_DRIVEN]]
+
+
 def _rival(rows: pd.DataFrame) -> str:
     """The model without physics that others are compared with: by name where there are several."""
-    pure = rows.model[rows.family == DATA_DRIVEN]
-    return "pure data-driven" if len(pure) < 2 else f"{pure.iloc[0]} (pure data-driven)"
+    pure = _pure(rows)
+    return "pure data-driven" if len(pure) < 2 else f"{pure[0]} (pure data-driven)"
 
 
 def _ends(spots: Sequence[Spot]) -> tuple[str, str]:
@@ -436,7 +441,7 @@ def _ends(spots: Sequence[Spot]) -> tuple[str, str]:
 
 def _takeaway(rows: pd.DataFrame, spots: list[Spot]) -> str:
     """Where H is lowest and highest, and up to which A physics helped at every N_D."""
-    pure = set(rows.model[rows.family == DATA_DRIVEN])
+    pure = set(_pure(rows))
     accuracy = dict(zip(rows.model, rows.A, strict=True))
     good = [spot for spot in spots if math.isfinite(spot.H)]
     text = "H runs from {} to {}".format(*_ends(spots))

@@ -109,7 +109,7 @@ def methods(content: ReportContent | MethodsContent) -> Figure | None:
         id="methods",
         title="Methods on the same cells",
         takeaway="".join(verdicts(frame)[:1]) or "No method has physics to improve.",
-        how="Methods are in the order of their mean H over all that is compared. "
+        how="Methods are in the order of their mean H with physics, or without where they have none. "
         "All methods see the same windows, folds and known quantities. Left: H (15) of each family. Right: H less "
         f"that of {reference} over the cells in which both have a result, mean over members, seeds and "
         f"{counted(max(worlds, 1), 'world')}; the 95 % interval comes from a bootstrap over test runs, each drawn with "
@@ -130,10 +130,16 @@ def methods(content: ReportContent | MethodsContent) -> Figure | None:
 
 
 def _order(frame: pd.DataFrame) -> list[str]:
-    """Methods by falling mean H, so that the best is at the top; those without any result first."""
-    means = frame[frame.family.eq(EVERY)].groupby("method", sort=False).H.mean()
+    """Methods by falling mean H, so that the best is at the top; those without any result first.
+
+    The mean is that with physics, or without where a method has none.
+    """
+    means: dict[str, float] = {}
+    for family in (DATA_DRIVEN, EVERY):
+        mine = frame[frame.family.eq(family) & frame.H.notna()]
+        means |= {str(name): float(H) for name, H in mine.groupby("method", sort=False).H.mean().items()}
     names = [str(name) for name in pd.unique(frame.method)]
-    return sorted(names, key=lambda name: -float(means.get(name, math.nan)) if name in means else -math.inf)
+    return sorted(names, key=lambda name: -means.get(name, math.inf))
 
 
 def _look(family: str, families: Sequence[str]) -> Style:

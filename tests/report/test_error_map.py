@@ -162,6 +162,13 @@ def test_of_several_models_without_physics_the_rival_has_its_name(simulation):
     assert "Hatched: H is not below that of no model (pure data-driven) at the same N_D." in figure.how
 
 
+def test_a_map_of_physics_alone_speaks_of_no_rival_and_no_training(simulation):
+    models, cells = (frame[frame.model.ne("no model")] for frame in (simulation.models, simulation.cells))
+    figure = error_map(replace(simulation, models=models, cells=cells))
+    assert "Hatched" not in figure.how
+    assert "trained" not in figure.how
+
+
 def test_there_is_no_map_of_one_size_or_one_model(simulation, full_scale):
     assert error_map(full_scale) is None
     names = ["nominal", "no model"]

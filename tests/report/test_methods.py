@@ -75,6 +75,20 @@ def test_every_number_is_in_the_table_and_every_view_in_the_figure(conditions: t
         assert any(cell.bad for cell in shown) == bool(given["failed"])
 
 
+def test_methods_are_in_the_order_that_the_page_says() -> None:
+    """The best at the top: with physics, or without where a method has none; at the foot what gave no result."""
+    rows = frame(2, ("",))
+    rows.loc[rows.family.eq(EVERY), "H"] = rows.method.map({"a": 3.0, "b": 1.0, "c": 5.0})
+    rows.loc[rows.family.eq("none") & rows.method.eq("b"), "H"] = 99.0
+    rival = rows[rows.method.eq("a") & rows.family.eq("none")]
+    rivals = [rival.assign(method=name, H=H) for name, H in (("r", 2.0), ("s", 4.0))]
+    drawn = methods(content(pd.concat([rows, *rivals], ignore_index=True)))
+    assert drawn is not None
+    ticks = drawn.views["0"][0].plot.layout["yaxis"]["ticktext"]
+    assert ticks == ["lost", "c", "s", "a", "r", "b"]
+    assert "in the order of their mean H with physics, or without where they have none" in drawn.how
+
+
 def test_the_page_is_one_file_that_escapes_its_texts(tmp_path: Path) -> None:
     text = write_comparison(content(frame(3)), tmp_path / "report.html").read_text()
     assert "Which is &lt;best&gt;?" in text
