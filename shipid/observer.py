@@ -35,11 +35,8 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.checked import Checked
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, clock_slack, stretches
-from shipid.data.windows import Commands, PathSource, Windows, to_frame
+from shipid.data.windows import PathSource, Windows
 from shipid.engine.casadi import summed_rates
-from shipid.engine.engines import AUTO, REPEATED
-from shipid.engine.integrate import Method
-from shipid.engine.rollout import rollout
 from shipid.engine.samples import on_samples
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.metrics import position_error
@@ -564,44 +561,6 @@ def observed_start(
     return ObservedStart(begun, environment, tau_extra(filters, columns, horizon, step), np.stack([north, east]))
 
 
-def observed_paths(
-    filters: Bank,
-    columns: Mapping[str, Array],
-    horizon: int,
-    step: float,
-    method: Method = "euler",
-    *,
-    planned: Mapping[str, Array] | None = None,
-    memory: Mapping[str, Array] | None = None,
-    path: PathSource = "position",
-    engine: str = AUTO,
-) -> tuple[Array, Array]:
-    """Paths (T, S, 2) [m] of the physics with the observer, in the frame (11), and which diverged (S,).
-
-    The vessel starts from the filtered state, in water that moves with the current, under the fading force.
-
-    Parameters
-    ----------
-    columns : of the instants (S,), measured and `observer.*`; wind that is missing is zero.
-    planned : known commands, name -> (T, S); default: held.
-    path : as in `cut_windows`.
-    engine : as in `rollout`.
-    """
-    begun, given = observed_start(filters, columns, horizon, step, path), {**columns, **(planned or {})}
-    model = dynamics(filters.vessel)
-    start = {name: begun.columns[name] for name in model.state if name in begun.columns}
-    commands = {name: given[name] for name in model.commands if name in given}
-    result = rollout(
-        filters.vessel, start, commands, begun.environment, step=step, num_steps=horizon,
-        method=method, memory=memory, tau_extra=begun.tau_extra, keep=("north", "east"),
-        engine=engine,
-    )  # fmt: skip
-    ages, zero = step * np.arange(1, horizon + 1)[:, None], np.zeros(len(columns["u"]))
-    north, east = result["north"][1:, 0] + ages * begun.drift[0], result["east"][1:, 0] + ages * begun.drift[1]
-    x, y = to_frame(north, east, columns.get("north", zero), columns.get("east", zero), columns["psi"])
-    return np.stack([x, y], axis=-1), result.diverged[0]
-
-
 def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:
     """Columns of windows, with the estimates `observer.*` (S,) of the last row at or before each instant.
 
@@ -624,12 +583,8 @@ def tune_observer(
     vessel: Vessel,
     dataset: Dataset,
     windows: Windows,
+    paths: Callable[[Observer, Mapping[str, Array]], Array],
     settings: Observer | None = None,
-    *,
-    method: Method = "euler",
-    commands: Commands = "held",
-    path: PathSource = "position",
-    memory: Mapping[str, Array] | None = None,
 ) -> tuple[Observer, dict[str, float]]:
     """Settings with the least mean error of prediction on training runs: coordinate search over a small grid.
 
@@ -641,9 +596,9 @@ def tune_observer(
     vessel : the physics, without any method.
     dataset : the training runs, as the observer sees them.
     windows : of these runs: instants of prediction and true paths.
+    paths : (settings, columns of the windows with the estimates `observer.*`) -> predicted paths (T, S, 2) [m], as of
+        `shipid.hybrid.physics.Physics.paths`; not finite where a window diverges.
     settings : the levels, and what is not searched.
-    method, commands, path : of the prediction, as in a study.
-    memory : hidden actuator states at the instants, name -> (S,); default: each actuator has reached its order.
 
     Returns
     -------
@@ -651,17 +606,12 @@ def tune_observer(
     diverges counts as 1e9 m, so that settings with fewer of them are better.
     """
     first = (settings or Observer()).model_copy(update={"choose": False})
-    planned = windows.planned if commands == "known" else None
     tried: dict[str, float] = {}
 
     def loss(one: Observer, columns: Mapping[str, Array]) -> float:
-        paths, diverged = observed_paths(
-            bank(vessel, one), columns, windows.horizon, windows.step, method,
-            planned=planned, memory=memory, path=path, engine=REPEATED,
-        )  # fmt: skip
         with np.errstate(invalid="ignore", over="ignore"):
-            each = position_error(paths, windows.future).mean(axis=0)
-        return float(np.where(diverged, DIVERGED, each).mean())
+            each = position_error(paths(one, columns), windows.future).mean(axis=0)
+        return float(np.where(np.isfinite(each), each, DIVERGED).mean())
 
     def faded(given: Observer, label: str) -> tuple[float, Observer]:
         alike = samples / bank(vessel, given).num_filters  # the fewer the filters, the smaller the call

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,7 +16,6 @@ import pytest
 from casadi import SX
 from scipy.linalg import expm
 
-from shipid import observer
 from shipid.data.causal import causal_columns, last_known
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.data.windows import Instants, Windows, cut_windows, from_frame
@@ -34,7 +33,6 @@ from shipid.observer import (
     MEASURED,
     NUMBERS,
     STATES,
-    Bank,
     Estimates,
     Observer,
     _growth,
@@ -45,7 +43,6 @@ from shipid.observer import (
     begin,
     filter_function,
     observe,
-    observed_paths,
     observer_function,
     tau_extra,
     tune_observer,
@@ -294,7 +291,7 @@ def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
 def test_moving_water_carries_the_path_and_the_wind_along() -> None:
     """Galilei: ship, wind and water faster by one velocity make a path that goes with it, under the same force."""
     vessel, rng, count, horizon, step = load_vessel("gunnerus-28.9"), np.random.default_rng(5), 4, 20, 0.5
-    filters, water = bank(vessel), np.array([[0.5], [-0.8]])
+    water = np.array([[0.5], [-0.8]])
     columns = {name: rng.uniform(0.3, 1.5, count) for name in (*MEASURED, *dynamics(vessel).commands)}
     columns |= {"u": rng.uniform(2, 4, count), "psi": rng.uniform(-3, 3, count), "r": rng.uniform(-0.05, 0.05, count)}
     wind = rng.uniform(-6, 6, (2, count))
@@ -307,7 +304,7 @@ def test_moving_water_carries_the_path_and_the_wind_along() -> None:
         moved |= {"V_w": np.hypot(north, east), "beta_w": np.arctan2(east, north)}
         seen = {f"observer.{name}": moved[name] for name in MEASURED} | force
         seen |= {f"observer.current_{name}": flow[i] + np.zeros(count) for i, name in enumerate(("north", "east"))}
-        paths, _ = observed_paths(filters, moved | seen, horizon, step)
+        paths = Physics(vessel, horizon, step, observer=Observer()).paths(Instants(moved, estimates=seen))
         x, y = np.moveaxis(paths, -1, 0)
         return np.array([c * x - s * y, s * x + c * y])
 
@@ -317,7 +314,7 @@ def test_moving_water_carries_the_path_and_the_wind_along() -> None:
 
 
 @pytest.mark.parametrize("path", ["position", "velocity"])
-def test_tuning_judges_the_paths_of_a_prediction(path: Literal["position", "velocity"]) -> None:
+def test_a_path_starts_where_it_is_compared(path: Literal["position", "velocity"]) -> None:
     """With `velocity` a path starts where the ship is; with `position`, where the observer believes her to be."""
     vessel, rng, count = load_vessel("gunnerus-28.9"), np.random.default_rng(4), 3
     motion = {
@@ -327,12 +324,9 @@ def test_tuning_judges_the_paths_of_a_prediction(path: Literal["position", "velo
     columns |= {"V_w": np.full(count, 5.0), "beta_w": rng.uniform(0, 6, count)}
     seen = {f"observer.{name}": motion.get(name, 0.0) + rng.normal(0, 1e-4, count) for name in COLUMNS}
     seen["observer.north"] = seen["observer.north"] + 2.0
-    ours, _ = observed_paths(bank(vessel), columns | seen, 20, 1.0, path=path)
-    known = Instants(columns, estimates=seen)
-    np.testing.assert_allclose(ours, Physics(vessel, 20, 1.0, observer=Observer(), path=path).paths(known), atol=1e-9)
-    shifted, _ = observed_paths(
-        bank(vessel), columns | seen | {"observer.north": seen["observer.north"] + 3.0}, 20, 1.0, path=path
-    )
+    farther = seen | {"observer.north": seen["observer.north"] + 3.0}
+    physics = Physics(vessel, 20, 1.0, observer=Observer(), path=path)
+    ours, shifted = (physics.paths(Instants(columns, estimates=known)) for known in (seen, farther))
     moved = np.hypot(*(shifted - ours).T)
     np.testing.assert_allclose(moved, 3.0 if path == "position" else 0.0, atol=1e-6)
 
@@ -348,13 +342,16 @@ def test_tuning_takes_what_errs_least_by_the_paths_of_the_physics(commands: Lite
     windows, given = some_windows(log), Observer(waves=(0.0, 0.01), change=(1e-4,), current=0.0, fade=5.0, choose=True)
     memory = window_memory(vessel, log, windows)
     assert memory
-    chosen, tried = tune_observer(vessel, log, windows, given, method="rk4", commands=commands, memory=memory)
+
+    def paths(settings: Observer, estimates: Mapping[str, np.ndarray]) -> np.ndarray:
+        instants = windows.instants(known=commands == "known", hidden=memory, estimates=estimates)
+        return Physics(vessel, 10, 1.0, "rk4", settings).paths(instants)
+
+    chosen, tried = tune_observer(vessel, log, windows, paths, given)
 
     def error(settings: Observer) -> float:
         estimates = at_instants(log, windows, observe(vessel, log, settings))
-        instants = windows.instants(known=commands == "known", hidden=memory, estimates=estimates)
-        paths = Physics(vessel, 10, 1.0, "rk4", settings).paths(instants)
-        return float(position_error(paths, windows.future).mean())
+        return float(position_error(paths(settings, estimates), windows.future).mean())
 
     assert not chosen.choose
     assert error(chosen) == pytest.approx(min(tried.values()), rel=1e-9)
@@ -365,18 +362,18 @@ def test_tuning_takes_what_errs_least_by_the_paths_of_the_physics(commands: Lite
     assert max(tried.values()) > 1.05 * min(tried.values())
 
 
-def test_settings_with_which_a_window_diverges_are_chosen_last(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_settings_with_which_a_window_diverges_are_chosen_last() -> None:
     """The other windows may be as well predicted as they like."""
     vessel, log = load_vessel("gunnerus-28.9"), weaving("a")
     windows = some_windows(log)
 
-    def paths(filters: Bank, *_: object, **__: object) -> tuple[np.ndarray, np.ndarray]:
-        still = filters.settings.waves == (0.0,)
+    def paths(settings: Observer, _: object) -> np.ndarray:
+        still = settings.waves == (0.0,)
         diverged = np.arange(len(windows)) < still
-        return np.where(diverged[:, None], np.nan, windows.future + (0.0 if still else 9.0)), diverged
+        return np.where(diverged[:, None], np.nan, windows.future + (0.0 if still else 9.0))
 
-    monkeypatch.setattr(observer, "observed_paths", paths)
-    chosen, tried = tune_observer(vessel, log, windows, Observer(waves=(0.0, 0.01), change=(1e-4,), current=0.0))
+    settings = Observer(waves=(0.0, 0.01), change=(1e-4,), current=0.0)
+    chosen, tried = tune_observer(vessel, log, windows, paths, settings)
     assert chosen.waves == (0.0, 0.01)
     assert tried["waves (0.0,), fade 12.0"] > 1e6
 
@@ -418,7 +415,8 @@ def test_without_measured_positions_a_path_starts_where_the_ship_is() -> None:
     far, settings = Dataset(frame, log.metadata), Observer(measured=("psi", "u", "v", "r"), current=0.0)
     windows = some_windows(far)
     columns = at_windows(far, observe(vessel, far, settings), windows)
-    paths, _ = observed_paths(bank(vessel, settings), columns, 10, 1.0, planned=windows.planned)
+    instants = windows.instants(known=True, estimates=columns)
+    paths = Physics(vessel, 10, 1.0, observer=settings).paths(instants)
     assert position_error(paths, windows.future).max() < 0.2
 
 
@@ -544,5 +542,5 @@ def test_the_example_of_the_documentation_runs(tmp_path: Path) -> None:
     log = write_dataset(sea().data, tmp_path / "log.parquet")
     names: dict[str, Any] = {}
     exec(re.sub(r'"results/quick-[0-9a-f]*/dataset.parquet"', repr(str(log)), text), names)
-    assert names["paths"].shape == (30, len(names["windows"]), 2)
+    assert names["predicted"].shape == (30, len(names["windows"]), 2)
     assert len(names["tried"]) > 1

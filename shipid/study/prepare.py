@@ -380,18 +380,15 @@ def chosen_observer(plan: Plan, foundation: Foundation, dataset: Dataset, window
 
     dataset : the runs of the windows.
     """
-    assert foundation.vessel is not None
-    settings, _ = tune_observer(
-        foundation.vessel,
-        known_by_then(plan, dataset),
-        windows,
-        foundation.observer,
-        method=plan.study.prediction.integrator,
-        commands=plan.study.prediction.commands,
-        path=path_of(plan),
-        memory=window_memory(foundation.vessel, dataset, windows),
-    )
-    return settings
+    vessel = foundation.vessel
+    assert vessel is not None
+    hidden = window_memory(vessel, dataset, windows)
+
+    def paths(observer: Observer, columns: Mapping[str, Array]) -> Array:
+        instants = windows.instants(known=plan.known, hidden=hidden, estimates=columns)
+        return physics_of(plan, vessel, observer).paths(instants)
+
+    return tune_observer(vessel, known_by_then(plan, dataset), windows, paths, foundation.observer)[0]
 
 
 def instants_of(

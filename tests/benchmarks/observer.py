@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,10 +12,11 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset
-from shipid.data.windows import Windows, cut_windows
+from shipid.data.windows import Instants, cut_windows
 from shipid.engine.rollout import rollout
+from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
-from shipid.observer import MEASURED, Estimates, Observer, at_windows, bank, observe, observed_paths
+from shipid.observer import MEASURED, Estimates, Observer, at_windows, observe
 from shipid.simulation.excitation import aprbs
 from shipid.simulation.log import logged
 from shipid.simulation.sea import Sea, draw_components, wave_loads
@@ -127,21 +129,24 @@ def errors(
     windows = whole.select(late)
     planned = windows.planned if known else None
 
-    def mean(paths: Array, which: Windows = windows) -> float:
-        return float(position_error(paths, which.future).mean())
+    observed = Physics(vessel, HORIZON, ROW, observer=settings or Observer())
 
-    filters, zero = bank(vessel, settings), np.zeros(len(windows))
+    def mean(columns: Mapping[str, Array]) -> float:
+        paths = observed.paths(Instants(columns, planned=planned, estimates=columns))
+        return float(position_error(paths, windows.future).mean())
+
+    zero = np.zeros(len(windows))
     unseen = {f"observer.{name}": zero for name in (*"XYN", "current_north", "current_east")}
     plain = {**windows.columns, **unseen, **{f"observer.{name}": windows.columns[name] for name in MEASURED}}
-    alone = mean(observed_paths(filters, plain, HORIZON, ROW, planned=planned)[0])
+    alone = mean(plain)
     columns = at_windows(made.data, estimates or observe(vessel, made.data, settings), windows)
-    seen = mean(observed_paths(filters, columns, HORIZON, ROW, planned=planned)[0])
+    seen = mean(columns)
     low = cut_windows(smoothed(made.data), horizon=HORIZON, interval=5.0).select(late).columns
     current = np.array([made.current[str(run)] for run in windows.run]).T
     ideal = {**windows.columns, **{f"observer.{name}": low[name] for name in MEASURED}}
     ideal |= {f"observer.{name}": np.zeros(len(windows)) for name in "XYN"}
     ideal |= {"observer.current_north": current[0], "observer.current_east": current[1]}
-    floor = mean(observed_paths(filters, ideal, HORIZON, ROW, planned=planned)[0])
+    floor = mean(ideal)
     return {"alone": alone, "observer": seen, "floor": floor}
 
 

@@ -109,9 +109,7 @@ def test_the_observer_of_a_log_with_causal_columns_is_judged_by_the_true_paths(
     plan, dataset = study(recorded, [WRONG, SEEN], data=block)
     given: list[tuple[Dataset, Windows]] = []
 
-    def tune(
-        _: Any, data: Dataset, windows: Windows, settings: Observer, **__: Any
-    ) -> tuple[Observer, dict[str, float]]:
+    def tune(_: Any, data: Dataset, windows: Windows, __: Any, settings: Observer) -> tuple[Observer, dict[str, float]]:
         given.append((data, windows))
         return settings.model_copy(update={"choose": False}), {}
 
