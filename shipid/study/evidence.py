@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 LEVEL = 0.025  # of one side: an interval of 95 % is free of 0
 RESAMPLES, SEED = 1999, 0
 FEWEST_RUNS = 5  # test manoeuvres below which no interval is given
+FEWEST_MODELS = 5  # whose order by A says anything: that of fewer comes by chance too often
 TRAINING, WORTH = 0.03, 4  # relative sd of H between trainings, and how many observations this number counts for
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from shipid.metrics import rank_correlation
 from shipid.study.bands import regions, share_interval
 from shipid.study.error_table import ALONE, ErrorTable, error_table
-from shipid.study.evidence import by_chance, doubling
+from shipid.study.evidence import FEWEST_MODELS, by_chance, doubling
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
@@ -44,7 +44,6 @@ CLAIMS = {
     "B1": "more accurate physics gives a narrower band",
     "B2": "bands hold the share of whole paths that they promise",
 }
-FEWEST_MODELS = 5  # B1 over many models: an order of fewer comes by chance too often
 SHORT = 0.05  # B2: a share that lies so far below its level is a broken promise
 
 

@@ -36,7 +36,7 @@ from scipy.special import stdtr
 from shipid.hybrid.method import Method
 from shipid.metrics import rank_correlation, roughness
 from shipid.study.error_table import ALONE, PLAIN, ErrorTable, Metric, error_table
-from shipid.study.evidence import FEWEST_RUNS, LEVEL, Contrasts, at_least, by_chance, contrasts, doubling
+from shipid.study.evidence import FEWEST_MODELS, FEWEST_RUNS, LEVEL, Contrasts, at_least, by_chance, contrasts, doubling
 from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
@@ -68,7 +68,6 @@ CLAIMS = {
     "S6": "moderate models with small N_D beat pure data-driven with a larger one, and more accurate physics alone",
     "S7": "paths of pure data-driven at small N_D are rough, those of cooperative models are not",
 }
-FEWEST_MODELS = 5  # S3: an order of fewer comes by chance too often
 FEWEST_ORDERS = 5  # S4: nested orders of runs that a fluctuation needs
 ALIKE, UNLIKE = 0.95, 0.8  # S5
 ROUGH = 1.5  # S7: times the roughness of the true paths
