@@ -24,7 +24,7 @@ from shipid.logs.repairs import REPAIRS
 from shipid.observer import Observer
 from shipid.physics import TERMS
 from shipid.simulation.manoeuvre import KINDS
-from shipid.study.plan import Study
+from shipid.study.schema import Study
 from shipid.vessel.schema import FIXED, term_model, vessel_model
 
 Schema = Mapping[str, Any]

@@ -57,7 +57,7 @@ def _study() -> Schema:
     from shipid.identification.settings import Identify
     from shipid.observer import Observer
     from shipid.simulation.truth import Truth
-    from shipid.study.plan import MethodBlock, Study
+    from shipid.study.schema import MethodBlock, Study
 
     shared = {name: (field.annotation, field) for name, field in MethodBlock.model_fields.items()}
     methods = [_of_kind("method", kind, method, shared) for kind, method in METHODS.items()]

@@ -35,7 +35,8 @@ from shipid.predictor import fit
 from shipid.simulation.approach import Controls
 from shipid.simulation.truth import Truth, check_truth, simulate
 from shipid.study.envelope import envelope_table
-from shipid.study.plan import Published, build_plan
+from shipid.study.plan import build_plan
+from shipid.study.schema import Published
 from shipid.units import DEGREE
 from shipid.vessel import perturb, schema
 from shipid.vessel.dynamics import dynamics

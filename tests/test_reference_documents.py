@@ -21,7 +21,7 @@ from shipid.observer import Observer
 from shipid.physics import ACTUATORS, TERMS
 from shipid.simulation.draw import SHARED
 from shipid.simulation.manoeuvre import KINDS
-from shipid.study.plan import Study
+from shipid.study.schema import Study
 from shipid.vessel.load import Patch
 from shipid.vessel.perturb import Perturbation
 from shipid.vessel.schema import FIXED, term_model, vessel_model

@@ -14,9 +14,10 @@ import numpy as np
 import pandas as pd
 
 from shipid.report.wording import listed
+from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, PLAIN, ErrorTable, error_table
 from shipid.study.evidence import Contrasts, contrasts
-from shipid.study.plan import NO_MODEL, Plan
+from shipid.study.plan import Plan
 from shipid.study.results import Results, judged_cells, naive_summary
 from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, span, too_few
 from shipid.study.worth import Estimate, break_even, runs_without_physics

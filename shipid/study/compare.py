@@ -10,9 +10,9 @@ import pandas as pd
 
 from shipid.errors import ResultError, ShipidError
 from shipid.files import as_argument
+from shipid.study.declared import NO_MODEL
 from shipid.study.evidence import over_worlds
 from shipid.study.findings import findings
-from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, read_results
 from shipid.study.store import stored_plan
 

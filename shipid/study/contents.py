@@ -19,9 +19,10 @@ from shipid.report.methods import MethodsContent, verdicts
 from shipid.study import advise, bands, memory, methods, seals, store
 from shipid.study import results as parts
 from shipid.study.claims import Claims
+from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import intervals_frame
 from shipid.study.findings import findings
-from shipid.study.plan import NO_MODEL, Plan
+from shipid.study.plan import Plan
 from shipid.study.results import Results, read_results
 
 log = logging.getLogger(__name__)

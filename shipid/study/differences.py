@@ -10,7 +10,8 @@ import pandas as pd
 
 from shipid import document as documents
 from shipid.document import Document
-from shipid.study.plan import Plan, Study
+from shipid.study.plan import Plan
+from shipid.study.schema import Study
 
 ABSENT = "-"  # shown where a document has no such key
 

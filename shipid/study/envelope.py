@@ -11,7 +11,7 @@ import pandas as pd
 from shipid.data.windows import Windows
 from shipid.hybrid.features import choose_features, feature_table
 from shipid.physics.signals import read_unit, signal_of
-from shipid.study.plan import Published, published_keys
+from shipid.study.schema import Published, published_keys
 
 LIMITS = ("min", "mean", "max")
 

@@ -12,8 +12,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.metrics import position_error
+from shipid.study.declared import NO_MODEL
 from shipid.study.evidence import Contrasts, contrasts, mean_errors, training_noise
-from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 
 Array = NDArray[np.float64]

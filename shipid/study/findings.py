@@ -19,12 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.metrics import position_error
+from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable, error_table
 from shipid.study.evidence import contrasts
 from shipid.study.findings_bands import band_findings
 from shipid.study.findings_simulation import simulation_findings
-from shipid.study.plan import NO_MODEL, Claims
 from shipid.study.results import Results, judged_cells
+from shipid.study.schema import Claims
 from shipid.study.verdict import (
     Finding,
     Verdict,

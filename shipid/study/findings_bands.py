@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from shipid.metrics import rank_correlation
 from shipid.study.bands import regions, share_interval
+from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable, error_table
 from shipid.study.evidence import FEWEST_MODELS, by_chance, doubling
-from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
     SAME_A,

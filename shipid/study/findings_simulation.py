@@ -35,9 +35,9 @@ from scipy.special import stdtr
 
 from shipid.hybrid.method import Method
 from shipid.metrics import rank_correlation, roughness
+from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, PLAIN, ErrorTable, Metric, error_table
 from shipid.study.evidence import FEWEST_MODELS, FEWEST_RUNS, LEVEL, Contrasts, at_least, by_chance, contrasts, doubling
-from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
     SAME_A,

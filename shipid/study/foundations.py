@@ -14,7 +14,8 @@ from shipid.data.windows import Windows
 from shipid.errors import ShipidError
 from shipid.metrics import position_error, summary
 from shipid.observer import Estimates
-from shipid.study.plan import Foundation, Plan
+from shipid.study.declared import Foundation
+from shipid.study.plan import Plan
 from shipid.study.prepare import Prepared, apart, chosen_observer, estimates_of, paths_of
 
 if TYPE_CHECKING:

@@ -20,10 +20,12 @@ from shipid.arguments import path_of
 from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError, ShipidError, choices
 from shipid.metrics import over_time, position_error
+from shipid.study.declared import NO_MODEL
 from shipid.study.differences import document_differences
 from shipid.study.evidence import Contrasts, contrasts, contrasts_apart, training_error
-from shipid.study.plan import NO_MODEL, WORLDS, Plan
+from shipid.study.plan import Plan
 from shipid.study.results import Results, read_results
+from shipid.study.schema import WORLDS
 from shipid.study.verdict import manoeuvres, shown, too_few
 
 Array = NDArray[np.float64]

@@ -15,8 +15,8 @@ from shipid.metrics import over_time, position_error
 from shipid.observer import bank, observe
 from shipid.predictor import Predictor
 from shipid.study import store
+from shipid.study.declared import Foundation, Way
 from shipid.study.evidence import contrasts, training_error
-from shipid.study.plan import Foundation, Way
 from shipid.study.prepare import known_by_then
 from shipid.study.results import Results, shown_runs, with_gaps
 

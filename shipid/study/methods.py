@@ -11,8 +11,8 @@ import pandas as pd
 
 from shipid.arguments import of_class
 from shipid.metrics import over_time, position_error
+from shipid.study.declared import NO_MODEL
 from shipid.study.evidence import contrasts, mean_errors, over_worlds, training_error
-from shipid.study.plan import NO_MODEL
 from shipid.study.results import Results
 
 EVERY = "with physics"  # all families but pure data-driven

@@ -27,8 +27,9 @@ from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
 from shipid.simulation.approach import Controls, service_speed
 from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import shaft_speed
+from shipid.study.declared import NO_MODEL
 from shipid.study.first_look import Look, first_look
-from shipid.study.plan import NO_MODEL, Plan, build_plan
+from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import all_windows, obtain, over_gaps, partition, prepare
 from shipid.study.survey import Survey, helm_sense, separation, survey, typical_runs
 from shipid.units import GRAVITY, RPM, plural

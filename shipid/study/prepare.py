@@ -37,8 +37,9 @@ from shipid.metrics import Summary, position_error, summary
 from shipid.observer import Estimates, Observer, at_windows, observe, tune_observer
 from shipid.simulation.manoeuvre import name_of
 from shipid.simulation.truth import draw_manoeuvres, simulate
+from shipid.study.declared import Foundation
 from shipid.study.kinds import kinds_of
-from shipid.study.plan import Batch, Foundation, Plan, beside, mapping_of
+from shipid.study.plan import Batch, Plan, beside, mapping_of
 from shipid.study.ranges import check_memory
 from shipid.units import plural
 from shipid.vessel.load import Vessel

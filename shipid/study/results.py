@@ -33,9 +33,10 @@ from shipid.observer import Estimates, observe
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.predictor import Predictor, checked_bands, read_bands
 from shipid.study import seals, store
+from shipid.study.declared import NO_MODEL, Way
 from shipid.study.envelope import envelope_table
 from shipid.study.kinds import kinds_of
-from shipid.study.plan import NO_MODEL, Plan, Way
+from shipid.study.plan import Plan
 from shipid.study.prepare import constant_motion, instants_of, known_by_then
 from shipid.vessel.outline import ship_outline
 

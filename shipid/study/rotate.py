@@ -19,9 +19,10 @@ from shipid.files import make_folder, read_table, sweep, write_table, write_text
 from shipid.logs.importing import sha256_of
 from shipid.study.claims import Claims
 from shipid.study.code import code_digest
+from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings import Rivals, judged
-from shipid.study.plan import NO_MODEL, Batch, Plan
+from shipid.study.plan import Batch, Plan
 from shipid.study.prepare import all_windows, partition, prepare
 from shipid.study.run import run_unit
 from shipid.study.verdict import Finding

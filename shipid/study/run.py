@@ -35,9 +35,10 @@ from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
 from shipid.study.claims import WAIT, Claims, Holder, TakenOver, pause
 from shipid.study.code import code_digest
+from shipid.study.declared import Foundation, Way
 from shipid.study.envelope import envelope
 from shipid.study.foundations import Prediction, predictions
-from shipid.study.plan import Batch, Foundation, Plan, Unit, Way
+from shipid.study.plan import Batch, Plan, Unit
 from shipid.study.prepare import (
     Prepared,
     apart,

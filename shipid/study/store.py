@@ -30,7 +30,8 @@ from shipid.files import (
 )
 from shipid.predictor import Predictor
 from shipid.study import seals
-from shipid.study.plan import WITH, Foundation, Plan, Unit, build_plan
+from shipid.study.declared import Foundation
+from shipid.study.plan import WITH, Plan, Unit, build_plan
 from shipid.version import __version__
 from shipid.vessel.load import check_vessel
 

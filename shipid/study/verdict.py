@@ -8,8 +8,8 @@ from typing import Literal, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.study.declared import NO_MODEL
 from shipid.study.evidence import FEWEST_RUNS, LEVEL, Contrasts, holm
-from shipid.study.plan import NO_MODEL
 from shipid.units import decimals_of, plural
 
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]

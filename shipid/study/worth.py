@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, stdtrit
 
+from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable
 from shipid.study.evidence import FEWEST_RUNS, LEVEL, SEED, resampled_means
-from shipid.study.plan import NO_MODEL
 
 Array = NDArray[np.float64]
 FEWEST_MODELS = 4  # for a line of H over A

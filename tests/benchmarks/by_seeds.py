@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from shipid.metrics import rank_correlation
+from shipid.study.declared import NO_MODEL
 from shipid.study.findings import Rivals
 from shipid.study.findings_simulation import Grid
-from shipid.study.plan import NO_MODEL
 from shipid.study.verdict import Verdict
 
 Array = np.ndarray

@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from shipid.study.plan import NO_MODEL, read_plan
+from shipid.study.declared import NO_MODEL
+from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.run import run_batch
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings import Rivals
 from shipid.study.findings import judged as judged_rivals
 from shipid.study.findings_bands import Widths, narrower
 from shipid.study.findings_simulation import RULES, Grid, rough
 from shipid.study.findings_simulation import judged as judged_grid
-from shipid.study.plan import NO_MODEL
 from shipid.study.verdict import Verdict
 
 Array = np.ndarray

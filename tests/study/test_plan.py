@@ -17,8 +17,10 @@ from shipid.hybrid.features import Memory
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
-from shipid.study.plan import NO_MODEL, Data, _sources, build_plan, read_plan
+from shipid.study.declared import NO_MODEL
+from shipid.study.plan import _sources, build_plan, read_plan
 from shipid.study.prepare import all_windows, obtain
+from shipid.study.schema import Data
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import mixed_plan, tiny_plan
 

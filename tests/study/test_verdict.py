@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipid.study.plan import NO_MODEL
+from shipid.study.declared import NO_MODEL
 from shipid.study.verdict import (
     every,
     interval,

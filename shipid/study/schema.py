@@ -1,0 +1,285 @@
+"""The keys of a study document: blocks as pydantic models, and what to write instead of keys of version 0.1."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
+
+from shipid.arguments import steps_in
+from shipid.data.windows import Commands, PathSource
+from shipid.document import Document
+from shipid.engine.integrate import Method as Integrator
+from shipid.errors import DocumentError, choices
+from shipid.physics.signals import SIGNALS, named
+from shipid.predictor import MOST_STEPS
+from shipid.simulation.truth import Truth, old_keys
+from shipid.vessel.perturb import Family
+
+NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
+WORLDS = 1000  # top-level `seed` times this is added to every other seed
+INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
+
+
+def published_keys() -> dict[str, tuple[str, float]]:
+    """Key of a published envelope -> signal, factor to SI: `n`, and `n_rpm` in the unit that sailors read."""
+    names = (*INPUTS, *named("command"))
+    read = {name: SIGNALS[name] for name in names if SIGNALS[name].shown}
+    in_words = {f"{name}_{row.read_in.partition('/')[0]}": (name, row.factor) for name, row in read.items()}
+    return {name: (name, 1.0) for name in names} | in_words
+
+
+class Strict(BaseModel):
+    """A block with no key but those declared."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class Data(Strict):
+    """`[data]`: real runs, from a dataset (Parquet) or a raw log with its mapping."""
+
+    mapping: str | None = Field(default=None, description="bundled name or path; the log is fetched if `log` is absent")
+    log: str | None = Field(default=None, description="raw log, if not the public original")
+    dataset: str | None = Field(default=None, description="Parquet file written by `shipid data import`")
+    without: list[str] = Field(default=[], description="repairs of the mapping to leave out")
+    causal: list[str] = Field(
+        default=[], description="columns interpolated between fixes: inputs hold the last fix, such as u and v"
+    )
+    path: PathSource = Field(
+        default="position", description="true path: logged positions, or the integral of u, v, psi"
+    )
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Data:
+        if (self.mapping is None) == (self.dataset is None):
+            raise ValueError("give either `dataset`, or `mapping` (with `log` if it is not the public original)")
+        if self.dataset is not None and (self.log is not None or self.without):
+            raise ValueError("`log` and `without` go with a `mapping`: a dataset has been imported already")
+        return self
+
+
+class Split(Strict):
+    """`[split]`: which runs test, and how the others train and validate; always by run."""
+
+    test: Annotated[list[str], Field(min_length=1)] | Annotated[int, Field(ge=1)] = Field(
+        description="names of the test runs, or how many to draw"
+    )
+    folds: Annotated[int, Field(ge=1)] = Field(default=1, description="1: 80 % train, 20 % validate; else k-fold")
+    seed: NonNegativeInt = 0
+
+
+class Prediction(Strict):
+    """`[prediction]`: horizon and step of the predictor, and what it knows; wind is held at its present value."""
+
+    ahead: Annotated[FiniteFloat, Field(gt=0, description="s, a multiple of the step")]
+    step: Annotated[FiniteFloat, Field(gt=0, description="s")] = 1.0
+    integrator: Integrator = "euler"
+    interval: Annotated[FiniteFloat, Field(gt=0, description="s between instants of prediction")] = 1.0
+    past: Annotated[
+        FiniteFloat, Field(ge=0, description="s of a run before its first instant; more if a method needs")
+    ] = 0.0
+    samples: Annotated[int, Field(ge=1)] | None = Field(default=None, description="instants per run, at most")
+    commands: Commands = Field(default="held", description="held at their present value, or known over the horizon")
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Prediction:
+        if not 2 <= steps_in(self.ahead, self.step) <= MOST_STEPS:
+            most = f"{MOST_STEPS:,}"
+            raise ValueError(f"ahead = {self.ahead:g} s must be 2 to {most} steps of {self.step:g} s")
+        return self
+
+    @property
+    def horizon(self) -> int:
+        """Number of steps T."""
+        return round(self.ahead / self.step)
+
+
+class Grid(Strict):
+    """`[grid]`: amounts of data and repetitions; every model gets a cell at each."""
+
+    N_D: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1, description="runs for training")]
+    seeds: Annotated[list[NonNegativeInt], Field(min_length=1)] = [0]
+
+
+class BandsBlock(Strict):
+    """`[bands]`: how far off a prediction may be."""
+
+    level: Annotated[FiniteFloat, Field(gt=0, le=0.99, description="share of true paths that a band holds whole")] = 0.9
+    refits: Annotated[int, Field(ge=0)] = Field(
+        default=0,
+        description="further fits, each without a share of the runs, of methods and identified families that need them "
+        "for a band; 5 is enough, 0: no band for those",
+    )
+
+
+class Role(NamedTuple):
+    """What a family must be that `[claims]` gives a role.
+
+    pair : the role that must be given, too. unlike : roles before this one that the same family may not have.
+    single : why the family may have one member only; empty: it may have any number.
+    """
+
+    pair: str = ""
+    unlike: tuple[str, ...] = ()
+    single: str = ""
+
+
+ROLES: dict[str, Role] = {
+    "accurate": Role("inaccurate", single="the findings compare one model with one"),
+    "inaccurate": Role("accurate", ("accurate",), single="the findings compare one model with one"),
+    "moderate": Role("high"),
+    "high": Role("moderate", ("moderate",)),
+    "nominal": Role(unlike=("moderate", "high"), single="the nominal row is the base as it is"),
+}
+"""Name of a role, a key of `[claims]`, -> what its family must be."""
+
+
+class Claims(Strict):
+    """`[claims]`: the families, and the method, that findings speak of: R1-R4, S1-S7, and B1-B2 in both."""
+
+    method: str | None = Field(default=None, description="default: the first method that learns from data")
+
+    accurate: str | None = Field(default=None, description="with `inaccurate`: findings R1-R4")
+    inaccurate: str | None = None
+    moderate: str | None = Field(default=None, description="with `high`: findings S1-S7")
+    high: str | None = None
+    nominal: str | None = Field(default=None, description="the base as it is: the floor, in no claim")
+    aside: list[str] = Field(default=[], description="families that saw the test runs: shown, but in no claim")
+
+    @model_validator(mode="after")
+    def _pairs(self) -> Claims:
+        lone = next((name for name in self.roles if ROLES[name].pair not in ("", *self.roles)), None)
+        if lone is not None:
+            one, other = (name for name in ROLES if name in (lone, ROLES[lone].pair))
+            raise ValueError(f"give both `{one}` and `{other}`, or neither")
+        return self
+
+    @property
+    def roles(self) -> dict[str, str]:
+        """Role -> family, of the roles that are given."""
+        return {role: getattr(self, role) for role in ROLES if getattr(self, role) is not None}
+
+    @property
+    def not_judged(self) -> set[str]:
+        """Families that no claim and no sentence of the answer counts among degraded models."""
+        return {*self.aside, *([self.nominal] if self.nominal else [])}
+
+
+class Published(Strict):
+    """`[published]`: the input envelope that others report, to be shown beside that of the study."""
+
+    source: Annotated[str, Field(min_length=3)]
+    envelope: dict[str, list[FiniteFloat]] = Field(description="key -> [min, mean, max]")
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Published:
+        for key, limits in self.envelope.items():
+            if key not in published_keys():
+                raise ValueError(f"envelope.{key} is no input of a study: {choices(key, published_keys())}")
+            if len(limits) != 3 or limits != sorted(limits):
+                raise ValueError(f"envelope.{key}: give [min, mean, max], not {limits}")
+        return self
+
+
+class Condition(Strict):
+    """`[[condition]]`: the changes of one part of a study that has several parts."""
+
+    name: Annotated[str, Field(pattern=NAME)]
+    set: dict[str, Any] = Field(default={}, description="dotted path -> value")
+
+
+class MethodBlock(BaseModel):
+    """`[[method]]`: a way to improve physics by data; every further key is a setting of its kind."""
+
+    model_config = ConfigDict(extra="allow")
+    name: Annotated[str, Field(pattern=NAME)]
+    kind: str
+    families: Annotated[list[str], Field(min_length=1, description="families that it meets; * matches any text")] = [
+        "*"
+    ]
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings of the kind."""
+        return dict(self.model_extra or {})
+
+
+class Study(Strict):
+    """A whole study document."""
+
+    question: Annotated[str, Field(min_length=3)]
+    description: str | None = None
+    seed: NonNegativeInt = Field(default=0, description="another world: other manoeuvres, families, data, training")
+    truth: Truth | None = None
+    data: Data | None = None
+    split: Split
+    prediction: Prediction
+    grid: Grid
+    method: Annotated[list[MethodBlock], Field(min_length=1)] = [MethodBlock(name="drawn", kind="path-drawn")]
+    claims: Claims | None = None
+    published: Published | None = None
+    bands: BandsBlock = BandsBlock()
+    unusual: list[str] = Field(default=[], description="dotted paths of numbers that may lie outside their range")
+    family: Annotated[list[Family], Field(min_length=1)]
+    repeat: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(
+        default={}, description="dotted path -> values: the study is done for each; the comparison pools them"
+    )
+    condition: list[Condition] = Field(default=[], description="the study is done in each; shown side by side")
+
+    @model_validator(mode="after")
+    def _one_world(self) -> Study:
+        if (self.truth is None) == (self.data is None):
+            raise ValueError("give either [truth] (simulation) or [data] (recorded runs)")
+        return self
+
+    def in_its_world(self) -> Study:
+        """Return the study with `WORLDS` times its top-level seed added to the seeds of truth, split, grid, families.
+
+        Seed 0 leaves all as they are; recorded runs stay the same in every world.
+        """
+        shift = WORLDS * self.seed
+        truth = self.truth and self.truth.model_copy(update={"seed": self.truth.seed + shift})
+        split = self.split.model_copy(update={"seed": self.split.seed + shift})
+        grid = self.grid.model_copy(update={"seeds": [seed + shift for seed in self.grid.seeds]})
+        family = [one.model_copy(update={"seed": one.seed + shift}) for one in self.family]
+        return self.model_copy(update={"truth": truth, "split": split, "grid": grid, "family": family})
+
+
+def check_version(document: Document, file: Path) -> None:
+    """Refuse a document of version 0.1: a line for each old key, with what to write instead."""
+    old = [DocumentError(message, file=file, path=path) for path, message in _old_keys(document)]
+    if old:
+        raise DocumentError(old[0].message, file=file, path=old[0].path, others=old[1:])
+
+
+def _old_keys(document: Document) -> Iterator[tuple[str, str]]:
+    """Yield the dotted path of every key of version 0.1 in a document, and what to write instead."""
+    if "recipe" in document:
+        paper = isinstance(document["recipe"], dict) and document["recipe"].get("kind") == "paper"
+        new = "path-trained" if paper else "path-drawn"
+        yield "recipe", f'write [[method]] with name = "{new}", kind = "{new}" and the other keys of [recipe] instead'
+    prediction = document.get("prediction")
+    if isinstance(prediction, dict) and "horizon" in prediction:
+        value, step = prediction["horizon"], prediction.get("step", 1.0)
+        numbers = isinstance(value, int | float) and isinstance(step, int | float)
+        seconds = f"ahead = {value * step:g}" if numbers else "ahead"
+        yield "prediction.horizon", f"was a number of steps: write {seconds}, in seconds"
+    if isinstance(prediction, dict) and "method" in prediction:
+        yield "prediction.method", "is now called `integrator`"
+    truth = document.get("truth")
+    if isinstance(truth, dict) and (moved := old_keys(truth)):
+        yield "truth", moved
+    families = document.get("family")
+    for index, family in enumerate(families if isinstance(families, list) else []):
+        if isinstance(family, dict) and "identify" in family and {"base", "perturb", "members"} & family.keys():
+            yield f"family.{index}.identify", separate_family(str(family.get("name", "")), "identify")
+
+
+def separate_family(name: str, block: str) -> str:
+    """What to write instead of a block `identify` or `observer` in a family that is more than an extension."""
+    return (
+        "an identified or observed family must be a separate family: remove the block here and add "
+        f'[[family]] name = "{name}-new", extends = "{name}" with the block [family.{block}]'
+    )
