@@ -162,8 +162,10 @@ class Predictor:
         self, paths: Array, instants: Instants, level: float, *, pointwise: bool = False, kind: str | None = None
     ) -> Region:
         """Return the region around paths (T, S, 2) [m] of `predict` that are known already; DataError as there."""
-        bands = self.check_level(level, kind)
-        check_instants(instants)
+        bands, instants = self.check_level(level, kind), self._checked(instants)
+        missing = next((name for name in bands.names if name not in instants.columns), None)
+        if missing is not None:
+            raise DataError("the band was calibrated with this column, and the instants lack it", path=missing)
         paths = self._paths(paths, instants)
         return bands.region(paths, instants.columns, self.physics.step, level, pointwise=pointwise, kind=kind)
 
@@ -191,8 +193,8 @@ class Predictor:
             raise DataError(f"paths must be {shape}, not {paths.shape}")
         return paths
 
-    def _known(self, instants: Instants) -> Instants:
-        """The instants with planned commands where the predictor takes them, and without them where it does not."""
+    def _checked(self, instants: Instants) -> Instants:
+        """The instants with arrays of floats; DataError for another step, without the motion, and for other shapes."""
         check_instants(instants)
         parts = {name: getattr(instants, name) for name in ("columns", "past", "planned", "hidden", "estimates")}
         for part, given in parts.items():
@@ -205,7 +207,11 @@ class Predictor:
         if instants.step is not None and abs(instants.step - step) > 1e-9 * step:
             message = f"instants of windows with steps of {instants.step:g} s, the predictor has {step:g} s"
             raise DataError(f"{message}: cut windows with its step")
-        instants = _as_numbers(instants)
+        return _as_numbers(instants)
+
+    def _known(self, instants: Instants) -> Instants:
+        """The instants with planned commands where the predictor takes them, and without them where it does not."""
+        instants = self._checked(instants)
         if self.commands == "held":
             return replace(instants, planned=None)
         if instants.planned is None:

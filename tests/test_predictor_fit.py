@@ -255,6 +255,22 @@ def test_a_band_takes_paths_and_instants_alone(predictor: Predictor) -> None:
         known.band(paths, wrong, 0.5)
 
 
+def test_a_band_takes_columns_as_a_prediction_does(predictor: Predictor) -> None:
+    """Before, a list ended in a TypeError, and a column that the band needs and the instants lack in a KeyError."""
+    instants, rng = WINDOWS.instants(), np.random.default_rng(3)
+    bands = replace(bands_of(rng, predictor.physics, instants, tuple(predictor.limits), 1.0), runs=60)
+    known = replace(predictor, bands=bands)
+    paths = known.predict(instants)
+    whole = known.band(paths, instants, 0.5)
+    for look in (list, np.ma.masked_array):
+        looking = Instants({name: look(values) for name, values in instants.columns.items()})
+        np.testing.assert_array_equal(known.band(paths, looking, 0.5).along, whole.along)
+    assert "port.n" in bands.names
+    lacking = replace(instants, columns={name: values for name, values in instants.columns.items() if name != "port.n"})
+    with pytest.raises(DataError, match=r"port\.n: the band was calibrated with this column, and the instants lack it"):
+        known.band(paths, lacking, 0.5)
+
+
 def test_a_prediction_is_no_view_of_what_was_passed_in() -> None:
     instants = WINDOWS.instants()
     known = fit(Alone(), Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0), WINDOWS)
