@@ -25,6 +25,7 @@ from shipid.hybrid.methods import METHODS, kind_of, listed
 from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.observer import AGE, Observer
 from shipid.physics.signals import SIGNALS, measurable
+from shipid.simulation.log import column_of
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 
@@ -118,7 +119,8 @@ class Predictor:
     ) -> Array | Banded:
         """Return paths (T, S, 2) [m] in the frame (11); with a level, also the band around them.
 
-        They are not numbers where a column that training or the vessel takes is none at the instant.
+        They are not numbers where a column that training or the vessel takes is none, at the instant, in the past that
+        the method looks at, or in the plan.
 
         Parameters
         ----------
@@ -139,14 +141,13 @@ class Predictor:
         instants = self._known(instants)
         alone = self._paths(self.physics.paths(instants) if paths is None else paths, instants)
         try:
-            predicted = self.corrector.predict(self.physics, instants, alone)
+            predicted, lost = self.corrector.predict(self.physics, instants, alone), self._lost(instants)
         except KeyError as error:
             raise DataError(
                 "the method was trained with this input, and the instants lack it", path=error.args[0]
             ) from error
         except (ValueError, TypeError, IndexError) as error:
             raise DataError(f"the arrays of the instants and of the predictor do not fit together ({error})") from error
-        lost = self._lost(instants)
         if predicted is paths or lost.any():  # the prediction is the caller's to change, too
             predicted = predicted.copy()
             predicted[:, lost] = np.nan
@@ -178,13 +179,22 @@ class Predictor:
         return self.physics.paths(self._known(instants))
 
     def _lost(self, instants: Instants) -> Array:
-        """Instants (S,) with an input that is no number: a tree, or an input that stands for two, hides it."""
-        taken = set(self.limits)
+        """Instants (S,) with an input that is no number, now, in the past that the method looks at, or in the plan.
+
+        Else a tree, an input that stands for two, or an error of the physics in the past would hide it.
+        """
+        taken, before = set(self.limits), {"x", "y", "psi", *self.limits}
         if self.vessel is not None:
             model = dynamics(self.vessel)
             taken |= {*model.commands, *model.environment}
-        finite = [np.isfinite(values) for name, values in instants.columns.items() if name in taken]
-        return ~np.all(finite, axis=0) if finite else np.zeros(len(instants), dtype=bool)
+            before |= {*map(column_of, model.state), *taken}
+        given = [values[None] for name, values in instants.columns.items() if name in taken]
+        given += [values[-self.past :] for name, values in instants.past.items() if name in before and self.past]
+        given += [values for name, values in (instants.planned or {}).items() if name in taken]
+        lost = np.zeros(len(instants), dtype=bool)
+        for values in given:
+            lost |= ~np.isfinite(values).all(axis=0)
+        return lost
 
     def _paths(self, paths: Array, instants: Instants) -> Array:
         """The paths as numbers; DataError unless they are (T, S, 2), of this horizon and these instants."""

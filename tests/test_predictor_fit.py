@@ -25,7 +25,7 @@ from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.predictor import Predictor, _folds, fit
 from shipid.vessel.load import Vessel, load_vessel
-from tests.export.strange import bands_of
+from tests.export.strange import bands_of, drawn
 
 HORIZON, SMALL = 5, PathDrawn(trials=1, units=8, terms=2)
 NONE = Physics(None, HORIZON, 1.0)
@@ -215,6 +215,22 @@ def test_an_input_that_is_no_number_gives_no_path(method: Method, vessel: Vessel
         paths, rest = made.predict(replace(instants, columns=columns)), np.arange(len(WINDOWS)) != 3
         assert np.isnan(paths[:, 3]).all(), name
         np.testing.assert_allclose(paths[:, rest], made.predict(instants)[:, rest], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("forest", 203), ("forest", 211), ("path-drawn", 204), ("path-drawn", 209)])
+def test_a_past_that_is_no_number_gives_no_path(kind: str, seed: int) -> None:
+    """Before, the error of the physics over the last seconds was 0 then, as if it had predicted them exactly."""
+    strange = drawn(kind, seed, count=5)
+    instants, known = strange.instants, strange.predictor
+    usual = known.predict(instants)
+    for name in ("u", "r", "psi", "x", "y", "port.n"):
+        past = {key: np.array(values) for key, values in instants.past.items()}
+        past[name][-1, 3] = np.nan
+        paths = known.predict(replace(instants, past=past))
+        assert np.isnan(paths[:, 3]).all(), name
+        np.testing.assert_array_equal(np.delete(paths, 3, axis=1), np.delete(usual, 3, axis=1))
+        past[name][-1, 3], past[name][: -known.past, 3] = instants.past[name][-1, 3], np.nan
+        np.testing.assert_array_equal(known.predict(replace(instants, past=past)), usual)  # it looks not so far
 
 
 def test_only_instants_are_predicted_from(predictor: Predictor) -> None:
