@@ -10,7 +10,7 @@ from shipid.errors import DataError
 from shipid.measures.record import Array, Record, helm_over, plateaus, released
 from shipid.measures.turning import MIDSHIPS
 from shipid.measures.zigzag import last_over
-from shipid.physics.signals import is_command, is_shaft, steers
+from shipid.physics.signals import is_command, is_shaft, orders_thrust, steers
 from shipid.units import DEGREE
 
 STATES = ("t", "north", "east", "psi", "u", "v", "r")
@@ -29,7 +29,7 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     that in `helm`, angle command -> +1 or -1, where the vessel is known; else the sign of the sum of angle times change
     of yaw rate. The shaft is the mean of the shaft speeds that are ahead at the start and later astern, else of those
     that later stop, else of those that are not 0 at the start: a tunnel thruster that runs all the time is none of them
-    in a stop.
+    in a stop. A shaft with a controllable pitch counts as its speed times the pitch over the greatest pitch.
 
     Raises
     ------
@@ -39,17 +39,25 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     if missing is not None:
         raise DataError("missing column", path=missing)
     states = {name: np.asarray(columns[name], dtype=float) for name in STATES}
-    angles, shafts = _commands(columns, steers), list(_commands(columns, is_shaft).values())
+    angles, running = _commands(columns, steers), _running(_driving(columns))
     known = {name: _sense(angle, states["r"]) for name, angle in angles.items()} if helm is None else helm
     moved = {name: float(np.ptp(angle)) for name, angle in angles.items() if known.get(name, 0.0) and angle.any()}
     least = MIDSHIPS * max(moved.values(), default=0.0)
     helms = [known[name] * angles[name] for name, size in moved.items() if size >= least]
-    running = _running(shafts)
     return Record(
         **states,
         helm=np.mean(helms, axis=0) if helms else np.zeros(len(states["t"])),
         shaft=np.mean(running, axis=0) if running else None,
     )
+
+
+def _driving(columns: Mapping[str, Array]) -> list[Array]:
+    """Shaft speed of each screw, > 0 where it drives ahead, as `record_of` says; the pitch alone where it has none."""
+    shafts = _commands(columns, is_shaft)
+    for name, pitch in _commands(columns, lambda name: orders_thrust(name) and not is_shaft(name)).items():
+        shaft = f"{name.rpartition('.')[0]}.n"
+        shafts[shaft] = shafts.get(shaft, np.ones(len(pitch))) * pitch / (np.abs(pitch).max() or 1.0)
+    return list(shafts.values())
 
 
 def _running(shafts: list[Array]) -> list[Array]:

@@ -37,7 +37,7 @@ class Record:
     north, east, psi : place [m] and heading [rad] of the logged point; the heading may jump by full turns.
     u, v, r : velocity over ground along and across the heading [m/s], yaw rate [rad/s].
     helm : helm as ordered, or as measured, > 0 where it turns the ship to starboard [rad].
-    shaft : shaft speed as ordered [rev/s]; None where it is not known.
+    shaft : shaft speed as ordered [rev/s], < 0 also where the pitch drives astern; None where it is not known.
 
     Raises
     ------

@@ -58,6 +58,22 @@ def test_a_tunnel_that_runs_during_a_stop_is_no_shaft_of_it(tunnel: float, aster
     assert kinds_of(seen)[0] == (("stop",) if astern < 0 else ())
 
 
+@pytest.mark.parametrize("turning", [True, False])
+@pytest.mark.parametrize("takes", [0.0, 12.0])
+def test_a_controllable_pitch_stops_a_ship_whose_shaft_goes_on(turning: bool, takes: float) -> None:
+    """Ordered, or as measured on its way from 0.9 to -0.7; a log may not have the speed of the shaft."""
+    record = every(RECORDS["stop"](), 0.5)
+    share = np.clip((record.t - START) / takes, 0, 1) if takes else np.where(record.t >= START, 1.0, 0.0)
+    given = columns(record) | {"screw.pitch": 0.9 - 1.6 * share}
+    if turning:
+        given["screw.n"] = np.full(len(record.t), 2.0)
+    seen = record_of(given)
+    assert kinds_of(seen) == (("stop",), "")
+    assert stop(seen)["execute"].value == pytest.approx(START, abs=0.5)
+    ahead = record_of(given | {"screw.pitch": np.full(len(record.t), 0.9)})
+    np.testing.assert_array_equal(ahead.shaft, 2.0 if turning else 1.0)
+
+
 def run(legs: list[tuple[float, float]], end: float) -> Record:
     """Nomoto's ship with these orders (s, deg), at 10 Hz."""
     t = clock(end)
