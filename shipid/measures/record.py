@@ -149,7 +149,7 @@ def crossing(t: Array, values: Array, level: float, start: float, rising: bool =
 def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, float]:
     """Time [s] and value of the maximum between two times, from a fitted polynomial of degree 4.
 
-    The polynomial is fitted to the samples whose distance to the maximum is at most a fifth of the rise since `start`,
+    The polynomial is fitted to the samples between them, at most a fifth of the rise since `start` below the maximum,
     at least five. So the result does not depend on the sampling interval, and noise is averaged. NaN if the largest
     value is at an end of the interval, because it is then not a maximum.
     """
@@ -160,7 +160,8 @@ def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, f
         return nothing
     low = np.flatnonzero(values < values[top] - TOP * (values[top] - value_at(t, values, start)))
     left, right = low[low < top], low[low > top]
-    first, last = int(left[-1]) + 1 if len(left) else 0, int(right[0]) - 1 if len(right) else len(t) - 1
+    first = max(int(left[-1]) + 1 if len(left) else 0, int(inside[0]))
+    last = min(int(right[0]) - 1 if len(right) else len(t) - 1, int(inside[-1]))
     if last - first < 4:
         first = int(np.clip(top - 2, 0, len(t) - 5))
         last = first + 4

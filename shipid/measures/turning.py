@@ -59,8 +59,10 @@ def turning(record: Record) -> Measures:
     measures.add("advance", value_at(t, ahead, passed[90]), "m", why[90])
     measures.add("transfer", side * value_at(t, aside, passed[90]), "m", why[90])
     measures.add("tactical_diameter", side * value_at(t, aside, passed[180]), "m", why[180])
-    measures.add("greatest_advance", _greatest(t, ahead, start, passed[180]), "m", why[180])
-    measures.add("greatest_transfer", _greatest(t, side * aside, start, passed[270]), "m", why[270])
+    for name, way, values, angle in (("advance", "ahead", ahead, 180), ("transfer", "aside", side * aside, 270)):
+        still = f"the ship still goes {way} where the heading has changed by {angle} deg"
+        missing = still if np.isfinite(passed[angle]) else why[angle]
+        measures.add(f"greatest_{name}", _greatest(t, values, start, passed[angle]), "m", missing)
     for angle in (90, 180, 360):
         measures.add(f"time_to_{angle}", passed[angle] - start, "s", why[angle])
     _steady(record, side, turned, passed[180], before, measures, why[360])
