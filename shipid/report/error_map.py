@@ -31,7 +31,7 @@ from shipid.report.figure import (
 from shipid.report.gain import gain, unplotted
 from shipid.report.palette import INK, MUTED, level
 from shipid.report.section import Section
-from shipid.report.selection import data_driven, left_out, overview, same_physics, spread, trained
+from shipid.report.selection import FEW_MODELS, data_driven, left_out, overview, same_physics, spread, trained
 from shipid.report.wording import counted, listed, metres, number, shortened
 
 HEIGHT, THICK = 580, 26  # of the plot and at most of a cell [px]
@@ -302,10 +302,14 @@ def _flat(drawn: Map, pieces: Pieces, bounds: Pieces) -> Plot:
 
 
 def _row_names(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
-    """Names of the models with an A, right of their cells; of more than have room, some at even distances."""
+    """Names of the models with an A, right of their cells; of more than have room there, some at even distances.
+
+    A few always have their names, even where their cells cover each other.
+    """
     high = HEIGHT - MARGIN["t"] - MARGIN["b"]
     known = rows[rows.A.notna()].reset_index(drop=True)
-    shown = [int(i) for i in spread([str(i) for i in known.index], int(known.y.max() / top * high / LINE))]
+    room = 1 + int(np.ptp(known.y) / top * high / LINE) if len(known) else 0
+    shown = [int(i) for i in spread([str(i) for i in known.index], max(room, FEW_MODELS))]
     heights = apart(known.y[shown].tolist(), LINE / high * top, float(known.y.max()))
     place = {"xref": "paper", "x": 1, "xanchor": "left", "xshift": 4, "showarrow": False}
     return [

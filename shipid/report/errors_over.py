@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,6 +21,7 @@ BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
 PIXELS = 540  # twice the height of the error over time
 LONGEST = 14  # characters of a name beside a line
+NAME = 0.055  # height of a name beside a line, as a share of the greatest error
 LEADER, LETTER, EDGE = 16, 7, 6  # line from an end to its name; a letter of a name, at most; space around it [px]
 STATISTICS = {  # option -> column of the frame, title of the axis, unit
     "mean": ("mean", "position error, mean", "m"),
@@ -195,13 +195,17 @@ def _seed_bands(traces: Sequence[Trace], seeds: pd.DataFrame) -> list[Trace]:
 
 
 def _names_at_the_end(traces: Sequence[Trace]) -> list[dict[str, Any]]:
-    """Names joined to the ends of the compensated lines, moved apart where they would collide in this view."""
+    """Names joined to the ends of the compensated lines, moved apart where they would collide in this view.
+
+    Of more names than have room, some at even distances.
+    """
     most = max((float(np.nanmax(t["y"])) for t in traces if np.isfinite(t["y"]).any()), default=0.0)
     ends = sorted(
         ((float(t["y"][-1]), float(t["x"][-1]), t) for t in traces if t["mode"] == "lines+markers" and len(t["y"])),
         key=lambda end: end[:2],
     )
-    heights = apart([height for height, _, _ in ends], 0.055 * most, math.inf)
+    ends = [ends[int(i)] for i in spread([str(i) for i in range(len(ends))], int(1 / NAME))]
+    heights = apart([height for height, _, _ in ends], NAME * most, 1.1 * most)
     notes = []
     for height, (end, place, trace) in zip(heights, ends, strict=True):
         short = trace["name"].removesuffix(", compensated")

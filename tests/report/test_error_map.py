@@ -96,6 +96,22 @@ def test_every_row_with_an_A_has_its_name_and_no_name_covers_another(simulation)
     assert min(b - a for a, b in itertools.pairwise(heights)) >= 12.99
 
 
+def test_names_of_many_rows_are_beside_their_cells(simulation):
+    """Moved apart below the least A, the name of a model stood at an A that no model has."""
+    models, cells = simulation.models, simulation.cells
+    (model,), (cell, *_) = (frame[frame.model.eq("high-1")].to_dict("records") for frame in (models, cells))
+    each = [{"model": f"m-{i}", "family": f"m-{i}", "A": 7.0 + 0.1 * i} for i in range(60)]
+    many = [pd.DataFrame([{**row, **one} for one in each]) for row in (model, cell)]
+    added = many[1].assign(N_D=30), many[1].assign(N_D=100)
+    pure = [frame[frame.family.eq("none")] for frame in (models, cells)]
+    content = replace(simulation, models=pd.concat([many[0], pure[0]]), cells=pd.concat([*added, pure[1]]))
+    names = [note for note in flat(content).layout.annotations if note.xref == "paper"]
+    places = {row["model"]: row["A"] ** 0.5 for row in each}
+    line = 13 * flat(content).layout.yaxis.range[1] / (580 - 56)
+    assert 6 < len(names) < 60
+    assert all(abs(note.y - places[note.text]) < 1.5 * line for note in names)
+
+
 def test_lines_carry_their_level_in_metres(simulation):
     figure = flat(simulation)
     texts = [note.text for note in figure.layout.annotations if note.xref != "paper"]

@@ -97,6 +97,25 @@ def test_names_at_the_ends_do_not_stretch_the_axis_of_their_view(simulation):
         assert max(name.ay for name in plot.layout.annotations) <= 1.1 * highest
 
 
+def test_names_at_the_ends_of_many_lines_have_room(simulation):
+    """Of 40 families: each name moved the next one up, to twice the greatest error, and they covered each other."""
+    one = {"models": simulation.models, "cells": simulation.cells, "horizon": simulation.horizon}
+    mine = {key: frame[frame.model.eq("high-1")] for key, frame in one.items()}
+    many = {key: [frame] for key, frame in one.items()}
+    for i in range(40):
+        for key, frame in mine.items():
+            many[key].append(frame.assign(model=f"m-{i}", **{"family": f"m-{i}"} if "family" in frame else {}))
+    content = replace(simulation, **{key: pd.concat(frames, ignore_index=True) for key, frames in many.items()})
+    for view in horizon(content).views.values():
+        plot = view[0].figure
+        most = max(np.nanmax(trace.y) for trace in plot.data if not trace.name.endswith(", seeds"))
+        heights = sorted(name.ay for name in plot.layout.annotations)
+        assert 10 < len(heights) < 40
+        assert np.diff(heights).min() > 0.054 * most
+        assert heights[0] >= 0
+        assert heights[-1] < 1.11 * most
+
+
 def test_what_failed_has_no_compensated_line(full_scale):
     names = [name for name in lines(horizon(full_scale), "0-0") if name.startswith("bare hull")]
     assert len(names) == 1
