@@ -84,13 +84,17 @@ def styles(content: ReportContent) -> Mapping[str, Style]:
 
 @lru_cache(maxsize=4)
 def close_styles(content: ReportContent) -> Mapping[str, Style]:
-    """Style of the models of a close-up: a colour and a marker each, whatever their A; no physics in ink."""
+    """Style of the models of a close-up: a colour and a marker each, whatever their A; no physics in ink.
+
+    When all colours are used, they come again with other markers: 36 models are told apart.
+    """
     frame = families(content)
     result: dict[str, Style] = {}
     of_family = dict(zip(frame.model.astype(str), frame.family, strict=True))
     physics = [name for name in exemplars(content) if of_family[name] != DATA_DRIVEN]
     for index, name in enumerate(physics):
-        result[name] = Style(category(index), SYMBOLS[index % len(SYMBOLS)], 2.0)
+        again = index // len(OKABE_ITO)
+        result[name] = Style(category(index), SYMBOLS[(index + again) % len(SYMBOLS)], 2.0)
     for name in exemplars(content):
         if of_family[name] == DATA_DRIVEN:
             result[name] = _without_physics(len([other for other in result if of_family[other] == DATA_DRIVEN]))

@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from shipid.report.palette import accuracy_range, styles, variables
+from shipid.report.palette import accuracy_range, close_styles, styles, variables
 
 
 def luminance(colour: str) -> float:
@@ -53,3 +53,10 @@ def test_methods_on_one_model_and_models_without_physics_have_markers_of_their_o
     drawn = [(look.colour, look.symbol) for name, look in looks.items() if name.startswith(("high-1", "no"))]
     assert len(drawn) == 1 + 6  # nominal
     assert len(set(drawn)) == len(drawn)
+
+
+def test_models_of_many_families_are_told_apart_in_close_ups(simulation):
+    mine = [frame[frame.model.eq("high-1")] for frame in (simulation.models, simulation.cells)]
+    many = [pd.concat([frame.assign(model=f"m-{i:02d}", family=f"m-{i:02d}") for i in range(36)]) for frame in mine]
+    looks = close_styles(replace(simulation, models=many[0], cells=many[1], best="m-00"))
+    assert len(looks) == len({(look.colour, look.symbol) for look in looks.values()}) == 36
