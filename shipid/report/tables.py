@@ -39,9 +39,13 @@ LONG = 30  # characters that a column shows of a text
 
 
 def cell_html(cell: Cell, numeric: bool, first: bool) -> Markup:
-    """Write a cell as an element of HTML; its key is left out where page.js reads the same from the text."""
+    """Write a cell as an element of HTML; its key is left out where page.js reads the same from the text.
+
+    Of a long text the begin is shown. A long name is shown whole: names of models often differ at the end alone.
+    """
     long = len(cell.text) > LONG
-    classes = " ".join(["words"] * (not numeric) + (["bad"] if cell.bad else ["long"] * long))
+    name = long and (" + " in cell.text or max(map(len, cell.text.split()), default=0) > LONG)
+    classes = " ".join(["words"] * (not numeric) + (["bad"] if cell.bad else ["name" if name else "long"] * long))
     read, key = cell.text.lower(), f"{cell.key:.6g}" if isinstance(cell.key, float | int) else cell.key
     given = {"scope": "row" if first else "", "class": classes, "data-key": "" if key == read else key}
     given["title"] = cell.text if long else ""

@@ -90,3 +90,18 @@ def test_a_cell_is_read_back_from_its_element(words, key, numeric, first):
     assert read == (expected or words.lower())
     assert ("words" in root.get("class", "").split()) != numeric
     assert (root.tag, root.get("scope")) == (("th", "row") if first else ("td", None))
+
+
+@pytest.mark.parametrize(
+    ("words", "style"),
+    [
+        ("a-family-of-models-with-a-long-name-1", "name"),
+        ("gunnerus-identified-1 + memory-with-observer", "name"),
+        ("each of the 32 damping derivatives times a factor", "long"),
+        ("moderate-1 + memory", None),
+    ],
+)
+def test_a_long_name_is_shown_whole(words, style):
+    """Models whose names differ at the end alone looked alike."""
+    classes = ElementTree.fromstring(cell_html(text(words), numeric=False, first=False)).get("class").split()
+    assert classes == ["words", *([style] if style else [])]
