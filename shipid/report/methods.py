@@ -15,10 +15,11 @@ from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label
 from shipid.report.palette import INK, OKABE_ITO, SYMBOLS, Style, category
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, figure, text
-from shipid.report.wording import counted, listed, number
+from shipid.report.wording import counted, listed, number, shortened
 
 EVERY = "with physics"
 ROW, MARGIN = 34, 96  # heights of a method in a panel, and around them [px]
+LONGEST = 20  # characters of a name at the axis: half of a narrow window
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -154,7 +155,7 @@ def _place(row: Mapping[str, Any], order: Sequence[str], families: Sequence[str]
 
 
 def _methods_axis(order: Sequence[str]) -> dict[str, Any]:
-    ticks = {"tickvals": list(range(len(order))), "ticktext": [label(name) for name in order]}
+    ticks = {"tickvals": list(range(len(order))), "ticktext": [label(shortened(name, LONGEST)) for name in order]}
     return axis("", **ticks, range=[-0.6, len(order) - 0.4])
 
 

@@ -89,6 +89,17 @@ def test_methods_are_in_the_order_that_the_page_says() -> None:
     assert "in the order of their mean H with physics, or without where they have none" in drawn.how
 
 
+def test_long_names_leave_room_for_the_points() -> None:
+    names = [f"a-method-with-a-name-that-leaves-no-room-{number}" for number in (1, 2, 3)]
+    rows = frame(2, ("",), failing=False)
+    rows["method"] = rows.method.map(dict(zip(("a", "b", "c"), names, strict=True)))
+    drawn = methods(content(rows))
+    assert drawn is not None
+    ticks = drawn.views["0"][0].plot.layout["yaxis"]["ticktext"]
+    assert max(map(len, ticks)) <= 20
+    assert {tick[-2:] for tick in ticks} == {"-1", "-2", "-3"}
+
+
 def test_the_page_is_one_file_that_escapes_its_texts(tmp_path: Path) -> None:
     text = write_comparison(content(frame(3)), tmp_path / "report.html").read_text()
     assert "Which is &lt;best&gt;?" in text
