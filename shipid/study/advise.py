@@ -158,7 +158,8 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
         return [*sentences, (_apart(results, largest), "cells")]
     if best is None:
         where = f" at {runs(largest)}" if largest else ""
-        return [*sentences, (f"No cell with physics has a result{where}, so there is no conclusion yet.", "cells")]
+        of = f" of the method {results.plan.judged!r}" if len(results.plan.methods) > 1 else ""
+        return [*sentences, (f"No cell{of} with physics has a result{where}, so there is no conclusion yet.", "cells")]
     case = Case(results, rows, best)
     chart = "map" if _has_map(rows) else "gain"
     pure = rows[rows["family"] == NO_MODEL]

@@ -328,6 +328,16 @@ def test_without_results_there_is_no_conclusion(made: Any) -> None:
     assert "there is no conclusion yet" in text(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (10,))))
 
 
+def test_where_the_method_that_judges_has_no_result_others_may_have_one(made: Any) -> None:
+    methods = [{"name": "drawn", "kind": "path-drawn"}, {"name": "other", "kind": "path-drawn"}]
+    results = made(grid({"good": (None, None), "none": (9.0, 4.0)}), changes={"method": methods}, planned=12)
+    (row,) = results.cells[results.cells["model"].eq("none") & results.cells["N_D"].eq(30)].to_dict("records")
+    other = pd.DataFrame([{**row, "method": "other", "foundation": "good", "model": "good + other", "family": "good"}])
+    results = replace(results, cells=pd.concat([results.cells, other], ignore_index=True))
+    advice = text(results)
+    assert "No cell of the method 'drawn' with physics has a result at 30 runs, so there is no conclusion yet" in advice
+
+
 def test_an_exact_model_has_no_error_to_leave(made: Any) -> None:
     H = {"good": (0.1, 0.1), "bad": (3.0, 1.5), "none": (9.0, 4.0)}
     advice = text(made(grid(H), alone={"good": 0.0, "bad": 6.0}))
