@@ -16,6 +16,7 @@ from shipid.report.section import Section
 from shipid.report.selection import exemplars, sizes
 from shipid.report.tables import Cell, Table, figure, length_places, text
 from shipid.report.wording import counted, listed, metres
+from shipid.units import plural
 
 WORST = 12  # test runs in the table of those that pay
 BY = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
@@ -36,12 +37,13 @@ def _judged(frame: pd.DataFrame) -> float:
 
 
 def coverage(content: ReportContent) -> Figure | None:
-    """Nominal against measured coverage, with intervals; None without bands."""
+    """Nominal against measured coverage, with intervals; None where no model of a close-up has a band."""
     frame = _frame(content, "coverage")
-    if frame.empty:
+    names = [name for name in exemplars(content) if len(frame) and name in set(frame.model)]
+    if not names:
         return None
-    counts, looks = sizes(frame.N_D), close_styles(content)
-    names = [name for name in exemplars(content) if name in set(frame.model)]
+    counts, looks, banded = sizes(frame.N_D), close_styles(content), frame.model.nunique()
+    drawn = f" Of {banded} models, {listed(names, 6)} {plural(len(names), 'is', 'are')} drawn; the table has all."
     views = {}
     for place, size in enumerate(counts):
         traces = [
@@ -77,7 +79,8 @@ def coverage(content: ReportContent) -> Figure | None:
         "is calibrated on errors of models that saw the run neither in training nor in the choice of hyperparameters, "
         "and counts runs, not windows. Measured on the test runs, which no model saw. Bars are exact binomial 95 % "
         f"intervals for so many windows as the {counted(int(frame.runs.max()), 'test run')} are worth: windows of one "
-        "run are alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less.",
+        "run are alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less."
+        + (drawn if len(names) < banded else ""),
         alternative="Points of the measured over the promised share of paths with intervals, one line per model. The "
         "numbers are in the table below.",
         height=420,

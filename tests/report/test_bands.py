@@ -92,6 +92,21 @@ def test_lines_of_the_coverage_are_those_of_a_close_up(banded: ReportContent) ->
     assert symbols == [chip.symbol for chip in figure.chips]
 
 
+def test_the_coverage_says_which_models_are_drawn(banded: ReportContent) -> None:
+    """Bands of methods that the study does not judge by are in the table; of these alone there is no figure."""
+    frame = banded.frames["coverage"]
+    other = frame.assign(model=frame.model + " + other")
+    both = replace(banded, frames={**banded.frames, "coverage": pd.concat([frame, other], ignore_index=True)})
+    figure = bands.coverage(both)
+    assert figure is not None
+    names = [chip.label for chip in figure.chips]
+    assert all(name in figure.how.partition(f" Of {2 * frame.model.nunique()} models, ")[2] for name in names)
+    assert "drawn; the table has all." in figure.how
+    alone = replace(banded, frames={**banded.frames, "coverage": other})
+    assert bands.coverage(alone) is None
+    assert bands.table(alone) is not None
+
+
 def test_bands_of_a_small_model_are_no_zeros(banded: ReportContent) -> None:
     frames = {name: frame.copy() for name, frame in banded.frames.items()}
     for name in ("coverage", "coverage_groups"):
