@@ -450,18 +450,7 @@ def fit(
     kinds = {} if kinds is None else kinds
     by_name("kinds", kinds, "the name of a run to a kind of manoeuvre", DataError)
     seed, refits = whole_number("seed", seed, 0, DataError), whole_number("refits", refits, 0, DataError)
-    if (physics.horizon, physics.step) != (windows.horizon, windows.step):
-        message = f"the physics has {physics.horizon} steps of {physics.step:g} s"
-        raise DataError(f"{message}, the windows have {windows.horizon} steps of {windows.step:g} s: make them equal")
-    if method.past > windows.num_past * windows.step + 1e-9:
-        steps = math.ceil(method.past / windows.step - 1e-9)
-        raise DataError(f"the method needs a past of {method.past:g} s: cut windows with past = {steps}")
-    if physics.vessel is None and not method.meets_none:
-        raise DataError(f"the method {kind!r} needs a vessel: the physics has none")
-    if physics.observer is not None:
-        raise DataError("windows hold no estimates of an observer: run a study, or fit the method on a Task with them")
-    if physics.vessel is not None:
-        check_columns(physics.vessel, windows.columns, "the windows")
+    _check_fit(method, kind, physics, windows)
     name = "physics" if physics.vessel is not None else "none"
     paths = physics.paths(windows.instants(known=commands == "known"))
     diverged = ~np.isfinite(paths).all(axis=(0, 2))
@@ -482,18 +471,40 @@ def fit(
     limits = limits_of(windows, windows.planned)
     provenance: dict[str, Any] = {"runs": list(windows.spans), "seed": seed}
     if left_out is None and refits:
-        left_out = np.full_like(windows.future, np.nan)
-        for training, judged in refit_folds(windows, refits, seed):
-            part = windows.select(judged)
-            try:
-                other = fit(method, physics, windows.select(training), commands=commands, seed=seed)
-            except DataError:  # too little is left to train: the runs that it leaves out have no errors
-                continue
-            left_out[:, judged] = part.future - other.predict(part.instants(known=commands == "known"))
+        left_out = _refitted(method, physics, windows, refits, commands, seed)
     bands, reason = bands_of(left_out, windows, limits, kinds)
     if bands is None:
         provenance["no_band"] = reason
     return Predictor(physics, kind, corrector, limits, provenance, commands, bands=bands)
+
+
+def _check_fit(method: Method, kind: str, physics: Physics, windows: Windows) -> None:
+    """Raise DataError where a method of this kind cannot be fitted to this physics on these windows."""
+    if (physics.horizon, physics.step) != (windows.horizon, windows.step):
+        message = f"the physics has {physics.horizon} steps of {physics.step:g} s"
+        raise DataError(f"{message}, the windows have {windows.horizon} steps of {windows.step:g} s: make them equal")
+    if method.past > windows.num_past * windows.step + 1e-9:
+        steps = math.ceil(method.past / windows.step - 1e-9)
+        raise DataError(f"the method needs a past of {method.past:g} s: cut windows with past = {steps}")
+    if physics.vessel is None and not method.meets_none:
+        raise DataError(f"the method {kind!r} needs a vessel: the physics has none")
+    if physics.observer is not None:
+        raise DataError("windows hold no estimates of an observer: run a study, or fit the method on a Task with them")
+    if physics.vessel is not None:
+        check_columns(physics.vessel, windows.columns, "the windows")
+
+
+def _refitted(method: Method, physics: Physics, windows: Windows, refits: int, commands: Commands, seed: int) -> Array:
+    """Errors (T, S, 2) [m] of further fits, each on the runs that it leaves out; not numbers where there are none."""
+    left_out = np.full_like(windows.future, np.nan)
+    for training, judged in refit_folds(windows, refits, seed):
+        part = windows.select(judged)
+        try:
+            other = fit(method, physics, windows.select(training), commands=commands, seed=seed)
+        except DataError:  # too little is left to train: the runs that it leaves out have no errors
+            continue
+        left_out[:, judged] = part.future - other.predict(part.instants(known=commands == "known"))
+    return left_out
 
 
 def read_bands(file: str | os.PathLike[str]) -> tuple[Bands | None, str]:
