@@ -186,8 +186,9 @@ def along_run(reach: Array, known_at: Array, now: Array, band: Band, table: Arra
     known_at, now : (S,) when each path ends, and the instants themselves [s], in order. table : radii of the band.
     """
     state, factors, waiting = adaptive(band.level, band.rate or 0.0), np.ones(len(now)), 0
+    slack = clock_slack(now)
     for i, t in enumerate(now):
-        while waiting < i and known_at[waiting] <= t + 1e-9:
+        while waiting < i and known_at[waiting] <= t + slack:
             if np.isfinite(reach[waiting]):
                 state = adapted(state, bool(reach[waiting] > factors[waiting]))
             waiting += 1

@@ -189,6 +189,17 @@ def test_an_adaptive_band_looks_at_ended_paths_alone() -> None:
     np.testing.assert_array_equal(later, factors)
 
 
+def test_an_adaptive_band_is_the_same_whenever_the_clock_began() -> None:
+    """Seconds since 1970 are rounded to some 1e-7 s: a path that ends at a row is known there."""
+    table, now = np.linspace(0.1, 3.0, 99), 0.1 * np.arange(200)
+    reach = np.random.default_rng(2).uniform(0.5, 1.5, 200)
+    factors = [
+        along_run(reach, t + 4.9, t, Band(0.9, rate=0.05), table) for t in (now, now + 1.7e9, now + 1_699_999_999.3)
+    ]
+    np.testing.assert_array_equal(factors[1], factors[0])
+    np.testing.assert_array_equal(factors[2], factors[0])
+
+
 def test_an_adaptive_band_judges_by_the_band_that_was_given() -> None:
     """Errors of 1.3 radii all along: once the band is that wide they are hits, and it misses its share."""
     now, table = np.arange(600.0), -np.log1p(-LEVELS)
