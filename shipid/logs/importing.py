@@ -545,7 +545,7 @@ def _with_losses(t: NDArray[np.float64], every: float, rounding: NDArray[np.floa
     A row at offset + every n fits while one offset in [low, high] lies within half a rounding of all rows so far; where
     none does, n leaves out as many steps as it must, or the offset starts anew, for a rate that is slightly off.
     """
-    half = 0.5 * rounding + 1e-9 * np.abs(t)
+    half = 0.5 * rounding + 1e-9 * (t - t[0]) + 4.0 * np.spacing(np.abs(t).max())  # digits of `every`, and of t
     steps, low, high = np.zeros(len(t)), t[0] - half[0], t[0] + half[0]
     offset, number, begin = np.empty(len(t)), 0.0, 0
     for row in range(1, len(t)):

@@ -238,6 +238,20 @@ def test_clock_in_minutes(plain_mapping: Write, tmp_path: Path) -> None:
     assert dataset.frame["t"].iloc[[0, -1]].tolist() == [30.0, 60.0]
 
 
+@pytest.mark.parametrize(
+    ("every", "lost"), [(0.1, [(400, 7), (900, 9)]), (0.1, [(300, 12)]), (0.5, [(200, 1), (400, 1)])]
+)
+def test_lost_rows_of_a_rounded_clock_are_found_whatever_it_counts_from(
+    every: float, lost: list[tuple[int, int]]
+) -> None:
+    """In whole seconds since 1970 as in those since the begin of the log."""
+    t = 0.03 + every * np.arange(int(300 / every))
+    seconds = np.floor(np.delete(t, np.concatenate([np.arange(first, first + count) for first, count in lost])))
+    even, since_1970 = (evenly(seconds + begin, every, Path("log.csv")) - begin for begin in (0.0, 1.7e9))
+    np.testing.assert_allclose(since_1970, even, atol=1e-5)
+    assert np.abs(even - seconds).max() < 1.0 + every
+
+
 @pytest.mark.parametrize(("step", "rounded"), [(0.5, 1.0), (0.02, 0.1), (0.1, 1.0)])
 def test_a_rounded_clock_runs_evenly(step: float, rounded: float, plain_mapping: Write, tmp_path: Path) -> None:
     """The rows are `every` apart; without the key, the same log is refused, for its times stand twice."""
