@@ -105,10 +105,15 @@ def cut_segments(
 
 def too_short(dataset: Dataset, runs: Sequence[str], step: float, horizon: float) -> list[str]:
     """Runs without a stretch that is long enough for a prediction; arguments as of `cut_segments`."""
-    spans = dict.fromkeys(runs, 0.0)
+    longest = dict.fromkeys(runs, 0)
     for run, rows in pieces(dataset.select(runs)):
-        spans[run] = max(spans[run], float(rows["t"].iloc[-1] - rows["t"].iloc[0]))
-    return [run for run, span in spans.items() if int(span / step + 1e-6) < _least(step, horizon) / step]
+        longest[run] = max(longest[run], _num_steps(rows["t"].to_numpy(), step))
+    return [run for run, count in longest.items() if count < _least(step, horizon) / step]
+
+
+def _num_steps(t: Array, step: float) -> int:
+    """Whole steps [s] within an unbroken stretch of rows at t (N,) [s]."""
+    return int((t[-1] - t[0] + clock_slack(t)) / step)
 
 
 def _least(step: float, horizon: float) -> float:
@@ -133,7 +138,7 @@ def _cut(
     between: Changes,
 ) -> list[ShootingSegment]:
     t = rows["t"]
-    count = int((t[-1] - t[0]) / step + 1e-6) if len(t) > 1 else 0
+    count = _num_steps(t, step)
     each = round(horizon / step) if horizon else max(count, 1)
     least = _least(step, horizon) / step
     if count < least:

@@ -29,6 +29,15 @@ def test_a_run_is_cut_into_horizons_and_its_end_counts_from_half_of_one(step: fl
     assert too_short(DATA, DATA.runs, step, 104.0) == list(DATA.runs)
 
 
+@pytest.mark.parametrize("begin", range(0, 20, 3))
+def test_a_run_has_as_many_steps_in_seconds_since_1970(begin: int) -> None:
+    """Twenty rows a second: the last of them ends a step, though such times are rounded to some 1e-7 s."""
+    rows = DATA.frame[DATA.frame["t"] < 50]
+    data = Dataset(rows.assign(t=1_700_000_000 + (0.05 * (begin + rows["t"])).round(2)), DATA.metadata)
+    assert [one.num_steps for one in cut_segments(SHIP, data, data.runs, 0.05, 0.0)] == [49, 49]
+    assert too_short(data, data.runs, 0.05, 4.9) == []
+
+
 def test_earlier_orders_are_those_before_the_segment_the_latest_first() -> None:
     frame = DATA.frame.assign(**{"port.n": 1.0 + 0.01 * DATA.frame["t"]})
     segments = cut_segments(SHIP, Dataset(frame, DATA.metadata), DATA.runs, 1.0, 20.0, lags=3)
