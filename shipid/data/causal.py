@@ -26,11 +26,12 @@ def last_known(t: Array, values: Array) -> NDArray[np.intp]:
     later, and before i. The row of a bend itself may be part of the next line, so the row before it counts. Where
     a value holds still (equal to the one before), nothing new is known and it counts as known.
     """
-    count = len(values)
-    slope = np.diff(values) / np.diff(t)
+    count, steps = len(values), np.diff(t)
+    slope = np.diff(values) / steps
     limit = ROUNDING * max(float(np.abs(slope).max(initial=0.0)), 1e-300)
+    of_clock = np.abs(slope) * 2 * np.spacing(np.abs(t).max()) / steps  # seconds since 1970 are rounded to some 1e-7
     bend = np.zeros(count, dtype=bool)
-    bend[1:-1] = np.abs(np.diff(slope)) > limit
+    bend[1:-1] = np.abs(np.diff(slope)) > limit + of_clock[1:] + of_clock[:-1]
     known = np.zeros(count, dtype=np.intp)
     latest = 0
     for i in range(1, count):
