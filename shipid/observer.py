@@ -33,12 +33,13 @@ from casadi import SX
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from shipid.arguments import of_class
 from shipid.checked import Checked
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, clock_slack, stretches
 from shipid.data.windows import PathSource, Windows
 from shipid.engine.casadi import summed_rates
 from shipid.engine.samples import on_samples
-from shipid.errors import DocumentError, ShipidError, choices
+from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.metrics import position_error
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import Dynamics, dynamics
@@ -158,7 +159,10 @@ class Bank:
 
 
 def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
-    """Filters for a vessel of three degrees of freedom; DocumentError for another."""
+    """Filters for a vessel of three degrees of freedom; DocumentError for another, or for what is none."""
+    of_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
+    if settings is not None:
+        of_class("settings", settings, Observer, "such as Observer(), or None", DocumentError)
     settings, model = settings or Observer(), dynamics(vessel)
     if model.num_dof != 3 or model.hidden:
         message = (
@@ -412,6 +416,7 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
     compile. Raises DocumentError for a vessel that is not of three degrees of freedom, ShipidError for a command that
     the dataset lacks.
     """
+    of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     filters, frame = bank(vessel, settings), dataset.frame
     model = filters.model
     missing = next((name for name in model.commands if name not in frame), None)

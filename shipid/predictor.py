@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple, Self, get_args, overload
 import numpy as np
 from pydantic import BaseModel, Field
 
-from shipid.arguments import by_name, names_of, numbers, of_class, one_of, path_of, whole_number
+from shipid.arguments import by_name, names_of, number, numbers, of_class, one_of, path_of, whole_number
 from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, run_folds
 from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DataError, ResultError, ShipidError, choices
@@ -206,7 +206,7 @@ class Predictor:
     def _checked(self, instants: Instants) -> Instants:
         """The instants with arrays of floats; DataError for another step, without the motion, and for other shapes."""
         check_instants(instants)
-        parts = {name: getattr(instants, name) for name in ("columns", "past", "planned", "hidden", "estimates")}
+        parts = {name: getattr(instants, name) for name in ("past", "planned", "hidden", "estimates")}
         for part, given in parts.items():
             if part not in ("planned", "hidden") or given is not None:
                 by_name(f"{part} of the instants", given, "a name to an array", DataError)
@@ -214,7 +214,7 @@ class Predictor:
         if missing is not None:
             raise DataError("the instants lack this column", path=missing)
         step = self.physics.step
-        if instants.step is not None and abs(instants.step - step) > 1e-9 * step:
+        if instants.step is not None and abs(number("step", instants.step, DataError) - step) > 1e-9 * step:
             message = f"instants of windows with steps of {instants.step:g} s, the predictor has {step:g} s"
             raise DataError(f"{message}: cut windows with its step")
         return _as_numbers(instants)
@@ -244,10 +244,12 @@ class Predictor:
             without a column, are passed over.
         """
         by_name("columns", columns, "a name to an array", DataError)
-        odd = next((name for name in columns if np.ndim(columns[name]) != 1), None)
+        shapes = {name: np.shape(columns[name]) for name in columns}
+        count = next((shape[0] for shape in shapes.values() if len(shape) == 1), 0)
+        odd = next((name for name, shape in shapes.items() if shape != (count,)), None)
         if odd is not None:
-            raise DataError(f"must be (S,), a value for each instant, not {np.shape(columns[odd])}", path=odd)
-        outside = np.full(len(columns[next(iter(columns))]) if len(columns) else 0, not self.limits)
+            raise DataError(f"must be (S,), a value for each instant, not {shapes[odd]}", path=odd)
+        outside = np.full(count, not self.limits)
         for name, (low, high) in self.limits.items():
             if name in columns:
                 slack, values = 1e-9 * max(1.0, abs(low), abs(high)), numbers(name, columns[name], DataError)

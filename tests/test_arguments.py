@@ -14,6 +14,8 @@ import shipid
 from shipid.arguments import names_of, number, numbers, of_class, one_of, positive, steps_in, whole_number
 from shipid.errors import DataError, ShipidError
 from shipid.export.write import export_predictor, export_vessel
+from shipid.hybrid.alone import Unchanged
+from shipid.observer import bank, observe
 from shipid.vessel.dynamics import dynamics
 
 
@@ -130,6 +132,7 @@ LOG = shipid.perform(SHIP, STRAIGHT, step=1.0, duration=60.0)
 DATA = shipid.Dataset(LOG[[name for name in LOG if not str(name).startswith("actual.")]], {})
 WINDOWS = shipid.cut_windows(DATA, horizon=3, step=1.0)
 PHYSICS = shipid.Physics(SHIP, 3, 1.0)
+PREDICTOR = shipid.Predictor(PHYSICS, "alone", Unchanged({}))
 IDENTIFY = shipid.Identify(parameters=["hull.abkowitz.X_vv"])
 
 
@@ -190,6 +193,19 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "changes": (lambda: shipid.read_plan("quick", ANY), "changes must be a dict, of a dotted path to a value, not"),
     "changes of no path": (lambda: shipid.read_plan("quick", {3: 4}), "no such block"),  # type: ignore[dict-item]
     "paths": (lambda: PHYSICS.paths(ANY), "instants must be an Instants, such as"),
+    "no columns": (lambda: PHYSICS.paths(shipid.Instants({})), "u: the instants lack this column"),
+    "reached": (lambda: PHYSICS.reached(shipid.Instants(ANY)), "columns of the instants must be a dict"),
+    "step of the instants": (
+        lambda: PREDICTOR.predict(shipid.Instants(WINDOWS.columns, step="1 s")),  # type: ignore[arg-type]
+        "step must be a number, not '1 s'",
+    ),
+    "outside": (
+        lambda: PREDICTOR.outside({"u": np.zeros(3), "v": np.zeros(2)}),
+        r"v: must be \(S,\), a value for each",
+    ),
+    "observe": (lambda: observe(SHIP, ANY), "dataset must be a Dataset, as of"),
+    "bank": (lambda: bank(SHIP, {"fade": 0.0}), "settings must be an Observer, such as"),  # type: ignore[arg-type]
+    "bank of a name": (lambda: bank("mariner"), "vessel must be a Vessel, as of"),  # type: ignore[arg-type]
     "position_error": (lambda: shipid.position_error(np.zeros(2), np.zeros(3)), "paths must both be"),
     "a wind": (lambda: roll(environment={"V_wind": np.zeros(1)}), "environment: .* has no 'V_wind'"),
     "keep": (lambda: roll(keep=3), "keep must be a name, or several names, not 3"),

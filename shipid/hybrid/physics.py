@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from shipid.arguments import numbers, of_class, one_of, positive, whole_number
+from shipid.arguments import by_name, numbers, of_class, one_of, positive, whole_number
 from shipid.data.windows import Instants, PathSource, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance
@@ -252,8 +252,11 @@ def _in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Arr
 
 
 def check_instants(instants: Instants) -> None:
-    """Raise DataError for what are no instants, such as windows."""
+    """Raise DataError for what are no instants, such as windows, or for instants without columns."""
     of_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
+    by_name("columns of the instants", instants.columns, "a name to an array", DataError)
+    if "u" not in instants.columns:  # which says how many instants there are
+        raise DataError("the instants lack this column", path="u")
 
 
 def assumed(vessel: Vessel, columns: Collection[str]) -> list[str]:
