@@ -20,7 +20,7 @@ from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrated
-from shipid.hybrid.method import Case, Corrector, Index, Method, Task
+from shipid.hybrid.method import Case, Corrector, Index, Method, Task, widened
 from shipid.hybrid.methods import METHODS, kind_of, listed
 from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.observer import AGE, Observer
@@ -250,10 +250,10 @@ class Predictor:
         if odd is not None:
             raise DataError(f"must be (S,), a value for each instant, not {shapes[odd]}", path=odd)
         outside = np.full(count, not self.limits)
-        for name, (low, high) in self.limits.items():
+        for name, ends in self.limits.items():
             if name in columns:
-                slack, values = 1e-9 * max(1.0, abs(low), abs(high)), numbers(name, columns[name], DataError)
-                outside |= ~((values >= low - slack) & (values <= high + slack))
+                (low, high), values = widened(*ends), numbers(name, columns[name], DataError)
+                outside |= ~((values >= low) & (values <= high))
         if self.run_up > 0:
             age = numbers(AGE, columns.get(AGE, np.zeros(len(outside))), DataError)
             outside |= ~(age >= self.run_up - 1e-3 * self.physics.step)

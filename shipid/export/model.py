@@ -17,7 +17,7 @@ from shipid.export.correctors import CORRECTORS, taken
 from shipid.export.known import Known, Layout, layout
 from shipid.hybrid.bands import Bands
 from shipid.hybrid.learned_force import ForceCorrector
-from shipid.hybrid.method import Corrector
+from shipid.hybrid.method import Corrector, widened
 from shipid.hybrid.physics import Physics
 from shipid.physics.signals import row_of, signal_of
 from shipid.simulation.log import column_of
@@ -113,12 +113,8 @@ class Model:
     @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:
         """Entry of `now` -> least and greatest value without an alarm."""
-        limits = {}
-        for name, (low, high) in self.predictor.limits.items():
-            if name in self.layout.now:
-                slack = 1e-9 * max(1.0, abs(low), abs(high))
-                limits[name] = (float(low - slack), float(high + slack))
-        return limits
+        given = {name: widened(*ends) for name, ends in self.predictor.limits.items() if name in self.layout.now}
+        return {name: (float(low), float(high)) for name, (low, high) in given.items()}
 
     def unit(self, name: str) -> str:
         """SI unit of an entry of an input."""

@@ -191,6 +191,12 @@ class Method(Checked, BaseModel, ABC):
         """Fit every foundation of a task; name of the foundation -> result."""
 
 
+def widened(low: float, high: float) -> tuple[float, float]:
+    """Least and greatest value that training has seen, apart by their rounding: what equals one of them is inside."""
+    slack = 1e-9 * max(1.0, abs(low), abs(high))
+    return low - slack, high + slack
+
+
 def shared_tables(task: Task, inputs: Inputs) -> dict[str, dict[str, Array]]:
     """Inputs (S,) by name, for every foundation; an input that does not depend on the physics is one array for all."""
     common = inputs.common(task.windows.instants(known=task.known), task.windows.step)
