@@ -108,6 +108,9 @@ def play(
         skipped += instants[2]
     if not rows:
         past = predictor.past * step
+        if every is not None and any(np.ptp(piece["t"]) >= past for _, piece in pieces(dataset)):
+            message = f"{every:g}: no instant so many s apart has the past of {past:g} s that the predictor needs"
+            raise DataError(f"{message}: give less, such as {past:g}", path="--every")
         raise DataError(f"no run is as long as the past of {past:g} s that the predictor needs", file=log)
     missing = () if vessel is None else tuple(assumed(vessel, names))
     return Played(

@@ -222,6 +222,17 @@ def test_a_wrong_interval_is_refused(predictor, tmp_path):
         play(predictor, saved(log(), tmp_path), every=0.0)
 
 
+def test_instants_too_far_apart_are_not_said_to_be_runs_too_short(tmp_path):
+    """Before, the runs were blamed, which are as long as the past and longer."""
+    file = drawn("path-drawn", 2, vessel="mariner").predictor.save(tmp_path / "cell.npz")  # a past of 3 s
+    target = saved(log().assign(V_w=0.0, beta_w=0.0), tmp_path)
+    with pytest.raises(DataError, match=r"^--every: 10000: no instant so many s apart has the past of 3 s .* as 3$"):
+        play(file, target, every=1e4)
+    assert len(play(file, target, every=3.0).instants)
+    with pytest.raises(DataError, match="no run is as long as the past of 3 s"):
+        play(file, saved(log().iloc[:1].assign(V_w=0.0, beta_w=0.0), tmp_path), every=1e4)
+
+
 def test_alarms_are_at_the_times_that_the_log_has():
     """Dates where its clock has them, and not seconds since 1970; else seconds of its clock."""
     rows = pd.DataFrame({"run": "a", "t": [1652954400.0, 1652954405.0, 1652954410.0], "outside": [True, True, False]})
