@@ -15,6 +15,7 @@ from pydantic import BaseModel, Field
 
 from shipid.arguments import by_name, names_of, number, numbers, of_class, one_of, path_of, whole_number
 from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, run_folds
+from shipid.document import plain
 from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
@@ -274,14 +275,14 @@ class Predictor:
             "observer": None if self.physics.observer is None else self.physics.observer.model_dump(mode="json"),
             "limits": {name: list(pair) for name, pair in self.limits.items()},
             "run_up": self.run_up,
-            "provenance": dict(self.provenance),
+            "provenance": plain(self.provenance),
             "method": self.method,
             "corrector": self.corrector.header(),
             "bands": None if self.bands is None else self.bands.header(),
         }
         if target.is_dir():
             raise ResultError("is a folder: name a file to write", file=target)
-        arrays = {"header": np.array(json.dumps(header)), **self.corrector.arrays()}
+        arrays = {"header": np.array(json.dumps(header, default=str)), **self.corrector.arrays()}
         if self.bands is not None:
             arrays |= {BANDS + name: values for name, values in self.bands.arrays().items()}
         write_arrays(target, arrays)  # not compressed: weights do not shrink

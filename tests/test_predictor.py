@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import MISSING, fields, replace
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +73,14 @@ def test_numbers_of_numpy_are_saved_and_exported(tmp_path: Path) -> None:
     assert Predictor.load(one.save(tmp_path / "one.npz")).physics == physics
     for file in one.export("c", tmp_path / "aboard"):
         assert "np.float64(" not in file.read_text(encoding="utf-8")
+
+
+def test_what_a_user_notes_of_the_origin_is_saved(tmp_path: Path) -> None:
+    """Before, a number of NumPy's, a date or a path among it ended in a TypeError."""
+    noted = {"runs": np.int64(3), "mean": np.array([1.0, 2.0]), "day": date(2026, 11, 26), "log": Path("trials.csv")}
+    one = Predictor(Physics(load_vessel("mariner"), 3, 0.5), "alone", Unchanged({}), provenance=noted)
+    known = Predictor.load(one.save(tmp_path / "one.npz")).provenance
+    assert known == {"runs": 3, "mean": [1.0, 2.0], "day": "2026-11-26", "log": "trials.csv"}
 
 
 def test_a_level_gives_a_band_or_one_sentence(tiny_run: Path) -> None:
