@@ -405,14 +405,16 @@ def build_plan(
     try:
         return _built(document, file, vessels, sources, changes)
     except DocumentError as error:
-        raise _named(error, document) from None
+        raise _named(error, document, tuple(changes or ())) from None
 
 
-def _named(error: DocumentError, document: Document) -> DocumentError:
-    """The error with paths by which a person finds the block: families and methods by name."""
+def _named(error: DocumentError, document: Document, changes: Sequence[str]) -> DocumentError:
+    """The error with paths by which a person finds the block, families and methods by name; whether --set made it."""
     path = error.path and documents.by_name(document, error.path)
-    others = [_named(other, document) for other in error.others if isinstance(other, DocumentError)]
-    return type(error)(error.message, file=error.file, path=path, others=others)
+    others = [_named(other, document, changes) for other in error.others if isinstance(other, DocumentError)]
+    changed = any(f"{place}.".startswith(f"{change}.") for place in (error.path, path) for change in changes)
+    message = f"--set: {error.message}" if changed else error.message
+    return type(error)(message, file=error.file, path=path, others=others)
 
 
 def _built(

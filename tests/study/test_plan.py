@@ -290,6 +290,23 @@ def test_changes_reach_the_document(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"grid.ND": [3]}, "grid.ND: --set: unknown key: did you mean 'N_D'"),
+        ({"grid.N_D": "3x"}, "grid.N_D: --set: '3x': must be a list"),
+        ({"family.0.members": -1}, "--set: "),
+        ({"truth": {"vessel": "gunnerus-28.9", "manouvres": 3}}, "truth.manouvres: --set: unknown key"),
+    ],
+)
+def test_a_mistake_of_set_is_not_put_down_to_the_file(changes: dict[str, object], message: str) -> None:
+    """Before, the bundled file was named, in which there is no such mistake, and nothing else."""
+    with pytest.raises(DocumentError) as caught:
+        read_plan("quick", changes)
+    assert message in str(caught.value)
+    assert str(caught.value).count("--set") == 1
+
+
+@pytest.mark.parametrize(
     ("changes", "path"),
     [
         ({"grd.N_D": [3]}, "grd.N_D"),
