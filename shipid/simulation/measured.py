@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from shipid.vessel.outline import ship_outline
 
 TRIALS: tuple[tuple[str, tuple[float, ...]], ...] = (("turning", (35,)), ("zigzag", (10, 10)), ("zigzag", (20, 20)))
 """Standard manoeuvres [deg] that have criteria."""
+FROM_REST = "the ship comes from rest: the tests ask for a steady approach at the test speed"
 LEVELS = {"spiral": levels, "reverse-spiral": rate_levels}  # kind -> how its steady levels are read from a record
 
 
@@ -112,8 +113,10 @@ def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
     columns = {str(column): frame[column].to_numpy() for column in frame if column != "run"}
     record = record_of(columns, Controls(vessel).helm)
     measures, length = MEASURES[chosen.kind](record), vessel.length
-    judged = criterion_rows(criteria(chosen.kind, measures, length))
-    return Measured(vessel, chosen, frame, record, measure_rows(measures, length), judged)
+    judged = criteria(chosen.kind, measures, length)
+    if chosen.manoeuvre.approach == "rest":
+        judged = [replace(one, met=None, note=FROM_REST) for one in judged]
+    return Measured(vessel, chosen, frame, record, measure_rows(measures, length), criterion_rows(judged))
 
 
 def approached(chosen: Standard) -> str:

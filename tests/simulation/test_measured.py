@@ -65,3 +65,13 @@ def test_a_ship_that_turns_against_her_helm_is_not_judged() -> None:
     assert turned.frame["psi"].iloc[-1] < -np.pi
     assert {row["verdict"] for row in turned.criteria} == {"not judged"}
     assert all("against her helm" in row["note"] for row in turned.criteria)
+
+
+@pytest.mark.parametrize(("name", "angles"), [("turning", (35,)), ("zigzag", (10,)), ("stop", ())])
+def test_a_run_from_rest_is_not_judged(name: str, angles: tuple[float, ...]) -> None:
+    """At a tenth of her speed a ship stops in 0.1 lengths: that meets no standard."""
+    ship = load_vessel("container-175")
+    assert all(row["verdict"] == "met" for row in measure_standard(ship, name, angles).criteria)
+    slow = measure_standard(ship, name, angles, approach="rest").criteria
+    assert slow
+    assert all(row["verdict"] == "not judged" and "comes from rest" in row["note"] for row in slow)
