@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipid.measures.record import NAN, Measures
+from shipid.measures.record import AT_REST, NAN, Measures
 from shipid.units import DEGREE
 
 SHORTEST = 100.0  # m: length from which the standards apply
@@ -89,7 +89,8 @@ def _zigzag(measures: Measures, length: float | None) -> Iterator[Criterion]:
         overshoot = measures[f"overshoot_{number}"]
         ordinal = "first" if number == 1 else "second"
         label = f"yaw checking: 10/10 {ordinal} overshoot ({paragraph})"
-        yield _judged(label, overshoot.value, limit, "rad", overshoot.why, length)
+        missing = overshoot.why or (AT_REST if speed == 0 else "")
+        yield _judged(label, overshoot.value, limit, "rad", missing, length)
 
 
 def first_limit(ratio: float) -> float:

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 
 NAN = float("nan")
 STILL = "the helm is never moved"
+AT_REST = "the ship does not move at the execute"
 POINTS = 4  # samples of the interpolating polynomial
 HALVINGS = 60
 TOP = 0.2  # share of a rise that is its top

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipid.measures.record import (
+    AT_REST,
     NAN,
     STEADY,
     STILL,
@@ -97,7 +98,7 @@ def _steady(
     measures.add("steady_speed", speed, "m/s", why)
     measures.add("steady_rate", rate, "rad/s", why)
     measures.add("steady_drift", mean(t, drift, first, end) if np.isfinite(rate) else NAN, "rad", why)
-    measures.add("speed_loss", 1 - speed / before if before else NAN, "-", why)
+    measures.add("speed_loss", 1 - speed / before if before else NAN, "-", why if before else AT_REST)
     measures.add("current_speed", _carried(record, first, end) if np.isfinite(rate) else NAN, "m/s", why)
 
 

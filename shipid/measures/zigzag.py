@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from shipid.measures.record import (
+    AT_REST,
     FULL,
     NAN,
     STILL,
@@ -76,7 +77,8 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
     slowest = NAN
     if np.isfinite(third):
         slowest = min(float(np.interp(third, t, record.speed)), *record.speed[(t >= start) & (t <= third)])
-    measures.add("speed_loss", 1 - slowest / before if before else NAN, "-", missing("third"))
+    lost = 1 - slowest / before if before else NAN
+    measures.add("speed_loss", lost, "-", missing("third") if before else AT_REST)
     return measures
 
 

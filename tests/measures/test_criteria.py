@@ -7,7 +7,7 @@ import pytest
 
 from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria, first_limit, second_limit
-from shipid.measures.record import Measures
+from shipid.measures.record import AT_REST, Measures
 from shipid.units import DEGREE
 from tests.measures.made_records import RECORDS, every
 
@@ -77,3 +77,5 @@ def test_what_is_not_judged_says_why() -> None:
     assert judged("stop", None)["5.3.4"][2:] == (None, "the length of the ship is not known")
     assert judged("stop", 100.0, track_reach=np.nan)["5.3.4"][2:] == (None, "is missing")
     assert "100 m and more" in judged("stop", 50.0)["5.3.4"][3]
+    at_rest = judged("zigzag", 200.0, approach_speed=0.0)
+    assert [at_rest[one][2:] for one in ("5.3.3.1", "5.3.3.2")] == [(None, AT_REST)] * 2

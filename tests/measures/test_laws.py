@@ -10,10 +10,10 @@ import pytest
 from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of
-from shipid.measures.record import Measures, Record
+from shipid.measures.record import AT_REST, Measures, Record
 from shipid.measures.rows import measure_rows
 from shipid.units import DEGREE
-from tests.measures.made_records import RECORDS, every, rows
+from tests.measures.made_records import RECORDS, START, every, rows
 
 KINDS = list(MEASURES)
 DENSE = {kind: every(sail(), 0.05) for kind, sail in RECORDS.items()}
@@ -115,3 +115,13 @@ def test_kinds_are_recognised(kind: str) -> None:
     expected = {"pull-out": ("turning", "pull-out"), "spiral": (), "reverse-spiral": ()}
     assert kinds == expected.get(kind, (kind,))
     assert ("a spiral or a reverse-spiral" in why) == ("spiral" in kind)
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "turning"])
+def test_a_ship_at_rest_at_the_execute_has_no_share_of_her_speed(kind: str) -> None:
+    """A log that begins with the first order, from a standing ship: neither its end nor the turn is the reason."""
+    record = every(RECORDS[kind](), 0.5)
+    moving = np.minimum(np.maximum(record.t - START, 0.0), 5.0) / 5.0
+    loss = MEASURES[kind](replace(record, u=moving * record.u, v=moving * record.v))["speed_loss"]
+    assert np.isnan(loss.value)
+    assert loss.why == AT_REST
