@@ -11,7 +11,8 @@ from shipid.measures.record import NAN, Array, Measures, Record, mean, plateaus,
 from shipid.measures.turning import MIDSHIPS
 from shipid.units import DEGREE
 
-LEVEL_HELM = 0.5 * DEGREE  # helm angles closer than this are one level
+LEVEL_HELM, LEVEL_SHARE = 0.5 * DEGREE, 0.02  # closer helm angles are one level, and such a share of the greatest one
+MOST_ROWS, SCATTER = 0.9, 3.0  # of the changes from row to row, and how far such changes scatter about a level
 LEVEL_RATE = 0.05  # of the largest rate: rates closer than this are one level
 
 
@@ -31,13 +32,19 @@ def levels(record: Record) -> Levels:
     """Helm levels of a direct spiral with the yaw rate over the last quarter of each, where that has settled."""
     t, most = record.t, float(np.abs(record.r).max())
     helm, rate = [], []
-    stretches = plateaus(t, record.helm, LEVEL_HELM)
+    stretches = plateaus(t, record.helm, _one_level(record.helm))
     for first, last in stretches:
         settled_rate = settled(t, record.r, float(t[first]), float(t[last]), most)
         if np.isfinite(settled_rate):
             helm.append(float(np.median(record.helm[first : last + 1])))
             rate.append(settled_rate)
     return Levels(np.array(helm), np.array(rate), len(stretches) - len(helm))
+
+
+def _one_level(helm: Array) -> float:
+    """How far helm angles of one level may be apart [rad]: the less, the finer the levels of a quiet helm are."""
+    scatter = SCATTER * float(np.quantile(np.abs(np.diff(helm)), MOST_ROWS))
+    return min(max(scatter, LEVEL_SHARE * float(np.abs(helm).max())), LEVEL_HELM)
 
 
 def rate_levels(record: Record) -> Levels:

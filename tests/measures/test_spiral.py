@@ -24,6 +24,18 @@ def test_a_stable_ship_has_no_loop() -> None:
     np.testing.assert_allclose(points.rate, GAIN * np.array(LEVELS) * DEGREE, atol=1e-5)
 
 
+@pytest.mark.parametrize(("share", "noise"), [(1.0, 0.05), (0.2, 0.03), (0.2, 0.0), (0.04, 0.0)])
+def test_levels_may_be_as_close_as_the_helm_is_quiet(share: float, noise: float) -> None:
+    """Helm angles of 20 deg to 0.8 deg at most, with noise [deg]: levels that run together made a loop."""
+    record = every(stable_spiral(), 0.5)
+    scatter = noise * np.random.default_rng(0).standard_normal(len(record.t)) * DEGREE
+    less = replace(record, helm=share * record.helm + scatter, r=share * record.r, psi=share * record.psi)
+    measures, points = spiral(less), levels(less)
+    assert measures["levels"].value == len(LEVELS)
+    np.testing.assert_allclose(points.helm, share * np.array(LEVELS) * DEGREE, atol=1e-9 + 0.5 * noise * DEGREE)
+    assert measures["loop_width"].value == pytest.approx(0.0, abs=(1e-3 + 0.5 * noise) * DEGREE)
+
+
 def test_a_loop_as_wide_as_it_was_made() -> None:
     """Rate K delta + 1 deg/s on the way to port, K delta - 1 deg/s on the way back: 2 deg/s high, 2 / K deg wide."""
     record = every(stable_spiral(), 0.5)
