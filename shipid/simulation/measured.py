@@ -18,9 +18,10 @@ from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import Levels, levels, rate_levels
 from shipid.report.manoeuvre import ManoeuvreContent
 from shipid.simulation.approach import Controls, NotStraight
+from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import Standard, standard
-from shipid.units import RPM
+from shipid.units import DEGREE, RPM
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 from shipid.vessel.outline import ship_outline
@@ -112,7 +113,8 @@ def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
     """The measures of one log."""
     columns = {str(column): frame[column].to_numpy() for column in frame if column != "run"}
     record = record_of(columns, Controls(vessel).helm)
-    measures, length = MEASURES[chosen.kind](record), vessel.length
+    known = {"execute_heading": chosen.manoeuvre.reversal_deg * DEGREE} if isinstance(chosen.manoeuvre, Zigzag) else {}
+    measures, length = MEASURES[chosen.kind](record, **known), vessel.length
     judged = criteria(chosen.kind, measures, length)
     if chosen.manoeuvre.approach == "rest":
         judged = [replace(one, met=None, note=FROM_REST) for one in judged]

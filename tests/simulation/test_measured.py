@@ -3,6 +3,7 @@ import pytest
 
 from shipid.errors import ShipidError
 from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
+from shipid.units import DEGREE
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.template import Particulars, first_guess
 
@@ -75,3 +76,15 @@ def test_a_run_from_rest_is_not_judged(name: str, angles: tuple[float, ...]) -> 
     slow = measure_standard(ship, name, angles, approach="rest").criteria
     assert slow
     assert all(row["verdict"] == "not judged" and "comes from rest" in row["note"] for row in slow)
+
+
+@pytest.mark.parametrize(("helm", "heading"), [(10, 9), (10, 11), (7.5, 7.5), (20, 19), (3, 0.5)])
+def test_a_zigzag_is_measured_at_the_heading_at_which_it_was_ordered(helm: float, heading: float) -> None:
+    """Of a log the heading is estimated, to a multiple of 5 deg where it is near; here it is known."""
+    done = measure_standard(load_vessel("kvlcc2-l7"), "zigzag", (helm, heading))
+    measures = {row["measure"]: row["value"] for row in done.measures}
+    assert measures["execute heading"] == pytest.approx(heading)
+    executes = np.flatnonzero(np.diff(done.record.helm)) + 1
+    off = (done.record.psi - done.record.psi[0]) / DEGREE
+    assert measures["overshoot 1"] == pytest.approx(off[executes[1] : executes[2]].max() - heading, abs=0.02)
+    assert not done.criteria  # of 10/10 and 20/20
