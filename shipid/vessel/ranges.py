@@ -171,13 +171,17 @@ def _of_block(path: str, value: float, values: Mapping[str, float]) -> Iterator[
 
 
 def _against_the_wind(values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    """Coefficients of the wind in the signs of another convention."""
+    """Coefficients of the wind in the signs of another convention, or over other angles."""
     for end in ("bow", "stern"):
         if values.get(path := f"wind.C_Dl_{end}", 0.0) < 0:
             yield path, f"{values[path]:g}: expected a drag, above 0"
     gamma = [(value, path.rpartition(".")[2]) for path, value in values.items() if path.startswith("wind.gamma_deg.")]
     if not gamma:
         return
+    least, most = min(gamma)[0], max(gamma)[0]
+    if least > ALONG or most < 180 - ALONG:
+        words = f"from {least:g} to {most:g} deg: expected from 0, a head wind, to 180"
+        yield "wind.gamma_deg", f"{words}, one from astern; beyond its ends a table is constant"
     (first, head), (_, beam) = (min(gamma, key=lambda one: abs(one[0] - of)) for of in (0.0, 90.0))
     if abs(first) < ALONG and values[f"wind.C_X.{head}"] > 0:
         words = f"{values[f'wind.C_X.{head}']:g} at {first:g} deg: a head wind drives her astern, C_X < 0"

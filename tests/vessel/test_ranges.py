@@ -193,3 +193,24 @@ def test_a_rudder_behind_the_screw_of_the_other_side_is_refused(tmp_path: Path) 
     (tmp_path / "twin.toml").write_text(swapped)
     with pytest.raises(DocumentError, match=r"starboard_rudder.behind: 'port' at y = .* is on the other side"):
         load_vessel(tmp_path / "twin.toml")
+
+
+@pytest.mark.parametrize("ends", [(0, 90), (30, 150), (90, 270)])
+def test_a_wind_table_of_fewer_angles_is_refused_and_may_be_meant(ends: tuple[float, float], tmp_path: Path) -> None:
+    """A wind from astern would have the force of one abeam."""
+    gamma = np.linspace(*ends, 5)
+    side = np.where(gamma > 180, -1, np.sign(gamma))
+    columns = {
+        "gamma_deg": gamma,
+        "C_X": -0.6 * np.cos(np.radians(gamma)),
+        "C_Y": side * np.abs(np.sin(np.radians(gamma))),
+        "C_N": 0 * gamma,
+    }
+    wind = "[wind]\n" + "\n".join(f"{name} = {values.tolist()}" for name, values in columns.items())
+    file = tmp_path / "ship.toml"
+    file.write_text(f'extends = "gunnerus-28.9"\n{wind}\n')
+    with pytest.raises(DocumentError, match=f"from {ends[0]} to {ends[1]} deg: expected from 0") as caught:
+        load_vessel(file)
+    assert caught.value.path == "wind.gamma_deg"
+    file.write_text(f'extends = "gunnerus-28.9"\nunusual = ["wind.gamma_deg"]\n{wind}\n')
+    load_vessel(file)
