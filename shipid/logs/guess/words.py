@@ -274,6 +274,7 @@ SYNONYMS |= {
     "strahler": "thruster",
     "propulsor": "thruster",
 }
+SYNONYMS |= {"geschw": "geschwindigkeit"}
 SYNONYMS |= {"rps": "rpm"}  # the unit is read from the name itself
 SYNONYMS |= {"transverse": "trans", "lateral": "lat", "forward": "fwd", "velocities": "vel", "degrees": "deg"}
 TRANSLATED = {
