@@ -128,6 +128,8 @@ TICKS = {11_644_473_600: "1601, as Windows does", 62_135_596_800: "the year 1, a
 """Seconds from the begin of a clock of ticks of 100 ns to 1970 -> who counts so."""
 SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
 NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
+SHIPS, UNKNOWN = ("mmsi", "userid", "imo", "imonumber", "callsign"), ("0", "unknown")
+"""Names of columns that say the ship, in small letters alone, the surest first; what they hold for an unknown one."""
 _UNIT = re.compile(
     r"[\[(]?(s|secs?|seconds|ms|us|ns|mins?|minutes|h|hrs?|hours?|d|days?|m|mm|cm|km|meters?|metres?|ft|deg(rees)?|°|grad|rad|m/s|mps|m\*s-1|kn|kts?|knots?|km/h|kmh|mph|cm/s|mm/s|"
     r"(deg|°|grad)/(s|sec|min)|dps|rad/s(ec)?|rpm|rps|1/(s|min)|u/min|min-1|s-1|hz|n|kn|nm|knm|kw|w|%|pct|percent|bar|v|a|°c|c|"
@@ -210,6 +212,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     else:
         table = read_table(file, model, "time")
         notes = tuple(f"{name!r} is {table.attrs['other'][name]}" for name in table.attrs.get("to save anew", ()))
+    _refuse_ships(table, file)
     columns, words = _numbers(table, form.get("decimal", "."), form.get("thousands"))
     in_parts = _degrees(columns)
     rarely = [name for name, values in columns.items() if np.isnan(values).mean() > 0.5]
@@ -424,6 +427,20 @@ def _refuse_long(rows: list[list[str]], file: Path) -> None:
             message = f"a row for each value, called {first} and so on: write a row for each time, a column for each"
             how = "such as with pandas: pivot_table(index=..., columns=..., values=...)"
             raise DataError(f"{message}, {how}", file=file)
+
+
+def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
+    """Raise DataError where a log holds several ships, as columns of AIS name them: the surest of these decides."""
+    names = {re.sub(r"[^a-z]", "", name.lower()): name for name in reversed([*map(str, table.columns)])}
+    name = next((names[one] for one in SHIPS if one in names), None)
+    if name is None:
+        return
+    texts = _called(table, name).dropna().astype(str).str.strip()
+    ships = [one for one in texts.unique() if not _NOTHING.fullmatch(one.lower()) and one.lower() not in UNKNOWN]
+    if len(ships) > 1:
+        first = ", ".join(ships[:3])
+        message = f"holds {len(ships)} ships ({name!r} is {first}{', ...' if len(ships) > 3 else ''})"
+        raise DataError(f"{message}: write the rows of each to a log of its own", file=file)
 
 
 def _called_in(heads: list[list[str]]) -> list[str]:

@@ -490,6 +490,49 @@ def test_what_ais_writes_for_nothing_is_a_missing_value(tmp_path: Path, name: st
     assert np.isnan(sniffed.columns[name]).sum() == 4
 
 
+@pytest.mark.parametrize(
+    ("value", "others", "row", "lost"),
+    [
+        ("4095", [7.201, 6.12], 3, True),  # a counter of 12 bits at its end
+        ("409.5", [*np.round(np.linspace(8.0, 12.0, 41), 1)], 3, True),
+        ("409.5", [*np.round(np.linspace(108.0, 312.0, 41), 1)], 3, False),
+        ("80", [0.0], 3, False),  # a thruster that is switched on
+        ("80", [5.0], 3, False),
+        ("80", [*np.round(np.linspace(0.0, 5.0, 41), 1)], 79, False),  # once
+    ],
+)
+def test_a_number_far_beyond_all_others_again_and_again_is_a_missing_value(
+    value: str, others: list[float], row: int, lost: bool, tmp_path: Path
+) -> None:
+    rows = [
+        f"{k / 2},{k % 7},{value if k % 20 == row % 20 and k >= row else others[k % len(others)]}" for k in range(80)
+    ]
+    sniffed = sniff(log_of(tmp_path, ["time,psi,n", *rows]))
+    assert np.isnan(sniffed.columns["n"]).any() == lost
+    assert (value in sniffed.form.get("missing", [])) == lost
+    rows[9] = f"4.5,{value},{others[0]}"  # of another column it is a value
+    assert "missing" not in sniff(log_of(tmp_path, ["time,psi,n", *rows])).form
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "words"),
+    [
+        ("MMSI", ("219001234", "219009999"), "holds 2 ships ('MMSI' is 219001234, 219009999)"),
+        ("mmsi", ("219001234", "219001234"), ""),
+        ("IMO", ("9123456", "Unknown"), ""),
+        ("Callsign", ("OXYZ", "OABC"), "holds 2 ships"),
+    ],
+)
+def test_a_log_of_several_ships_is_refused(name: str, values: tuple[str, str], words: str, tmp_path: Path) -> None:
+    rows = [f"{k},{values[k % 2]},{10 + k % 2},{np.sin(k):.3f}" for k in range(80)]
+    log = log_of(tmp_path, [f"time,{name},lat,heading", *rows])
+    if not words:
+        assert "lat" in sniff(log).columns
+        return
+    with pytest.raises(DataError, match=f"{re.escape(words)}.*: write the rows of each to a log of its own"):
+        sniff(log)
+
+
 def test_a_number_for_missing_values_is_one_in_every_column(tmp_path: Path) -> None:
     """In hundredths of a degree -999 is not far from the others, but the import takes it for a missing value."""
     rows = [f"{k},{np.sin(k):.3f},{400 * k}" for k in range(80)]
