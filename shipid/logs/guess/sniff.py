@@ -350,7 +350,8 @@ def _text_format(
         raise DataError("no table of numbers with any separator: export it as CSV", file=file)
     rows = [cells(line, separator) for line in lines]
     width = Counter(len(row) for row in rows if any(row)).most_common(1)[0][0]
-    shares = [_number_share(row, decimal, mark) for row in rows]
+    places = _places_of_numbers([row for row in rows if len(row) == width], decimal, mark)
+    shares = [_number_share([row[k] for k in places if k < len(row)], decimal, mark) for row in rows]
     usual = float(np.median([share for row, share in zip(rows, shares, strict=True) if len(row) == width]))
     least = max(NUMERIC / 2, usual - 0.9 / width)  # a header may hold numbers, too, but fewer
     data = next(
@@ -533,6 +534,19 @@ def _thousands(rows: list[list[str]], decimal: str) -> str | None:
         if mark not in ".," or whole or any(decimal in cell or cell.count(mark) > 1 for cell in cells):
             return mark
     return None
+
+
+def _places_of_numbers(rows: list[list[str]], decimal: str, thousands: str | None) -> list[int]:
+    """Places of a line's cells that hold numbers in most lines where they hold anything; all where none do.
+
+    Words beside the first lines, such as the weather, are in other cells.
+    """
+    found = []
+    for place in range(len(rows[0])):
+        column = [row[place] for row in rows]
+        if _number_share(column, decimal, thousands) > 0.5:
+            found.append(place)
+    return found or [*range(len(rows[0]))]
 
 
 def _number_share(row: list[str], decimal: str, thousands: str | None = None) -> float:

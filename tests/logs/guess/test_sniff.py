@@ -812,6 +812,17 @@ def test_a_table_beside_the_first_lines_is_left_out(tmp_path: Path) -> None:
     np.testing.assert_allclose(table["psi"].astype(float), 30.0 + T[2:])
 
 
+def test_words_beside_the_first_lines_are_no_header(tmp_path: Path) -> None:
+    """Notes on the weather, on the right, have made the third line one of names, such as 0.5 and 30.5."""
+    lines = text().splitlines()
+    beside = ["Weather", "Sea state 2", "Depth 54 m"]
+    lines = [f"{line},,{beside[i] if i < len(beside) else ''}" for i, line in enumerate(lines)]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    sniffed = sniff(tmp_path / "log.csv")
+    assert list(sniffed.columns)[:2] == ["N", "psi"]
+    np.testing.assert_allclose(sniffed.columns["psi"], 30.0 + T)
+
+
 @pytest.mark.parametrize(
     ("second", "asked"),
     [
