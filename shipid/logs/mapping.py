@@ -42,6 +42,8 @@ UNITS: dict[str, dict[str, float]] = {
         "hhmmss": 1.0,
         "s of day": 1.0,
         "s of week": 1.0,
+        "ms of day": 1e-3,
+        "ms of week": 1e-3,
     },
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
@@ -61,8 +63,8 @@ breaks; `hhmmss` as seconds since the first midnight. `ddmm`, of latitude and lo
 EPOCHS = {"datenum": 719529.0, "excel": 25569.0, "mjd": 40587.0, "jd": 2440587.5}
 """Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system; Julian dates, modified
 or not: IAU resolution B1 of 1997)."""
-AGAIN = {"s of day": DAY, "s of week": 7 * DAY}
-"""Unit of a clock in seconds that begins again -> after how many seconds."""
+AGAIN = {"s of day": DAY, "s of week": 7 * DAY, "ms of day": DAY, "ms of week": 7 * DAY}
+"""Unit of a clock that begins again -> after how many seconds."""
 SIDES = {"latitude": "NS", "longitude": "EW"}
 """Column of a position on the Earth -> the letters of its sides in a text, that of positive numbers first."""
 _BOTH = re.compile(r"([^A-Za-z]*\d[^A-Za-z]*[NS])[\s,;/]*([^A-Za-z]+[EW])|([NS][^A-Za-z]+?)[\s,;/]*([EW][^A-Za-z]+)")
@@ -296,8 +298,9 @@ def clock_seconds(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]
     if unit == "hhmmss":
         return since_midnight(values)
     if unit in AGAIN:
-        steps = np.diff(values, prepend=values[:1])
-        return np.asarray(values + AGAIN[unit] * np.cumsum(steps < NEXT_DAY - AGAIN[unit]), dtype=np.float64)
+        since = values * to_si(unit, "t")
+        steps = np.diff(since, prepend=since[:1])
+        return np.asarray(since + AGAIN[unit] * np.cumsum(steps < NEXT_DAY - AGAIN[unit]), dtype=np.float64)
     return (values - EPOCHS[unit]) * DAY if unit in EPOCHS else values * to_si(unit, "t")
 
 

@@ -49,6 +49,10 @@ UTC_BEHIND = r"\s+(?:UTC|GMT)$"
 """The end of a date that says in letters that it has no other zone."""
 COMPACT = r"^(\d{8})[-_ ]?(\d{6})(?:\.?(\d{1,9}))?$"
 """A date and a time of day in one number, or nearly: 20240514080000, 20240514080000.5, 20240514_080000."""
+DURATION = (
+    r"[+-]?\d+(?:\.\d+)? ?(?:d|days?|h|hrs?|hours?|min|minutes?|s|secs?|seconds?|ms)(?: \+?\d+:\d\d:\d\d(?:\.\d+)?)?"
+)
+"""A time since the begin of a log as MATLAB and pandas write it: 0.5 sec, 0 days 00:00:00.5."""
 ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
 """The end of a date in ISO 8601 that says its zone."""
 DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y")
@@ -190,9 +194,9 @@ def read_table(
 def seconds(dates: pd.Series[Any]) -> Array:
     """Return dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
 
-    Read are ISO 8601, dates and durations of pandas, and `DAYS` with `HOURS`; of those that every row can be, that with
-    which the log is shorter, else day/month. A time of day goes on after midnight. NaN where there is none, and where a
-    date has no zone while others have one.
+    Read are ISO 8601, dates and durations of pandas, durations as text, and `DAYS` with `HOURS`; of those that every
+    row can be, that with which the log is shorter, else day/month. A time of day goes on after midnight. NaN where
+    there is none, and where a date has no zone while others have one.
     """
     if isinstance(dates.dtype, pd.CategoricalDtype):
         dates = dates.astype(object)
@@ -209,6 +213,9 @@ def seconds(dates: pd.Series[Any]) -> Array:
             dates = texts.reindex(dates.index)
         if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
             return _since_midnight(dates)
+        if len(texts) and texts.str.fullmatch(DURATION).all():
+            since = pd.to_timedelta(texts, errors="coerce").dt.total_seconds()
+            return np.array(since.reindex(dates.index), dtype=np.float64)
         ordinal = texts.str.extract(ORDINAL)
         if len(texts) and ordinal.notna().all(axis=None):
             joined = ordinal[0] + " " + ordinal[1] + " " + ordinal[2]

@@ -37,7 +37,18 @@ def test_bundled_mappings_are_valid_and_have_a_source(name: str) -> None:
 
 DEFINED = {  # from the definitions: an inch is 25.4 mm, a nautical mile 1852 m, a turn 2 pi
     "s": {"s": 1, "ms": 1 / 1000, "us": 1 / 1000**2, "ns": 1 / 1000**3, "min": 60, "h": 60 * 60, "d": 24 * 60 * 60}
-    | {"date": 1, "datenum": 1, "excel": 1, "mjd": 1, "jd": 1, "hhmmss": 1, "s of day": 1, "s of week": 1},
+    | {
+        "date": 1,
+        "datenum": 1,
+        "excel": 1,
+        "mjd": 1,
+        "jd": 1,
+        "hhmmss": 1,
+        "s of day": 1,
+        "s of week": 1,
+        "ms of day": 1e-3,
+        "ms of week": 1e-3,
+    },
     "m": {"m": 1, "cm": 1 / 100, "mm": 1 / 1000, "km": 1000, "ft": 12 * 0.0254, "nmi": 1852},
     "m/s": {
         "m/s": 1,

@@ -31,6 +31,7 @@ from shipid.logs.mapping import (
     degrees_in_text,
     names_of,
     since_midnight,
+    to_si,
 )
 from shipid.logs.readers import (
     DAY,
@@ -118,6 +119,7 @@ FIELDS = {
     "second": ("second seconds sec ss s sekunde seconde secondo segundo sekund sek", 0.0, 60.0),
 }
 """Field of a date or time in columns -> words for it, and its least and largest number."""
+YEARS = 1990.0, 2050.0  # of a log
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
 FINE = {"ns": (1e17, 1e8), "us": (1e14, 1e5)}
 """Unit of a clock -> least number that counts from 1970 in it, and least step of whole numbers: 0.1 s."""
@@ -647,6 +649,14 @@ def _is_whole(values: Array, most: float) -> bool:
 def _fields(columns: dict[str, Array]) -> dict[str, str]:
     """Field of a date or time -> column of whole numbers that is called so: year, month, day, hour, minute, second."""
     found: dict[str, str] = {}
+    names, order = [*columns], [one for one in FIELDS if one != "day of the year"]
+    for place in range(len(names) - len(order) + 1 if all(map(str.isdecimal, names)) else 0):
+        six = dict(zip(order, names[place:], strict=False))  # as datevec of MATLAB writes
+        limits = {**FIELDS, "year": ("", *YEARS)}
+        parts = [np.floor(columns[name]) if one == "second" else columns[name] for one, name in six.items()]
+        inside = zip(parts, order, strict=True)
+        if all(_is_whole(part, limits[one][2]) and np.min(part) >= limits[one][1] for part, one in inside):
+            return six
     for name, values in columns.items():
         word = (parts_of(name) or ("",))[-1]
         called = [one for one, (words, _, _) in FIELDS.items() if word in words.split() and one not in found]
@@ -965,6 +975,9 @@ def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tu
     if values.min() > 1e9 and _is_time_of_day(values % 1e6):
         message = f"{name!r} is a date and a time of day in one number, {values[0]:.15g}: write 2024-05-14 08:00:00"
         raise DataError(f"no column can be the clock: {message}", file=file)
+    if YEARS[0] < values[0] < YEARS[1] and 0.0 < np.ptp(values) < 1.0 and {"year", "years"} & {*parts_of(name)}:
+        message = f"{name!r} is a year with decimals, {values[0]:.12g}: write a date, 2024-05-14 08:00:00, or seconds"
+        raise DataError(f"no column can be the clock: {message}", file=file)
     for epoch, what in TICKS.items():
         if DATES["d"][0] < (values[0] / 1e7 - epoch) / DAY < DATES["d"][1] and np.median(np.diff(values)) >= 1e5:
             message = f"{name!r} counts 100 ns since {what}: write seconds since 1970, value / 1e7 - {epoch}"
@@ -1010,14 +1023,15 @@ def _calendars(parts: tuple[str, ...]) -> list[str]:
 
 
 def _again(values: Array) -> str | None:
-    """Return the unit of seconds that begin again after a day or a week; None where none do.
+    """Return the unit of a clock that begins again after a day or a week; None where none does.
 
     A row may be missing there, so that a clock goes back by a little less than that, but not by an hour.
     """
     steps = np.diff(values)
     back = steps[steps < 0]
-    for unit, period in AGAIN.items():
-        if len(back) and values.min() >= 0 and values.max() < period and np.all(back + period < NEXT_DAY):
+    for unit, seconds_of in AGAIN.items():
+        period, next_day = seconds_of / to_si(unit, "t"), NEXT_DAY / to_si(unit, "t")
+        if len(back) and values.min() >= 0 and values.max() < period and np.all(back + period < next_day):
             return unit
     return None
 

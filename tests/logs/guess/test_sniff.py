@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -591,6 +593,8 @@ def with_clock(name: str, values: list[object]) -> pd.DataFrame:
         ("UTC", [moment.strftime("%H%M%S.%f")[:9] for moment in START_OF_DAY], "hhmmss"),
         ("Seconds of day", [(86280 + 0.5 * k) % 86400 for k in range(600)], "s of day"),
         ("TOW [s]", [(604680 + 0.5 * k) % 604800 for k in range(600)], "s of week"),
+        ("TOW [ms]", [(604680000 + 500 * k) % 604800000 for k in range(600)], "ms of week"),
+        ("ms of day", [(86280000 + 500 * k) % 86400000 for k in range(600)], "ms of day"),
         ("Time", [moment.strftime("%Y-%j %H:%M:%S.%f") for moment in START_OF_DAY], "date"),
         ("Time", [moment.strftime("%Y:%j:%H:%M:%S.%f") for moment in START_OF_DAY], "date"),
         ("Day of year", [135.9986 + 0.5 * k / 86400 for k in range(600)], "d"),
@@ -610,6 +614,26 @@ def test_clocks_that_begin_again_and_days_of_the_year(
         return
     read = clock_seconds(pd.read_csv(file)[name].to_numpy(float), unit)
     np.testing.assert_allclose(np.diff(read), 0.5, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "write", ["{:g} sec", "{:g}s", lambda t: f"{t / 60:.9f} min", lambda t: f"0 days 00:{t // 60:02.0f}:{t % 60:09.6f}"]
+)
+def test_durations_as_text(write: Callable[[float], str] | str, tmp_path: Path) -> None:
+    """As MATLAB writes those of a timetable, and pandas its own."""
+    times = [write.format(0.5 * k) if isinstance(write, str) else write(0.5 * k) for k in range(600)]
+    with_clock("Time", times).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "Time", "unit": "date"}
+    np.testing.assert_allclose(sniffed.t, 0.5 * np.arange(600), atol=1e-6)
+
+
+def test_a_year_with_decimals_is_no_clock_in_seconds(tmp_path: Path) -> None:
+    with_clock("Decimal year", [2024.3655 + 0.5 * k / 366 / 86400 for k in range(600)]).to_csv(
+        tmp_path / "log.csv", index=False, float_format="%.12f"
+    )
+    with pytest.raises(DataError, match=r"'Decimal year' is a year with decimals, 2024.3655.*: write a date"):
+        sniff(tmp_path / "log.csv")
 
 
 def test_a_clock_that_goes_back_by_less_than_a_day_is_refused(tmp_path: Path) -> None:
@@ -648,7 +672,10 @@ def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -
             [f"{k // 60:02}:{k % 60:02}.5" for k in range(90)],
             "'00:00.5' in row 1, without the hour, as Excel shows times",
         ),
-        ([str((k + 604_755) % 604_800 * 1000) for k in range(90)], "goes back from 604799 s to 0 s in row 46"),
+        (
+            [str(1000 * (k + (604_755 if k < 45 else 5000))) for k in range(90)],
+            "goes back from 604799 s to 5045 s in row 46",
+        ),
     ],
 )
 def test_a_clock_that_cannot_be_read_says_its_text(times: list[str], words: str, tmp_path: Path) -> None:
@@ -712,6 +739,18 @@ def test_a_date_in_columns_is_the_clock(
     np.testing.assert_allclose(sniffed.t, zero + T, atol=1e-5)
     assert sniffed.clock.items() >= clock.items()
     assert list(sniffed.columns) == ["N", "psi"]
+
+
+def test_a_date_in_columns_without_names_is_the_clock(tmp_path: Path) -> None:
+    """As datevec of MATLAB has it, beside a count of rows."""
+    fields = {"Year": "%Y", "Month": "%m", "Day": "%d", "Hour": "%H", "Minute": "%M", "Second": "%S.%f"}
+    log = in_columns(TABLE, fields)
+    log.insert(0, "row", range(1, 1 + len(log)))
+    log.to_csv(tmp_path / "log.csv", index=False, header=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert (sniffed.clock["from"], sniffed.clock["date"]) == (["5", "6", "7"], ["2", "3", "4"])
+    np.testing.assert_allclose(sniffed.t, 1709251197.5 + T, atol=1e-5)
+    assert list(sniffed.columns) == ["1", "8", "9"]
 
 
 def test_a_date_in_columns_beside_a_time_of_day(tmp_path: Path) -> None:
