@@ -27,6 +27,7 @@ HELD_SHARE, HELD_ROWS = 0.2, 60  # of the rows; repeats in a row that are no res
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
+FARTHER = 2.0  # times the way from row to row that a ship would go in a hole of the clock, at least
 STREAM = 0.5  # of the misfit of positions and velocities: less is no current
 NOTHING, OFTEN = 0.3, 20.0  # share of the rows that are 0 for no value, at most; s of a speed that count as a spike
 HALF, AWAY = 0.5, 18.0  # share of the usual speed, and parts of a turn, by which the rows around are away from 0
@@ -126,9 +127,26 @@ def defects_of_motion(state: State) -> None:
                 state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
     if state.velocity is None or state.position is None or state.body is None:
         return
+    _ask_for_set_clock(state)
     path = evidence.integral(state.t, state.velocity)
     _jumps(state, _arm_or_delay(state, path))
     _heading_offset(state)
+
+
+def _ask_for_set_clock(state: State) -> None:
+    """Ask where the clock leaves out a time in which the ship, that was under way, went no farther than in a row."""
+    if state.joined or state.velocity is None or state.position is None:
+        return
+    steps, way = np.diff(state.t), np.abs(np.diff(state.position))
+    usual, speed = (
+        float(np.median(steps)),
+        np.minimum(*(np.abs(part) for part in (state.velocity[:-1], state.velocity[1:]))),
+    )
+    near = float(np.percentile(way[steps < evidence.GAP * usual], 99))
+    for row in np.flatnonzero((steps > evidence.GAP * usual) & (way <= near) & (speed * steps > FARTHER * near))[:1]:
+        times = " comes ".join(when(state, float(state.t[row + one])) for one in (0, 1))
+        words = f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
+        state.ask(("clock", "t"), f"{words}Then split the log there")
 
 
 def _is_earth_fixed(state: State) -> bool:
