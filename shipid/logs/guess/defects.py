@@ -17,7 +17,7 @@ from shipid.logs.readers import date_of
 from shipid.physics.signals import is_shaft
 
 POSITIONS = ("latitude", "longitude", "north", "east")
-SPIKY = ("speed", "u", "v", "r", "psi", "phi", "V_w")
+SPIKY = ("speed", "course", "u", "v", "r", "psi", "phi", "theta", "V_w")
 OF_POSITIONS = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
 FEW = 4  # times that a sentence names
 MEASURED = ("speed", "u", "v", "r")

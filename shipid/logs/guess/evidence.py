@@ -316,17 +316,17 @@ def spikes(values: Array) -> NDArray[np.bool_]:
     They leave the median of five rows by more than all else the signal ever does, or, of a signal that moves in most
     rows, by more than 0.02 of its range. In both cases that is far more than nine in ten of the rows around do, and
     than the signal steps there from row to row; the rows before and after agree. An angle that counts from 0 again, and
-    a signal with more than one such row in fifty, has none.
+    a signal with more than one such row in fifty, has none, but where all have one value, as where it stands for none.
     """
-    result = _spikes(values)
+    result = _spikes(values, values)
     for turn in TURNS:
         if result.any() and 0.9 * turn < np.ptp(values) <= 1.02 * turn:  # an angle that crosses its 0 for a row?
-            result &= _spikes(np.unwrap(values, period=turn))
+            result &= _spikes(np.unwrap(values, period=turn), values)
     return result
 
 
-def _spikes(values: Array) -> NDArray[np.bool_]:
-    """Rows (N,) that leave a signal, were it no angle."""
+def _spikes(values: Array, written: Array) -> NDArray[np.bool_]:
+    """Rows (N,) that leave a signal, were it no angle; `written` is as it is in the log."""
     none = np.zeros(len(values), dtype=bool)
     low, high = np.percentile(values, [0.5, 99.5])
     if len(values) < 50 or not high > low:
@@ -349,7 +349,8 @@ def _spikes(values: Array) -> NDArray[np.bool_]:
         size = float(off[first:end].min())
         agrees = abs(values[after] - values[before]) < 0.25 * size
         result[first:end] = end - first <= 2 and agrees and size > 4 * usual[first:end].max()
-    return result if result.mean() <= 0.02 else none
+    one_value = len(np.unique(written[result])) == 1
+    return result if result.mean() <= (0.1 if one_value else 0.02) else none
 
 
 def spans_of(rows: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -84,6 +84,8 @@ SENTINELS = tuple(
 )
 NOT_AVAILABLE = {"psi": (511.0, 360.0), "speed": (102.3, 51.0), "latitude": (91.0, 90.0), "longitude": (181.0, 180.0)}
 """Meaning -> number [deg, kn] that AIS writes for none (ITU-R M.1371), and the largest of the others."""
+VISITS, SELDOM = 3, 0.3  # rows at which a number for no value begins, at least; share of the rows, at most
+BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one that has so few values, an order, more
 LONG_WIDTH = 8  # cells, at most, of a row with one value: time, name, value, unit, quality and the like
 MOST_HEADS = 3  # lines above the data: names in two, and units
 FEWEST_TIMES = 10  # of a second clock that are compared with the first
@@ -735,7 +737,9 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
     texts: dict[str, None] = {}
     for name, values in columns.items():
         never = dict(NOT_AVAILABLE[one] for one in fits(name) if one in NOT_AVAILABLE)
-        for value in (*SENTINELS, *never):
+        finite = values[np.isfinite(values)]
+        ends = {float(finite.max()), float(finite.min())} if len(finite) else set()
+        for value in dict.fromkeys([*SENTINELS, *never, *ends]):
             hit = values == value
             others = values[~hit & ~np.isin(values, SENTINELS) & np.isfinite(values)]
             if not hit.any() or len(others) < 2:
@@ -743,6 +747,8 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
             low, high = float(others.min()), float(others.max())
             if value in never:
                 known = max(-low, high) > never[value]
+            elif value not in SENTINELS:  # of no recorder that is known
+                known = not _stands_out(values, value) or _is_elsewhere(table, name, hit)
             else:
                 known = low - max(high - low, -low) <= value <= high + max(high - low, high)
                 known |= low == high == 0.0 and 0.0 < value < 1000.0
@@ -753,6 +759,26 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
         if not is_clock(name):
             values[_called(table, name).astype(str).str.strip().isin(texts).to_numpy()] = np.nan
     return list(texts)
+
+
+def _stands_out(values: Array, value: float) -> bool:
+    """Whether a column (N,) takes a value again and again that is far beyond all others.
+
+    The others are not mostly near 0: a thruster that is switched on has no value but 0 else.
+    """
+    hit, others = values == value, values[(values != value) & np.isfinite(values)]
+    visits = int(np.sum(hit[1:] & ~hit[:-1]))
+    if visits < VISITS or hit.mean() > SELDOM:
+        return False
+    usual, beyond = np.abs(others), BEYOND if len(np.unique(others)) > LEVELS else BEYOND_LEVELS
+    return bool(abs(value) > beyond * usual.max() and np.median(usual) > usual.max() / BEYOND)
+
+
+def _is_elsewhere(table: pd.DataFrame, name: str, hit: Rows) -> bool:
+    """Whether another column of a table holds a text that one of this name has in some rows (N,)."""
+    texts = _called(table, name)[hit].astype(str).str.strip().unique()
+    others = (table.iloc[:, index] for index, one in enumerate(map(str, table.columns)) if one != name)
+    return any(other.astype(str).str.strip().isin(texts).any() for other in others)
 
 
 def _minus_ones(columns: dict[str, Array]) -> Iterator[str]:

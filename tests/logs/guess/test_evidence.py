@@ -202,6 +202,21 @@ def test_drawn_spikes_are_all_and_the_only_ones(seed: int) -> None:
         np.testing.assert_array_equal(evidence.spikes(spoilt), wrong)
 
 
+@pytest.mark.parametrize("heading", [False, True])
+def test_a_value_that_stands_for_none_in_many_rows_is_a_spike_in_each(heading: bool) -> None:
+    """Also within the range of an angle; of different values so many are none."""
+    random, t = np.random.default_rng(1), np.arange(2000.0)
+    signal = np.round(200 + 170 * np.sin(t / 200) + random.normal(0, 0.1, len(t)), 1)
+    signal = np.round((signal + t / 4) % 360, 1) if heading else signal
+    wrong = np.zeros(len(t), dtype=bool)
+    wrong[random.choice(np.arange(5, 1990, 8), 90, replace=False)] = True
+    wrong &= np.abs((signal - 102.3 + 180) % 360 - 180) > 30
+    found = evidence.spikes(np.where(wrong, 102.3, signal))
+    assert not (found & ~wrong).any()
+    assert (found & wrong).sum() > 0.7 * wrong.sum()
+    assert not evidence.spikes(np.where(wrong, 102.3 + random.normal(0, 3, len(t)), signal)).any()
+
+
 def test_orders_angles_and_stays_are_no_spikes() -> None:
     t = np.arange(2000.0)
     helm = np.where((t % 300) < 150, 0.0, 20.0)
