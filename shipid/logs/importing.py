@@ -81,6 +81,7 @@ from shipid.physics.signals import is_command, is_output, row_of, wraps
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 
+BLOCK = 200_000  # rows that are projected at once
 NEAR = 3.0  # usual steps: rows further apart are no neighbours
 TURN, ABOUT = 2 * np.pi, np.pi / 4  # rad: a jump of an angle that counts from 0 again, and how far from it one may be
 Records = list[dict[str, Any]]
@@ -727,6 +728,8 @@ def _check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: fl
     ordered = row is not None and row.angle and is_command(name)
     if column.wrap or not (wraps(name) or name == "course" or ordered):
         return
+    if not np.nanmax(values, initial=-np.inf) - np.nanmin(values, initial=np.inf) > TURN - ABOUT:
+        return  # none can: of a large log there is no room for what follows
     known = np.isfinite(values)
     times = t[known]
     steps, jumps = np.diff(times), np.diff(values[known])
@@ -774,8 +777,10 @@ def _projected(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Dat
     else:
         first = known[0] if len(known) else 0
         origin = float(latitude[first]), float(longitude[first])
-    north, east, _ = geodetic2ned(latitude, longitude, 0.0, *origin, 0.0)
-    return rows.drop(columns=["latitude", "longitude"]).assign(north=north, east=east), origin
+    for first in range(0, len(rows), BLOCK):  # of a large log there is no room for all steps of the projection
+        part = slice(first, first + BLOCK)
+        latitude[part], longitude[part], _ = geodetic2ned(latitude[part], longitude[part], 0.0, *origin, 0.0)
+    return rows.drop(columns=["latitude", "longitude"]).assign(north=latitude, east=longitude), origin
 
 
 def _in_body(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:

@@ -12,7 +12,7 @@ import pytest
 
 from shipid.data.dataset import Dataset, flag_bit, pieces, read_dataset, write_dataset
 from shipid.errors import DataError, DocumentError
-from shipid.logs import readers
+from shipid.logs import importing, readers
 from shipid.logs.importing import _unwrap, even_clock, evenly, import_log, read_mapping, rounding_of, runs_of
 from shipid.logs.mapping import Source
 from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, stamps, turning
@@ -573,6 +573,15 @@ def test_dates_and_angles_in_several_columns(side: float, tmp_path: Path) -> Non
     assert dataset.metadata["origin"] == pytest.approx({"latitude": side * 33.3, "longitude": -0.125})
     metres = side * 111.0e3 * 1e-5 * np.arange(10)  # of latitude there: a degree has 110.9 km
     np.testing.assert_allclose(dataset.frame["north"], metres, atol=0.02)
+
+
+def test_positions_are_projected_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mapping.toml").write_text(PARTED)
+    parted().to_csv(tmp_path / "log.csv", index=False)
+    whole = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv").frame
+    monkeypatch.setattr(importing, "BLOCK", 3)
+    by_parts = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv").frame
+    pd.testing.assert_frame_equal(by_parts, whole, rtol=1e-14)
 
 
 @pytest.mark.parametrize("large", [False, True])
