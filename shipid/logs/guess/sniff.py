@@ -1135,8 +1135,11 @@ def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
         text = str(_called(table, name).iloc[0]).strip()
         short = re.fullmatch(r"\d([.,]\d+)?[eE]\+?\d+", text) and np.any(np.diff(values) == 0)
         return f"holds {text!r} in row 1, with too few digits: export it with all of them" if short else ""
+    texts = _called(table, name).astype(str).str.strip()
+    of_day = texts.str.fullmatch(TIME_OF_DAY).to_numpy(dtype=bool)
+    wrong = ~of_day if wrong.all() and of_day.mean() > 0.5 else wrong  # a single other text, and none is read
     row = int(np.argmax(wrong))
-    text = str(_called(table, name).iloc[row]).strip()
+    text = texts.iloc[row]
     if _NOTHING.fullmatch(text.lower()):
         return ""
     begin = f"holds {text[:40]!r} in row {row + 1}"

@@ -658,6 +658,13 @@ def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -
     assert words in caught.value.message
 
 
+def test_a_line_below_times_of_day_is_named(tmp_path: Path) -> None:
+    """The first row has a time that can be read: it was said to have none."""
+    lines = ["Time,north,heading", *(f"08:00:{k:02},{2 * k},0.1" for k in range(60)), "Average,59,0.1"]
+    with pytest.raises(DataError, match="holds 'Average' in row 61, no time: remove the line"):
+        sniff(log_of(tmp_path, lines))
+
+
 @pytest.mark.parametrize(
     ("times", "words"),
     [
