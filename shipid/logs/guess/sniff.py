@@ -586,7 +586,10 @@ def _numbers(table: pd.DataFrame, decimal: str, thousands: str | None) -> tuple[
         values[np.isinf(values)] = np.nan
         if np.isnan(values).any() and is_run(name):  # names of runs, as numbers
             values = pd.factorize(table.iloc[:, index].ffill().bfill())[0].astype(np.float64)
-        if np.isnan(values).all() and table.iloc[:, index].dropna().astype(str).str.strip().ne("").any():
+        lost = np.isnan(values)
+        texts = table.iloc[:, index][lost].dropna().astype(str).str.strip() if lost.any() else pd.Series(dtype=str)
+        said = sum(count for text, count in texts.value_counts().items() if not _NOTHING.fullmatch(str(text).lower()))
+        if (lost.all() and texts.ne("").any()) or said > len(values) - lost.sum():
             words.append(name)
         elif name and name not in columns:
             columns[name] = values

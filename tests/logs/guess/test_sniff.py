@@ -663,6 +663,13 @@ def test_a_line_below_times_of_day_is_named(tmp_path: Path) -> None:
     lines = ["Time,north,heading", *(f"08:00:{k:02},{2 * k},0.1" for k in range(60)), "Average,59,0.1"]
     with pytest.raises(DataError, match="holds 'Average' in row 61, no time: remove the line"):
         sniff(log_of(tmp_path, lines))
+    moments = [f"2024-05-14 {line}" for line in lines[1:-1]]
+    for below, which in (
+        ("Run,1,2", "the line"),
+        ("Run,1,2\n1,1,2\n2,1,2", "the 3 such lines"),
+    ):  # a number made it no column of dates
+        with pytest.raises(DataError, match=f"holds 'Run' in row 61, no time: remove {which}"):
+            sniff(log_of(tmp_path, [lines[0], *moments, below]))
 
 
 @pytest.mark.parametrize(
