@@ -6,9 +6,12 @@ precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B, of 
     fisher    B = sum over signals of s^2 J_s^T J_s      errors independent from sample to sample; s^2 is the level of
               each signal as the residuals show it, not as declared. To be trusted where residuals are white.
     sandwich  B = sum over clusters of (J_g^T A_g e_g)(...)^T     anything within a cluster, independent clusters.
-              A cluster is a run: process noise, model error and colour within it are allowed. A_g = (I - H_gg)^(-1/2)
-              takes the bias out that fitting puts in (CR2), t has Satterthwaite's degrees of freedom. To be trusted
-              from 4 degrees of freedom on (Tipton).
+              A cluster is a run: process noise, model error and colour within it are allowed. A_g = (I - H_gg)^(-1)
+              gives the estimates without that run (CR3, the jackknife): a run that decides much draws the estimates to
+              itself, so its residuals show less than its errors. One number scales B so that it is right in the median
+              direction where errors are independent; t has Satterthwaite's degrees of freedom (of CR2). In a direction
+              that one run alone decides it has no residuals: there errors count as in the others on average. To be
+              trusted from 4 degrees of freedom on (Tipton).
     blocks    the sandwich form with clusters that are stretches of a run, each much longer than the correlation time
               of the residuals. For few runs; it does not account for a current or a bias that lasts a whole run.
 
@@ -16,10 +19,11 @@ No form accounts for a bias of the estimates. Where every prediction has a free 
 the factors (incidental parameters: Neyman, Scott, Econometrica 16 (1948) 1), the more the shorter the horizon is
 against the correlation time of the residuals: compare with a fit over a longer horizon.
 
-Sources: Liang, Zeger, Biometrika 73 (1986) 13; Bell, McCaffrey, Survey Methodology 28 (2002) 169; Pustejovsky, Tipton,
-Journal of Business & Economic Statistics 36 (2018) 672 (also that nuisances may be projected out first); Tipton,
-Psychological Methods 20 (2015) 375 (4 degrees of freedom); Carlstein, Annals of Statistics 14 (1986) 1171 (blocks);
-Ljung, Box, Biometrika 65 (1978) 297.
+Sources: Liang, Zeger, Biometrika 73 (1986) 13; Bell, McCaffrey, Survey Methodology 28 (2002) 169 (CR3, Satterthwaite);
+MacKinnon, Nielsen, Webb, Journal of Applied Econometrics 38 (2023) 671 (the jackknife where clusters differ);
+Pustejovsky, Tipton, Journal of Business & Economic Statistics 36 (2018) 672 (nuisances may be projected out first);
+Tipton, Psychological Methods 20 (2015) 375 (4 degrees of freedom); Carlstein, Annals of Statistics 14 (1986) 1171
+(blocks); Ljung, Box, Biometrika 65 (1978) 297.
 """
 
 from __future__ import annotations
@@ -43,6 +47,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Kind = Literal["fisher", "sandwich", "blocks"]
+_Part = tuple[Array, Array, Array]  # of a cluster: singular values of J_g R, those of A_g J_g R, directions (k, n)
 KINDS: tuple[Kind, ...] = get_args(Kind)
 """In order of preference: the first trusted form is reported; if none is, `blocks`, or `fisher` with one block only."""
 
@@ -53,7 +58,7 @@ WHITE = 0.05  # probability under which whiteness is rejected
 LITTLE = 1.1  # integrated correlation time, in samples, that makes no difference: 5 % of a standard error
 MOST_LAGS, LEAST_ROWS = 10, 5  # lags that whiteness looks at; fewest rows of a run for that
 BLOCK = 10.0  # length of a block in integrated correlation times
-KEPT = 1e-9  # of I - H: directions that a cluster alone decides have no residual left
+KEPT = 1e-4  # of I - H: directions that a cluster alone decides have no residual left
 
 
 @dataclass(frozen=True)
@@ -402,30 +407,26 @@ def _freedom(total: Array, squares: Array) -> Array:
 
 
 def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: str) -> Covariance:
-    """Cluster-robust covariance (CR2) with Satterthwaite's degrees of freedom under independent errors."""
-    n = len(fit.paths)
-    root = _root(basis.inverse)
-    scores, squares, shared = [], [], []
+    """Cluster-robust covariance by the jackknife (CR3) with Satterthwaite's degrees of freedom."""
+    root, parts, scores = _root(basis.inverse), [], []
     for number in np.unique(clusters):
         rows = clusters == number
-        jacobian = fit.jacobian[rows]
-        spread = jacobian @ root  # H_gg = spread spread^T
-        left, values, _ = np.linalg.svd(spread, full_matrices=False)
+        left, values, axes = np.linalg.svd(
+            fit.jacobian[rows] @ root, full_matrices=False
+        )  # H_gg = left values^2 left^T
         rest = 1 - values**2
-        grown = np.where(rest > KEPT, 1 / np.sqrt(np.maximum(rest, KEPT)), 0.0) - 1
-        adjusted = jacobian + left @ (grown[:, None] * (left.T @ jacobian))  # A_g J_g
-        scores.append(adjusted.T @ fit.residuals[rows])
-        influence = adjusted @ basis.inverse  # (m_g, n)
-        squares.append((influence**2).sum(axis=0))
-        shared.append(spread.T @ influence)  # (n, n): of (I - H)_gh = delta_gh - spread_g spread_h^T
-    influences = -np.array(scores) @ basis.inverse
-    spread_of_data = influences.T @ influences
+        grown = np.where(rest > KEPT, values / np.maximum(rest, KEPT), 0.0)
+        parts.append((values, grown, axes))
+        scores.append((grown * (left.T @ fit.residuals[rows])) @ axes)  # root^T J_g^T A_g e_g
+    scale, alone = _scale(parts, np.array(scores))
+    influences = -np.array(scores) @ root.T * scale
+    spread_of_data = influences.T @ influences + root @ alone @ root.T
     matrix = spread_of_data + (basis.inverse * basis.prior) @ basis.inverse
-    free = np.array([_satterthwaite(np.array(squares)[:, j], np.array(shared)[:, :, j]) for j in range(n)])
+    free = np.array([_satterthwaite(parts, row) for row in root])
     freedom = np.maximum(_freedom(np.diag(matrix), np.diag(spread_of_data) ** 2 / free), 1.0)
     typical = float(np.median(freedom))
     trusted = bool(typical >= LEAST_FREEDOM)
-    reason = f"{len(squares)} {what}, worth {typical:.1f} degrees of freedom"
+    reason = f"{len(parts)} {what}, worth {typical:.1f} degrees of freedom"
     if not trusted:
         reason += f"; under {LEAST_FREEDOM:g} the intervals mislead"
     return Covariance(kind, matrix, freedom, trusted, reason, influences)
@@ -439,8 +440,35 @@ def _root(matrix: Array) -> Array:
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def _satterthwaite(diagonal: Array, shared: Array) -> float:
-    """(tr B)^2 / tr(B^2) of B = diag(diagonal) - shared shared^T; diagonal (clusters,), shared (clusters, n)."""
+def _scale(parts: Sequence[_Part], scores: Array) -> tuple[float, Array]:
+    """What to multiply scores (clusters, n) by, and the covariance (n, n) along directions that one cluster decides.
+
+    The sum of the squared scores of independent errors is compared with their variance in each principal direction. The
+    scale makes both agree in the median. No score shows the errors along a direction that one cluster alone decides:
+    they count as many times more than independent ones as the scores of all others do.
+    """
+    of_scores = sum((axes.T * (values * grown)) @ axes for values, grown, axes in parts)
+    of_errors = sum((axes.T * values**2) @ axes for values, _, axes in parts)
+    sizes, directions = np.linalg.eigh(of_scores)
+    true = np.maximum(np.einsum("in,ij,jn->n", directions, of_errors, directions), 0.0)
+    several = sizes > np.maximum(true / 2, KEPT**2)  # at least `true`, or next to nothing
+    alone = directions[:, ~several] * np.sqrt(true[~several])
+    if not several.any():
+        return 1.0, np.asarray(alone @ alone.T)
+    level = float((((scores @ directions) ** 2).sum(axis=0)[several] / sizes[several]).mean())
+    return float(np.sqrt(np.median(true[several] / sizes[several]))), np.asarray(level * alone @ alone.T)
+
+
+def _satterthwaite(parts: Sequence[_Part], weights: Array) -> float:
+    """(tr B)^2 / tr(B^2) of a sum of squared scores along weights (n,), as a form B in independent errors.
+
+    The scores are those without bias (CR2), A_g = (I - H_gg)^(-1/2): CR3 would count twice that runs are unequal.
+    """
+    of_cluster = [(np.sqrt(values * grown) * (axes @ weights), values, axes) for values, grown, axes in parts]
+    diagonal = np.array([one @ one for one, _, _ in of_cluster])
+    if diagonal.sum() <= KEPT * float(weights @ weights):
+        return 1.0  # one cluster alone decides it
+    shared = np.array([(values * one) @ axes for one, values, axes in of_cluster])  # I - H couples clusters by it
     taken = (shared**2).sum(axis=1)
     squares = float(diagonal @ diagonal - 2 * diagonal @ taken + ((shared.T @ shared) ** 2).sum())
     return float((diagonal.sum() - taken.sum()) ** 2 / squares) if squares > 0 else 1.0

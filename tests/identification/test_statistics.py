@@ -67,17 +67,49 @@ def test_fisher_is_the_textbook_formula() -> None:
     np.testing.assert_allclose(statistics(fit).information, np.linalg.inv(expected), rtol=1e-9)
 
 
-def test_sandwich_of_single_samples_is_hc2() -> None:
-    """Clusters of one residual each: CR2 is HC2 of MacKinnon and White (1985)."""
-    rows = np.array(NAMES) == "u"
-    jacobian = JACOBIAN[rows][:200]
-    error = np.random.default_rng(0).normal(size=200)
-    estimates = statistics(fitted(jacobian, error, np.arange(200), ("u",) * 200))
-    fit, inverse = estimates.fit, np.linalg.inv(jacobian.T @ jacobian)
-    leverage = np.einsum("mi,ij,mj->m", jacobian, inverse, jacobian)
-    weights = fit.residuals**2 / (1 - leverage)
-    expected = inverse @ (jacobian.T * weights) @ jacobian @ inverse
-    np.testing.assert_allclose(estimates.covariances["sandwich"].matrix, expected, rtol=1e-9)
+def test_sandwich_is_the_jackknife_over_runs() -> None:
+    """In the ratios of its entries: the estimates are computed again without each run."""
+    fit = one(0.8)
+    matrix = statistics(fit).covariances["sandwich"].matrix
+    again = [
+        np.linalg.lstsq(fit.jacobian[fit.clusters != run], -fit.residuals[fit.clusters != run], rcond=None)[0]
+        for run in range(RUNS)
+    ]
+    expected = np.array(again).T @ np.array(again)
+    np.testing.assert_allclose(matrix / matrix[0, 0], expected / expected[0, 0], rtol=1e-6, atol=1e-6)
+    assert matrix[0, 0] / expected[0, 0] == pytest.approx((RUNS - 1) / RUNS, rel=0.1)
+
+
+def test_sandwich_of_a_mean_over_equal_clusters() -> None:
+    """G equal clusters, one mean: the variance of the means of the clusters (divisor G - 1) over G."""
+    clusters, error = np.repeat(np.arange(7), 12), np.random.default_rng(0).normal(size=84)
+    form = statistics(fitted(np.ones((84, 1)), error, clusters, ("u",) * 84)).covariances["sandwich"]
+    expected = error.reshape(7, 12).mean(axis=1).var(ddof=1) / 7
+    assert form.matrix[0, 0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("among", [(), (2, 3, 4, 5)])
+def test_intervals_cover_what_one_run_alone_excites(among: tuple[int, ...]) -> None:
+    """That run has no residuals along such a factor: they said nothing of its error, which was given as next to none.
+
+    among : factors that this run does not excite.
+    """
+    runs, samples = 10, 40
+    jacobian, (clusters, signals) = design(runs, samples, COUNT), labels(runs, samples)
+    jacobian[clusters > 0, 0] = 0.0
+    jacobian[np.ix_(clusters == 0, among)] = 0.0
+    rng, covered = np.random.default_rng(1), np.zeros(COUNT)
+    for _ in range(60):
+        estimates = statistics(fitted(jacobian, noise(rng, runs, samples, 0.8), clusters, signals))
+        assert estimates.chosen == "sandwich"
+        covered += (estimates.low <= 1) & (estimates.high >= 1)
+    assert covered.min() / 60 >= 0.9
+
+
+def test_a_single_run_is_not_trusted() -> None:
+    single = statistics(fitted(design(1, 400, 3), noise(np.random.default_rng(0), 1, 400, 0.99), *labels(1, 400)))
+    assert not single.covariances["sandwich"].trusted
+    assert np.isfinite(single.covariances["sandwich"].matrix).all()
 
 
 def test_freedom_of_a_mean_over_equal_clusters() -> None:
