@@ -34,6 +34,7 @@ from shipid.identification.settings import BLOCK, Identify, overrides, overrides
 from shipid.identification.sides import by_group, uneven
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, Statistics, autocorrelation, statistics
+from shipid.identification.unstable import grows, growth
 from shipid.interrupts import uninterrupted
 from shipid.physics.signals import is_shaft
 from shipid.simulation.measured import measure_standard
@@ -290,6 +291,7 @@ def run_identification(
             *unmeasured(vessel, dataset, fitted, settings),
             *unrecorded(dataset, fitted, settings),
             *_warnings(solution, judged, pairs),
+            *filter(None, (_unstable(pair[AFTER], dataset, solution, judged),)),
             *_left(solution, curves),
             *(
                 f"no profile of {path}: it is at a bound, fixed or dropped"
@@ -623,9 +625,7 @@ def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:
 
 def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns]) -> list[str]:
     """Warnings about the fit: coloured residuals, short horizon, untrusted errors, bounds, no test, worse free runs."""
-    warnings, between = [], residual_spacing(solution)
-    coloured = {name: colour.memory * between for name, colour in judged.whiteness.items() if not colour.white}
-    horizon = solution.settings.horizon
+    warnings, coloured, horizon = [], _coloured(solution, judged), solution.settings.horizon
     if coloured:
         longest = max(coloured.values())
         begun = "initial_state" in solution.settings.widths
@@ -657,6 +657,20 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
         if worse and not diverged:
             warnings.append(f"free runs of the {name} runs are worse than before in {listed(worse)}")
     return warnings
+
+
+def _coloured(solution: Solution, judged: Statistics) -> dict[str, float]:
+    """Signals whose residuals are correlated, and over what time [s]."""
+    between = residual_spacing(solution)
+    return {name: colour.memory * between for name, colour in judged.whiteness.items() if not colour.white}
+
+
+def _unstable(identified: Vessel, dataset: Dataset, solution: Solution, judged: Statistics) -> str:
+    """A warning if whole runs were predicted of a ship that does not keep her course, with random forces; else none."""
+    coloured = _coloured(solution, judged)
+    if solution.settings.horizon or not coloured:
+        return ""
+    return grows(growth(identified, dataset, solution.runs), _longest(solution), max(coloured.values()))
 
 
 def _rounded(value: float) -> float:
