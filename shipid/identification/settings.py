@@ -193,7 +193,11 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     base, file = vessel.parameters, vessel.file
 
     def chosen(patterns: Sequence[str], key: str) -> list[str]:
-        return select(patterns, base, file, f"{BLOCK}.{key}")
+        try:
+            return select(patterns, base, file, f"{BLOCK}.{key}")
+        except DocumentError as error:
+            message = f"{error.message}{_left_out(vessel, patterns)}"
+            raise DocumentError(message, file=error.file, path=error.path) from None
 
     selected = chosen(settings.parameters, "parameters")
     named = {*settings.parameters, *settings.prior, *settings.bounds, *settings.scale}
@@ -248,6 +252,17 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
         for path in reached(pattern, "prior", place):
             prior[place[path]] = width
     return Unknowns(tuple(groups), tuple(scales), centre, low, high, prior)
+
+
+def _left_out(vessel: Vessel, patterns: Sequence[str]) -> str:
+    """How to make a number that the vessel leaves at its default one that can be fitted; empty where there is none."""
+    for path in patterns:
+        block, _, name = path.rpartition(".")
+        if path in vessel.parameters or "*" in path or not block:
+            continue
+        if any(_accepts(vessel, path, value) for value in (0.0, 1.0)):
+            return f"; to fit {name}, which this vessel leaves out, write it in [{block}] of a file that extends her"
+    return ""
 
 
 def _without_dimensions(asked: Sequence[str], patterns: Collection[str], file: str) -> list[str]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -88,6 +90,21 @@ def test_a_pattern_selects_no_constant_and_no_dimension() -> None:
     assert set(unknowns(otter, some).paths) - set(paths) == {"hull.crossflow.T"}
     with pytest.raises(DocumentError, match=r"dimensions and constants only.*hull\.crossflow\.x_aft"):
         unknowns(otter, Identify(parameters=["hull.crossflow.x_*"]))
+
+
+@pytest.mark.parametrize("path", ["hull.derivatives.N_v", "inertia.z_G"])
+def test_what_the_vessel_leaves_out_is_free_once_it_is_written(path: str, tmp_path: Path) -> None:
+    """The message says how, and that works."""
+    block, _, name = path.rpartition(".")
+    settings = Identify(parameters=[path], scale={path: 1.0})
+    with pytest.raises(DocumentError, match=re.escape(f"write it in [{block}] of a file that extends her")):
+        unknowns(SHIP, settings)
+    file = tmp_path / "ship.toml"
+    file.write_text(f'extends = "gunnerus-28.9"\n[{block}]\n{name} = 0.0\n')
+    assert unknowns(load_vessel(file), settings).paths == (path,)
+    with pytest.raises(DocumentError) as error:
+        unknowns(SHIP, Identify(parameters=["hull.derivatives.Q_q"]))
+    assert "extends" not in str(error.value)
 
 
 def test_the_time_constant_of_an_actuator_is_no_draught() -> None:
