@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +13,7 @@ from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import files
 from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
 from shipid.cli.terminal import digits, ended_by, iterations, steps, table
-from shipid.errors import ShipidError
+from shipid.errors import DocumentError, ShipidError
 from shipid.units import plural
 
 if TYPE_CHECKING:
@@ -115,10 +116,11 @@ def identify(
     declared = read_settings(settings, options | parsed(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
     if structures is None:
-        check(ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ())
+        with _of_settings(settings):
+            check(ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ())
     elif needless := next((name for name, value in {"--profile": profile, "--design": design}.items() if value), None):
         raise ShipidError("does not go with --structures: identify the structure chosen", path=needless)
-    with answering(as_json) as answer:
+    with answering(as_json) as answer, _of_settings(settings):
         _look(ship, log, runs or (), test or (), answer)
         if structures is not None:
             how: dict[str, Any] = {"runs": runs or (), "held_out": test or (), "ahead": ahead}
@@ -140,6 +142,17 @@ def identify(
 
             content = identification_content(outcome, dataset, command_line())
             answer.say(f"page -> {write_identification(content, html)}", page=html)
+
+
+@contextmanager
+def _of_settings(settings: Path | None) -> Iterator[None]:
+    """Errors of the block of settings are those of its file, where it has one."""
+    try:
+        yield
+    except DocumentError as error:
+        if error.file is not None or not (error.path or "").startswith("identify"):
+            raise
+        raise DocumentError(error.message, file=settings, path=error.path) from None
 
 
 def _paths(given: Sequence[str]) -> list[str]:

@@ -109,7 +109,7 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
         vessel = vessel.with_values({"current.kind": "uniform"})
     if "thrust_scale" in widths and not any(map(is_thrust, vessel.parameters)):
         message = f"{vessel.name} has no thrust coefficient: leave it out"
-        raise DocumentError(message, file=vessel.file, path=f"{BLOCK}.nuisance.thrust_scale")
+        raise DocumentError(message, path=f"{BLOCK}.nuisance.thrust_scale")
     model, unknown = dynamics(vessel), unknowns(vessel, settings)
     _check_outputs(vessel, dataset, settings)
     overridden = overrides(settings, runs, vessel, model.environment, dataset.runs)
@@ -125,7 +125,6 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
         path = f"{BLOCK}.runs.{'.'.join(twice)}"
         raise DocumentError(
             "is free in the fit and also set for a run: fix it, or remove the value of the run",
-            file=vessel.file,
             path=path,
         )
     return Problem(
@@ -155,7 +154,7 @@ def _check_outputs(vessel: Vessel, dataset: Dataset, settings: Identify) -> None
         if name not in predicted:
             lacks = "; a torque needs K_Q of the propeller" if name.endswith(".torque") else ""
             message = f"{vessel.name} predicts no {name}: {choices(name, predicted)}{lacks}"
-            raise DocumentError(message, file=vessel.file, path=path)
+            raise DocumentError(message, path=path)
         if name not in dataset.outputs:
             message = f"was not measured; the data have {', '.join(dataset.outputs) or 'no output of a component'}"
             raise DataError(message, path=path)

@@ -190,18 +190,18 @@ class Unknowns:
 
 def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     """The factors that the settings leave free; DocumentError for a selection without a match or a zero base value."""
-    base, file = vessel.parameters, vessel.file
+    base = vessel.parameters
 
     def chosen(patterns: Sequence[str], key: str) -> list[str]:
         try:
-            return select(patterns, base, file, f"{BLOCK}.{key}")
+            return select(patterns, base, None, f"{BLOCK}.{key}")
         except DocumentError as error:
             message = f"{error.message}{_left_out(vessel, patterns)}"
-            raise DocumentError(message, file=error.file, path=error.path) from None
+            raise DocumentError(message, path=error.path) from None
 
     selected = chosen(settings.parameters, "parameters")
     named = {*settings.parameters, *settings.prior, *settings.bounds, *settings.scale}
-    asked = _without_dimensions(selected, named | {path for group in settings.together for path in group}, file)
+    asked = _without_dimensions(selected, named | {path for group in settings.together for path in group})
 
     def reached(pattern: str, key: str, among: Collection[str]) -> list[str]:
         paths = [path for path in chosen([pattern], key) if path in among]
@@ -209,7 +209,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
             message = (
                 f"{pattern!r} selects no parameter that is free in the fit: add it to parameters, or remove it here"
             )
-            raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
+            raise DocumentError(message, path=f"{BLOCK}.{key}")
         return paths
 
     fixed = {path for pattern in settings.fixed for path in reached(pattern, "fixed", selected)}
@@ -217,23 +217,22 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     if not free:
         raise DocumentError(
             "every selected parameter is also fixed, so none is left to estimate: fix fewer",
-            file=file,
             path=f"{BLOCK}.fixed",
         )
     unknown = next((path for path in settings.scale if base.get(path, 1.0) != 0), None)
     if unknown is not None:
         hint = f"is {base[unknown]:g}: scale is for a 0" if unknown in base else choices(unknown, base)
-        raise DocumentError(f"{unknown!r}: {hint}", file=file, path=f"{BLOCK}.scale")
-    groups = _groups(settings, free, chosen, file)
+        raise DocumentError(f"{unknown!r}: {hint}", path=f"{BLOCK}.scale")
+    groups = _groups(settings, free, chosen)
     scales = []
     for group in groups:
         if len({base[path] == 0 for path in group}) > 1:
             message = f"{' and '.join(group)} share a factor, but some are 0 and some are not: untie them"
-            raise DocumentError(message, file=file, path=f"{BLOCK}.together")
+            raise DocumentError(message, path=f"{BLOCK}.together")
         bare = next((path for path in group if base[path] == 0 and path not in settings.scale), None)
         if bare is not None:
             message = f'{bare} is 0, which no factor changes: give its size, scale."{bare}" = ..., or fix it'
-            raise DocumentError(message, file=file, path=f"{BLOCK}.scale")
+            raise DocumentError(message, path=f"{BLOCK}.scale")
         scales.append(tuple(settings.scale.get(path, base[path]) for path in group))
     centre = np.array([0.0 if base[group[0]] == 0 else 1.0 for group in groups])
     high, prior = np.full(len(groups), np.inf), np.full(len(groups), np.inf)
@@ -265,7 +264,7 @@ def _left_out(vessel: Vessel, patterns: Sequence[str]) -> str:
     return ""
 
 
-def _without_dimensions(asked: Sequence[str], patterns: Collection[str], file: str) -> list[str]:
+def _without_dimensions(asked: Sequence[str], patterns: Collection[str]) -> list[str]:
     """The paths without dimensions and constants, which are measured or known; with those that are written in full."""
     known = {
         path
@@ -274,7 +273,7 @@ def _without_dimensions(asked: Sequence[str], patterns: Collection[str], file: s
     }
     if known == set(asked):
         message = f"selects dimensions and constants only: to fit them all the same, write {', '.join(sorted(known))}"
-        raise DocumentError(message, file=file, path=f"{BLOCK}.parameters")
+        raise DocumentError(message, path=f"{BLOCK}.parameters")
     return [path for path in asked if path not in known]
 
 
@@ -303,7 +302,7 @@ def _accepts(vessel: Vessel, path: str, value: float) -> bool:
     return True
 
 
-def _groups(settings: Identify, free: list[str], chosen: Any, file: str) -> list[tuple[str, ...]]:
+def _groups(settings: Identify, free: list[str], chosen: Any) -> list[tuple[str, ...]]:
     """Free paths in the order of the vessel, paths of `together` in one group."""
     of: dict[str, int] = {}
     for number, patterns in enumerate(settings.together):
@@ -311,10 +310,10 @@ def _groups(settings: Identify, free: list[str], chosen: Any, file: str) -> list
         for path in chosen(patterns, key):
             if path not in free:
                 message = f"{path} is tied but not free: add it to parameters, or untie it"
-                raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
+                raise DocumentError(message, path=f"{BLOCK}.{key}")
             if path in of:
                 message = f"{path} is in two groups: tie all of them in one"
-                raise DocumentError(message, file=file, path=f"{BLOCK}.{key}")
+                raise DocumentError(message, path=f"{BLOCK}.{key}")
             of[path] = number
     groups: dict[Any, list[str]] = {}
     for path in free:
@@ -343,13 +342,11 @@ def overrides(
         where = f"{BLOCK}.runs.{key}"
         if run is None:
             hint = choices(key.split(".", 1)[0], result)
-            raise DocumentError(f"does not begin with the name of a run: {hint}", file=vessel.file, path=where)
+            raise DocumentError(f"does not begin with the name of a run: {hint}", path=where)
         path = key[len(run) + 1 :]
         if path not in valid:
-            raise DocumentError(
-                f"{path!r} cannot be set for a run: {choices(path, valid)}", file=vessel.file, path=where
-            )
+            raise DocumentError(f"{path!r} cannot be set for a run: {choices(path, valid)}", path=where)
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise DocumentError(f"{value!r} is not a number", file=vessel.file, path=where)
+            raise DocumentError(f"{value!r} is not a number", path=where)
         result[run][path] = float(value)
     return {run: result[run] for run in runs}

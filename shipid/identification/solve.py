@@ -251,7 +251,7 @@ def _factors(problem: Problem, start: Mapping[str, float]) -> Array:
     for path, factor in start.items():
         if path not in unknown.paths:
             message = f"{path!r} is not free in the fit: {choices(path, unknown.paths)}"
-            raise DocumentError(message, file=problem.vessel.file, path=f"{BLOCK}.start")
+            raise DocumentError(message, path=f"{BLOCK}.start")
         factors[unknown.paths.index(path)] = float(numbers(f"start of {path}", factor, DocumentError))
     return np.asarray(np.clip(factors, unknown.low, unknown.high))
 

@@ -110,6 +110,24 @@ def test_a_mistake_is_one_line_and_writes_nothing(name: str, file: Path) -> None
 
 
 @pytest.mark.parametrize(
+    ("line", "path"),
+    [
+        ('parameters = ["hull.derivatives.N_urr"]', "identify.parameters: "),
+        (f'parameters = ["{ONE}"]\nfixed = ["wind.*"]', "identify.fixed: "),
+        (
+            f'parameters = ["{ONE}"]\nruns = {{M99 = {{environment = {{V_w = 1}}}}}}',
+            "identify.runs.M99.environment.V_w: ",
+        ),
+    ],
+)
+def test_a_mistake_in_settings_is_one_of_their_file(line: str, path: str, file: Path) -> None:
+    Path("mine.toml").write_text(f"[identify]\n{line}\n")
+    with pytest.raises(ShipidError) as error:
+        output_of("identify", "gunnerus-28.9", file, "--settings", "mine.toml")
+    assert str(error.value).startswith(f"mine.toml: {path}")
+
+
+@pytest.mark.parametrize(
     ("vessel", "parameters", "message"),
     [
         ("gunnerus-33.9-template", "hull.mmg.X_vv", "is 0, which no factor changes"),
