@@ -536,6 +536,11 @@ class ObservedStart:
     drift: Array
 
 
+def moves_start(settings: Observer, path: PathSource) -> bool:
+    """Whether a path starts at the filtered position; else where the ship is, as the true path does."""
+    return path == "position" and {"north", "east"} <= set(settings.measured)
+
+
 def observed_start(
     filters: Bank,
     columns: Mapping[str, Array],
@@ -552,7 +557,7 @@ def observed_start(
     """
     model, zero = filters.model, np.zeros(len(columns["u"]))
     begun = start(columns)
-    if path == "velocity" or not {"north", "east"} <= set(filters.settings.measured):
+    if not moves_start(filters.settings, path):
         begun |= {name: columns.get(name, zero) for name in ("north", "east")}
     north, east, psi = columns["observer.current_north"], columns["observer.current_east"], begun["psi"]
     begun["u"] = begun["u"] - north * np.cos(psi) - east * np.sin(psi)

@@ -14,7 +14,7 @@ from shipid.export.blocks import Graph, Value, formula
 from shipid.export.equations import Equations, rollout
 from shipid.hybrid.features import MOTIONS, PARTS, Inputs, steps_of
 from shipid.hybrid.physics import Physics
-from shipid.observer import COLUMNS, LOW, bank
+from shipid.observer import COLUMNS, LOW, bank, moves_start
 from shipid.physics.signals import plain_inputs
 
 SX_of = Mapping[str, SX]
@@ -190,7 +190,7 @@ class Known:
         seen = dict(zip(COLUMNS, ca.vertsplit(estimates), strict=True))
         north, east, psi = seen["current_north"], seen["current_east"], seen["psi"]
         place = [SX(0), SX(0)]
-        if physics.path == "position":
+        if moves_start(filters.settings, physics.path):
             place = [seen["north"] - now["north"], seen["east"] - now["east"]]
         u = seen["u"] - north * ca.cos(psi) - east * ca.sin(psi)
         v = seen["v"] + north * ca.sin(psi) - east * ca.cos(psi)

@@ -12,11 +12,16 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from shipid.data.windows import Instants
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.export.model import model
 from shipid.export.write import export_predictor, export_vessel
+from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
+from shipid.observer import COLUMNS, Observer
+from shipid.predictor import Predictor
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.export.strange import drawn
 
@@ -32,6 +37,29 @@ def test_a_predictor_is_one_function(kind, tmp_path):
         path = np.array(function(**{key: values[i] for key, values in given.items()})["path"])
         np.testing.assert_allclose(path.T, expected[:, i], rtol=0, atol=1e-11)
     assert [entry["name"] for entry in listed["inputs"]["now"]] == list(model(strange.predictor).layout.now)
+
+
+@pytest.mark.parametrize("settings", [Observer(), Observer(measured=("psi", "u", "v", "r"), current=0.0)])
+@pytest.mark.parametrize("path", ["position", "velocity"])
+def test_a_path_starts_where_it_does_in_python(settings, path, tmp_path):
+    """At the filtered position where positions are measured and make the true path, else where the ship is."""
+    vessel, rng = load_vessel("mariner"), np.random.default_rng(1)
+    columns = {
+        name: rng.uniform(0.1, 0.2, 3) for name in ("north", "east", "psi", "u", "v", "r", *dynamics(vessel).commands)
+    }
+    columns |= {"u": np.full(3, 7.0)}
+    estimates = {f"observer.{name}": columns.get(name, 0.0) + rng.normal(0, 1e-4, 3) for name in COLUMNS}
+    estimates["observer.north"] = estimates["observer.north"] + 300.0
+    predictor = Predictor(
+        Physics(vessel, 4, 5.0, observer=settings, path=path), "alone", Unchanged({}), {"u": (0.0, 9.0)}
+    )
+    instants = Instants(columns, estimates=estimates)
+    file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
+    given, expected = model(predictor).inputs(instants), predictor.predict(instants)
+    for i in range(3):
+        seen = ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})["path"]
+        np.testing.assert_allclose(np.array(seen).T, expected[:, i], rtol=0, atol=1e-9)
+    assert (np.abs(expected[0]).max() > 200) == (path == "position" and "north" in settings.measured)
 
 
 def test_a_forest_is_refused_in_one_line(tmp_path):
