@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
+from shipid.engine.rollout import SPEED_LIMIT
 from shipid.export.blocks import Graph, Value, formula
 from shipid.export.equations import Equations, rollout
 from shipid.hybrid.features import MOTIONS, PARTS, Inputs, steps_of
@@ -229,14 +230,30 @@ class Known:
         if drift is not None:
             north, east = north + age * water[0], east + age * water[1]
         c, s = ca.cos(psi), ca.sin(psi)
+        slow = SX.sym("slow")
         frame = formula(
             "frame",
-            [("carry", carry), ("age", age), ("psi", psi), ("drift", water)],
-            [c * north + s * east, c * east - s * north],
+            [("carry", carry), ("age", age), ("psi", psi), ("drift", water), ("slow", slow)],
+            [ca.if_else(slow, place, np.nan) for place in (c * north + s * east, c * east - s * north)],
         )
         ages = graph.constant(self.physics.step * np.arange(1, horizon + 1))
         fixed = [self.of("now", ["psi"]), drift if drift is not None else self.values["now"][0:0]]
-        return graph.map(frame, [records, ages], fixed, horizon)
+        return graph.map(frame, [records, ages], [*fixed, self._slow(records, horizon)], horizon)
+
+    def _slow(self, records: Value, count: int) -> Value:
+        """1 while no velocity of some carries is above that of any ship; 0 for a rollout that Python says diverged."""
+        carry, each = SX.sym("carry", self.equations.num_carry), SX.sym("fastest", count)
+        speeds = ca.vertsplit(carry)[self.equations.model.num_dof : 2 * self.equations.model.num_dof]
+        fastest = SX(0)
+        for speed in speeds:
+            fastest = ca.fmax(fastest, ca.fabs(speed))
+        block = formula("fastest", [("carry", carry)], [fastest])
+        slow = SX(1)
+        for one in ca.vertsplit(each):
+            slow = ca.logic_and(slow, one <= SPEED_LIMIT)
+        return self.graph.call(
+            formula("slow", [("fastest", each)], [slow]), self.graph.map(block, [records], [], count)
+        )
 
     def past_error(self, seconds: float) -> Value:
         """x, y, u, v, r of `shipid.hybrid.features.past_error`."""
@@ -258,12 +275,13 @@ class Known:
         c, s = ca.cos(turned), ca.sin(turned)
         errors = [c * dx + s * dy, c * dy - s * dx]
         errors += [now[1 + i] - motion for i, motion in enumerate(self.equations.horizontal(carry))]
-        sound = finite(errors)
-        block = formula(
-            "error", [("carry", carry), ("then", then), ("now", now)], [ca.if_else(sound, e, 0) for e in errors]
-        )
+        slow = SX.sym("slow")
+        sound = ca.logic_and(finite(errors), slow)
+        given = [("carry", carry), ("then", then), ("now", now), ("slow", slow)]
+        block = formula("error", given, [ca.if_else(sound, e, 0) for e in errors])
         last = known[-self.equations.num_carry :] if known.size > self.equations.num_carry else known
-        return graph.call(block, last, self.of("past", ("x", "y", "psi"), first), self.of("now", ("psi", *MOTIONS)))
+        seen = self.of("past", ("x", "y", "psi"), first), self.of("now", ("psi", *MOTIONS))
+        return graph.call(block, last, *seen, self._slow(known, steps))
 
     def table(self, inputs: Inputs, trajectory: Sequence[int] = ()) -> Table:
         """Every input that a method may take, see `shipid.hybrid.features.Inputs.table`.

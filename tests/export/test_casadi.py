@@ -62,6 +62,22 @@ def test_a_path_starts_where_it_does_in_python(settings, path, tmp_path):
     assert (np.abs(expected[0]).max() > 200) == (path == "position" and "north" in settings.measured)
 
 
+@pytest.mark.parametrize("step", [20.0, 60.0])
+def test_a_path_that_diverged_is_none(step, tmp_path):
+    """As in Python: positions far beyond any ship are finite for some steps."""
+    vessel = load_vessel("mariner")
+    columns = {name: np.zeros(2) for name in ("psi", "v", "r")} | {"u": np.array([7.0, 0.1])}
+    columns |= {"propeller.n": np.array([1.3, 0.0]), "rudder.delta": np.array([0.5, 0.0])}
+    predictor = Predictor(Physics(vessel, 6, step), "alone", Unchanged({}), {"u": (0.0, 9.0)})
+    file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
+    given, expected = model(predictor).inputs(Instants(columns)), predictor.predict(Instants(columns))
+    for i in range(2):
+        seen = ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})["path"]
+        np.testing.assert_allclose(np.array(seen).T, expected[:, i], rtol=1e-9)
+    assert np.isnan(expected[:, 0]).all() == (step == 60.0)
+    assert np.isfinite(expected[:, 1]).all()
+
+
 def test_a_forest_is_refused_in_one_line(tmp_path):
     strange = drawn("forest", 1)
     with pytest.raises(ShipidError, match="export it to c or fmu"):
