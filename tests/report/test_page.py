@@ -113,6 +113,15 @@ def test_nothing_is_fetched(page):
     assert "http" not in policy
 
 
+def test_counts_of_cells_without_a_result_stay_below_each_other(page):
+    """Only words, such as the status of a failed cell, are set left and may wrap."""
+    (style,) = (style for _, style in page[2].all("style"))
+    (rule,) = re.findall(r"\n\.sortable \.bad \{([^}]*)\}", style)
+    assert "text-align" not in rule
+    assert "min-width" not in rule
+    assert re.search(r"\n\.sortable \.words\.bad \{[^}]*white-space: normal", style)
+
+
 def test_names_of_the_user_stay_text(page, simulation, simulation_drawn, full_scale_drawn):
     content, text, parsed = page
     sections = simulation_drawn if content is simulation else full_scale_drawn
