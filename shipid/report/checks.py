@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +65,7 @@ def _answer(checks: pd.DataFrame) -> list[Sentence]:
 
 
 def _table(checks: pd.DataFrame) -> Table:
-    """Return the table of all checks, failed ones first."""
+    """Return the table of all checks, failed ones first; what these say is shown whole."""
     ordered = checks.assign(ok=checks["ok"].astype(bool)).sort_values("ok", kind="stable")
     rows = [
         [
@@ -74,7 +74,7 @@ def _table(checks: pd.DataFrame) -> Table:
             Cell("passed", "passed") if row.ok else Cell("failed", "failed", bad=True),
             Cell(_amount(float(str(row.value)), str(row.unit)), float(str(row.value))),
             Cell(scientific(float(str(row.limit)), 3), float(str(row.limit))),
-            tables.text(bound(str(row.sentence))),
+            replace(tables.text(bound(str(row.sentence))), bad=not row.ok),
         ]
         for row in ordered.itertuples()
     ]
