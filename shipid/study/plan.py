@@ -554,6 +554,9 @@ def _check_amounts(study: Study, truth: Truth, file: Path) -> None:
     if not isinstance(test, int):
         raise DocumentError("runs of a [truth] are drawn: give the number of test runs", file=file, path="split.test")
     pool = truth.manoeuvres - test
+    if truth.manoeuvres < 3:
+        message = f"{truth.manoeuvres}: a study needs 3 or more: 1 to test, 2 to train and validate"
+        raise DocumentError(message, file=file, path="truth.manoeuvres")
     if pool < 2:
         message = f"{test}: of {truth.manoeuvres} manoeuvres at most {truth.manoeuvres - 2} can test"
         raise DocumentError(message, file=file, path="split.test")

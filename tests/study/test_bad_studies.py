@@ -151,6 +151,12 @@ def test_names_that_differ_in_capitals_alone_are_one_file(changes: dict[str, Any
     assert caught.value.path == path
 
 
+def test_of_two_manoeuvres_none_can_test() -> None:
+    with pytest.raises(DocumentError, match="2: a study needs 3 or more: 1 to test, 2 to train and validate") as caught:
+        read_plan(FOLDER / "plain.toml", {"truth.manoeuvres": 2, "split.test": 1, "grid.N_D": [1]})
+    assert caught.value.path == "truth.manoeuvres"
+
+
 @pytest.mark.parametrize("name", ["nowhere.toml", "./nowhere.toml", "quik"])
 def test_no_such_study(name: str) -> None:
     with pytest.raises(DocumentError, match=r"no such file|did you mean 'quick'\?"):
