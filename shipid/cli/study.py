@@ -15,7 +15,7 @@ from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyN
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import counted, digits, draw, ended_by, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import length_text
+from shipid.units import decimals_of, length_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -397,14 +397,15 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
 def _difference(row: Mapping[Any, Any], banded: bool) -> list[str]:
     """One row of a comparison as words."""
     known = row["low"] == row["low"] and row["verdict"] != "identical"
-    interval = f" [{row['low']:+.3f}, {row['high']:+.3f}]" if known else ""
+    places = max(decimals_of(max(row["first"], row["other"])), 3)
+    interval = f" [{row['low']:+.{places}f}, {row['high']:+.{places}f}]" if known else ""
     amount = "A" if row["N_D"] == 0 else str(row["N_D"])
     shares = row["coverage_first"], row["coverage_other"]
     inside = ", ".join("-" if share != share else f"{share:.0%}" for share in shares)
     return [
         *(row["family"], row["method"], amount, str(row["cells"])),
-        *(f"{row[side]:.3f}" for side in ("first", "other")),
-        f"{row['difference']:+.3f}{interval}",
+        *(f"{row[side]:.{places}f}" for side in ("first", "other")),
+        f"{row['difference']:+.{places}f}{interval}",
         *["" if inside == "-, -" else inside] * banded,
         row["verdict"],
     ]

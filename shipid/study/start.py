@@ -12,6 +12,7 @@ from shipid.study.contents import share_pages
 from shipid.study.plan import read_plan
 from shipid.study.results import Results, read_results
 from shipid.study.run import Event, run_study
+from shipid.units import decimals_of
 
 log = logging.getLogger(__name__)
 
@@ -83,7 +84,8 @@ def event_line(event: Event) -> str:
     if event.kind != "cell":
         return ""
     if row["status"] == "ok":
-        result = f"H {row['H']:.3f} m, H_90 {row['H_90']:.3f} m"
+        H, H_90 = (f"{row[name]:.{max(decimals_of(row[name]), 3)}f} m" for name in ("H", "H_90"))
+        result = f"H {H}, H_90 {H_90}"
     else:
         result = f"{row['status']}: {row['sentence']}"
     return f"[{event.done}/{event.total}] {row['cell']}: {result}, {row['seconds']:.1f} s"

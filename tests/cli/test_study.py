@@ -13,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
+from shipid.cli.study import _difference
 from shipid.document import bundled
 from shipid.engine import engines
 from shipid.errors import ShipidError
@@ -196,3 +197,19 @@ def test_a_run_whose_lines_cannot_be_printed_gives_its_claims_back(
     assert (code, error) == (1, "error: system: No space left on device\n")
     assert taken[0].gi_frame is None, "the generator is closed"
     assert not (tmp_path / "run" / "claims").exists()
+
+
+def test_differences_of_a_ship_model_are_no_zeros() -> None:
+    row = {
+        "family": "a",
+        "method": "drawn",
+        "N_D": 10,
+        "cells": 1,
+        "first": 0.0004,
+        "other": 0.0002,
+        "verdict": "lower",
+    }
+    row |= {"difference": -0.0002, "low": -0.0003, "high": -0.0001, "coverage_first": 0.9, "coverage_other": 0.9}
+    assert _difference(row, banded=False)[4:] == ["0.0004", "0.0002", "-0.0002 [-0.0003, -0.0001]", "lower"]
+    row |= {"first": 1.5, "other": 1.0, "difference": -0.5, "low": -0.6, "high": -0.4}
+    assert _difference(row, banded=False)[4:] == ["1.500", "1.000", "-0.500 [-0.600, -0.400]", "lower"]

@@ -10,7 +10,8 @@ import pytest
 
 from shipid.errors import ShipidError
 from shipid.study.plan import read_plan
-from shipid.study.start import events, run
+from shipid.study.run import Event
+from shipid.study.start import event_line, events, run
 from tests.study.tiny import TINY
 
 
@@ -45,3 +46,9 @@ def test_a_mistake_is_an_error_of_shipid() -> None:
         run("quik")
     with pytest.raises(ShipidError, match=r"grid\.M_D"):
         next(events(TINY, {"grid.M_D": [4]}))
+
+
+@pytest.mark.parametrize(("H", "words"), [(12.3456, "12.346"), (0.05, "0.050"), (0.0002, "0.0002")])
+def test_errors_of_a_ship_model_are_no_zeros_while_a_study_runs(H: float, words: str) -> None:
+    row = {"status": "ok", "cell": "a", "H": H, "H_90": 2 * H, "seconds": 1.0}
+    assert f"H {words} m, H_90 {2 * H:.{len(words.partition('.')[2])}f} m" in event_line(Event("cell", "", 1, 2, row))
