@@ -362,15 +362,17 @@ def _takeaway(content: ReportContent, size: int) -> str:
 
 
 def _takeaway_row(content: ReportContent, windows: list[Snapshot], counts: list[int]) -> str:
-    """How far the compensated paths end from the truth in each panel."""
+    """How far the compensated paths end from the truth in each panel, or those without physics where there are none."""
     pure, drawn = data_driven(content), exemplars(content)
-    means = []
-    for window, size in zip(windows, counts, strict=False):
-        keys = {k for k in window.paths if k[1] == "cooperative" and k[2] == size and k[0] in drawn and k[0] != pure}
-        means.append(_mean_end_error([window], keys))
-    if not np.isfinite(means).any():
-        return "No compensated path was recorded for these windows."
-    return f"From panel to panel, the compensated paths end {listed([number(m) for m in means])} m from the true place."
+    physics = [name for name in drawn if name != pure]
+    for models, words in ((physics, "the compensated paths"), ([pure], "the paths without physics")):
+        means = []
+        for window, size in zip(windows, counts, strict=False):
+            keys = {k for k in window.paths if k[1] == "cooperative" and k[2] == size and k[0] in models}
+            means.append(_mean_end_error([window], keys))
+        if np.isfinite(means).any():
+            return f"From panel to panel, {words} end {listed([number(m) for m in means])} m from the true place."
+    return "No compensated path was recorded for these windows."
 
 
 def _takeaway_models(window: Snapshot, models: list[str], counts: list[int]) -> str:

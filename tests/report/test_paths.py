@@ -150,6 +150,15 @@ def test_one_size_gives_three_instants_of_one_run(full_scale):
     np.testing.assert_allclose(times, 4150 + 179 * np.array([1, 3, 5]) / 6, atol=2)
 
 
+def test_where_nothing_has_physics_the_panels_are_of_what_has_none(full_scale):
+    """Paths were drawn below the sentence that none was recorded."""
+    first = full_scale.snapshots[0]
+    error = number(float(np.hypot(*(first.paths["no model", "cooperative", 15] - first.truth)[-1])))
+    pure = {key: path for key, path in first.paths.items() if key[0] == "no model" or key[1] != "cooperative"}
+    figure = snapshots(replace(full_scale, snapshots=[replace(first, paths=pure)]))
+    assert figure.takeaway == f"From panel to panel, the paths without physics end {error} m from the true place."
+
+
 def test_takeaway_is_the_mean_end_error(full_scale):
     ends = {"cooperative": [], "physics": []}
     for snapshot in full_scale.snapshots:
