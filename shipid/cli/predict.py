@@ -18,7 +18,7 @@ def predict(
     log: Annotated[Path, typer.Argument(help="dataset (Parquet), or a raw log with --mapping")],
     cell: Annotated[str, typer.Option(help="cell whose predictor to use; see results.parquet", autocompletion=cells)],
     mapping: Annotated[str | None, typer.Option(help="mapping of a raw log")] = None,
-    out: Annotated[Path | None, typer.Option(help="file to write: .parquet or .csv")] = None,
+    out: Annotated[Path | None, typer.Option(help="file to write: .parquet or .csv; default: <cell>.parquet")] = None,
     level: Annotated[
         float | None, typer.Option(help="share of whole paths that a band is to hold, such as 0.9: adds its columns")
     ] = None,

@@ -355,7 +355,7 @@ def read_dataset(file: str | os.PathLike[str]) -> Dataset:
         with open_file(file) as stream:
             table = pyarrow.parquet.read_table(stream)
     except (pyarrow.ArrowException, ValueError, TypeError):
-        hint = "make one from a log with `shipid data import`, or give the log with --mapping where there is one"
+        hint = "make one from a log with `shipid data import`, or give the log itself if the command has --mapping"
         raise DataError(f"not a Parquet file: {hint}", file=file) from None
     except FileNotFoundError:
         raise DataError("cannot be read (no such file)", file=file) from None
