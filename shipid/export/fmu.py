@@ -716,7 +716,7 @@ FMI2_STATUS FMI2(fmi2GetBoolean)(fmi2Component c, const fmi2ValueReference vr[],
     size_t i;
     if (follow(self) != fmi2OK) return fmi2Error;
     for (i = 0; i < n; ++i) {
-        if (vr[i] + 1 > NUM_BOOLEANS) return refuse(self, fmi2Error, "there is no boolean variable %u", vr[i]);
+        if (!NUM_BOOLEANS || vr[i]) return refuse(self, fmi2Error, "there is no boolean variable %u", vr[i]);
         value[i] = Model_boolean(&self->model, vr[i]);
     }
     return fmi2OK;

@@ -274,6 +274,9 @@ def test_wrong_values_are_refused_and_the_instance_goes_on(ship, folder):
             one.set(V_w=value)
     with pytest.raises(fmi.FMICallException):
         one.fmu.getReal([100000])
+    for reference in (0, 2**32 - 1):  # a vessel has no alarm
+        with pytest.raises(fmi.FMICallException):
+            one.fmu.getBoolean([reference])
     one.fmu.exitInitializationMode()
     with pytest.raises(fmi.FMICallException):
         one.set(u=3.0)
