@@ -360,16 +360,21 @@ def _as_numbers(instants: Instants) -> Instants:
         if columns[name].shape != count:
             raise DataError(f"must be {count} as 'u', not {columns[name].shape}", path=name)
 
-    def floats(what: str, given: Mapping[str, Array]) -> dict[str, Array]:
-        return {name: numbers(f"{what} {name!r}", values, DataError) for name, values in given.items()}
+    def floats(what: str, given: Mapping[str, Array], leading: int | None = None) -> dict[str, Array]:
+        arrays = {name: numbers(f"{what} {name!r}", values, DataError) for name, values in given.items()}
+        for name, array in arrays.items():
+            if leading is not None and (array.ndim != leading + 1 or array.shape[leading:] != count):
+                wanted = f"({'P, ' * leading}{count[0]}{'' if leading else ','})"
+                raise DataError(f"{what} must be {wanted}, not {array.shape}", path=name)
+        return arrays
 
     return replace(
         instants,
         columns=columns,
-        past=floats("past", instants.past),
+        past=floats("the past", instants.past, 1),
         planned=None if instants.planned is None else floats("planned", instants.planned),
-        hidden=None if instants.hidden is None else floats("hidden", instants.hidden),
-        estimates=floats("estimate", instants.estimates),
+        hidden=None if instants.hidden is None else floats("the hidden state", instants.hidden, 0),
+        estimates=floats("the estimate", instants.estimates, 0),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -231,6 +232,27 @@ def test_a_past_that_is_no_number_gives_no_path(kind: str, seed: int) -> None:
         np.testing.assert_array_equal(np.delete(paths, 3, axis=1), np.delete(usual, 3, axis=1))
         past[name][-1, 3], past[name][: -known.past, 3] = instants.past[name][-1, 3], np.nan
         np.testing.assert_array_equal(known.predict(replace(instants, past=past)), usual)  # it looks not so far
+
+
+@pytest.mark.parametrize("part", ["past", "hidden", "estimates"])
+def test_a_part_of_another_shape_is_named(part: str) -> None:
+    """Before, one value was taken for all instants, and others ended in a ValueError."""
+    strange = drawn("path-drawn", 203, count=5, vessel="mariner")
+    given = getattr(strange.instants, part) or {"rudder.delta": np.zeros(5)}
+    for name, values in given.items():
+        for wrong in (values[..., :2], values[..., 0], values[None]):
+            changed = replace(strange.instants, **{part: {**given, name: wrong}})
+            with pytest.raises(DataError, match=rf"{re.escape(name)}: the .* must be \((P, 5|5,)\), not \("):
+                strange.predictor.predict(changed)
+
+
+def test_an_estimate_that_is_missing_is_named() -> None:
+    """Before, it ended in a KeyError."""
+    strange = next(one for one in (drawn("alone", seed, 5, "mariner") for seed in range(99)) if one.instants.estimates)
+    for name in strange.instants.estimates:
+        estimates = {key: values for key, values in strange.instants.estimates.items() if key != name}
+        with pytest.raises(DataError, match=rf"{re.escape(name)}: the physics has an observer, and the instants lack"):
+            strange.predictor.predict(replace(strange.instants, estimates=estimates))
 
 
 def test_only_instants_are_predicted_from(predictor: Predictor) -> None:

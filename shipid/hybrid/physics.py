@@ -15,13 +15,14 @@ from shipid.engine.gradient import rollout_gradient, squared_distance
 from shipid.engine.integrate import Method as Integrator
 from shipid.engine.rollout import Distances, Trajectories, distances, rollout
 from shipid.errors import DataError, ShipidError
-from shipid.observer import Observer, bank, observed_start
+from shipid.observer import COLUMNS, Observer, bank, observed_start
 from shipid.simulation.log import LEANING, aboard, column_of, horizontal
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 MOTION = ("u", "v", "r", "psi")
+ESTIMATED = tuple(f"observer.{name}" for name in COLUMNS)
 WORTH_COMPILING = 20_000  # steps of single windows: who asks for so many at once, in training or on a log, asks again
 RolloutInputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
 """Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
@@ -229,6 +230,9 @@ class Physics:
         if self.observer is not None:
             if not instants.estimates:
                 raise DataError("the physics has an observer: instants must hold its estimates", path="observer")
+            missing = next((name for name in ESTIMATED if name not in instants.estimates), None)
+            if missing is not None:
+                raise DataError("the physics has an observer, and the instants lack this estimate", path=missing)
             observed = {**columns, **instants.estimates}
             begun = observed_start(bank(self.ship, self.observer), observed, self.horizon, self.step, self.path)
             columns, environment, slow, drift = begun.columns, begun.environment, begun.tau_extra, begun.drift
