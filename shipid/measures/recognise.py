@@ -27,9 +27,10 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     The helm is the mean of the angle commands that move, by a quarter of the one that moves most or more: a bow unit
     parked across, or the offset of a rudder at rest, is no helm. Each has the sign that turns the ship to starboard:
     that in `helm`, angle command -> +1 or -1, where the vessel is known; else the sign of the sum of angle times change
-    of yaw rate. The shaft is the mean of the shaft speeds that are ahead at the start and later astern, else of those
-    that later stop, else of those that are not 0 at the start: a tunnel thruster that runs all the time is none of them
-    in a stop. A shaft with a controllable pitch counts as its speed times the pitch over the greatest pitch.
+    of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start. Where the ship goes
+    ahead no longer after some of those ahead are reversed, else stopped, it is the slowest of these: a stop begins with
+    the first order, and a tunnel thruster that runs all the time is no shaft of it. A shaft with a controllable pitch
+    counts as its speed times the pitch over the greatest pitch.
 
     Raises
     ------
@@ -39,7 +40,7 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     if missing is not None:
         raise DataError("missing column", path=missing)
     states = {name: np.asarray(columns[name], dtype=float) for name in STATES}
-    angles, running = _commands(columns, steers), _running(_driving(columns))
+    angles = _commands(columns, steers)
     known = {name: _sense(angle, states["r"]) for name, angle in angles.items()} if helm is None else helm
     moved = {name: float(np.ptp(angle)) for name, angle in angles.items() if known.get(name, 0.0) and angle.any()}
     least = MIDSHIPS * max(moved.values(), default=0.0)
@@ -47,7 +48,7 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     return Record(
         **states,
         helm=np.mean(helms, axis=0) if helms else np.zeros(len(states["t"])),
-        shaft=np.mean(running, axis=0) if running else None,
+        shaft=_shaft(_driving(columns), states["u"]),
     )
 
 
@@ -60,11 +61,17 @@ def _driving(columns: Mapping[str, Array]) -> list[Array]:
     return list(shafts.values())
 
 
-def _running(shafts: list[Array]) -> list[Array]:
-    """Shaft speeds that drive the ship, as `record_of` says."""
-    ahead = [shaft for shaft in shafts if shaft[0] > 0]
-    astern, stopped = ([shaft for shaft in ahead if below(shaft.min(), 0)] for below in (np.less, np.less_equal))
-    return astern or stopped or [shaft for shaft in shafts if shaft[0] != 0]
+def _shaft(shafts: list[Array], u: Array) -> Array | None:
+    """Shaft speed of the ship, as `record_of` says; None where no shaft runs."""
+    for below in (np.less, np.less_equal):
+        stopped = [shaft for shaft in shafts if shaft[0] > 0 and below(shaft.min(), 0)]
+        if not stopped:
+            continue
+        slowest = np.asarray(np.min(stopped, axis=0))
+        if (u[int(np.argmax(below(slowest, 0))) :] <= 0).any():
+            return slowest
+    running = [shaft for shaft in shafts if shaft[0] != 0]
+    return np.asarray(np.mean(running, axis=0)) if running else None
 
 
 def _commands(columns: Mapping[str, Array], wanted: Callable[[str], bool]) -> dict[str, Array]:

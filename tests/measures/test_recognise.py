@@ -58,6 +58,26 @@ def test_a_tunnel_that_runs_during_a_stop_is_no_shaft_of_it(tunnel: float, aster
     assert kinds_of(seen)[0] == (("stop",) if astern < 0 else ())
 
 
+@pytest.mark.parametrize("later", [-3.0, 6.0])
+def test_a_stop_begins_with_the_first_of_two_shafts(later: float) -> None:
+    record = every(RECORDS["stop"](), 0.5)
+    assert record.shaft is not None
+    other = np.where(record.t >= START + later, -1.0, record.shaft[0])
+    seen = record_of(columns(record) | {"port.n": record.shaft, "starboard.n": other})
+    assert stop(seen)["execute"].value == START + min(later, 0.0)
+
+
+@pytest.mark.parametrize("name", ["starboard.n", "bow.n"])
+def test_a_shaft_astern_in_a_turn_makes_no_stop(name: str) -> None:
+    """One of two screws that helps to turn, or a tunnel thruster to the other side: the ship goes on ahead."""
+    record = every(RECORDS["turning"](), 0.5)
+    astern = np.where(record.t < START, 1.0, -1.0)
+    given = columns(record) | {"rudder.delta": record.helm, "port.n": np.full(len(record.t), 2.0), name: astern}
+    seen = record_of(given)
+    assert kinds_of(seen)[0] == ("turning",)
+    np.testing.assert_array_equal(seen.shaft, (2.0 + astern) / 2)
+
+
 @pytest.mark.parametrize("turning", [True, False])
 @pytest.mark.parametrize("takes", [0.0, 12.0])
 def test_a_controllable_pitch_stops_a_ship_whose_shaft_goes_on(turning: bool, takes: float) -> None:
