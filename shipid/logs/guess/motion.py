@@ -15,6 +15,7 @@ from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.words import fits, is_order
 from shipid.logs.mapping import UNITS, is_dated, to_si
 from shipid.logs.readers import DAY
+from shipid.physics.signals import named
 from shipid.units import GRAVITY
 
 CLEAR = 1.5  # times the unexplained share of the best, that a hypothesis with fitting names may leave
@@ -403,21 +404,25 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
     if float(np.std(change)) < np.radians(0.5):
         _rate_by_name(state)
         return
-    candidates = _rates(state, change, state.eligible("r"))
     called = state.all_called("r")
-    named = [
+    candidates = [
+        entry
+        for entry in _rates(state, change, state.eligible("r"))
+        if entry[1] in called or entry[0].left < MISLED or not fits(entry[1]).keys() & named("command").keys()
+    ]  # a large ship may turn by as many deg/min as her rudder has degrees
+    by_name = [
         entry for entry in candidates if entry[1] in called and entry[0].left < CLEAR * candidates[0][0].left + 0.1
     ]
-    if not state.numbered and (not candidates or (not named and candidates[0][0].left > most)):
+    if not state.numbered and (not candidates or (not by_name and candidates[0][0].left > most)):
         # a name that says something else misleads, if the integral of its column is the heading to within little
         others = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and not names_another(name, "r")]
         candidates = [entry for entry in _rates(state, change, others) if entry[0].left < MISLED and entry[3] < MISLED]
-    if not candidates or (not named and candidates[0][0].left > most):
+    if not candidates or (not by_name and candidates[0][0].left > most):
         if called and not state.numbered and called[0] in state.free():
             sentence = f"{called[0]!r} is named as a yaw rate, but its integral is not the heading: it is not used"
             state.find("yaw rate does not fit", (called[0],), 0.6, sentence)
         return
-    fit, name, unit, _ = named[0] if named else candidates[0]
+    fit, name, unit, _ = by_name[0] if by_name else candidates[0]
     extra: dict[str, Any] = {}
     why = f"integrated in {unit} it leaves {100 * fit.left:.2g} % of the heading's change unexplained"
     confidence = 0.99 * (1 - min(0.5, fit.left))

@@ -217,14 +217,14 @@ WIND_WORDS = {
 """Parts that say which wind a column has. `twa` does not: it is the true wind, from the bow."""
 SOURCES = frozenset(
     (
-        "act actual apparent ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga gnss "
-        "gpgga gprmc gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos "
-        "posicion posisjon position raw rel rtk sensor ship signal sim standort t the true val value vessel vtg wert "
-        "gemessen istwert rueckmeldung rechtweisend reel reelle mesure mesuree effectif retour vrai vraie medido "
-        "medida real efectivo misurato misurata effettivo reale vero vera verdadero gemeten werkelijk ware maalt "
-        "virkelig faktisk tilbakemelding sann aervaerde wahr wahrer relatif relativo relativa relativer apparente "
-        "aparente scheinbar scheinbarer schijnbare relativ de du des le la les el del della di van der den het al sul "
-        "sur"
+        "act actual answer apparent ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga "
+        "gnss gpgga gprmc gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos "
+        "posicion posisjon position raw rel response rtk sensor ship signal sim standort t the true val value vessel "
+        "vtg wert gemessen istwert rueckmeldung rechtweisend reel reelle mesure mesuree effectif retour vrai vraie "
+        "medido medida real efectivo misurato misurata effettivo reale vero vera verdadero gemeten werkelijk ware "
+        "maalt virkelig faktisk tilbakemelding sann aervaerde wahr wahrer relatif relativo relativa relativer "
+        "apparente aparente scheinbar scheinbarer schijnbare relativ de du des le la les el del della di van der den "
+        "het al sul sur"
     ).split()
 )
 """Parts that say where a value comes from, and nothing of what it is."""

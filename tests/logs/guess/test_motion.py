@@ -211,6 +211,19 @@ def test_yaw_rate(columns: dict[str, np.ndarray], expected: tuple[str, str, int]
         np.testing.assert_allclose(state.r, R, atol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["Rudder Answer", "Rudder response", "rudder xy"])
+def test_a_rudder_that_has_the_numbers_of_a_yaw_rate_is_none(name: str) -> None:
+    """A large ship turns by about as many deg/min as her rudder has degrees."""
+    rate = np.degrees(R) * 60.0
+    rudder = np.round(1.1 * np.interp(T + 5.0, T, rate))
+    state = state_with_pose({name: rudder})
+    choose_yaw_rate(state)
+    assert "r" not in described(state)
+    state = state_with_pose({name: rudder, "channel 7": rate})
+    choose_yaw_rate(state)
+    assert described(state)["r"] == ("channel 7", "deg/min", 1)
+
+
 def test_a_ship_that_hardly_turns_has_a_yaw_rate_by_its_name_alone() -> None:
     state = state_with_pose({"rot": 0.01 * np.sin(T), "other": np.cos(T)})
     state.psi = 1e-4 * np.sin(T)
