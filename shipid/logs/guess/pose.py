@@ -279,9 +279,10 @@ def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: l
         other = _best(state, [(best.north, best.east, best.on_globe, 0.3)], rivals, 150)
         close = other is not None and other.misfit < 2 * best.misfit + 0.02
         if close and other is not None and rated.get(other.heading, 1.0) < 2 * rated.get(best.heading, 1.0) + 1e-3:
+            best, course = (other, best) if other.misfit > best.misfit else (best, other)  # a ship drifts in a turn
             state.ask(
-                ("psi", "u", "v", "speed", "course"),
-                f"is {best.heading!r} the heading and {other.heading!r} the course, or the other way?",
+                ("psi", "north", "east", "u", "v", "r", "speed", "course"),
+                f"is {best.heading!r} the heading and {course.heading!r} the course, or the other way?",
             )
     return best
 

@@ -15,6 +15,7 @@ from tests.logs.simulated import si_log, state_of
 LOG = si_log()
 T, NORTH, EAST, PSI = (LOG[name].to_numpy() for name in ("t", "north", "east", "psi"))
 DEG = np.degrees(PSI) % 360.0
+COURSE = np.degrees(PSI + np.arctan2(LOG["v"], LOG["u"]).to_numpy()) % 360.0
 FILE = Path("log.csv")
 
 
@@ -188,6 +189,14 @@ def test_false_samples_across_360_are_counted_and_repaired() -> None:
     assert finding.kind == "interpolation across 360"
     assert finding.repair is not None
     assert finding.repair["kind"] == "wrap_interpolation"
+
+
+def test_of_a_heading_and_a_course_without_names_the_one_that_keeps_to_the_track_is_the_course() -> None:
+    """A ship drifts in a turn. Before, the course was the heading, and a lever arm made up for the drift."""
+    state = chosen({"2": COURSE, "3": DEG, "4": NORTH, "5": EAST})
+    assert sources(state)["psi"] == "3"
+    assert any("is '3' the heading and '2' the course, or the other way" in one.sentence for one in state.questions)
+    assert_motion(state)
 
 
 @pytest.mark.parametrize(
