@@ -892,6 +892,12 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
                 if twice is not None:
                     raise DataError(twice[1], file=file, path=f"row {twice[0] + 1}")
                 raise DataError(f"no column can be the clock: {name!r} {_fault(since)}", file=file)
+        dates = _dates(table, texts)
+        called = [name for name in called if name != dates] or called  # that repeat: the times beside them are at fault
+        for name in called if dates is not None else ():
+            if name in texts:
+                fault = _unread(table, name, times[name]) or _fault(times[name])
+                raise DataError(f"no column can be the clock: {name!r} {fault}", file=file)
     candidates = [name for name in rising if name in called] or [name for name in rising if not _counts(columns[name])]
     unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
     rounded = [name for name in called or unnamed if name in finite and name not in rising]
@@ -1132,7 +1138,7 @@ def _counts(values: Array) -> bool:
 
 
 def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
-    """Say which text in a clock is no time; empty where a cell is empty."""
+    """Say which text in a clock is no time, or that there is none; empty where all are."""
     wrong = ~np.isfinite(values)
     if not wrong.any():
         text = str(_called(table, name).iloc[0]).strip()
@@ -1144,7 +1150,7 @@ def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
     row = int(np.argmax(wrong))
     text = texts.iloc[row]
     if _NOTHING.fullmatch(text.lower()):
-        return ""
+        return f"has no value in row {row + 1}"
     begin = f"holds {text[:40]!r} in row {row + 1}"
     if re.fullmatch(r"\d{1,3}([,.' \u00a0]\d{3})+([.,]\d*)?", text):
         return f"{begin}: take the mark of thousands out of the log"

@@ -658,6 +658,14 @@ def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -
     assert words in caught.value.message
 
 
+@pytest.mark.parametrize("time", ["", "---"])
+def test_a_time_that_is_missing_beside_dates_is_named(time: str, tmp_path: Path) -> None:
+    """Not the dates, that repeat from row to row."""
+    rows = [f"2024/05/14,{time if k == 30 else f'08:00:{k:02}'},{2 * k},0.1" for k in range(60)]
+    with pytest.raises(DataError, match="'Time' has no value in row 31"):
+        sniff(log_of(tmp_path, ["Date,Time,north,heading", *rows]))
+
+
 def test_a_line_below_times_of_day_is_named(tmp_path: Path) -> None:
     """The first row has a time that can be read: it was said to have none."""
     lines = ["Time,north,heading", *(f"08:00:{k:02},{2 * k},0.1" for k in range(60)), "Average,59,0.1"]
