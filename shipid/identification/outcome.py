@@ -33,7 +33,7 @@ from shipid.identification.reach import beyond, of_log, reach_of
 from shipid.identification.settings import BLOCK, Identify, overrides, overrides_of, unknowns
 from shipid.identification.sides import by_group, uneven
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, Statistics, autocorrelation, statistics
+from shipid.identification.statistics import LinearFit, Statistics, autocorrelation, decided_alone, statistics
 from shipid.identification.unstable import grows, growth
 from shipid.interrupts import uninterrupted
 from shipid.physics.signals import is_shaft
@@ -643,6 +643,12 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
     best = judged.covariances[judged.chosen]
     if not best.trusted:
         warnings.append(f"standard errors ({best.kind}) are not to be trusted: {best.reason}")
+    if best.kind == "sandwich":
+        warnings += [
+            f"run {run} alone decides {path}: the interval takes the errors of this run to be like those of others; "
+            f"excite {path} in another run, too"
+            for path, run in decided_alone(judged.fit).items()
+        ]
     bound = [path for path, there in zip(solution.paths, solution.at_bound, strict=True) if there]
     if bound:
         warnings.append(f"at a bound, so without an interval: {listed(bound)}")

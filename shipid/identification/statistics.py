@@ -57,6 +57,7 @@ LEAST_FREEDOM = 4.0  # degrees of freedom under which t misleads (Tipton 2015)
 WHITE = 0.05  # probability under which whiteness is rejected
 LITTLE = 1.1  # integrated correlation time, in samples, that makes no difference: 5 % of a standard error
 MOST_LAGS, LEAST_ROWS = 10, 5  # lags that whiteness looks at; fewest rows of a run for that
+ALONE = 0.95  # of the variance of a factor under independent errors: one run decides it
 BLOCK = 10.0  # length of a block in integrated correlation times
 KEPT = 1e-4  # of I - H: directions that a cluster alone decides have no residual left
 
@@ -399,6 +400,19 @@ def declared_error(fit: LinearFit, path: str) -> float:
     inverse = _Basis.of(inner).inverse
     j = inner.paths.index(path)
     return float(np.sqrt(inverse[j, j]))
+
+
+def decided_alone(fit: LinearFit) -> dict[str, str]:
+    """Factors that one run of several decides alone: path -> name of the run. Others do not show their errors."""
+    inner, numbers = _free(fit, _free_places(fit)), np.unique(fit.clusters)
+    if len(numbers) < 2 or not fit.runs:
+        return {}
+    inverse = _Basis.of(inner).inverse
+    parts = np.array([((inner.jacobian[fit.clusters == number] @ inverse) ** 2).sum(axis=0) for number in numbers])
+    whole = np.where(parts.sum(axis=0) > 0, parts.sum(axis=0), np.inf)
+    most = parts.argmax(axis=0)
+    alone = parts.max(axis=0) / whole > ALONE
+    return {path: fit.runs[numbers[most[j]]] for j, path in enumerate(inner.paths) if alone[j]}
 
 
 def _freedom(total: Array, squares: Array) -> Array:

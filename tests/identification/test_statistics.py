@@ -10,7 +10,14 @@ import pytest
 from scipy import stats
 
 from shipid.errors import ShipidError
-from shipid.identification.statistics import LinearFit, autocorrelation, blocks, statistics, whiteness
+from shipid.identification.statistics import (
+    LinearFit,
+    autocorrelation,
+    blocks,
+    decided_alone,
+    statistics,
+    whiteness,
+)
 from tests.identification.linear import SIGNALS, design, fitted, labels, noise
 
 RUNS, SAMPLES, COUNT = 20, 80, 6
@@ -104,6 +111,17 @@ def test_intervals_cover_what_one_run_alone_excites(among: tuple[int, ...]) -> N
         assert estimates.chosen == "sandwich"
         covered += (estimates.low <= 1) & (estimates.high >= 1)
     assert covered.min() / 60 >= 0.9
+
+
+def test_a_run_that_alone_decides_a_factor_is_named() -> None:
+    names = tuple(f"M{number + 1:02d}" for number in range(RUNS))
+    jacobian = JACOBIAN.copy()
+    jacobian[CLUSTERS != 4, 2] *= 0.01
+    fit = fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.8), CLUSTERS, NAMES, runs=names)
+    assert decided_alone(fit) == {fit.paths[2]: "M05"}
+    assert decided_alone(one(0.8, runs=names)) == {}
+    few = labels(1, 400)
+    assert decided_alone(fitted(design(1, 400, 3), np.ones(1200), *few, runs=("M01",))) == {}
 
 
 def test_a_single_run_is_not_trusted() -> None:
