@@ -340,10 +340,14 @@ def degrees_in_text(texts: pd.Series[Any], sides: str) -> NDArray[np.float64]:
     point or more, all that are one number are degrees and minutes in one, with six or more also seconds.
     """
     upper = texts.astype(str).str.strip().str.upper()
-    both = upper.str.extract(rf"^\s*(?:{_BOTH.pattern})\s*$")
-    first, second = both[0].fillna(both[2]), both[1].fillna(both[3])
-    parts = upper.mask(first.notna(), first if sides == SIDES["latitude"] else second)
-    found = parts.str.extract(rf"^\s*(?:{_ANGLE.pattern})$").fillna("")
+    found = upper.str.extract(rf"^(?:{_ANGLE.pattern})$")
+    others = found[2].isna()
+    if others.any():
+        both = upper[others].str.extract(rf"^(?:{_BOTH.pattern})$")
+        one = (0, 2) if sides == SIDES["latitude"] else (1, 3)
+        parts = both[one[0]].fillna(both[one[1]]).str.strip()
+        found = found.mask(others, parts.str.extract(rf"^(?:{_ANGLE.pattern})$"))
+    found = found.fillna("")
     before, sign, *numbers, behind = (found[place] for place in range(6))
     letter = before + behind
     values = [pd.to_numeric(one, errors="coerce").to_numpy(dtype=np.float64) for one in numbers]
