@@ -767,14 +767,15 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
 def _stands_out(values: Array, value: float) -> bool:
     """Whether a column (N,) takes a value again and again that is far beyond all others.
 
-    The others are not mostly near 0: a thruster that is switched on has no value but 0 else.
+    A few others are not mostly near 0: a thruster that is switched on has no value but 0 else.
     """
     hit, others = values == value, values[(values != value) & np.isfinite(values)]
     visits = int(np.sum(hit[1:] & ~hit[:-1]))
     if visits < VISITS or hit.mean() > SELDOM:
         return False
-    usual, beyond = np.abs(others), BEYOND if len(np.unique(others)) > LEVELS else BEYOND_LEVELS
-    return bool(abs(value) > beyond * usual.max() and np.median(usual) > usual.max() / BEYOND)
+    usual, many = np.abs(others), len(np.unique(others)) > LEVELS
+    on_and_off = not many and np.median(usual) <= usual.max() / BEYOND
+    return bool(abs(value) > (BEYOND if many else BEYOND_LEVELS) * usual.max() and not on_and_off)
 
 
 def _is_elsewhere(table: pd.DataFrame, name: str, hit: Rows) -> bool:

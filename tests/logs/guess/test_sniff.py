@@ -498,6 +498,7 @@ def test_what_ais_writes_for_nothing_is_a_missing_value(tmp_path: Path, name: st
         ("4095", [7.201, 6.12], 3, True),  # a counter of 12 bits at its end
         ("409.5", [*np.round(np.linspace(8.0, 12.0, 41), 1)], 3, True),
         ("409.5", [*np.round(np.linspace(108.0, 312.0, 41), 1)], 3, False),
+        ("1023", [*np.round(np.linspace(0.0, 0.5, 41) ** 4, 4)], 3, True),  # a helm in rad, mostly amidships
         ("80", [0.0], 3, False),  # a thruster that is switched on
         ("80", [5.0], 3, False),
         ("80", [*np.round(np.linspace(0.0, 5.0, 41), 1)], 79, False),  # once
