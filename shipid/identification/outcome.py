@@ -290,8 +290,7 @@ def run_identification(
             *filter(None, (late_fit(solution, dataset, judged),)),
             *unmeasured(vessel, dataset, fitted, settings),
             *unrecorded(dataset, fitted, settings),
-            *_warnings(solution, judged, pairs),
-            *filter(None, (_unstable(pair[AFTER], dataset, solution, judged),)),
+            *_warnings(solution, judged, pairs, growth(pair[AFTER], dataset, fitted)),
             *_left(solution, curves),
             *(
                 f"no profile of {path}: it is at a bound, fixed or dropped"
@@ -623,9 +622,14 @@ def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:
     return warnings
 
 
-def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns]) -> list[str]:
-    """Warnings about the fit: coloured residuals, short horizon, untrusted errors, bounds, no test, worse free runs."""
-    warnings, coloured, horizon = [], _coloured(solution, judged), solution.settings.horizon
+def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns], rate: float) -> list[str]:
+    """Warnings about the fit: coloured residuals, horizon, untrusted errors, bounds, no test, worse free runs.
+
+    rate : at which a small yaw of the identified ship grows [1/s].
+    """
+    warnings, between = [], residual_spacing(solution)
+    coloured = {name: colour.memory * between for name, colour in judged.whiteness.items() if not colour.white}
+    horizon = solution.settings.horizon
     if coloured:
         longest = max(coloured.values())
         begun = "initial_state" in solution.settings.widths
@@ -634,12 +638,16 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
             f"residuals of {listed(list(coloured))} are correlated over {digits(longest)} s: the model, or "
             f"the wind and current data, are incomplete{starts}"
         )
+        grown = grows(rate, _longest(solution), longest)
         if 0 < horizon < LONG * longest:
-            longer = f"{digits(LONG * longest)} s, or " if LONG * longest < _longest(solution) else ""
+            longer = [f"{digits(LONG * longest)} s"] if LONG * longest < _longest(solution) else []
+            longer += [] if grown else ["whole runs (horizon 0)"]
             warnings.append(
-                f"the horizon of {horizon:g} s is short in comparison: estimates may be biased beyond their intervals; "
-                f"compare with {longer}whole runs (horizon 0)"
+                f"the horizon of {horizon:g} s is short in comparison: estimates may be biased beyond their intervals"
+                + (f"; compare with {', or '.join(longer)}" if longer else "")
             )
+        if grown and not horizon:
+            warnings.append(grown)
     best = judged.covariances[judged.chosen]
     if not best.trusted:
         warnings.append(f"standard errors ({best.kind}) are not to be trusted: {best.reason}")
@@ -663,20 +671,6 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
         if worse and not diverged:
             warnings.append(f"free runs of the {name} runs are worse than before in {listed(worse)}")
     return warnings
-
-
-def _coloured(solution: Solution, judged: Statistics) -> dict[str, float]:
-    """Signals whose residuals are correlated, and over what time [s]."""
-    between = residual_spacing(solution)
-    return {name: colour.memory * between for name, colour in judged.whiteness.items() if not colour.white}
-
-
-def _unstable(identified: Vessel, dataset: Dataset, solution: Solution, judged: Statistics) -> str:
-    """A warning if whole runs were predicted of a ship that does not keep her course, with random forces; else none."""
-    coloured = _coloured(solution, judged)
-    if solution.settings.horizon or not coloured:
-        return ""
-    return grows(growth(identified, dataset, solution.runs), _longest(solution), max(coloured.values()))
 
 
 def _rounded(value: float) -> float:

@@ -19,7 +19,7 @@ from shipid.vessel.load import Vessel
 GROWN = 3.0  # times e-fold within a prediction: from there on random forces count
 SHORTER = 3.0  # correlation times of the residuals of whole runs, that a prediction should last instead
 PLACES = ("north", "east", "psi")  # states that no force depends on in calm water
-STEP = 1e-4  # of the speed, for differences
+STEP, SLOWEST = 1e-4, 0.01  # of the speed, for differences; m/s
 
 
 def growth(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> float:
@@ -28,7 +28,7 @@ def growth(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> float:
     Rudders and azimuths are amidships. It is negative where the ship is course-stable.
     """
     model, rows = dynamics(vessel), dataset.frame[dataset.frame["run"].isin(runs)]
-    speed = float(np.median(np.hypot(rows["u"], rows["v"])))
+    speed = max(float(np.median(np.hypot(rows["u"], rows["v"]))), SLOWEST)
     orders = {name: neutral(name) if steers(name) else float(rows[name].median()) for name in model.commands}
     names = (*model.state, *model.hidden)
     moving = [place for place, name in enumerate(names) if name not in PLACES]

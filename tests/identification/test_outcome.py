@@ -424,3 +424,26 @@ def test_a_profile_of_a_factor_that_ends_at_a_bound_is_left_out_and_the_fit_stay
     result = run_identification(off(), trials(SHIP, runs=2), settings(bounds=bounds), profiles=FEW[:2])
     assert [curve.path for curve in result.profiles] == FEW[1:2]
     assert f"no profile of {FEW[0]}: it is at a bound, fixed or dropped" in result.warnings
+
+
+@pytest.mark.usefixtures("one_manoeuvre")
+@pytest.mark.parametrize(
+    ("horizon", "rate", "there", "absent"),
+    [
+        (0, 1.0, "is course-unstable", "is short in comparison"),
+        (0, -1.0, "are correlated over", "is course-unstable"),
+        (5.0, 1.0, "is short in comparison", "whole runs"),
+        (5.0, -1.0, "whole runs (horizon 0)", "is course-unstable"),
+    ],
+)
+def test_whole_runs_are_advised_to_stable_ships_alone(
+    horizon: float, rate: float, there: str, absent: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The residuals are correlated: the log has an error that comes and goes."""
+    monkeypatch.setattr(outcome, "growth", lambda *_: rate)
+    log = trials(SHIP, 3, 100)
+    drift = np.sin(log.frame["t"].to_numpy() / 3)
+    shaken = changed(log, **{name: log.frame[name] + size * drift for name, size in NOISE.items()})
+    warnings = "; ".join(run_identification(off(), shaken, settings(horizon=horizon)).warnings)
+    assert there in warnings
+    assert absent not in warnings

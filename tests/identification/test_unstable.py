@@ -51,6 +51,7 @@ def test_every_bundled_ship_has_one(name: str) -> None:
     vessel = load_vessel(name)
     speed = 0.2 * np.sqrt(9.81 * (vessel.length or 30.0))
     assert np.isfinite(growth(vessel, straight(vessel, speed), ["A"]))
+    assert np.isfinite(growth(vessel, straight(vessel, 0.0), ["A"]))
 
 
 def test_only_what_grows_within_the_runs_is_told() -> None:
