@@ -10,7 +10,16 @@ import numpy as np
 import pandas as pd
 
 from shipid.arguments import of_class
-from shipid.data.dataset import Array, Dataset, cumulative_integral, pieces, pieces_by_run, shares_clock, unit_of
+from shipid.data.dataset import (
+    Array,
+    Dataset,
+    clock_slack,
+    cumulative_integral,
+    pieces,
+    pieces_by_run,
+    shares_clock,
+    unit_of,
+)
 from shipid.errors import DataError
 from shipid.physics.signals import row_of
 
@@ -57,7 +66,10 @@ def _clock(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
         yield _row("gap", 0.0, "s", 0.0, "a single row", ok=False)
         return
     usual, longest = float(np.median(steps)), float(steps.max())
-    yield _row("gap", longest, "s", GAP * usual, f"the longest step is {longest:.3g} s, the usual one {usual:.3g} s")
+    slack = max(clock_slack(rows["t"].to_numpy()) for rows in stretches)
+    yield _row(
+        "gap", longest, "s", GAP * usual + slack, f"the longest step is {longest:.3g} s, the usual one {usual:.3g} s"
+    )
     jitter = float(np.sqrt(np.mean((steps - usual) ** 2))) / usual
     yield _row("jitter", jitter, "1", JITTER, f"steps differ from {usual:.3g} s by {100 * jitter:.2g} % (RMS)")
 

@@ -94,6 +94,8 @@ def _too_short(predictor: Predictor) -> str:
 
 def _known_cell(folder: Path, cell: str) -> Path:
     available = {file.stem for file in (folder / "cells").glob("*.npz")}
+    if not folder.is_dir():
+        raise ResultError("no such folder: give that of a run", file=folder)
     if not available:
         raise ResultError("holds no finished cells: is it the folder of a run?", file=folder)
     if cell not in available:
