@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from shipid.errors import ResultError
 from shipid.files import read_json
 from shipid.report import errors_over
 from shipid.study import contents, seals
@@ -53,6 +54,14 @@ def test_pages_are_written_anew_from_the_folder(tiny_run: Path, tmp_path: Path) 
     assert all(line in (folder / "summary.md").read_text() for line in answer)
     first = report.read_bytes()
     assert write_pages(folder).read_bytes() == first, "the same folder gives the same page"
+
+
+def test_a_folder_of_another_user_is_named_before_anything_is_read(
+    tiny_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with pytest.raises(ResultError, match="is a folder that this user may not write into: copy it, and name the copy"):
+        write_pages(tiny_run)
 
 
 @pytest.mark.parametrize("at", ["read_results", "report_content"])
