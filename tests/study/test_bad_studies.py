@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -136,21 +135,6 @@ def test_broken(name: str) -> None:
     assert remedy in line
 
 
-@pytest.mark.parametrize(
-    ("changes", "path", "names"),
-    [
-        ({"family.right.name": "WRONG-2"}, "family", "'WRONG-2' and 'wrong-2'"),
-        ({"method": [{"name": name, "kind": "alone"} for name in ("a", "b", "A")]}, "method.A.name", "'a' and 'A'"),
-        ({"condition": [{"name": "Held"}, {"name": "held"}]}, "condition.held.name", "'Held' and 'held'"),
-    ],
-)
-def test_names_that_differ_in_capitals_alone_are_one_file(changes: dict[str, Any], path: str, names: str) -> None:
-    """Where a file system does not tell them apart, the cells of one would be those of the other."""
-    with pytest.raises(DocumentError, match=f"called {names}, which are one file on many systems") as caught:
-        read_plan(FOLDER / "plain.toml", changes)
-    assert caught.value.path == path
-
-
 def test_of_two_manoeuvres_none_can_test() -> None:
     with pytest.raises(DocumentError, match="2: a study needs 3 or more: 1 to test, 2 to train and validate") as caught:
         read_plan(FOLDER / "plain.toml", {"truth.manoeuvres": 2, "split.test": 1, "grid.N_D": [1]})
@@ -161,37 +145,6 @@ def test_of_two_manoeuvres_none_can_test() -> None:
 def test_no_such_study(name: str) -> None:
     with pytest.raises(DocumentError, match=r"no such file|did you mean 'quick'\?"):
         read_plan(name)
-
-
-def test_a_document_of_version_0_1_is_answered_as_a_whole(tmp_path: Path) -> None:
-    """Every old key in one message, a line each with its file and path, and what to write instead."""
-    text = (FOLDER / "recipe-of-old.toml").read_text()
-    text = text.replace("[[truth.manoeuvre]]\n", "").replace("ahead = 5.0", 'horizon = 10\nstep = 0.5\nmethod = "rk4"')
-    text += '\n[family.identify]\nparameters = ["hull.derivatives.N_ur"]\n'
-    file = tmp_path / "old.toml"
-    file.write_text(text)
-    with pytest.raises(DocumentError) as caught:
-        read_plan(file)
-    lines = str(caught.value).split("\n")
-    assert [line.removeprefix(f"{file}: ").partition(": ")[0] for line in lines] == [
-        "recipe",
-        "prediction.horizon",
-        "prediction.method",
-        "truth",
-        "family.wrong.identify",
-    ]
-    assert all(line.startswith(f"{file}: ") for line in lines)
-    assert "write ahead = 5, in seconds" in lines[1]
-    for key in ("n_rpm = [50.0, 200.0]", "alpha_deg = [-50.0, 50.0]", "start_speed = [1.0, 3.0]"):
-        assert key in lines[3]
-
-
-def test_the_remedy_for_a_recipe_works(tmp_path: Path) -> None:
-    """What the message of an old recipe says, done: the document is one of today."""
-    text = (FOLDER / "recipe-of-old.toml").read_text()
-    file = tmp_path / "mended.toml"
-    file.write_text(text.replace('[recipe]\nkind = "fast"', '[[method]]\nname = "path-drawn"\nkind = "path-drawn"'))
-    assert read_plan(file).methods[0].kind == "path-drawn"
 
 
 @pytest.mark.parametrize(

@@ -168,34 +168,6 @@ def test_another_source_is_another_study(tmp_path: Path) -> None:
     assert logs[0].folder != logs[1].folder
 
 
-@pytest.mark.parametrize("integrator", ["euler", "rk4"])
-def test_what_is_identified_is_integrated_as_it_predicts(tmp_path: Path, integrator: str) -> None:
-    document = tiny_plan(tmp_path).document
-    document["prediction"] |= {"integrator": integrator, "step": 0.5}
-    document["family"].append({"name": "fit", "extends": "right", "identify": {"parameters": ["inertia.m"]}})
-    plan = build_plan(document, tmp_path / "tiny.toml")
-    settings = next(one.identify for one in plan.foundations if one.name == "fit")
-    assert settings is not None
-    assert (settings.method, settings.step, settings.horizon) == (integrator, 0.5, plan.study.prediction.ahead)
-
-
-def test_an_observer_measures_no_position_where_velocities_make_the_path(tmp_path: Path) -> None:
-    document = tiny_plan(tmp_path).document
-    document["family"].append({"name": "seen", "extends": "right", "observer": {}})
-    document["method"] = [{"name": "alone", "kind": "alone"}]
-    simulated = build_plan(document, tmp_path / "tiny.toml")
-    del document["truth"]
-    document |= {"data": {"dataset": "log.parquet", "path": "velocity"}, "split": {"test": ["f"]}}
-    recorded = build_plan(document, tmp_path / "tiny.toml")
-    here, there = (next(one.observer for one in plan.foundations if one.observer) for plan in (simulated, recorded))
-    assert here is not None
-    assert there is not None
-    assert {"north", "east"} <= set(here.measured)
-    assert set(there.measured) == {"psi", "u", "v", "r"}
-    assert here.current != 0.0
-    assert there.current == 0.0  # without a position nobody sees one
-
-
 def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
     """The architecture document pins it: higher-order damping removed, N_ur, Y_ur, N_uv times 0.6, nothing else."""
     models = {model.name: model for model in read_plan("full-scale").foundations}
@@ -385,23 +357,6 @@ def test_families_of_the_quick_study_share_damping_factors_by_rule() -> None:
     assert high["thruster.port.D_p"] == high["thruster.starboard.D_p"]
     assert 0.6 <= high["inertia.m"] <= 1.4
     assert models["moderate-1"].factors != models["moderate-2"].factors
-
-
-def test_an_identified_family_on_an_identified_one_has_the_members_of_the_first(tmp_path: Path) -> None:
-    block = {"parameters": ["hull.derivatives.N_ur"]}
-    families = [
-        {"name": "right", "base": "gunnerus-28.9"},
-        {"name": "fitted", "extends": "right", "identify": block},
-        {"name": "again", "extends": "fitted", "identify": {**block, "horizon": 9.0}},
-    ]
-    plan = tiny_plan(tmp_path, {"family": families})
-    assert [one.name for one in plan.foundations] == ["right", "fitted", "again", NO_MODEL]
-    right, fitted, again, _ = plan.foundations
-    assert right.variant == fitted.variant == again.variant
-    assert plan.fitted == {"fitted", "again"}
-    assert fitted.identify is not None
-    assert again.identify is not None
-    assert (fitted.identify.horizon, again.identify.horizon) == (5.0, 9.0)
 
 
 def test_work_is_cut_where_cells_share_hardly_anything(tmp_path: Path) -> None:

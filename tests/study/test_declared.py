@@ -1,0 +1,75 @@
+"""What a study declares: names that are one file, members of identified families, observers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shipid.errors import DocumentError
+from shipid.study.declared import NO_MODEL
+from shipid.study.plan import build_plan, read_plan
+from tests.study.tiny import tiny_plan
+
+FOLDER = Path(__file__).parents[1] / "bad" / "studies"
+
+
+@pytest.mark.parametrize(
+    ("changes", "path", "names"),
+    [
+        ({"family.right.name": "WRONG-2"}, "family", "'WRONG-2' and 'wrong-2'"),
+        ({"method": [{"name": name, "kind": "alone"} for name in ("a", "b", "A")]}, "method.A.name", "'a' and 'A'"),
+        ({"condition": [{"name": "Held"}, {"name": "held"}]}, "condition.held.name", "'Held' and 'held'"),
+    ],
+)
+def test_names_that_differ_in_capitals_alone_are_one_file(changes: dict[str, Any], path: str, names: str) -> None:
+    """Where a file system does not tell them apart, the cells of one would be those of the other."""
+    with pytest.raises(DocumentError, match=f"called {names}, which are one file on many systems") as caught:
+        read_plan(FOLDER / "plain.toml", changes)
+    assert caught.value.path == path
+
+
+@pytest.mark.parametrize("integrator", ["euler", "rk4"])
+def test_what_is_identified_is_integrated_as_it_predicts(tmp_path: Path, integrator: str) -> None:
+    document = tiny_plan(tmp_path).document
+    document["prediction"] |= {"integrator": integrator, "step": 0.5}
+    document["family"].append({"name": "fit", "extends": "right", "identify": {"parameters": ["inertia.m"]}})
+    plan = build_plan(document, tmp_path / "tiny.toml")
+    settings = next(one.identify for one in plan.foundations if one.name == "fit")
+    assert settings is not None
+    assert (settings.method, settings.step, settings.horizon) == (integrator, 0.5, plan.study.prediction.ahead)
+
+
+def test_an_observer_measures_no_position_where_velocities_make_the_path(tmp_path: Path) -> None:
+    document = tiny_plan(tmp_path).document
+    document["family"].append({"name": "seen", "extends": "right", "observer": {}})
+    document["method"] = [{"name": "alone", "kind": "alone"}]
+    simulated = build_plan(document, tmp_path / "tiny.toml")
+    del document["truth"]
+    document |= {"data": {"dataset": "log.parquet", "path": "velocity"}, "split": {"test": ["f"]}}
+    recorded = build_plan(document, tmp_path / "tiny.toml")
+    here, there = (next(one.observer for one in plan.foundations if one.observer) for plan in (simulated, recorded))
+    assert here is not None
+    assert there is not None
+    assert {"north", "east"} <= set(here.measured)
+    assert set(there.measured) == {"psi", "u", "v", "r"}
+    assert here.current != 0.0
+    assert there.current == 0.0  # without a position nobody sees one
+
+
+def test_an_identified_family_on_an_identified_one_has_the_members_of_the_first(tmp_path: Path) -> None:
+    block = {"parameters": ["hull.derivatives.N_ur"]}
+    families = [
+        {"name": "right", "base": "gunnerus-28.9"},
+        {"name": "fitted", "extends": "right", "identify": block},
+        {"name": "again", "extends": "fitted", "identify": {**block, "horizon": 9.0}},
+    ]
+    plan = tiny_plan(tmp_path, {"family": families})
+    assert [one.name for one in plan.foundations] == ["right", "fitted", "again", NO_MODEL]
+    right, fitted, again, _ = plan.foundations
+    assert right.variant == fitted.variant == again.variant
+    assert plan.fitted == {"fitted", "again"}
+    assert fitted.identify is not None
+    assert again.identify is not None
+    assert (fitted.identify.horizon, again.identify.horizon) == (5.0, 9.0)
