@@ -445,7 +445,7 @@ def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
     if len(ships) > 1:
         first = ", ".join(ships[:3])
         message = f"holds {len(ships)} ships ({name!r} is {first}{', ...' if len(ships) > 3 else ''})"
-        raise DataError(f"{message}: write the rows of each to a log of its own", file=file)
+        raise DataError(f"{message}: write the rows of each ship to a separate log", file=file)
 
 
 def _called_in(heads: list[list[str]]) -> list[str]:

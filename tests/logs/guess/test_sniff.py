@@ -532,7 +532,7 @@ def test_a_log_of_several_ships_is_refused(name: str, values: tuple[str, str], w
     if not words:
         assert "lat" in sniff(log).columns
         return
-    with pytest.raises(DataError, match=f"{re.escape(words)}.*: write the rows of each to a log of its own"):
+    with pytest.raises(DataError, match=f"{re.escape(words)}.*: write the rows of each ship to a separate log"):
         sniff(log)
 
 
