@@ -38,6 +38,7 @@ from shipid.vessel.regressions import (
 RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
 BEAMY = 0.5  # of the charts' yaw inertia: where Clarke's formula, which falls with the beam, gives less, charts do
+MOST_N_RR = -0.003  # of full and beamy ships, to which the formula gives 0 and more: yaw is damped, and can be fitted
 ROUNDING = 1e-9  # of the quotient of two numbers as people write them, such as 5.4 / 3
 SHORTEST = 3.0  # length / beam of the ships behind most formulae
 PROPULSORS = ("propeller-rudder", "azimuth", "differential")
@@ -323,7 +324,9 @@ def hull(given: Particulars) -> Values:
         "N_v": Value(s * (0.5 + 2.4 * T / L), "prime", clarke),
         "N_r": Value(s * (0.25 + 0.039 * B / T - 0.56 * B / L), "prime", clarke),
         "N_|v|v": Value(0.96 * slender - 0.066, "prime", f"0.96 (1 - C_b) T / B - 0.066, {kijima}"),
-        "N_|r|r": Value(min(0.5 * full - 0.09, 0.0), "prime", f"0.5 C_b B / L - 0.09, at most 0, {kijima}"),
+        "N_|r|r": Value(
+            min(0.5 * full - 0.09, MOST_N_RR), "prime", f"0.5 C_b B / L - 0.09, at most {MOST_N_RR:g}, {kijima}"
+        ),
         "N_vrr": Value(0.5 * C_b * T / B - 0.05, "prime", f"0.5 C_b T / B - 0.05, {kijima}"),
         "N_vvr": Value(
             -(57.5 * full**2 - 18.4 * full + 1.6), "prime", f"-(57.5 (C_b B / L)^2 - 18.4 C_b B / L + 1.6), {kijima}"
