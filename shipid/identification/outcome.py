@@ -34,7 +34,7 @@ from shipid.identification.settings import BLOCK, Identify, overrides, overrides
 from shipid.identification.sides import by_group, uneven
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, Statistics, autocorrelation, decided_alone, statistics
-from shipid.identification.unstable import grows, growth
+from shipid.identification.unstable import grows, growth_in
 from shipid.interrupts import uninterrupted
 from shipid.physics.signals import is_shaft
 from shipid.simulation.measured import measure_standard
@@ -290,7 +290,7 @@ def run_identification(
             *filter(None, (late_fit(solution, dataset, judged),)),
             *unmeasured(vessel, dataset, fitted, settings),
             *unrecorded(dataset, fitted, settings),
-            *_warnings(solution, judged, pairs, growth(pair[AFTER], dataset, fitted)),
+            *_warnings(solution, judged, pairs, growth_in(dataset, fitted, pair[AFTER])),
             *_left(solution, curves),
             *(
                 f"no profile of {path}: it is at a bound, fixed or dropped"

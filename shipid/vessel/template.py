@@ -34,6 +34,7 @@ from shipid.vessel.regressions import (
     wave_resistance,
     wetted_surface,
 )
+from shipid.vessel.stability import growth
 
 RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
@@ -174,16 +175,16 @@ def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
     body = "\n".join(_blocks(given, name))
     vessel = check_vessel(tomllib.loads(body), file)
     n = _shaft(vessel, given.service)
-    growth = _growth(vessel, given.service, n)
+    rate = growth(vessel, given.service, _orders(vessel, n))
     verdict = (
-        f"course-{'stable' if growth < 0 else 'UNSTABLE'} by these formulae (a small yaw goes as exp({growth:+.4f} t))"
+        f"course-{'stable' if rate < 0 else 'UNSTABLE'} by these formulae (a small yaw goes as exp({rate:+.4f} t))"
     )
     head = [
         "# A FIRST GUESS from main particulars by regression formulae: nothing is measured. Replace what you know.",
         f"# At {given.service:.3g} m/s the ship needs {60 * n:.4g} rpm and is {verdict}.",
         "# SI units; x forward, y starboard, z down, from amidships, where the centre of gravity is assumed to be.",
     ]
-    return FirstGuess("\n".join([*head, body]), vessel, n, growth, tuple(_remarks(given)))
+    return FirstGuess("\n".join([*head, body]), vessel, n, rate, tuple(_remarks(given)))
 
 
 def _remarks(given: Particulars) -> Iterator[str]:
@@ -658,37 +659,25 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _accelerations(vessel: Vessel) -> Callable[[tuple[float, float, float], float], np.ndarray]:
-    """(u, v, r), shaft speed -> accelerations (3,) in calm water, helm amidships."""
-    model = dynamics(vessel)
-    calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
-
-    def accelerations(nu: tuple[float, float, float], n: float) -> np.ndarray:
-        commands = [n if is_shaft(name) else neutral(name) for name in model.commands]
-        memory = [n if is_shaft(name) else neutral(name) for name in model.memory]
-        rates: Any = model.rates([0.0, 0.0, 0.0, *nu], memory, commands, calm, values, np.zeros(3))
-        return np.array(rates).ravel()[3:]
-
-    return accelerations
+def _orders(vessel: Vessel, n: float) -> dict[str, float]:
+    """Commands [SI] with all shafts at n [rev/s] and the helm amidships."""
+    return {name: n if is_shaft(name) else neutral(name) for name in dynamics(vessel).commands}
 
 
 def _shaft(vessel: Vessel, speed: float) -> float:
     """Shaft speed [rev/s] at which thrust equals resistance, by bisection."""
-    acceleration = _accelerations(vessel)
+    model = dynamics(vessel)
+    calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
+
+    def surge(n: float) -> float:
+        orders = _orders(vessel, n)
+        memory, state = [orders[name] for name in model.memory], [0.0, 0.0, 0.0, speed, 0.0, 0.0]
+        rates: Any = model.rates(state, memory, list(orders.values()), calm, values, np.zeros(3))
+        return float(rates[3])
+
     low, high = 0.0, 1.0
-    while acceleration((speed, 0.0, 0.0), high)[0] < 0 and high < 1e3:
+    while surge(high) < 0 and high < 1e3:
         low, high = high, 2 * high
     if high >= 1e3:
         raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: give a lower speed")
-    return _bisect(lambda n: float(acceleration((speed, 0.0, 0.0), n)[0]), low, high)
-
-
-def _growth(vessel: Vessel, speed: float, n: float) -> float:
-    """Largest real part [1/s] of the eigenvalues of sway and yaw about straight running."""
-    acceleration = _accelerations(vessel)
-    h = 1e-4 * speed
-    steps = ((h, 0.0), (0.0, h / vessel.document["particulars"]["L_pp"]))
-    columns = [
-        (acceleration((speed, v, r), n) - acceleration((speed, -v, -r), n))[1:] / (2 * (v + r)) for v, r in steps
-    ]
-    return float(np.linalg.eigvals(np.column_stack(columns)).real.max())
+    return _bisect(surge, low, high)

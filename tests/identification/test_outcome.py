@@ -440,7 +440,7 @@ def test_whole_runs_are_advised_to_stable_ships_alone(
     horizon: float, rate: float, there: str, absent: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The residuals are correlated: the log has an error that comes and goes."""
-    monkeypatch.setattr(outcome, "growth", lambda *_: rate)
+    monkeypatch.setattr(outcome, "growth_in", lambda *_: rate)
     log = trials(SHIP, 3, 100)
     drift = np.sin(log.frame["t"].to_numpy() / 3)
     shaken = changed(log, **{name: log.frame[name] + size * drift for name, size in NOISE.items()})
