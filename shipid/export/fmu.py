@@ -37,9 +37,7 @@ _BAND = {
     "ahead_x": ("-", "unit vector of the track, ahead"),
     "ahead_y": ("-", "unit vector of the track, to starboard"),
 }
-LARGEST_STEP = (
-    0.1  # s: of a ship of 30 m or more inside a communication step; of a shorter one by the root of the length
-)
+LARGEST_STEP = 0.1  # s: inside a communication step, of a ship of 30 m and more; times the root of the length below
 
 
 @dataclass(frozen=True)

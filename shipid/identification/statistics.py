@@ -425,9 +425,8 @@ def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: s
     root, parts, scores = _root(basis.inverse), [], []
     for number in np.unique(clusters):
         rows = clusters == number
-        left, values, axes = np.linalg.svd(
-            fit.jacobian[rows] @ root, full_matrices=False
-        )  # H_gg = left values^2 left^T
+        # H_gg = left values^2 left^T
+        left, values, axes = np.linalg.svd(fit.jacobian[rows] @ root, full_matrices=False)
         rest = 1 - values**2
         grown = np.where(rest > KEPT, values / np.maximum(rest, KEPT), 0.0)
         parts.append((values, grown, axes))

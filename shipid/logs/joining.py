@@ -103,9 +103,8 @@ def _names(datasets: Mapping[Path, Dataset], notes: list[str]) -> dict[Path, dic
     stems = [file.stem for file in datasets]
     if len(set(stems)) < len(stems):
         stems = [f"{stem} {number}" for number, stem in enumerate(stems, 1)]
-    if len({f"{stem} {run}" for stem, one in zip(stems, datasets.values(), strict=True) for run in one.runs}) < len(
-        runs
-    ):
+    names = {f"{stem} {run}" for stem, one in zip(stems, datasets.values(), strict=True) for run in one.runs}
+    if len(names) < len(runs):
         stems = [f"{number} {stem}" for number, stem in enumerate(stems, 1)]  # "day" with "1 a", and "day 1" with "a"
     notes.append(f"runs of one name in several files: names begin with {', '.join(stems)}")
     named = zip(stems, datasets.items(), strict=True)

@@ -27,10 +27,10 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     The helm is the mean of the angle commands that move, by a quarter of the one that moves most or more: a bow unit
     parked across, or the offset of a rudder at rest, is no helm. Each has the sign that turns the ship to starboard:
     that in `helm`, angle command -> +1 or -1, where the vessel is known; else the sign of the sum of angle times change
-    of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start. Where the ship goes
-    ahead no longer after some of those ahead are reversed, else stopped, it is the slowest of these: a stop begins with
-    the first order, and a tunnel thruster that runs all the time is no shaft of it. A shaft with a controllable pitch
-    counts as its speed times the pitch over the greatest pitch.
+    of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start. In a stop it is the slowest of
+    those that are reversed, or stopped where none is reversed: the ship loses her way ahead after it. So a stop begins
+    with the first order, and a tunnel thruster that runs all the time has no part in it. A shaft with a controllable
+    pitch counts as its speed times the pitch over the greatest pitch.
 
     Raises
     ------

@@ -292,9 +292,9 @@ class HelmOver:
 def helm_over(record: Record) -> HelmOver:
     """The first execute of a record.
 
-    A helm that is over in the first row counts as executed there if the ship does not turn yet, unless she still does
-    not turn where it is first put all the way over: until then it held her course, as against wind. If she turns, it
-    belongs to an earlier manoeuvre, and the next execute counts.
+    A helm may be over in the first row already. If the ship turns there, it belongs to an earlier manoeuvre, and the
+    next execute counts. If she does not turn, this is the execute. There is one exception: she does not turn until the
+    helm is all the way over. Then it held her course until there, as against wind, and the full helm is the execute.
     """
     size, rate = np.abs(record.helm), np.abs(record.r)
     if not size.max() > 0:

@@ -90,7 +90,7 @@ def error_map(content: ReportContent) -> Figure | None:
         title="Physics and data: the map",
         takeaway=_takeaway(rows, spots),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
-        + (f" Hatched: H is not below that of {_rival(rows)} at the same N_D." if _pure(rows) else "")
+        + (f" Hatched: H is not below that of {_rival(rows)} at the same N_D." if any(s.worse for s in spots) else "")
         + (lined if pieces else "")
         + " The bars show the same cells, models in the order of A; the front row is the largest N_D."
         + left_out(content)

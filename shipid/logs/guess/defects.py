@@ -138,10 +138,8 @@ def _ask_for_set_clock(state: State) -> None:
     if state.joined or state.velocity is None or state.position is None:
         return
     steps, way = np.diff(state.t), np.abs(np.diff(state.position))
-    usual, speed = (
-        float(np.median(steps)),
-        np.minimum(*(np.abs(part) for part in (state.velocity[:-1], state.velocity[1:]))),
-    )
+    usual, fast = float(np.median(steps)), np.abs(state.velocity)
+    speed = np.minimum(fast[:-1], fast[1:])
     near = float(np.percentile(way[steps < evidence.GAP * usual], 99))
     for row in np.flatnonzero((steps > evidence.GAP * usual) & (way <= near) & (speed * steps > FARTHER * near))[:1]:
         times = " comes ".join(when(state, float(state.t[row + one])) for one in (0, 1))

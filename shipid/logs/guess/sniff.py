@@ -634,9 +634,8 @@ def _in_text(
         meant = [one for one in SIDES if fits(name).get(one, 0.0) > 0.5]
         read = {one: degrees_in_text(texts, SIDES[one]) for one in meant or SIDES}
         known = {one: values for one, values in read.items() if np.mean(np.isfinite(values)) > 0.5}
-        lettered = meant or bool(
-            np.nanmax(np.abs(read["latitude"] - read["longitude"]), initial=0.0)
-        )  # a time of day may be both
+        # a time of day may be both: then they are equal
+        lettered = meant or np.nanmax(np.abs(read["latitude"] - read["longitude"]), initial=0.0) > 0
         if len(known) != len(read) or not lettered:
             continue
         found |= {name if meant else f"{name} {one}": (name, values) for one, values in known.items()}
