@@ -13,7 +13,8 @@ from shipid.cli.terminal import show
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-    from rich.table import Table
+
+    from shipid.cli.terminal import Table
 
 Json = Annotated[bool, typer.Option("--json", help="print one JSON object instead of tables; all else goes to stderr")]
 

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +16,6 @@ from shipid.errors import visible
 from shipid.units import length_text
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from shipid.study.progress import Watch
     from shipid.study.run import Event
 
@@ -26,30 +25,63 @@ HANDLER = "command line"
 """Name of the handler that writes log messages to standard error."""
 
 
-def table(columns: list[str], rows: Iterable[Iterable[str]] | Iterator[Any]) -> Table:
-    """Make a table of text: the headings of its columns, and rows of values."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
+@dataclass(frozen=True)
+class Table:
+    """A table of text: the headings of its columns, and rows with one cell for each."""
 
-    result = Table(box=box.SIMPLE_HEAD)
-    for column in columns:
-        # As text: rich would take [m] for markup. Folded: in a narrow terminal it would cut 5.067 to "5.…".
-        result.add_column(Text(visible(column)), overflow="fold")
-    for row in rows:
-        result.add_row(*(Text(visible(str(cell))) for cell in row))
-    return result
+    columns: list[str]
+    rows: list[list[str]]
+
+
+def table(columns: list[str], rows: Iterable[Iterable[Any]]) -> Table:
+    """Make a table of the headings of its columns and rows of values."""
+    return Table([visible(column) for column in columns], [[visible(str(cell)) for cell in row] for row in rows])
 
 
 def show(table: Table) -> None:
-    """Print a table: as wide as the terminal, 200 columns where there is none."""
-    from rich.console import Console
+    """Print a table: folded to the width of a terminal; elsewhere a line for each row, however long."""
+    if sys.stdout.isatty():
+        from rich.console import Console
 
-    console = Console()
-    if console.is_terminal:
-        console.print(table)
+        Console().print(_folded(table))
     else:
-        Console(width=200).print(table)
+        typer.echo("\n".join(_lines(table)))
+
+
+def _folded(table: Table) -> Any:
+    """Return the table as one of rich's, which folds its cells."""
+    from rich import box
+    from rich.table import Table as Folded
+    from rich.text import Text
+
+    result = Folded(box=box.SIMPLE_HEAD)
+    for column in table.columns:
+        # As text: rich would take [m] for markup. Folded: in a narrow terminal it would cut 5.067 to "5.…".
+        result.add_column(Text(column), overflow="fold")
+    for row in table.rows:
+        result.add_row(*map(Text, row))
+    return result
+
+
+def _lines(table: Table) -> list[str]:
+    """Return the lines of a table that looks as on a terminal, but is as wide as it is."""
+    widths = [max(map(_width, column)) for column in zip(table.columns, *table.rows, strict=True)]
+
+    def line(cells: Iterable[str]) -> str:
+        padded = (f" {cell}{' ' * (width - _width(cell))} " for cell, width in zip(cells, widths, strict=True))
+        return f" {' '.join(padded)}".rstrip()
+
+    rule = ("\u2500" if "utf" in (sys.stdout.encoding or "").lower() else "-") * (sum(widths) + 3 * len(widths) - 1)
+    return ["", line(table.columns), f" {rule}", *map(line, table.rows), ""]
+
+
+def _width(text: str) -> int:
+    """Return the places that a text takes on a line: two for a Chinese, Japanese or Korean sign."""
+    if text.isascii():
+        return len(text)
+    from rich.cells import cell_len
+
+    return cell_len(text)
 
 
 @contextmanager
@@ -81,9 +113,7 @@ def reading(log: Path) -> Iterator[Callable[[float], None]]:
 
 def show_reasons(choices: Iterable[Mapping[str, str]]) -> None:
     """Print choices, each with its path, value and reason why: a table on a terminal, else a line each."""
-    from rich.console import Console
-
-    if Console().is_terminal:
+    if sys.stdout.isatty():
         show(table(["choice", "value", "because"], (choice.values() for choice in choices)))
         return
     for choice in choices:
@@ -154,16 +184,15 @@ def counted(blocks: Iterable[Any], total: int, what: str = "members", interrupte
 
     interrupted : what Ctrl-C is answered with.
     """
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
     with ended_by(interrupted):
-        if not console.is_terminal:
+        if not sys.stderr.isatty():
             yield from _said(blocks, total, what)
             return
-        with Progress(*columns, console=console) as progress:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=Console(stderr=True)) as progress:
             task = progress.add_task(what, total=total)
             for block in blocks:
                 progress.advance(task, len(block))
@@ -195,11 +224,10 @@ def iterations() -> Iterator[Any]:
 @contextmanager
 def steps(first: str = "") -> Iterator[Callable[[str], object]]:
     """Give a function that takes the step of a long calculation; shown at once on a terminal, else now and then."""
-    from rich.console import Console
+    if sys.stderr.isatty():
+        from rich.console import Console
 
-    console = Console(stderr=True)
-    if console.is_terminal:
-        with console.status(first) as status:
+        with Console(stderr=True).status(first) as status:
             yield lambda step: status.update(visible(step))
         return
     last = [first]
@@ -256,12 +284,10 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
 
     watch : what says how far searches are, so that there is news within long cells, too.
     """
-    from rich.console import Console
-
     from shipid.study.start import event_line
 
-    console, event = Console(), None
-    if not console.is_terminal:
+    event = None
+    if not sys.stdout.isatty():
         quiet = Quiet(watch)
         with looking(quiet.look, min(SILENCE, 5.0)):
             for event in events:
@@ -269,6 +295,7 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
                 if line:
                     quiet.say(line)
         return event
+    from rich.console import Console
     from rich.markup import escape
     from rich.progress import (
         BarColumn,
@@ -288,7 +315,7 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
     )
     best: dict[str, Any] = {}
     worst: dict[str, Any] = {}
-    progress = Progress(*columns, console=console, refresh_per_second=2)  # drawing takes time from workers
+    progress = Progress(*columns, console=Console(), refresh_per_second=2)  # drawing takes time from workers
     task, inner = progress.add_task("cells", total=None), progress.add_task("", total=None, visible=False)
 
     def look() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -19,18 +20,28 @@ def test_a_table_prints_text_as_it_is(capsys: pytest.CaptureFixture[str]) -> Non
     assert "[bold]4" in out
 
 
-def test_a_narrow_table_loses_no_digit() -> None:
-    from rich.console import Console
+def test_a_narrow_table_loses_no_digit(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    from shipid.cli.terminal import show, table
 
-    from shipid.cli.terminal import table
-
-    console = Console(width=24, record=True)
-    console.print(
-        table(["criterion", "value", "limit", "verdict"], [["tactical diameter", "5.067", "4.512", "not met"]])
-    )
-    printed = console.export_text()
+    monkeypatch.setenv("COLUMNS", "24")
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    show(table(["criterion", "value", "limit", "verdict"], [["tactical diameter", "5.067", "4.512", "not met"]]))
+    printed = re.sub("\x1b\\[\\d+m", "", capsys.readouterr().out)
+    assert max(map(len, printed.splitlines())) <= 24
     assert "…" not in printed
     assert sum(character.isdigit() for character in printed) == 8
+
+
+def test_without_a_terminal_a_row_is_one_line_and_columns_stay_in_line(capsys: pytest.CaptureFixture[str]) -> None:
+    """A search for a name finds the whole row; a sign of Chinese takes two places."""
+    from shipid.cli.terminal import show, table
+
+    show(table(["ship", "H [m]"], [["\u8239", 1.5], ["a", "x" * 300]]))
+    first, heading, rule, *rows, last = capsys.readouterr().out.splitlines()
+    assert (first, heading, last) == ("", "  ship   H [m]", "")
+    assert rows == ["  \u8239     1.5", f"  a      {'x' * 300}"]
+    assert set(rule.strip()) == {"\u2500"}
+    show(table([], []))
 
 
 def test_digits() -> None:
@@ -89,6 +100,7 @@ def test_long_cells_are_no_silence(capsys: pytest.CaptureFixture[str], monkeypat
     screen = io.StringIO()
     made = rich.console.Console
     monkeypatch.setattr(rich.console, "Console", lambda: made(file=screen, force_terminal=True, width=150))
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     watch = Still()
     terminal.draw(slow(watch), watch)  # type: ignore[arg-type]
     assert "a[b]-N0004-s0: trial " in screen.getvalue()
