@@ -21,7 +21,7 @@ from shipid.logs.mapping import to_si
 
 FEW_ROWS, FAR, BRIEF = 30, np.radians(240.0), 600.0  # rows; turn of the ship; s: parts of a log that show the wind
 CLEARLY, STEADY = 0.5, 0.3  # of the change of the wind as the names have it, of the wind speed: less decides
-SPEEDS = ("m/s", "kn", "km/h")
+SPEEDS, RARE = ("m/s", "kn", "km/h"), "mph"  # units of a wind without one; that which must fit clearly better
 TOWARDS = frozenset("towards toward to nach vers hacia verso naar mot".split())
 Kind = Literal["true", "angle", "apparent"]
 WORDS = {"true": "the true wind, from north", "angle": "the true wind, from the bow", "apparent": "an apparent wind"}
@@ -86,7 +86,7 @@ def _by_motion(state: State, speed: str, angle: str, drafted: Reading) -> tuple[
     beta = state.columns[angle] * to_si(likely_unit(state, angle, "beta_w"), "beta_w")
     spans = _turns(state.t, state.psi)
     written = unit_in_name(speed, "m/s")
-    units: tuple[str, ...] = (written,) if written else SPEEDS
+    units: tuple[str, ...] = (written,) if written else (*SPEEDS, RARE)
     readings = [drafted, Reading("true", drafted.unit, drafted.direction)]
     readings += [Reading("angle", drafted.unit, drafted.direction)]
     readings += [Reading("apparent", unit, way) for unit in units for way in ("from", "towards")]
@@ -99,6 +99,8 @@ def _by_motion(state: State, speed: str, angle: str, drafted: Reading) -> tuple[
         parts = [_changes(state.t[span], wind[span]) for span in spans]
         left[one] = float(np.sqrt(np.mean(np.square(parts))))
     best = min(left, key=left.__getitem__)
+    usual = min((one for one in readings if written or one.unit != RARE), key=left.__getitem__)
+    best = usual if left[best] > CLEARLY * left[usual] else best
     mean = float(np.mean(np.abs(size))) * to_si(best.unit, "V_w")
     if best == drafted or left[best] > CLEARLY * left[drafted] or left[best] > STEADY * max(mean, 1e-9):
         return drafted, ""

@@ -15,6 +15,7 @@ from shipid.logs.guess.draft import draft_mapping
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.simulated import KNOT, as_bridge, si_log
 
+MPH = 0.44704  # m/s
 LOG = si_log()
 TURNED = np.exp(1j * LOG["psi"].to_numpy())
 SHIP = (LOG["u"] + 1j * LOG["v"]).to_numpy() * TURNED
@@ -90,3 +91,17 @@ def test_a_gusty_true_wind_stays_a_true_one(seed: int, tmp_path: Path) -> None:
     angle = (random.uniform(0, 360) + random.normal(0, 25.0, len(LOG))) % 360.0
     frame = as_bridge(LOG).assign(**{"Wind speed": size.round(1), "Wind dir": angle.round()})
     assert "kind of wind" not in drafted(frame, tmp_path)[0].kinds
+
+
+@pytest.mark.parametrize("gusty", [True, False])
+def test_an_apparent_wind_in_miles_per_hour_is_read_or_asked(gusty: bool, tmp_path: Path) -> None:
+    """In knots it would be 15 % more: gusts hide that, and a steady wind shows it."""
+    frame = logged("apparent", "from", MPH, ("AWS", "AWA"))
+    if not gusty:
+        vector = (7.0 * np.exp(1j * np.radians(150.0)) - SHIP) / TURNED
+        frame = frame.assign(AWS=(np.abs(vector) / MPH).round(1), AWA=(np.degrees(np.angle(-vector)) % 360).round(1))
+    proposal, dataset = drafted(frame, tmp_path)
+    asked = [one.sentence for one in proposal.questions if "'AWS'" in one.sentence]
+    assert any("mph" in one for one in asked) == gusty
+    if not gusty:
+        assert dataset.frame["V_w"].to_numpy() == pytest.approx(7.0, abs=0.1)
