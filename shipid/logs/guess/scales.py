@@ -16,7 +16,7 @@ from shipid.data.dataset import Array
 from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.words import fits, units_in
-from shipid.logs.mapping import degrees_of
+from shipid.logs.mapping import UNITS, degrees_of
 from shipid.units import DEGREE
 
 TURNS = {400.0: "gon", 3600.0: "tenths of a degree", 36000.0: "hundredths of a degree", 6400.0: "mils"}
@@ -29,8 +29,11 @@ WRITTEN = {
 """A whole turn -> regular expression of how logs write its unit, in lower case."""
 ANGLES = ("psi", "course", "alpha", "beta_w")
 WHOLE = 0.1  # share of the rows that are whole numbers, at least: between them rows without a value were filled
-FINE, MICRO = 1e-7, 1e-6  # deg, of whole numbers of a receiver
-SLOW = 0.17  # way over the integral of a speed in m/s, km/h or kn: less is ten times too little
+FINE, AIS = 1e-7, 1.0 / 600_000.0  # deg
+PARTS = {FINE: "1e-7 deg", 1e-6: "1e-6 deg", AIS: "1/10000 min"}
+"""Part of a degree [deg] that receivers and AIS (ITU-R M.1371) write as whole numbers -> its name."""
+OF_AIS = re.compile(r"(1/10[., ']?000|1e-?0?4|10\^-4|0[.,]0001) ?(arc)?(min(utes?)?|')")
+SPEEDS, DOUBTED = ("m/s", "kn", "km/h"), 0.4  # of a speed without a unit; share of how far off the next part is
 CLOSE = 0.97  # share of a whole turn that a heading sweeps before it jumps: it has been all round
 BEYOND, TWICE = 360.5, 720.0  # deg: a compass shows less; more than two turns in a row are rare
 OFF, BETTER, AGREES = 0.02, 4.0, 0.2  # misfit of a course and a heading, 1 - cos: of 11 deg; times; of a bad one
@@ -61,9 +64,9 @@ def _take_positions(state: State) -> None:
             _take_sides(state, north, east)
             continue
         if all(np.mean(one % 1 == 0) > WHOLE and one.max() > 1e6 for one in both) and _on_globe(both, FINE):
-            fine = MICRO if _on_globe(both, MICRO) and _is_micro(state, north, east) else FINE
+            fine = _fine(state, north, east)
             for name in (north, east):
-                _scale(state, name, fine, f"whole numbers of {fine:.0e} deg".replace("e-0", "e-"))
+                _scale(state, name, fine, f"whole numbers of {PARTS[fine]}")
         elif all(_is_ddmm(one) for one in both) and both[0].max() < 9000 and both[1].max() < 18000:
             for name in (north, east):
                 state.columns[name] = degrees_of(state.columns[name])
@@ -76,17 +79,43 @@ def _take_positions(state: State) -> None:
                 state.ask(("latitude", "longitude"), f"{words}If they are S or W, write sign = -1")
 
 
-def _is_micro(state: State, north: str, east: str) -> bool:
-    """Whether whole numbers are of 1e-6 deg, as the speed shows: of 1e-7 deg the way would be a tenth; else asked."""
-    place = [FINE * state.columns[name] for name in (north, east)]
-    a, b, _ = geodetic2ned(*place, 0.0, float(place[0][0]), float(place[1][0]), 0.0)
-    way = float(np.sum(np.abs(state.chosen.change(np.asarray(a + 1j * b)))))
+def _fine(state: State, north: str, east: str) -> float:
+    """Part of a degree [deg] that whole numbers count, as their names or the speed show; else asked."""
+    if all(any(OF_AIS.fullmatch(unit.strip().lower()) for unit in units_in(name)) for name in (north, east)):
+        return AIS
+    both = np.abs(state.columns[north]), np.abs(state.columns[east])
+    parts = [fine for fine in PARTS if _on_globe(both, fine)]
+    if len(parts) == 1:
+        return parts[0]
+    way = {fine: _way(state, *(fine * state.columns[name] for name in (north, east))) for fine in parts}
+    names = f"{north!r} and {east!r}"
     for name in [*state.called("speed"), *state.called("u")]:
         ran = state.chosen.change(np.cumsum(np.abs(state.columns[name]) * np.gradient(state.t)))
-        if (length := float(np.sum(np.abs(ran)))) > 0:
-            return way < SLOW * length
-    state.ask(("latitude", "longitude", "t"), f"are {north!r} and {east!r} whole numbers of 1e-7 deg, or of 1e-6 deg?")
-    return False
+        length, written = float(np.sum(np.abs(ran))), unit_in_name(name, "m/s")
+        if not length > 0:
+            continue
+        off = {
+            fine: min(
+                abs(np.log(max(way[fine], 1e-12) / (length * UNITS["m/s"][unit])))
+                for unit in ([written] if written else SPEEDS)
+            )
+            for fine in parts
+        }
+        best, *others = sorted(parts, key=off.__getitem__)
+        if off[best] > DOUBTED * off[others[0]]:
+            words = f"are {names} whole numbers of {PARTS[best]}, or of {PARTS[others[0]]}?"
+            state.ask(("latitude", "longitude", "t"), f"{words} The speed {name!r} does not say it clearly")
+        return best
+    last = [PARTS[fine] for fine in parts]
+    words = f"are {names} whole numbers of {', '.join(last[:-1])} or of {last[-1]}?"
+    state.ask(("latitude", "longitude", "t"), f"{words} {last[0]} is a guess")
+    return parts[0]
+
+
+def _way(state: State, latitude: Array, longitude: Array) -> float:
+    """Way [m] over the windows, of positions (N,) [deg]."""
+    north, east, _ = geodetic2ned(latitude, longitude, 0.0, float(latitude[0]), float(longitude[0]), 0.0)
+    return float(np.sum(np.abs(state.chosen.change(np.asarray(north + 1j * east)))))
 
 
 def _by_track(state: State) -> None:

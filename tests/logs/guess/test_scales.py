@@ -104,6 +104,33 @@ def test_whole_numbers_of_parts_of_a_degree_are_told_by_the_speed(digits: int, t
     assert [one.extra["factor"] for one in columns if one is not None] == [10.0**-digits] * 2
 
 
+@pytest.mark.parametrize(
+    ("names", "speed", "asks"),
+    [
+        (("lat", "lon"), "SOG [kn]", False),
+        (("lat", "lon"), "SOG", False),
+        (("lat", "lon"), "", True),
+        (("lat [1/10000 min]", "lon [1/10000 min]"), "", False),
+    ],
+)
+def test_positions_of_AIS_are_whole_numbers_of_parts_of_a_minute(
+    names: tuple[str, str], speed: str, asks: bool, tmp_path: Path
+) -> None:
+    """As 1e-6 deg the ship would be elsewhere on the Earth, and 0.6 times as fast."""
+    frame = on_globe(LAT, LON).drop(columns=["lat", "lon", "u", "v"])
+    for name, degrees in zip(names, (LAT, LON), strict=True):
+        frame[name] = (600_000 * degrees).round().astype(int)
+    if speed:
+        frame[speed] = (np.hypot(LOG["u"], LOG["v"]) * 3600 / 1852).round(1)
+        frame["COG"] = np.degrees(LOG["psi"] + np.arctan2(LOG["v"], LOG["u"])) % 360
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    proposal = guess(tmp_path / "log.csv")
+    assert ("whole numbers of" in asked(proposal)) == asks
+    columns = [proposal.column(name) for name in ("latitude", "longitude")]
+    read = [one.extra["factor"] for one in columns if one is not None]
+    assert asks or read == pytest.approx([1 / 600_000] * 2)
+
+
 @pytest.mark.parametrize(("turn", "asks"), [(400.0, True), (360.0, False)])
 def test_gon_that_a_compass_in_degrees_may_show_are_asked(turn: float, asks: bool, tmp_path: Path) -> None:
     frame = turned_round(200.0).drop(columns="psi")
