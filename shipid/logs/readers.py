@@ -6,6 +6,7 @@ are returned as written, as text or numbers; the mapping gives units and meaning
 
 from __future__ import annotations
 
+import bisect
 import codecs
 import io
 import math
@@ -35,6 +36,7 @@ from shipid.units import KNOT
 DAY, HALF_DAY = 86400.0, 43200.0  # s
 NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, but for those that go back by an hour
 HOUR = 3600.0  # s: by which local time goes back at the end of daylight saving
+LATE_DATE = 60.0  # s after midnight: so long a receiver may write the date of the day before
 LOOKED_AT = 300  # lines that a guess at the format looks at
 LONGEST_LINE = 8_000_000  # bytes: more is no log
 LARGE = 32_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
@@ -819,13 +821,15 @@ def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
                 message = f"{error}: set [format] time = 'fix'"
                 raise DataError(message, file=file, path=f"row {number}") from None
             continue
-        clock.read(getattr(sentence, "timestamp", None))
-        if clock.now is not None:  # before the first fix the time is unknown
-            rows.append({"time": clock.now, **values})
+        clock.read(sentence)
+        if clock.fixes:  # before the first fix the time is unknown
+            rows.append({"time": len(clock.fixes) - 1, **values})
     if not rows:
         message = f"no NMEA 0183 sentence with a time in {unreadable} unreadable lines: set [format] kind or time"
         raise DataError(message, file=file, path="format.kind")
     table = pd.DataFrame(rows).reindex(columns=["time", *NMEA_COLUMNS])
+    if form.time == "fix":
+        table["time"] = clock.times()[table["time"]]
     again = table["time"].ne(table["time"].shift()).cumsum()  # sentences of one instant are one row
     table = table.groupby(again).first().reset_index(drop=True)
     table.attrs["unreadable"] = unreadable
@@ -833,22 +837,57 @@ def _nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
 
 
 class _Clock:
-    """Seconds since the midnight before the first fix, over further midnights."""
+    """Times of fixes: seconds since the midnight before the first one, over further midnights.
+
+    RMC and ZDA say the date. Another fix is of the day of that one before or behind it whose time of day is nearer.
+    Without any date a time of day that goes back by twelve hours is of the next day.
+    """
 
     def __init__(self) -> None:
-        self.now: float | None = None
+        self.fixes: list[tuple[float, int | None]] = []  # s of the day, and day
 
-    def read(self, fix: Any) -> None:
-        if not hasattr(fix, "hour"):
-            return
-        seconds = 3600.0 * fix.hour + 60.0 * fix.minute + fix.second + 1e-6 * fix.microsecond
-        if self.now is None:
-            self.now = seconds
-            return
-        midnight = DAY * (self.now // DAY)
-        if seconds + midnight < self.now - HALF_DAY:
-            midnight += DAY
-        self.now = midnight + seconds
+    def read(self, sentence: Any) -> None:
+        """Add the fix of a sentence that has one."""
+        time: Any = getattr(sentence, "timestamp", None)
+        if hasattr(time, "hour"):
+            seconds = 3600.0 * time.hour + 60.0 * time.minute + time.second + 1e-6 * time.microsecond
+            self.fixes.append((seconds, _day_of(sentence)))
+
+    def times(self) -> Array:
+        """Return the times (N,) [s] of the fixes."""
+        since = np.array([seconds for seconds, _ in self.fixes])
+        known = [place for place, (_, day) in enumerate(self.fixes) if day is not None]
+        if not known:
+            return np.asarray(since + DAY * np.cumsum(np.diff(since, prepend=since[:1]) < -HALF_DAY))
+        days = [self._day(place, known) for place in range(len(since))]
+        result = since + DAY * (np.array(days) - days[0])
+        for place in np.flatnonzero(since < LATE_DATE):
+            if place and 0.0 <= result[place] + DAY - result[place - 1] < NEXT_DAY:  # the date is of the day before
+                result[place] += DAY
+        return np.asarray(result)
+
+    def _day(self, place: int, known: list[int]) -> int:
+        """Day of a fix, where those at the places `known` say theirs."""
+        now, day = self.fixes[place]
+        if day is not None:
+            return day
+        behind = bisect.bisect_left(known, place)
+        near = [self.fixes[one] for one in known[max(0, behind - 1) : behind + 1]]
+        apart = [(now - seconds + HALF_DAY) % DAY - HALF_DAY for seconds, _ in near]
+        nearest = int(np.argmin(np.abs(apart)))
+        seconds, day = near[nearest]
+        return int(day or 0) + round((seconds + apart[nearest] - now) / DAY)
+
+
+def _day_of(sentence: Any) -> int | None:
+    """Day of a valid RMC or ZDA, None of another sentence and of one without a date."""
+    kind = getattr(sentence, "sentence_type", "")
+    if kind not in ("RMC", "ZDA") or getattr(sentence, "status", "A") == "V":
+        return None
+    try:
+        return int(sentence.datestamp.toordinal())
+    except (AttributeError, TypeError, ValueError):
+        return None
 
 
 def _stamp(text: str) -> float:

@@ -540,6 +540,35 @@ def test_values_that_a_sentence_calls_invalid_are_not_taken(tmp_path: Path) -> N
     assert table.attrs["unreadable"] == 0
 
 
+@pytest.mark.parametrize(
+    ("fixes", "hours"),
+    [
+        (["GGA 230000", "RMC 230000 271022", "GGA 010000", "RMC 010000 281022"], [0, 2]),
+        (["RMC 080000 271022", "GGA 080100", "GGA 090000", "RMC 090000 281022"], [0, 1 / 60, 25]),
+        (["RMC 080000 271022", "RMC 070000 301022", "GGA 070100"], [0, 71, 71 + 1 / 60]),
+        (["ZDA 080000 271022", "GGA 090000", "ZDA 090000 281022"], [0, 25]),
+        (["RMC 235959 311222", "RMC 000000 311222", "RMC 000001 010123"], [0, 1 / 3600, 2 / 3600]),
+        (["RMC 080000 271022", "RMC 090000 -"], [0, 1]),
+        (["GGA 230000", "GGA 010000"], [0, 2]),
+    ],
+)
+def test_a_fix_is_of_the_day_that_the_sentences_say(fixes: list[str], hours: list[float], tmp_path: Path) -> None:
+    """Before, a log that was off for 25 h went on after one; a date that changes a second late makes no day."""
+    lines = []
+    for kind, time, *date in map(str.split, fixes):
+        day = (date or ["-"])[0].replace("-", "")
+        if kind == "RMC":
+            lines.append(f"GPRMC,{time},A,4807.0,N,01131.0,E,5.0,84.0,{day},,,A")
+        elif kind == "ZDA":
+            lines.append(f"GPZDA,{time},{day[:2]},{day[2:4]},20{day[4:]},00,00")
+        else:
+            lines.append(f"GPGGA,{time},4807.0,N,01131.0,E,1,8,0.9,5.0,M,46.9,M,,")
+    (tmp_path / "log").write_text("\n".join(map(sentence, lines)))
+    t = readers.read_table(tmp_path / "log", readers.NmeaFormat(kind="nmea"), "time")["time"]
+    np.testing.assert_allclose((t - t[0]) / 3600, hours)
+    assert 0 <= t[0] < 86400
+
+
 @pytest.mark.parametrize("speed", ["10.0,N,,M", ",N,5.1444,M", "10.0,N,5.1444,M"])
 def test_the_true_wind_is_read_in_knots_too(speed: str, tmp_path: Path) -> None:
     fixes = [f"GPRMC,12000{k},A,4807.0,N,01131.0,E,5.0,84.0,271022,,,A" for k in (0, 1)]
