@@ -226,7 +226,7 @@ def _tables(
         log = read_table(file, mapping.format, mapping.clock.sources[0], () if whole_rows else here, progress)
         first = 0
         for end in [*_restarts(log, mapping, file), len(log)]:
-            part = log.iloc[first:end].reset_index(drop=True) if first or end < len(log) else log
+            part = log.iloc[first:end] if first or end < len(log) else log
             part.attrs = {} if first else log.attrs
             yield run, file, part
             first = end
@@ -294,7 +294,7 @@ def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, .
         if mapping.resamples or "latitude" in mapping.columns
         else list(rows.columns)
     )
-    return Imported(rows[order], first + records + gaps + more + estimated, read, origin, begins)
+    return Imported(rows[order].reset_index(drop=True), first + records + gaps + more + estimated, read, origin, begins)
 
 
 def _added(parts: list[Records]) -> Records:
@@ -340,9 +340,9 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
         parts = [_numbers(table, one, form, other, f"columns.{name}.from", sides) for one in names_of(column.source)]
         numbers = parts[0]
         if column.unit == "ddmm":
-            numbers = _of_minutes(numbers, other, f"columns.{name}.unit")
+            numbers = _of_minutes(numbers, table, other, f"columns.{name}.unit")
         if len(parts) > 1:
-            numbers = _of_parts(parts, names_of(column.source), other, f"columns.{name}.from")
+            numbers = _of_parts(parts, names_of(column.source), table, other, f"columns.{name}.from")
         unit = to_si(column.unit, name)
         factor = column.sign * column.factor * unit
         values = numbers * factor if factor != 1.0 else numbers
@@ -366,29 +366,32 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
         records += [{"kind": "resampled", "column": name, "count": len(t), "note": note} for name, note in notes]
     else:
         columns = {name: values for name, (_, values) in channels.items()}
-    rows = pd.DataFrame({"t": t, **columns, "flags": np.zeros(len(t), dtype=np.int64)}, copy=False)
+    flags, numbered = np.zeros(len(t), dtype=np.int64), None if mapping.resamples else log.index
+    rows = pd.DataFrame({"t": t, **columns, "flags": flags}, index=numbered, copy=False)
     return rows, records, read, begins
 
 
-def _of_minutes(numbers: NDArray[np.float64], file: Path, path: str) -> NDArray[np.float64]:
+def _of_minutes(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: str) -> NDArray[np.float64]:
     """Degrees and minutes (N,) as degrees."""
     degrees = degrees_of(numbers)
     wrong = np.isfinite(numbers) & ~np.isfinite(degrees)
     if wrong.any():
         row = int(np.argmax(wrong))
-        message = f"{numbers[row]:.10g} in row {row + 1} has 60 minutes or more: is the unit deg?"
+        message = f"{numbers[row]:.10g} in {_row(log, row)} has 60 minutes or more: is the unit deg?"
         raise DataError(message, file=file, path=path)
     return degrees
 
 
-def _of_parts(parts: list[NDArray[np.float64]], names: tuple[str, ...], file: Path, path: str) -> NDArray[np.float64]:
+def _of_parts(
+    parts: list[NDArray[np.float64]], names: tuple[str, ...], log: pd.DataFrame, file: Path, path: str
+) -> NDArray[np.float64]:
     """Degrees, minutes and seconds (N,), of columns of these names, as degrees."""
     degrees = degrees_in_parts(parts)
     for name, part in zip(names[1:], parts[1:], strict=True):
         wrong = np.abs(part) >= 60.0
         if wrong.any():
             row = int(np.argmax(wrong))
-            message = f"{name!r} is {part[row]:.10g} in row {row + 1}, 60 or more: are these minutes or seconds?"
+            message = f"{name!r} is {part[row]:.10g} in {_row(log, row)}, 60 or more: are these minutes or seconds?"
             raise DataError(message, file=file, path=path)
     return degrees
 
@@ -425,7 +428,7 @@ def _once(log: pd.DataFrame, clock: Clock, form: Format, file: Path) -> tuple[pd
         again = repeated_rows(log)
     note = "rows that repeat the row before" if clock.every is not None else "rows with the time of the row before"
     records: Records = [{"kind": "repeated", "column": "", "count": int(again.sum()), "note": note}]
-    return (log.loc[~again].reset_index(drop=True), records) if again.any() else (log, [])
+    return (log.loc[~again], records) if again.any() else (log, [])
 
 
 def repeated_rows(table: pd.DataFrame) -> NDArray[np.bool_]:
@@ -462,7 +465,7 @@ def _as_text(
     """The column of dates or times, or those of its parts as one."""
     if isinstance(source, str):
         return _column(log, source, file, path)
-    return write([_numbers(log, name, form, file, path) for name in source])
+    return write([_numbers(log, name, form, file, path) for name in source]).set_axis(log.index)
 
 
 def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
@@ -470,9 +473,9 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
     t = _times(log, clock, form, file, path)
     twice = hour_twice(t) if np.isfinite(t).all() and (is_dated(clock.unit) or clock.unit == "hhmmss") else None
     if twice is not None:
-        raise DataError(twice[1], file=file, path=f"row {twice[0] + 1}")
+        raise DataError(twice[1], file=file, path=_row(log, twice[0]))
     if isinstance(clock, Clock) and clock.every is not None and np.isfinite(t).all():
-        return evenly(t, clock.every, file)
+        return evenly(t, clock.every, log, file)
     wrong = np.flatnonzero(~(np.diff(t) > 0)) if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
     if len(wrong):
         row = int(wrong[0]) + 1
@@ -484,7 +487,7 @@ def _instants(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: P
             )
         else:
             what = f"time goes back from {moment_of(t[row - 1])} to {moment_of(t[row])}: sort or split the log"
-        raise DataError(what, file=file, path=f"row {row + 1}")
+        raise DataError(what, file=file, path=_row(log, row))
     return t
 
 
@@ -509,8 +512,8 @@ def _unread(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path, p
     )
 
 
-def evenly(t: NDArray[np.float64], every: float, file: Path) -> NDArray[np.float64]:
-    """Return instants `every` [s] apart in place of a rounded column of time t (N,) [s].
+def evenly(t: NDArray[np.float64], every: float, log: pd.DataFrame, file: Path) -> NDArray[np.float64]:
+    """Return instants `every` [s] apart in place of a rounded column of time t (N,) [s] of a log.
 
     The rows run on from the first. Where the column pauses, or where rows were lost, whole steps are left out. Raises
     DataError where the column leaves the instants by more than it is rounded.
@@ -522,7 +525,7 @@ def evenly(t: NDArray[np.float64], every: float, file: Path) -> NDArray[np.float
     if np.any(wrong):
         row = int(np.argmax(wrong))
         message = f"the time is {off[row]:.3g} s from rows every {every:g} s: the clock has another rate"
-        raise DataError(message, file=file, path=f"row {row + 1}, clock.every")
+        raise DataError(message, file=file, path=f"{_row(log, row)}, clock.every")
     return even
 
 
@@ -635,6 +638,11 @@ def _brought(
     return np.where((times[index] - times[index - 1] > max_gap + clock_slack(times)) & ~on_sample, np.nan, result)
 
 
+def _row(log: pd.DataFrame, place: int) -> str:
+    """A row of a log in words, by its number among all rows of the file: of `log` some may have been left out."""
+    return f"row {int(log.index[place]) + 1}"
+
+
 def _column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Series[Any]:
     names = [str(name) for name in log.columns]
     if names.count(source) > 1:
@@ -661,7 +669,7 @@ def _numbers(
         infinite = np.flatnonzero(np.isinf(numbers))
         if len(infinite):
             message = f"{numbers[infinite[0]]} is no number (column {source!r}; {len(infinite)} such rows)"
-            raise DataError(message, file=file, path=f"row {infinite[0] + 1}")
+            raise DataError(message, file=file, path=_row(log, infinite[0]))
         return numbers
     read = form if isinstance(form, TableFormat) else TextFormat()
     text = column.fillna("").astype(str).str.strip()
@@ -671,7 +679,7 @@ def _numbers(
             f"{text.iloc[grouped]!r} has a point, and the decimal is a comma (column {source!r}): is it a mark of "
             "thousands? Write [format] thousands = '.'. Is it the decimal of this column? Write a comma there"
         )
-        raise DataError(message, file=file, path=f"row {grouped + 1}")
+        raise DataError(message, file=file, path=_row(log, grouped))
     plain = in_points(text, read.decimal, read.thousands).mask(missing)
     numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
     if sides and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
@@ -685,7 +693,7 @@ def _numbers(
         )
         if isinstance(form, SheetFormat) and text.iloc[bad[0]].startswith("="):
             message = f"{text.iloc[bad[0]]!r} (column {source!r}; {len(bad)} such rows) is {NOT_CALCULATED}"
-        raise DataError(message, file=file, path=f"row {bad[0] + 1}")
+        raise DataError(message, file=file, path=_row(log, bad[0]))
     return numbers
 
 
@@ -844,7 +852,7 @@ def _close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[
             continue
         if max_gap is None:
             message = f"no number in {int(missing.sum())} rows of {name!r}: set max_gap to interpolate short gaps"
-            raise DataError(message, file=file, path=f"row {int(np.argmax(missing)) + 1}, clock.max_gap")
+            raise DataError(message, file=file, path=f"{_row(rows, int(np.argmax(missing)))}, clock.max_gap")
         before = np.maximum.accumulate(np.where(missing, -np.inf, t))
         after = np.minimum.accumulate(np.where(missing, np.inf, t)[::-1])[::-1]
         short = missing & (after - before <= longest)

@@ -247,7 +247,8 @@ def test_lost_rows_of_a_rounded_clock_are_found_whatever_it_counts_from(
     """In whole seconds since 1970 as in those since the begin of the log."""
     t = 0.03 + every * np.arange(int(300 / every))
     seconds = np.floor(np.delete(t, np.concatenate([np.arange(first, first + count) for first, count in lost])))
-    even, since_1970 = (evenly(seconds + begin, every, Path("log.csv")) - begin for begin in (0.0, 1.7e9))
+    log = pd.DataFrame(index=range(len(seconds)))
+    even, since_1970 = (evenly(seconds + begin, every, log, Path("log.csv")) - begin for begin in (0.0, 1.7e9))
     np.testing.assert_allclose(since_1970, even, atol=1e-5)
     assert np.abs(even - seconds).max() < 1.0 + every
 
@@ -277,7 +278,7 @@ def test_a_rounded_clock_starts_anew_after_a_pause() -> None:
 def test_a_clock_of_another_rate_is_refused() -> None:
     t = np.floor(np.arange(0.0, 60.0, 0.1) + 1e-9)
     with pytest.raises(DataError, match=r"log\.csv: row \d+, clock\.every: the time is .* from rows every 0\.2 s"):
-        evenly(t, 0.2, Path("log.csv"))
+        evenly(t, 0.2, pd.DataFrame(index=range(len(t))), Path("log.csv"))
 
 
 def test_the_rounding_of_a_clock_grows_with_its_numbers() -> None:
@@ -430,6 +431,22 @@ def test_rows_that_repeat_a_time_are_left_out_where_the_mapping_asks(plain_mappi
     dataset = import_log(read_mapping(plain_mapping("", ('from = "time"', 'from = "time"\nrepeated = "drop"'))), log)
     assert counts(dataset)["repeated"] == 3
     np.testing.assert_allclose(dataset.frame["north"], motion["north"], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "what"), [("abc", r"row 31: 'abc' is no number"), ("", r"row 31, clock\.max_gap: no n")]
+)
+def test_a_row_has_its_number_among_all_rows_of_the_file(
+    text: str, what: str, plain_mapping: Write, tmp_path: Path
+) -> None:
+    """Rows 9 and 10 say the time of the row before, and are left out."""
+    log = as_log(turning(T).iloc[[*range(8), 7, 7, *range(8, len(T))]], tmp_path / "log.csv")
+    table = pd.read_csv(log, dtype=str)
+    table.loc[30, "heading"] = text
+    table.to_csv(log, index=False)
+    mapping = read_mapping(plain_mapping("", ('from = "time"', 'from = "time"\nrepeated = "drop"')))
+    with pytest.raises(DataError, match=what):
+        import_log(mapping, log)
 
 
 @pytest.mark.parametrize("large", [False, True])
