@@ -46,7 +46,9 @@ from shipid.logs.mapping import (
     is_dated,
     names_of,
     read_mapping,
+    size_of,
     to_si,
+    yaw_of,
 )
 from shipid.logs.readers import (
     Format,
@@ -81,6 +83,7 @@ from shipid.physics.signals import is_command, is_output, row_of, wraps
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 
+OFF_ONE = 0.05  # of the size of a quaternion from 1: more is no rounding
 BLOCK = 200_000  # rows that are projected at once
 NEAR = 3.0  # usual steps: rows further apart are no neighbours
 TURN, ABOUT = 2 * np.pi, np.pi / 4  # rad: a jump of an angle that counts from 0 again, and how far from it one may be
@@ -341,7 +344,9 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
         numbers = parts[0]
         if column.unit == "ddmm":
             numbers = _of_minutes(numbers, table, other, f"columns.{name}.unit")
-        if len(parts) > 1:
+        if column.unit == "quaternion":
+            numbers = _of_quaternion(parts, names_of(column.source), table, other, f"columns.{name}.from")
+        elif len(parts) > 1:
             numbers = _of_parts(parts, names_of(column.source), table, other, f"columns.{name}.from")
         unit = to_si(column.unit, name)
         factor = column.sign * column.factor * unit
@@ -394,6 +399,22 @@ def _of_parts(
             message = f"{name!r} is {part[row]:.10g} in {_row(log, row)}, 60 or more: are these minutes or seconds?"
             raise DataError(message, file=file, path=path)
     return degrees
+
+
+def _of_quaternion(
+    parts: list[NDArray[np.float64]], names: tuple[str, ...], log: pd.DataFrame, file: Path, path: str
+) -> NDArray[np.float64]:
+    """Quaternions (4, N), of columns of these names, as yaw angles [rad]."""
+    size = size_of(parts)
+    wrong = (size > 0) & (np.abs(size - 1.0) > OFF_ONE)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        said = ", ".join(map(repr, names))
+        message = (
+            f"{said} have the size {size[row]:.4g} in {_row(log, row)}, and a quaternion has 1: are these x, y, z, w?"
+        )
+        raise DataError(message, file=file, path=path)
+    return yaw_of(parts)
 
 
 def _begins(log: pd.DataFrame, t: NDArray[np.float64], parts: Parts, file: Path) -> Begins:

@@ -47,7 +47,7 @@ UNITS: dict[str, dict[str, float]] = {
     },
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
-    "rad": {"rad": 1.0, "deg": DEGREE, "ddmm": DEGREE},
+    "rad": {"rad": 1.0, "deg": DEGREE, "ddmm": DEGREE, "quaternion": 1.0},
     "rad/s": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / MINUTE},
     "rev/s": {"rev/s": 1.0, "rpm": RPM, "rad/s": 0.15915494309189535},
     "N": {"N": 1.0, "kN": 1e3},
@@ -58,7 +58,8 @@ UNITS: dict[str, dict[str, float]] = {
 mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 
 `date`, `datenum`, `excel`, `mjd` and `jd` are read as seconds since 1970 (UTC), and so are the times of segments and
-breaks; `hhmmss` as seconds since the first midnight. `ddmm`, of latitude and longitude only, are degrees and minutes.
+breaks; `hhmmss` as seconds since the first midnight. `ddmm`, of latitude and longitude only, are degrees and minutes;
+`quaternion`, of the heading only, four columns x, y, z, w.
 """
 EPOCHS = {"datenum": 719529.0, "excel": 25569.0, "mjd": 40587.0, "jd": 2440587.5}
 """Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system; Julian dates, modified
@@ -94,7 +95,11 @@ Named = str | Annotated[tuple[str, ...], Field(min_length=2, max_length=3)]
 """A column of the log, or two or three that say one value in parts: degrees and minutes; hour, minute and second."""
 
 
-def names_of(source: Named) -> tuple[str, ...]:
+Four = Annotated[tuple[str, ...], Field(min_length=4, max_length=4)]
+"""The columns x, y, z, w of a quaternion."""
+
+
+def names_of(source: Named | Four) -> tuple[str, ...]:
     """Return the names of the columns of the log that say a value."""
     return (source,) if isinstance(source, str) else tuple(source)
 
@@ -170,11 +175,12 @@ class Origin(Strict):
 class Column(Strict):
     """One column of the dataset: value = sign * factor * (source column) + offset, in `unit`, then turned as declared.
 
-    The source of a latitude or longitude may be two or three columns: degrees, minutes and seconds. Its samples are of
-    `latency` [s] before their time stamp; `interpolation` is the rule between samples.
+    The source of a latitude or longitude may be two or three columns: degrees, minutes and seconds; that of a heading
+    the four of a quaternion. Its samples are of `latency` [s] before their time stamp; `interpolation` is the rule
+    between samples.
     """
 
-    source: Named = Field(alias="from")
+    source: Named | Four = Field(alias="from")
     unit: str
     file: str | None = None
     factor: float = 1.0
@@ -332,6 +338,21 @@ def degrees_in_parts(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.asarray(np.where(np.any(np.signbit(parts), axis=0), -degrees, degrees), dtype=np.float64)
 
 
+def yaw_of(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Yaw [rad] of quaternions x, y, z, w (4, N), counted about z from x to y; NaN where all four are 0.
+
+    It is the first turn of the three by yaw, pitch and roll.
+    """
+    x, y, z, w = parts
+    yaw = np.arctan2(2.0 * (w * z + x * y), w**2 + x**2 - y**2 - z**2)
+    return np.asarray(np.where(np.any(np.array(parts) != 0.0, axis=0), yaw, np.nan), dtype=np.float64)
+
+
+def size_of(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Size (N,) of quaternions (4, N): 1, but for rounding."""
+    return np.asarray(np.sqrt(np.sum(np.square(parts), axis=0)), dtype=np.float64)
+
+
 def degrees_in_text(texts: pd.Series[Any], sides: str) -> NDArray[np.float64]:
     """Texts (N,) such as 59°26'12.3"N, N59 26.205 or 5926.205N in degrees; NaN for a text that says no angle.
 
@@ -423,7 +444,13 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
         if column.unit == "ddmm" and name not in ("latitude", "longitude"):
             message = "only latitude and longitude are in degrees and minutes: write deg or rad"
             raise DocumentError(message, file=file, path=f"{path}.unit")
-        if not isinstance(column.source, str) and (name not in ("latitude", "longitude") or column.unit != "deg"):
+        four = not isinstance(column.source, str) and len(column.source) == 4
+        if four != (column.unit == "quaternion") or (four and name != "psi"):
+            message = "a quaternion is the heading, from four columns: write from = [x, y, z, w] and this unit for psi"
+            raise DocumentError(message, file=file, path=f"{path}.unit")
+        if not (four or isinstance(column.source, str)) and (
+            name not in ("latitude", "longitude") or column.unit != "deg"
+        ):
             message = "only a latitude or longitude in deg is written in degrees, minutes and seconds: name one column"
             raise DocumentError(message, file=file, path=f"{path}.from")
         if (column.direction is None) == (name == "beta_w"):

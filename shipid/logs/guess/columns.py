@@ -103,6 +103,7 @@ def guess(
     joined = len(source.files) > 1 or bool(sniffed.runs)
     state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), joined, spiky)
     state.sides, state.words = sniffed.sides, sniffed.words
+    state.units |= {name: "quaternion" for name, parts in sniffed.in_parts.items() if len(parts) == 4}
     state.commands = () if vessel is None else dynamics(vessel).commands
     numbering = tuple(
         name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])

@@ -21,7 +21,7 @@ from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.foreign import foreign
 from shipid.logs.guess.words import fits, is_run, known_words, parts_of, units_in
-from shipid.logs.importing import even_clock, repeated_rows, rounding_of
+from shipid.logs.importing import OFF_ONE, even_clock, repeated_rows, rounding_of
 from shipid.logs.mapping import (
     AGAIN,
     EPOCHS,
@@ -31,7 +31,9 @@ from shipid.logs.mapping import (
     degrees_in_text,
     names_of,
     since_midnight,
+    size_of,
     to_si,
+    yaw_of,
 )
 from shipid.logs.readers import (
     DAY,
@@ -219,6 +221,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     _refuse_ships(table, file)
     columns, words = _numbers(table, form.get("decimal", "."), form.get("thousands"))
     in_parts = _degrees(columns)
+    turned = _quaternions(columns)
     rarely = [name for name, values in columns.items() if np.isnan(values).mean() > 0.5]
     in_text, letters = _in_text(table, [*words, *rarely], form.get("decimal", "."))
     columns |= dict(in_text.values())
@@ -229,7 +232,9 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
             form["missing"] = [*model.missing, *missing]
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
     made = {name: degrees_in_parts([columns[part] for part in parts]) for name, parts in in_parts.items()}
+    made |= {name: yaw_of([columns[part] for part in parts]) for name, parts in turned.items()}
     made |= {name: values for name, (source, values) in in_text.items() if name != source}
+    in_parts |= turned
     in_parts |= {name: (in_text[name][0],) for name in made.keys() & in_text.keys()}
     words = [name for name in words if name not in columns]
     runs, since = _restarts(table, columns)
@@ -617,6 +622,20 @@ def _degrees(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
                 break
         if len(parts) > 1 and not _is_whole(columns[parts[-1]], 60.0):
             found[" + ".join(parts)] = tuple(parts)
+    return found
+
+
+def _quaternions(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
+    """Yaw angle -> columns x, y, z, w of a quaternion: names that differ by these letters alone, and its size is 1."""
+    found: dict[str, tuple[str, ...]] = {}
+    for name in columns:
+        place = name.lower().rfind("w")
+        four = tuple(f"{name[:place]}{letter}{name[place + 1 :]}" for letter in ("XYZW" if "W" in name else "xyzw"))
+        if place >= 0 and {*four} <= columns.keys():
+            size = size_of([columns[one] for one in four])
+            known = np.isfinite(size) & (size > 0)
+            if known.any() and np.all(np.abs(size[known] - 1.0) < OFF_ONE):
+                found[f"{name[:place].rstrip('._/ [(')} yaw".strip()] = four
     return found
 
 

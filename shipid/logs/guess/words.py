@@ -65,7 +65,7 @@ PHRASES: dict[str, str] = {
         "speed x, v surge, vitesse long, vitesse avance, vitesse axiale, vitesse avant, vitesse cavalement, "
         "cavalement, velocidad long, velocidad avance, velocita long, velocita avanzo, langs snelheid, "
         "langsscheepse snelheid, langs hastighet, langskips hastighet, langskips fart, laengs hastighet, u vel, "
-        "vel u"
+        "vel u, linear x"
     ),
     "v": (
         "v, sway, sway vel, sway speed, v trans, trans speed, lat speed, lateral speed, speed trans, speed lat, "
@@ -74,7 +74,8 @@ PHRASES: dict[str, str] = {
         "vel, trans vel, tvers fart, drift speed, speed y, v sway, vitesse trans, vitesse embardee, vitesse "
         "laterale, velocidad trans, velocidad deriva, velocita trans, velocita deriva, velocita scarroccio, dwars "
         "snelheid, dwarsscheepse snelheid, tverr hastighet, tverrskips hastighet, tverrskips fart, tvaers "
-        "hastighet, tvers hastighet, tverr fart, v vel, vel v"
+        "hastighet, tvers hastighet, tverr fart, v vel, vel v, "
+        "linear y"
     ),
     "velocity_north": (
         "vn, v n, v north, vel north, vel n, north vel, north speed, speed north, geschwindigkeit nord, v nord, "
@@ -94,7 +95,8 @@ PHRASES: dict[str, str] = {
         "vitesse lacet, taux lacet, giration, velocidad giro, velocidad guinada, razon giro, regimen giro, "
         "velocita accostata, velocita imbardata, velocita virata, rateo accostata, rateo virata, draai snelheid, "
         "gier snelheid, sving hastighet, dreie hastighet, dreie rate, svinge rate, drei hastighet, girings "
-        "hastighet, dreje hastighed, dreje rate, wende rate, wende zeiger, gyro rate z, yaw dot"
+        "hastighet, dreje hastighed, dreje rate, wende rate, wende zeiger, gyro rate z, yaw dot, "
+        "angular z"
     ),
     "phi": (
         "phi, roll, roll angle, heel, heel angle, roll winkel, kraengung, rull, krengning, eta 4, gite, angle "
@@ -217,6 +219,7 @@ WIND_WORDS = {
 """Parts that say which wind a column has. `twa` does not: it is the true wind, from the bow."""
 SOURCES = frozenset(
     (
+        "attitude header orientation pose quat quaternion twist "
         "act actual answer apparent ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga "
         "gnss gpgga gprmc gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos "
         "posicion posisjon position raw rel response rtk sensor ship signal sim standort t the true val value vessel "

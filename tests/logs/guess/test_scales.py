@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError
 from shipid.files import write_new
 from shipid.logs.guess.columns import Guess, guess
 from shipid.logs.guess.draft import draft_mapping
+from shipid.logs.guess.pose import Frame
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.mapping import degrees_of
 from tests.logs.simulated import SCHEDULE, as_bridge, si_log
@@ -301,3 +303,46 @@ def test_circles_to_one_side_with_a_rudder_to_one_side_are_not_asked(tmp_path: P
     assert LOG["r"][inside].min() > 0
     frame = BRIDGE[inside].assign(rudder=RUDDER[inside].clip(lower=0))
     assert "never negative" not in asked(guess(as_file(frame.reset_index(drop=True), tmp_path)))
+
+
+def quaternion(yaw: np.ndarray, roll: float = 0.08, pitch: float = -0.03) -> dict[str, np.ndarray]:
+    """x, y, z, w of turns by roll about x, then pitch about y, then yaw about z."""
+    parts = Rotation.from_euler("ZYX", np.stack([yaw, np.full(len(yaw), pitch), np.full(len(yaw), roll)], 1)).as_quat()
+    return dict(zip("xyzw", parts.T, strict=True))
+
+
+@pytest.mark.parametrize("names", ["orientation.{}", "q{}", "att_quat_{}", "Q_{} [-]"])
+@pytest.mark.parametrize("frame", ["ned", "ros"])
+def test_a_quaternion_is_the_heading(names: str, frame: Frame, tmp_path: Path) -> None:
+    psi = LOG["psi"].to_numpy()
+    four = quaternion(psi if frame == "ned" else np.pi / 2 - psi)
+    log = BRIDGE.drop(columns=["psi", "N", "E"]).assign(x=LOG["north" if frame == "ned" else "east"])
+    log["y"] = LOG["east" if frame == "ned" else "north"]
+    for letter, values in four.items():
+        log[names.format(letter.upper() if "Q" in names else letter)] = values.round(6)
+    log.to_csv(tmp_path / "log.csv", index=False)
+    mapping = write_new(draft_mapping(guess(tmp_path / "log.csv", frame=frame)), tmp_path / "draft.toml")
+    dataset = import_log(read_mapping(mapping).model_copy(update={"segment": ()}), tmp_path / "log.csv")
+    assert turned(dataset).max() < 1e-5
+    assert dataset.frame["v"].to_numpy() == pytest.approx(LOG["v"].to_numpy(), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("row", "said"), [([0.0, 0.0, 0.0, 0.0], "row 6, clock.max_gap"), ([0.0, 0.0, 1.0, 1.0], "size 1.414 in row 6")]
+)
+def test_four_zeros_are_no_quaternion_and_have_no_heading(row: list[float], said: str, tmp_path: Path) -> None:
+    """As an angle they would be 0."""
+    log = pd.DataFrame({"t": np.arange(20.0), "x": np.arange(20.0), **dict.fromkeys(["y", "u", "v", "r"], 0.0)})
+    log = log.assign(**{f"q{one}": values for one, values in quaternion(np.zeros(20)).items()})
+    log.loc[5, ["qx", "qy", "qz", "qw"]] = row
+    log.to_csv(tmp_path / "log.csv", index=False)
+    plain = {"north": "x", "east": "y", "u": "u", "v": "v", "r": "r"}
+    units = {"north": "m", "east": "m", "u": "m/s", "v": "m/s", "r": "rad/s"}
+    text = "".join(f'[columns.{one}]\nfrom = "{name}"\nunit = "{units[one]}"\n' for one, name in plain.items())
+    text += '[columns.psi]\nfrom = ["qx", "qy", "qz", "qw"]\nunit = "quaternion"\n'
+    mapping = write_new('name = "q"\n[clock]\nfrom = "t"\n' + text, tmp_path / "mapping.toml")
+    with pytest.raises(DataError, match=said):
+        import_log(read_mapping(mapping), tmp_path / "log.csv")
+    mapping.write_text(mapping.read_text().replace("quaternion", "rad"))
+    with pytest.raises(DocumentError, match="a quaternion is the heading, from four columns"):
+        read_mapping(mapping)
