@@ -124,6 +124,7 @@ FIELDS = {
 }
 """Field of a date or time in columns -> words for it, and its least and largest number."""
 YEARS = 1990.0, 2050.0  # of a log
+OF_YEARS = "is a year with decimals, {:.12g}: write a date, 2024-05-14 08:00:00, or seconds"
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
 FINE = {"ns": (1e17, 1e8), "us": (1e14, 1e5)}
 """Unit of a clock -> least number that counts from 1970 in it, and least step of whole numbers: 0.1 s."""
@@ -132,6 +133,7 @@ DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in {**EPOCHS, "
 modified Julian dates to 2008 are the same numbers."""
 TICKS = {11_644_473_600: "1601, as Windows does", 62_135_596_800: "the year 1, as .NET does"}
 """Seconds from the begin of a clock of ticks of 100 ns to 1970 -> who counts so."""
+SHORT_YEAR = 2e-6  # years, a minute: no clock of a ship has steps of as many seconds, or hours, without a unit
 SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
 NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
 SHIPS, UNKNOWN = ("mmsi", "userid", "imo", "imonumber", "callsign"), ("0", "unknown")
@@ -937,6 +939,8 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     fault = (
         f"{called[0]!r} {_unread(table, called[0], first) or _fault(first)}" if called else "none rises from row to row"
     )
+    if called and called[0] in finite and _is_years(called[0], finite[called[0]]):
+        fault = f"{called[0]!r} {OF_YEARS.format(finite[called[0]][0])}"
     raise DataError(f"no column can be the clock: {fault}", file=file)
 
 
@@ -1029,8 +1033,8 @@ def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tu
     if values.min() > 1e9 and _is_time_of_day(values % 1e6):
         message = f"{name!r} is a date and a time of day in one number, {values[0]:.15g}: write 2024-05-14 08:00:00"
         raise DataError(f"no column can be the clock: {message}", file=file)
-    if YEARS[0] < values[0] < YEARS[1] and 0.0 < np.ptp(values) < 1.0 and {"year", "years"} & {*parts_of(name)}:
-        message = f"{name!r} is a year with decimals, {values[0]:.12g}: write a date, 2024-05-14 08:00:00, or seconds"
+    if _is_years(name, values):
+        message = f"{name!r} {OF_YEARS.format(values[0])}"
         raise DataError(f"no column can be the clock: {message}", file=file)
     for epoch, what in TICKS.items():
         if DATES["d"][0] < (values[0] / 1e7 - epoch) / DAY < DATES["d"][1] and np.median(np.diff(values)) >= 1e5:
@@ -1038,6 +1042,13 @@ def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tu
             raise DataError(f"no column can be the clock: {message}", file=file)
     unit = _unit_of_clock(name, values)
     return unit, clock_seconds(values, unit)
+
+
+def _is_years(name: str, values: Array) -> bool:
+    """Whether a clock is in years with decimals: its name says so, or it says no unit and a minute is no step of it."""
+    inside = YEARS[0] < values[0] < YEARS[1] and np.ptp(values) < 1.0 and np.any(values % 1)
+    said = {*FIELDS["year"][0].split(), "years"} & {*parts_of(name)}
+    return bool(inside and (said or (not units_in(name) and float(np.median(np.diff(values))) < SHORT_YEAR)))
 
 
 def _unit_of_clock(name: str, values: Array) -> str:

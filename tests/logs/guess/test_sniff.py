@@ -629,11 +629,13 @@ def test_durations_as_text(write: Callable[[float], str] | str, tmp_path: Path) 
     np.testing.assert_allclose(sniffed.t, 0.5 * np.arange(600), atol=1e-6)
 
 
-def test_a_year_with_decimals_is_no_clock_in_seconds(tmp_path: Path) -> None:
-    with_clock("Decimal year", [2024.3655 + 0.5 * k / 366 / 86400 for k in range(600)]).to_csv(
-        tmp_path / "log.csv", index=False, float_format="%.12f"
+@pytest.mark.parametrize(("name", "digits"), [("Decimal year", 12), ("time", 12), ("Jahr", 12), ("time", 4)])
+def test_a_year_with_decimals_is_no_clock_in_seconds(name: str, digits: int, tmp_path: Path) -> None:
+    """With four digits an hour has one number, which repeats."""
+    with_clock(name, [f"{2024.3655 + 0.5 * k / 366 / 86400:.{digits}f}" for k in range(600)]).to_csv(
+        tmp_path / "log.csv", index=False
     )
-    with pytest.raises(DataError, match=r"'Decimal year' is a year with decimals, 2024.3655.*: write a date"):
+    with pytest.raises(DataError, match=rf"'{name}' is a year with decimals, 2024.3655.*: write a date"):
         sniff(tmp_path / "log.csv")
 
 
