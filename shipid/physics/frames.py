@@ -58,15 +58,23 @@ def heave_rate(eta: SX, nu: SX) -> SX:
     return rotation(eta[3], eta[4], eta[5])[2, :] @ nu[:3]
 
 
-def current(eta: SX, nu: SX, V_c: SX, beta_c: SX) -> tuple[SX, SX]:
-    """A steady uniform current in body axes, nu_c (6), and its rate d(nu_c)/dt = -omega x nu_c.
+def current(eta: SX, nu: SX, V_c: SX, beta_c: SX, *, heaves: bool = True) -> tuple[SX, SX]:
+    """A steady uniform current in body axes, nu_c (6), and its rate d(nu_c)/dt.
 
-    V_c in m/s, beta_c in rad: the direction the current sets towards, clockwise from north. In the plane the rate
-    is [r v_c, -r u_c, 0] (method eq. 3; Fossen 2021, sec. 10.3).
+    V_c in m/s, beta_c in rad: the direction the current sets towards, clockwise from north. The rate is
+    -omega x nu_c; in the plane [r v_c, -r u_c, 0] (method eq. 3; Fossen 2021, sec. 10.3). A ship that rolls and does
+    not heave has w = 0 through the water and over ground: nu_c then has no w, and its v is greater by 1 / cos(phi),
+    so that the ship is carried as the water is.
     """
     towards = vector(V_c * ca.cos(beta_c), V_c * ca.sin(beta_c), 0)
-    linear = rotation(eta[3], eta[4], eta[5]).T @ towards
-    rate = -skew(nu[3:]) @ linear
+    if heaves:
+        linear = rotation(eta[3], eta[4], eta[5]).T @ towards
+        rate = -skew(nu[3:]) @ linear
+    else:
+        level = rotation(SX(1, 1), SX(1, 1), eta[5]).T @ towards
+        c_phi, turning = ca.cos(eta[3]), ca.cos(eta[3]) * nu[5]
+        linear = vector(level[0], level[1] / c_phi, 0)
+        rate = vector(turning * level[1], (nu[3] * ca.tan(eta[3]) * level[1] - turning * level[0]) / c_phi, 0)
     return ca.vertcat(linear, SX(3, 1)), ca.vertcat(rate, SX(3, 1))
 
 

@@ -141,7 +141,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         eta[axis], nu[axis] = state[position], state[len(axes) + position]
     nu_c, nu_c_dot = SX(6, 1), SX(6, 1)
     if "current" in vessel.document:
-        nu_c, nu_c_dot = current(eta, nu, weather["V_c"], weather["beta_c"])
+        nu_c, nu_c_dot = current(eta, nu, weather["V_c"], weather["beta_c"], heaves=HEAVE in axes)
     nu_r = nu - nu_c
     states_of = {path: ca.vertcat(*(state_of[name] for name in entries)) for path, entries in hidden.items()}
     available = {"eta": eta, "nu": nu, "nu_r": nu_r, "psi": eta[5], **weather, **actual}
@@ -149,18 +149,17 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     M_RB = rigid_body(**_values(bound["inertia"], value_of))
     M_A = added_mass(**_values(bound["added_mass"], value_of))
     kept = CORIOLIS[vessel.document.get("added_mass", {}).get("coriolis", "full")]
-    force = _added_mass_force(M_A, nu_r, nu_c_dot, kept)
+    force = _added_mass_force(M_A, nu_r, kept)
     if vessel.document["inertia"].get("coriolis", "full") == "full":
-        force -= coriolis(M_RB, nu)
-    else:  # what the derivatives hold of it turns the mass with nu_r alone; the water turns it with the rest
-        force += M_RB @ nu_c_dot
+        force -= coriolis(M_RB, nu_r)  # with the water's own motion of M_RB nu_c_dot: that of nu (Fossen 2021, 10.3)
     if HEAVE in axes:
-        force += _upright(eta, nu, M_RB[0, 0])
+        force += _upright(eta, nu_r, M_RB[0, 0])
     available |= _gives(terms, available, bound, value_of, outputs=False)
     summed, mapped = _sum_of_terms(terms, available, states_of, bound, value_of)
     shown = _gives(terms, available, bound, value_of, outputs=True)
     inverse = ca.inv_minor if len(rows) <= 3 else ca.inv  # four masses multiplied overflow single precision
-    acceleration = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
+    through_water = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
+    acceleration = through_water + nu_c_dot[rows]
     more = [
         _rates(TERMS[key], {**available, "state": states_of[path]}, _values(bound[path], value_of))
         for path, key, _ in terms
@@ -203,8 +202,8 @@ def _orders_taken(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> tuple[
     )
 
 
-def _added_mass_force(M_A: SX, nu_r: SX, nu_c_dot: SX, kept: tuple[int, ...]) -> SX:
-    """Force (6) of added mass beyond -M_A nu_dot.
+def _added_mass_force(M_A: SX, nu_r: SX, kept: tuple[int, ...]) -> SX:
+    """Force (6) of added mass beyond -M_A d(nu_r)/dt.
 
     Surge, sway and yaw have the Coriolis terms of manoeuvring in calm water, on the axes `kept`. Heave acts in the
     inertial frame, on w_dot + p v - q u, and what is coupled to it has no others.
@@ -212,7 +211,7 @@ def _added_mass_force(M_A: SX, nu_r: SX, nu_c_dot: SX, kept: tuple[int, ...]) ->
     heave = nu_r[0] * nu_r[4] - nu_r[1] * nu_r[3]
     plane = ca.diag(vector(*(1 if axis in PLANE else 0 for axis in range(6))))
     turning = ca.diag(vector(*(1 if axis in kept else 0 for axis in range(6))))
-    return M_A @ (nu_c_dot + vector(0, 0, heave, 0, 0, 0)) - turning @ coriolis(plane @ M_A @ plane, plane @ nu_r)
+    return M_A @ vector(0, 0, heave, 0, 0, 0) - turning @ coriolis(plane @ M_A @ plane, plane @ nu_r)
 
 
 def _upright(eta: SX, nu: SX, m: SX) -> SX:

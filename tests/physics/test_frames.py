@@ -75,6 +75,23 @@ def test_rate_of_a_steady_current_is_its_derivative_along_the_motion(seed: int) 
     assert np.abs(computed).max() > 1e-3
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_ship_that_rolls_and_does_not_heave_is_carried_as_the_water_is(seed: int) -> None:
+    """Her kinematics, with w = 0, of the current alone give its own velocity; the rate is the derivative of that."""
+    rng, still = np.random.default_rng(seed), dm(np.zeros(3))
+    eta = ca.SX.sym("eta", 6)
+    nu = dm([*rng.uniform(-3, 3, 2), 0, rng.uniform(-0.3, 0.3), 0, rng.uniform(-0.3, 0.3)])
+    nu_c, rate = current(eta, nu, ca.SX(0.8), ca.SX(2.1), heaves=False)
+    by_chain_rule = ca.jtimes(nu_c, eta, kinematics(eta, nu))
+    over_ground = kinematics(eta, ca.vertcat(nu_c[:3], still))[:2]
+    function = ca.Function("both", [eta], [rate, by_chain_rule, over_ground])
+    leaning = [0, 0, 0, rng.uniform(-0.6, 0.6), 0, rng.uniform(-3, 3)]
+    computed, expected, velocity = (np.array(x).ravel() for x in function(leaning))
+    np.testing.assert_allclose(computed, expected, atol=1e-14)
+    np.testing.assert_allclose(velocity, [0.8 * np.cos(2.1), 0.8 * np.sin(2.1)], atol=1e-14)
+    assert np.abs(computed).max() > 1e-3
+
+
 def test_current_rate_in_the_plane() -> None:
     """Method section 2: d(nu_c)/dt = [r v_c, -r u_c, 0]."""
     nu_c, rate = current(dm([0, 0, 0, 0, 0, 0.4]), dm([2.0, 0.1, 0, 0, 0, 0.07]), ca.SX(1.0), ca.SX(1.9))
