@@ -26,6 +26,7 @@ from shipid.physics.grammar import (
 )
 
 SPEED_FLOOR = 0.01  # m/s: keeps 1/U finite at rest
+TIGHTEST = 2.0  # r L / U: turns of ships under rudders are wider, with r L / U up to 1.2
 
 
 def derivatives(nu_r: SX, eta: SX, **values: Annotated[SX, DERIVATIVES]) -> SX:
@@ -106,12 +107,15 @@ def mmg(
     X = 1/2 rho L T U^2 (-R_0 + X_vv v'^2 + ...), N with L^2 T; v' = v / U, r' = r L / U at the origin (amidships). The
     resistance opposes the motion along the ship: with its full value for drift angles below 45 deg, and k_astern times
     that when she goes astern. U [m/s] is the instantaneous speed through the water, rounded off at 0.01 m/s: the root
-    of u^2 + v^2 + 0.01^2.
+    of u^2 + v^2 + 0.01^2. In the primes of the derivatives it is at least |r| L_pp / TIGHTEST: beyond any turn in which
+    such polynomials were measured they may drive a ship that turns on the spot.
     """
     U = ca.sqrt(nu_r[0] ** 2 + nu_r[1] ** 2 + SPEED_FLOOR**2)
     ahead = ca.fmin(ca.fmax(nu_r[0] / (ca.fabs(nu_r[1]) + SPEED_FLOOR), -1), 1)
     ahead = _more_astern(ahead, nu_r[0], k_astern)
-    scaled = {name: value * T / L_pp * prime_scale(name, rho, L_pp, U) for name, value in values.items()}
+    turning = nu_r[5] * L_pp / TIGHTEST
+    at_least = ca.sqrt(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, turning**2) + SPEED_FLOOR**2)
+    scaled = {name: value * T / L_pp * prime_scale(name, rho, L_pp, at_least) for name, value in values.items()}
     return derivatives(nu_r, eta, **scaled) - vector(rho / 2 * L_pp * T * R_0 * U**2 * ahead, 0, 0, 0, 0, 0)
 
 

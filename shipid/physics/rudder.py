@@ -18,10 +18,8 @@ from shipid.physics.grammar import (
     cross_flow_monomial,
     rudder_flow,
 )
-from shipid.physics.hull import SPEED_FLOOR, about_service_speed, summed
+from shipid.physics.hull import SPEED_FLOOR, TIGHTEST, about_service_speed, summed
 from shipid.physics.propeller import drift, signed_root
-
-TIGHTEST = 2.0  # r L / U: turns of ships under rudders are wider, with r L / U up to 1.2
 
 
 def rudder(

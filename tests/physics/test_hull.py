@@ -154,6 +154,18 @@ def test_the_mmg_hull_is_its_formula() -> None:
     np.testing.assert_allclose(numbers(forces), [X, Y, 0, 0, 0, N], rtol=1e-4, atol=1e-9)
 
 
+def test_the_mmg_hull_of_a_ship_that_turns_on_the_spot_takes_primes_of_her_turn() -> None:
+    """Where r L / U is above 2, U is |r| L / 2: N_vrr v r^2 / U grew without limit, and could drive her round."""
+    L, T, r = 7.0, 0.46, 0.4
+    U = r * L / 2
+    for v in (-0.1, 0.001, 0.1):
+        forces = hull.mmg(
+            ca.SX(ca.DM([0.05, v, 0, 0, 0, r])), UPRIGHT, R_0=0.02, N_r=-0.05, N_vrr=0.1, L_pp=L, T=T, rho=1000.0
+        )
+        N = 500 * L**2 * T * (-0.05 * r * L * U + 0.1 * v * (r * L) ** 2 / U)
+        assert numbers(forces)[5] == pytest.approx(N, rel=1e-4)
+
+
 def test_the_mmg_resistance_turns_round_with_the_ship() -> None:
     ahead, astern = (
         numbers(hull.mmg(ca.SX(ca.DM([u, 0.2, 0, 0, 0, 0])), UPRIGHT, R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0))[0]
