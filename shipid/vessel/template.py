@@ -310,12 +310,17 @@ def hull(given: Particulars) -> Values:
     m_x, m_y = (-added_mass(given)[name].number / (given.rho / 2 * L**2 * T) for name in ("X_udot", "Y_vdot"))
     clarke, kijima = "Clarke et al. (1983), x L / T", "Kijima et al. (1990)"
     masumoto = "Yoshimura and Masumoto (2012)"
+    X_vv = min(1.15 * full - 0.18, 0.0)
     return {
         "R_0": _resistance(given),
-        "X_vv": Value(min(1.15 * full - 0.18, 0.0), "prime", f"1.15 C_b B / L - 0.18, at most 0, {masumoto}"),
+        "X_vv": Value(X_vv, "prime", f"1.15 C_b B / L - 0.18, at most 0, {masumoto}"),
         "X_vr": Value(1.91 * full - 0.08 - m_y, "prime", f"1.91 C_b B / L - 0.08 - m_y', {masumoto}: v = -U beta"),
         "X_rr": Value(-0.085 * full + 0.008, "prime", f"-0.085 C_b B / L + 0.008, {masumoto}"),
-        "X_vvvv": Value(max(-6.68 * full + 1.1, 0.0), "prime", f"-6.68 C_b B / L + 1.1, at least 0, {masumoto}"),
+        "X_vvvv": Value(
+            min(max(-6.68 * full + 1.1, 0.0), -X_vv),
+            "prime",
+            f"-6.68 C_b B / L + 1.1, 0 to -X_vv: no drift drives her ahead, {masumoto}",
+        ),
         "Y_v": Value(s * (1 + 0.4 * C_b * B / T), "prime", clarke),
         "Y_r": Value(s * (-0.5 + 2.2 * B / L - 0.08 * B / T) + m_x, "prime", f"{clarke}, + m_x', which turns apart"),
         "Y_|v|v": Value(-2.5 * slender - 0.5, "prime", f"-2.5 (1 - C_b) T / B - 0.5, {kijima}"),
