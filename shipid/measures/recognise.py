@@ -10,7 +10,7 @@ from shipid.errors import DataError
 from shipid.measures.record import Array, Record, helm_over, plateaus, released
 from shipid.measures.turning import MIDSHIPS
 from shipid.measures.zigzag import last_over
-from shipid.physics.signals import is_command, is_shaft, orders_thrust, steers
+from shipid.physics.signals import is_command, is_shaft, orders_thrust, steers, turns_round
 from shipid.units import DEGREE
 
 STATES = ("t", "north", "east", "psi", "u", "v", "r")
@@ -18,6 +18,7 @@ LEAST_HELM, LEAST_TURN = 3 * DEGREE, 90 * DEGREE
 MANY, APART = 5, 2 * DEGREE  # levels of helm that make a spiral, and how far they are apart
 MOSTLY = 0.7  # of the time that a zigzag's helm is over, to either side
 AMIDSHIPS = 0.2  # of the time of the turn that a pull-out's helm is amidships
+ASTERN = 120 * DEGREE  # of an azimuth unit, from which it pushes astern rather than aside
 STRAIGHT = 0.25  # of the greatest yaw rate, up to which a ship goes straight
 
 
@@ -30,7 +31,8 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start. In a stop it is the slowest of
     those that are reversed, or stopped where none is reversed: the ship loses her way ahead after it. So a stop begins
     with the first order, and a tunnel thruster that runs all the time has no part in it. A shaft with a controllable
-    pitch counts as its speed times the pitch over the greatest pitch.
+    pitch counts as its speed times the pitch over the greatest pitch; that of an azimuth unit which is turned to push
+    astern as its speed times 1 at 0 deg, 0 at 90 deg and -1 at 180 deg, in proportion to the angle.
 
     Raises
     ------
@@ -58,6 +60,10 @@ def _driving(columns: Mapping[str, Array]) -> list[Array]:
     for name, pitch in _commands(columns, lambda name: orders_thrust(name) and not is_shaft(name)).items():
         shaft = f"{name.rpartition('.')[0]}.n"
         shafts[shaft] = shafts.get(shaft, np.ones(len(pitch))) * pitch / (np.abs(pitch).max() or 1.0)
+    for name, angle in _commands(columns, turns_round).items():
+        shaft, off = f"{name.rpartition('.')[0]}.n", np.abs(np.arctan2(np.sin(angle), np.cos(angle)))
+        if shaft in shafts and off.max() > ASTERN:
+            shafts[shaft] = shafts[shaft] * (1 - off / (90 * DEGREE))
     return list(shafts.values())
 
 
@@ -88,11 +94,11 @@ def _sense(angle: Array, r: Array) -> float:
 def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
     """Kinds of manoeuvre of a run (keys of `MEASURES`), and the reason as a sentence if there is none.
 
-    Stop: the shaft changes from ahead to astern. The other kinds follow from the helm, and the ship must be on a
-    straight course when the helm is first put over. Zigzag: the helm is reversed at least once while the heading
-    changes by less than 90 deg. Turning: the helm stays on one side for 90 deg or more. Pull-out, in addition: the helm
-    is then amidships for at least a fifth of the time of the turn. Many helm levels are a spiral; the user has to say
-    which kind.
+    Stop: the shaft changes from ahead to astern, by its speed, its pitch or the angle of its unit. The other kinds
+    follow from the helm, and the ship must be on a straight course when the helm is first put over. Zigzag: the helm is
+    reversed at least once while the heading changes by less than 90 deg. Turning: the helm stays on one side for 90 deg
+    or more. Pull-out, in addition: the helm is then amidships for at least a fifth of the time of the turn. Many helm
+    levels are a spiral; the user has to say which kind.
     """
     shaft, over = record.shaft, helm_over(record)
     if shaft is not None and shaft[0] > 0 > shaft.min():

@@ -78,6 +78,31 @@ def test_a_shaft_astern_in_a_turn_makes_no_stop(name: str) -> None:
     np.testing.assert_array_equal(seen.shaft, (2.0 + astern) / 2)
 
 
+@pytest.mark.parametrize("counted", ["to 180 deg", "to 360 deg"])
+@pytest.mark.parametrize("takes", [0.0, 15.0])
+def test_azimuth_units_turned_astern_stop_a_ship(counted: str, takes: float) -> None:
+    """Both are turned outwards by half a turn while their shafts go on; it was said that no shaft is reversed."""
+    record = every(RECORDS["stop"](), 0.5)
+    share = np.clip((record.t - START) / takes, 0, 1) if takes else np.where(record.t >= START, 1.0, 0.0)
+    given = columns(record) | {"port.n": np.full(len(record.t), 2.0), "starboard.n": np.full(len(record.t), 2.0)}
+    given |= {"port.alpha": 0.05 - np.pi * share, "starboard.alpha": -0.05 + np.pi * share}
+    if counted == "to 360 deg":
+        given |= {name: given[name] % (2 * np.pi) for name in ("port.alpha", "starboard.alpha")}
+    seen = record_of(given)
+    assert kinds_of(seen) == (("stop",), "")
+    assert stop(seen)["execute"].value == pytest.approx(START, abs=0.6)
+
+
+@pytest.mark.parametrize("angle", [35.0, 90.0, 110.0])
+def test_azimuth_units_that_turn_a_ship_do_not_stop_her(angle: float) -> None:
+    record = every(RECORDS["turning"](), 0.5)
+    alpha = -angle * DEGREE * record.helm / record.helm.max()
+    given = columns(record) | {"port.n": np.full(len(record.t), 2.0), "port.alpha": alpha}
+    seen = record_of(given)
+    assert kinds_of(seen)[0] == ("turning",)
+    np.testing.assert_array_equal(seen.shaft, 2.0)
+
+
 @pytest.mark.parametrize("turning", [True, False])
 @pytest.mark.parametrize("takes", [0.0, 12.0])
 def test_a_controllable_pitch_stops_a_ship_whose_shaft_goes_on(turning: bool, takes: float) -> None:
