@@ -35,14 +35,16 @@ class Criterion:
     note: str = ""
 
 
-def criteria(kind: str, measures: Measures, length: float | None) -> list[Criterion]:
+def criteria(kind: str, measures: Measures, length: float | None, *, calm: bool = False) -> list[Criterion]:
     """Criteria of a manoeuvre; `length` [m] is that between perpendiculars. Empty for kinds without a criterion.
+
+    calm : whether there is known to be no current and no wind, as in a simulation.
 
     The user must ensure the test conditions: test speed of at least 90 % of that at 85 % of the maximum engine power,
     full load, deep calm water (5.2), and a logged point at midships.
     """
     if kind == "turning":
-        return list(_turning(measures, length))
+        return list(_turning(measures, length, calm=calm))
     if kind == "zigzag":
         return list(_zigzag(measures, length))
     if kind == "stop":
@@ -57,17 +59,19 @@ def criteria(kind: str, measures: Measures, length: float | None) -> list[Criter
     return []
 
 
-def _turning(measures: Measures, length: float | None) -> Iterator[Criterion]:
+def _turning(measures: Measures, length: float | None, *, calm: bool) -> Iterator[Criterion]:
     over = _wrong(measures, {"helm": 35.0})
     note = f"{over}; the test asks for that, or for the greatest helm allowed at the test speed" if over else ""
     current, steady = measures["current_speed"].value, measures["steady_speed"].value
+    why = "" if calm else measures["current_speed"].why
+    remark = f"how far current or wind carried the ship is not known: {why}" if why else ""
     if current > CARRIED * steady:
         carried = f"current or wind carried the ship at {current:.2g} m/s: correct the track for it (MSC/Circ.1053)"
         note = "; ".join(filter(None, [note, carried]))
     for name, limit in (("advance", 4.5), ("tactical_diameter", 5.0)):
         label = f"turning ability: {name.replace('_', ' ')} (5.3.1)"
         missing = measures[name].why
-        yield _judged(label, _lengths(measures, name, length), limit, "L", missing, length, note)
+        yield _judged(label, _lengths(measures, name, length), limit, "L", missing, length, note, remark)
 
 
 def _zigzag(measures: Measures, length: float | None) -> Iterator[Criterion]:
@@ -118,10 +122,20 @@ def _wrong(measures: Measures, asked: dict[str, float]) -> str:
 
 
 def _judged(
-    name: str, value: float, limit: float, unit: str, missing: str, length: float | None, note: str = ""
+    name: str,
+    value: float,
+    limit: float,
+    unit: str,
+    missing: str,
+    length: float | None,
+    note: str = "",
+    remark: str = "",
 ) -> Criterion:
+    """One criterion; with a `note` it is not judged, a `remark` changes nothing."""
     if not np.isfinite(value) or not np.isfinite(limit):
         why = missing or "the length of the ship is not known"
         return Criterion(name, value, limit, unit, None, why)
     short = f"the standards are for ships of {SHORTEST:g} m and more" if length and length < SHORTEST else ""
-    return Criterion(name, value, limit, unit, None if note else value <= limit, "; ".join(filter(None, [note, short])))
+    return Criterion(
+        name, value, limit, unit, None if note else value <= limit, "; ".join(filter(None, [note, remark, short]))
+    )

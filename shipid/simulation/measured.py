@@ -115,7 +115,7 @@ def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
     record = record_of(columns, Controls(vessel).helm)
     known = {"execute_heading": chosen.manoeuvre.reversal_deg * DEGREE} if isinstance(chosen.manoeuvre, Zigzag) else {}
     measures, length = MEASURES[chosen.kind](record, **known), vessel.length
-    judged = criteria(chosen.kind, measures, length)
+    judged = criteria(chosen.kind, measures, length, calm=True)
     if chosen.manoeuvre.approach == "rest":
         judged = [replace(one, met=None, note=FROM_REST) for one in judged]
     return Measured(vessel, chosen, frame, record, measure_rows(measures, length), criterion_rows(judged))
