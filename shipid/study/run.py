@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipid.arguments import of_class, path_of, whole_number
 from shipid.capacity import processor
@@ -23,6 +24,7 @@ from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.engines import check_device
 from shipid.engine.native import engine
+from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError
 from shipid.files import make_folder, read_json, write_json
 from shipid.hybrid.compensator import shared_units
@@ -30,7 +32,7 @@ from shipid.hybrid.device import use_threads, vectors
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Case, Corrector, Fitted, Task
 from shipid.hybrid.physics import Physics
-from shipid.metrics import position_error, summary
+from shipid.metrics import lengths, position_error, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
 from shipid.study.claims import WAIT, Claims, Holder, TakenOver, pause
@@ -502,12 +504,26 @@ def _judged(
         return _failed(sentence, "diverged") | {"hyperparameters": words}, None
     instants = instants_of(plan, predictor.vessel, prepared.data, test, one.estimates)
     paths = predictor.predict(instants, one.test_paths)
-    if not np.isfinite(paths).all():
-        return _failed("the prediction diverges on test windows", "diverged") | {"hyperparameters": words}, None
+    failed = _beyond_ships(paths, test.step)
+    if failed.any():
+        sentence = (
+            f"the prediction diverges on {failed.mean():.1%} of the test windows: it is farther away than any ship"
+        )
+        return _failed(sentence, "diverged") | {"hyperparameters": words}, None
     error = summary(position_error(paths, test.future))
     errors = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}
     errors |= _promise(plan, predictor, instants, paths, test)
     return {**errors, "status": "ok", "sentence": one.sentence, "hyperparameters": words}, paths
+
+
+def _beyond_ships(paths: Array, step: float) -> NDArray[np.bool_]:
+    """Which windows (S,) have a place of paths (T, S, 2) [m] that is no number, or that no ship can reach by then.
+
+    The limit of speed is that at which the physics has diverged, too.
+    """
+    reach = SPEED_LIMIT * step * np.arange(1, len(paths) + 1)
+    beyond: NDArray[np.bool_] = ~(lengths(paths) <= reach[:, None]).all(axis=0)
+    return beyond
 
 
 def _promise(plan: Plan, predictor: Predictor, instants: Instants, paths: Array, test: Windows) -> dict[str, float]:

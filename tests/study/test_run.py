@@ -342,6 +342,25 @@ def test_a_training_that_fails_is_a_value(tmp_path: Path, monkeypatch: pytest.Mo
     assert len(read_results(tmp_path / "run").paths) == 6
 
 
+@pytest.mark.parametrize("factor", [1e200, 1e5, np.nan])
+def test_a_path_that_no_ship_can_follow_is_a_cell_without_a_result(
+    factor: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A method without bounds may be finite and worth nothing: it has no H, as physics that diverges has none."""
+    plan, predict = tiny_plan(tmp_path), Predictor.predict
+
+    def wild(self: Predictor, *given: Any, **options: Any) -> Any:
+        paths = np.array(predict(self, *given, **options))
+        paths[-1, : paths.shape[1] // 2] *= factor
+        return paths
+
+    monkeypatch.setattr(Predictor, "predict", wild)
+    rows = [row for row, *_ in run_batch(plan, prepare(plan, obtain(plan)), plan.batches[0], "cpu")]
+    assert {row["status"] for row in rows} == {"diverged"}
+    assert all("the prediction diverges on 50.0" in row["sentence"] for row in rows)
+    assert np.isnan([row["H"] for row in rows]).all()
+
+
 def test_runs_too_short_to_learn_from_are_a_value(tmp_path: Path) -> None:
     """Two runs of one window each: without one of them no input varies. Larger amounts keep their results."""
     method = {"name": "trained", "kind": "path-trained", "trials": 1, "epochs": 2, "units": 4, "layers": 1}
