@@ -243,10 +243,21 @@ def _good_enough(case: Case) -> str:
             parts.append(_limit(limit))
             limits = True
     begins = f"How good must the physics be, {_ahead(case.results)} ahead? " if limits else ""
-    if not limits and len(parts) == 2 and parts[0] == parts[1]:
-        return f"With {case.smallest} or {runs(case.largest)} {parts[0]}."
+    if len(parts) == 2 and (once := _once(parts, list(every))):
+        return f"{begins}With {case.smallest} or {runs(case.largest)} {once}."
     each = "; ".join(f"with {runs(amount)} {part}" for amount, part in zip(every, parts, strict=True))
     return f"{begins}{each[0].upper()}{each[1:]}."
+
+
+def _once(said: Sequence[str], amounts: Sequence[int]) -> str:
+    """What is said of two amounts of data, once, each interval with its amount; empty where more than these differ."""
+    if said[0] == said[1]:
+        return said[0]
+    (text, *_), (again, *_) = ends = [part.partition(" [") for part in said]
+    known = [
+        f"with {runs(amount)} {end[2].removesuffix(']')}" for amount, end in zip(amounts, ends, strict=True) if end[2]
+    ]
+    return f"{text} [{'; '.join(known)}]" if text == again else ""
 
 
 def _limit_of_A(case: Case, amount: int, sides: Sides) -> Estimate | None:
@@ -379,12 +390,14 @@ def _physics_or_none(case: Case, judged: bool, planned: bool) -> list[str]:
         where = runs(case.largest)
         return [f"Not every cell has a result without physics, so it is unknown whether physics harms at {where}."]
     every = {amount: _against_none(case, amount) for amount in dict.fromkeys((case.smallest, case.largest))}
-    decided = {amount: sides for amount, sides in every.items() if sides.better or sides.worse}
-    return [
-        f"At {runs(amount)} {_counted(sides, 'no physics')}."
-        for amount, sides in decided.items()
-        if _limit_of_A(case, amount, sides) is not None  # else the first sentence names them
-    ]
+    spoken = {  # else the first sentence names them
+        amount: _counted(sides, "no physics")
+        for amount, sides in every.items()
+        if (sides.better or sides.worse) and _limit_of_A(case, amount, sides) is not None
+    }
+    if len(spoken) == 2 and len(set(spoken.values())) == 1:
+        return [f"At {case.smallest} and at {runs(case.largest)} {spoken[case.largest]}."]
+    return [f"At {runs(amount)} {words}." for amount, words in spoken.items()]
 
 
 def _counted(sides: Sides, rival: str) -> str:

@@ -12,7 +12,7 @@ import pytest
 
 from shipid.report.section import declared
 from shipid.report.sections import SECTIONS
-from shipid.study.advise import _limit, answer, best_model, by_model
+from shipid.study.advise import _limit, _once, answer, best_model, by_model
 from shipid.study.results import Results
 from shipid.study.worth import Estimate
 from tests.study.byhand import grid
@@ -173,10 +173,14 @@ def test_how_good_physics_must_be(made: Any) -> None:
     assert "; with 30 runs the test cannot tell any of 5 physics models from no physics." in advice
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (30.0, 20.0)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
-    assert "With 10 runs physics pays even with an error A of 16.0 m, the worst tried; with 30" in advice
+    assert advice.startswith(
+        "How good must the physics be, 8 s ahead? With 10 or 30 runs physics pays even with an error A of 16.0 m, the "
+        "worst tried.\n"
+    )
+    assert "At 10 and at 30 runs every physics model with a result does better than no physics." in advice
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (0.2, 0.2)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
-    assert "With 10 runs physics does not pay even with an error A of 1.00 m, the best tried" in advice
+    assert "With 10 or 30 runs physics does not pay even with an error A of 1.00 m, the best tried" in advice
 
 
 def test_no_limit_of_A_where_better_physics_does_worse(made: Any) -> None:
@@ -206,6 +210,15 @@ def test_an_interval_of_everything_is_no_bound() -> None:
     assert _limit(Estimate(9.0, 2.0, 9.0, (2.0, 9.0))).endswith("9.00 m, the worst tried [under 2.0, over 9.0]")
     assert _limit(Estimate(2.0, 2.0, 9.0, (2.0, 9.0))).endswith("2.00 m, the best tried [under 2.0, over 9.0]")
     assert _limit(Estimate(9.0, 3.0, 9.0, (2.0, 9.0))).endswith("the worst tried [at least 3.0]")
+
+
+def test_what_is_true_at_both_amounts_is_said_once() -> None:
+    pays = "physics pays even with an error A of 9.00 m, the worst tried"
+    assert _once([pays, pays], [10, 100]) == pays
+    assert _once([f"{pays} [at least 3.0]", pays], [1, 100]) == f"{pays} [with 1 run at least 3.0]"
+    both = _once([f"{pays} [at least 3.0]", f"{pays} [at least 4.0]"], [10, 100])
+    assert both == f"{pays} [with 10 runs at least 3.0; with 100 runs at least 4.0]"
+    assert not _once([pays, pays.replace("9.00", "8.00")], [10, 100])
 
 
 def test_runs_that_are_not_enough_may_still_be_too_many(made: Any) -> None:
