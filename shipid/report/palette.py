@@ -18,6 +18,7 @@ from shipid.report.selection import FEW_MODELS, exemplars, families, same_physic
 
 INK, MUTED, GRID, TRUTH, NAIVE = "var(--ink)", "var(--muted)", "var(--grid)", "var(--truth)", "var(--muted)"
 LEVELS = 24
+ROUNDING = 1e-9  # of the greatest error: that of an exact model
 # Okabe and Ito (2008), "Color universal design"; yellow and black are left out: one page is white, one nearly black.
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 SYMBOLS = ("circle", "diamond", "square", "triangle-up", "cross", "star")
@@ -107,8 +108,12 @@ def _without_physics(number: int) -> Style:
 
 
 def level(value: float, span: tuple[float, float]) -> int:
-    """Place of a magnitude on a logarithmic scale of `LEVELS` colours: errors are factors apart, a few far off."""
-    low, high, here = np.log(np.maximum([*span, value], 1e-3))
+    """Place of a magnitude on a logarithmic scale of `LEVELS` colours: errors are factors apart, a few far off.
+
+    A scale that begins at no error, or at one that is nothing but rounding, begins at a ten-thousandth of its end.
+    """
+    least = span[0] if span[0] >= ROUNDING * span[1] else 1e-4 * span[1]
+    low, high, here = np.log(np.maximum([*span, value], least or 1.0))
     return round(float(np.clip((here - low) / (high - low), 0, 1)) * (LEVELS - 1)) if high > low else 0
 
 

@@ -1,9 +1,10 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 
-from shipid.report.palette import accuracy_range, close_styles, styles, variables
+from shipid.report.palette import accuracy_range, close_styles, level, styles, variables
 
 
 def luminance(colour: str) -> float:
@@ -43,6 +44,18 @@ def test_few_models_have_names_many_have_a_scale(simulation, full_scale):
     assert len(set(colours)) == len(colours)
     symbols = {name.split("-")[0]: style.symbol for name, style in styles(simulation).items()}
     assert len(set(symbols.values())) == len(symbols)
+
+
+def test_errors_of_a_model_ship_have_colours():
+    """A scale from 0.1 mm to 10 km, and one whose first value is that of an exact model."""
+    decades = [level(10.0**k, (1e-4, 1e4)) for k in range(-4, 5)]
+    assert decades[0] == 0
+    assert decades[-1] == 23
+    assert min(np.diff(decades)) >= 2
+    assert level(4e-4, (2e-4, 8e-4)) == 12
+    for exact in (0.0, 1e-15):
+        assert [level(value, (exact, 10.0)) for value in (exact, 0.1, 10.0)] == [0, 12, 23]
+    assert level(0.0, (0.0, 0.0)) == 0
 
 
 def test_methods_on_one_model_and_models_without_physics_have_markers_of_their_own(simulation):
