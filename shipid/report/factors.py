@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.report import tables
-from shipid.report.content import ReportContent
+from shipid.report.content import DATA_DRIVEN, ReportContent
 from shipid.report.figure import Chip, Figure, Panel, Plot, axis, label, layout, line
 from shipid.report.palette import INK, MUTED, SYMBOLS, category
 from shipid.report.section import Section
@@ -27,7 +27,7 @@ def factors(content: ReportContent) -> Figure | None:
     if frame.empty:
         return None
     names = [str(name) for name in families(content).model if name in set(frame.model)]
-    bases = set(content.models.model)  # further methods on one of them have its numbers
+    bases = set(content.models.model[content.models.family.ne(DATA_DRIVEN)])  # further methods have their numbers
     untouched = [str(name) for name in families(content).model if name in bases and name not in names]
     groups = [str(name) for name in pd.unique(frame.group)]
     return Figure(

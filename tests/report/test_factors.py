@@ -21,7 +21,7 @@ def test_one_dot_per_number_at_its_factor(simulation):
     low, high = plot.layout.xaxis.range
     assert low < np.log(simulation.factors.factor.min())
     assert high > np.log(simulation.factors.factor.max())
-    assert "Not perturbed: nominal and no model." in figure.how
+    assert "Not perturbed: nominal." in figure.how, "what has no physics is no model that was spared"
 
 
 def test_the_row_tells_where_the_error_comes_from(simulation):
@@ -65,7 +65,7 @@ def test_a_removed_term_lies_at_the_left_edge(full_scale, factor, word):
 def test_another_method_on_a_model_is_not_called_unperturbed(simulation):
     others = simulation.cells[simulation.cells.model.eq("high-1")].assign(model="high-1 + alone")
     figure = factors(replace(simulation, cells=pd.concat([simulation.cells, others], ignore_index=True)))
-    assert "Not perturbed: nominal and no model." in figure.how
+    assert "Not perturbed: nominal." in figure.how, "what has no physics is no model that was spared"
 
 
 def test_no_rows_no_figure(simulation):
