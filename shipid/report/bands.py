@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, ReportContent
+from shipid.report.content import ReportContent
 from shipid.report.error_map import cells_map
 from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line
 from shipid.report.palette import MUTED, close_styles
@@ -131,16 +131,15 @@ def width_map(content: ReportContent) -> Figure | None:
     if len(cells) < 2:
         return None
     shown = replace(content, cells=cells.assign(H=cells.width, H_90=cells.width))
-    hatched = " Hatched: not narrower than the band of pure data-driven at the same N_D."
     return cells_map(
         shown,
         id="width-map",
         title="Better physics, narrower promise",
         scale="mean radius of the band [m]",
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is the mean radius of "
-        "its band over the horizon and all test windows, mean over seeds."
-        + (hatched if cells.family.eq(DATA_DRIVEN).any() else "")
-        + " Cells with too few runs for the level are left out.",
+        "its band over the horizon and all test windows, mean over seeds. Cells with too few runs for the level are "
+        "left out.",
+        hatched="not narrower than the band of pure data-driven at the same N_D.",
     )
 
 

@@ -105,13 +105,16 @@ def error_map(content: ReportContent) -> Figure | None:
         },
         controls=[Control("View", ["map", "bars"])],
         chips=([Chip("iso", "lines of equal H", INK, width=1.5)] if pieces else [])
-        + ([Chip("bounds", "their 95 % bands", INK, "dot", 1.5)] if bounds else []),
+        + ([Chip("bounds", "ends of the 95 % interval", INK, "dot", 1.5)] if bounds else []),
         scale=Scale("position error, mean, H [m]", *span, "--heat"),
     )
 
 
-def cells_map(content: ReportContent, *, id: str, title: str, scale: str, how: str) -> Figure | None:
-    """Another quantity than H over A and N_D, which the content holds in the place of H; None as for `error_map`."""
+def cells_map(content: ReportContent, *, id: str, title: str, scale: str, how: str, hatched: str) -> Figure | None:
+    """Another quantity than H over A and N_D, which the content holds in the place of H; None as for `error_map`.
+
+    hatched : what a hatched cell is, said where there is one.
+    """
     drawn = _map(content)
     if drawn is None:
         return None
@@ -121,7 +124,7 @@ def cells_map(content: ReportContent, *, id: str, title: str, scale: str, how: s
         id=id,
         title=title,
         takeaway=f"The {scale.partition(' [')[0]} goes from {low} to {high}.",
-        how=how,
+        how=how + (f" Hatched: {hatched}" if any(spot.worse for spot in drawn.spots) else ""),
         alternative=f"Cells of {scale} for {counted(len(drawn.rows), 'model')} by A and N_D. "
         "The numbers are in a table.",
         height=HEIGHT,
@@ -348,13 +351,25 @@ def _isolines(pieces: Pieces) -> tuple[list[Trace], list[dict[str, Any]]]:
     for height, piece in pieces:
         if height not in longest or length(piece) > length(longest[height]):
             longest[height] = piece
-    for place, (height, piece) in enumerate(longest.items(), start=1):  # names at different heights do not collide
-        x, y = piece[len(piece) * place // (len(longest) + 1)]
+    taken: list[Floats] = []
+    for height, piece in longest.items():
+        taken.append(_free_place(piece, taken, np.ptp(np.concatenate([*longest.values()]), axis=0)))
+        x, y = taken[-1].tolist()
         names.append(
-            {"x": float(x), "y": float(y), "text": f"{height:g} m", "showarrow": False}
+            {"x": x, "y": y, "text": f"{height:g} m", "showarrow": False}
             | {"font": {"size": 11, "color": INK}, "bgcolor": "var(--page)", "borderpad": 1}
         )
     return traces, names
+
+
+def _free_place(piece: Floats, taken: Sequence[Floats], span: Floats) -> Floats:
+    """Place on a line (k, 2) that is farthest from those taken, in parts of the span of all lines; else its middle."""
+    along = np.linspace(0, len(piece) - 1, 11)[1:-1]
+    places = np.column_stack([np.interp(along, np.arange(len(piece)), column) for column in piece.T])
+    scale = np.where(span > 0, span, 1.0)
+    away = [min((float(np.hypot(*((place - other) / scale))) for other in taken), default=0.0) for place in places]
+    free: Floats = places[int(np.argmax(away)) if taken else len(places) // 2]
+    return free
 
 
 def _bars(drawn: Map) -> Plot:

@@ -128,6 +128,15 @@ def test_the_map_of_the_width(banded: ReportContent) -> None:
     assert (figure.scale.low, figure.scale.high) == (pytest.approx(least), pytest.approx(most))
 
 
+def test_the_map_of_the_width_speaks_of_hatching_where_there_is_some(banded: ReportContent) -> None:
+    pure = banded.cells.family.eq("none")
+    for factor, told in ((100.0, False), (0.01, True)):
+        cells = banded.cells.assign(width=banded.cells.width.where(~pure, factor * banded.cells.width.mean()))
+        figure = bands.width_map(replace(banded, cells=cells))
+        assert figure is not None
+        assert ("Hatched: not narrower than the band of pure data-driven" in figure.how) == told
+
+
 def test_the_page_holds_it_and_no_tag(banded: ReportContent) -> None:
     only = {"how-far-off": SECTIONS["how-far-off"]}
     none = {name: getattr(banded, name).iloc[:0] for name in ("horizon", "over_time", "trials")}

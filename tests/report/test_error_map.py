@@ -170,6 +170,20 @@ def test_axes_have_ticks_at_any_size_of_error(simulation, factor):
     assert len(set(heights)) == len(heights)
 
 
+def test_names_of_lines_are_apart(simulation):
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        errors = dict.fromkeys(zip(simulation.cells.model, simulation.cells.N_D, strict=True))
+        errors = {key: float(np.exp(rng.normal())) for key in errors}
+        pairs = zip(simulation.cells.model, simulation.cells.N_D, strict=True)
+        figure = flat(replace(simulation, cells=simulation.cells.assign(H=[errors[pair] for pair in pairs])))
+        lines = np.concatenate([np.column_stack([t.x, t.y]) for t in figure.data if t.meta == ("iso",)])
+        span = np.ptp(lines, axis=0)
+        places = [np.array([note.x, note.y]) / span for note in figure.layout.annotations if note.xref != "paper"]
+        assert len(places) > 2
+        assert min(np.hypot(*(a - b)) for a, b in itertools.combinations(places, 2)) > 0.15
+
+
 def test_of_several_models_without_physics_the_rival_has_its_name(simulation):
     """Another may err less than all models with physics: H is not below that of every pure data-driven model."""
     better = simulation.cells[simulation.cells.model.eq("no model")].assign(model="none + plain", H=0.01)
