@@ -18,6 +18,11 @@ from shipid.report.tables import Cell, Table, figure, text
 from shipid.report.wording import counted, listed, number, shortened
 
 EVERY = "with physics"
+STEPS = (  # greatest by least error below which an axis has these ticks in a decade: two at least are within it
+    (2.5, (1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 3.5, 4, 5, 6, 7, 8, 9)),
+    (6.0, (1, 1.5, 2, 3, 4, 6, 8)),
+    (100.0, (1, 2, 5)),
+)
 ROW, MARGIN = 34, 96  # heights of a method in a panel, and around them [px]
 LONGEST = 20  # characters of a name at the axis: half of a narrow window
 
@@ -174,7 +179,8 @@ def _errors(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -
         traces.append(trace)
     errors = mine.H[mine.H > 0]
     span = float(errors.max() / errors.min()) if len(errors) else 1.0
-    x = logarithmic("position error, H [m]", (1, 1.5, 2, 3, 4, 6, 8) if span < 6 else (1, 2, 5) if span < 30 else (1,))
+    fine = next((steps for most, steps in STEPS if span < most), (1,))
+    x = logarithmic("position error, H [m]", fine)
     return Plot(traces, layout(x, _methods_axis(order), hovermode="closest"))
 
 

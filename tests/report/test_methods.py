@@ -89,6 +89,18 @@ def test_methods_are_in_the_order_that_the_page_says() -> None:
     assert "in the order of their mean H with physics, or without where they have none" in drawn.how
 
 
+@pytest.mark.parametrize("ends", [(0.17, 6.7), (0.0012, 9.0), (1.1, 1.9), (0.4, 11.0)])
+def test_the_axis_of_errors_has_two_ticks_at_least(ends: tuple[float, float]) -> None:
+    rows = frame(0, ("",))
+    drawn = methods(content(rows.assign(H=np.resize(ends, len(rows)))))
+    assert drawn is not None
+    for panels in drawn.views.values():
+        plot = panels[0].plot
+        shown = [value for trace in plot.traces for value in np.asarray(trace["x"]).tolist()]
+        inside = [tick for tick in plot.layout["xaxis"]["tickvals"] if min(shown) <= tick <= max(shown)]
+        assert len(inside) >= 2
+
+
 def test_long_names_leave_room_for_the_points() -> None:
     names = [f"a-method-with-a-name-that-leaves-no-room-{number}" for number in (1, 2, 3)]
     rows = frame(2, ("",), failing=False)
