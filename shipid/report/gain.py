@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import ReportContent
+from shipid.report.content import DATA_DRIVEN, ReportContent
 from shipid.report.figure import (
     Chip,
     Control,
@@ -25,10 +25,11 @@ from shipid.report.figure import (
     silent,
 )
 from shipid.report.palette import INK, NAIVE, Style, accuracy_range, styles
-from shipid.report.selection import data_driven, left_out, overview, trained
+from shipid.report.selection import data_driven, left_out, overview, spread, trained
 from shipid.report.wording import counted, listed, metres, shortened
 
 ROW = 46  # height of a model in the dumbbell figure [px]
+MOST_LINES, FAR = 12, 30.0  # models with physics that have a line; H by the least H that needs a logarithmic axis
 LONGEST = 28  # characters of a name that fit beside its numbers on a phone
 
 
@@ -75,12 +76,15 @@ def unplotted(content: ReportContent) -> str:
 
 def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
     looks, span = styles(content), accuracy_range(content)
-    order = [str(name) for name in overview(content).model]
+    order, drawn = _lined(content)
+    shown = {name: looks[name] for name in order}
     views = {
         f"{i}-{j}": [Panel(plot)]
         for i, statistic in enumerate(STATISTICS)
-        for j, plot in enumerate(_lines(content, means, statistic, looks))
+        for j, plot in enumerate(_lines(content, means, statistic, shown))
     }
+    heights = means.H[means.model.isin(order) & means.H.gt(0)]
+    far = len(heights) > 0 and heights.max() > FAR * heights.min()
     accuracy = content.cells.groupby("model").A.first()
     chips = [
         Chip(
@@ -100,6 +104,7 @@ def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
         + (" Colour is A; the" if span else " The")
         + " marker is the family; N_D counts manoeuvres to train and to validate."
         + left_out(content)
+        + drawn
         + unplotted(content),
         alternative=f"Lines of the position error over the number of manoeuvres for {counted(len(order), 'model')}. "
         "The numbers are in the table of cells.",
@@ -107,11 +112,26 @@ def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
         views=views,
         controls=[
             Control("Position error", [statistic.name for statistic in STATISTICS]),
-            Control("Axis", ["linear", "logarithmic"]),
+            Control("Axis", ["linear", "logarithmic"], int(far)),
         ],
         chips=[*chips, Chip("naive", "constant velocity", NAIVE, "dash")],
         scale=Scale("error of the physics alone, A [m]", *span) if span else None,
     )
+
+
+def _lined(content: ReportContent) -> tuple[list[str], str]:
+    """Models that have a line, by A, and a sentence on those that have none: of many some, or no line is told apart."""
+    frame = overview(content)
+    pure = frame.family.eq(DATA_DRIVEN)
+    physics = [str(name) for name in frame.model[~pure]]
+    kept = {*spread(physics, MOST_LINES), content.best, *frame.model[pure]}
+    order = [str(name) for name in frame.model if name in kept]
+    few = len(order) - int(pure.sum())
+    words = (
+        f" Of {len(physics)} models with physics, {few} have a line: some spread over A" if few < len(physics) else ""
+    )
+    words += " and the best in validation" if words and content.best else ""
+    return order, f"{words}; the others are in the map and in the table of cells." if words else ""
 
 
 def _lines(content: ReportContent, means: pd.DataFrame, statistic: Statistic, looks: Mapping[str, Style]) -> list[Plot]:

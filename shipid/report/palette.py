@@ -107,13 +107,18 @@ def _without_physics(number: int) -> Style:
     return Style(INK, "x", 3.0) if number == 0 else Style(INK, FURTHER[(number - 1) % len(FURTHER)], 1.5)
 
 
-def level(value: float, span: tuple[float, float]) -> int:
-    """Place of a magnitude on a logarithmic scale of `LEVELS` colours: errors are factors apart, a few far off.
+def least_coloured(span: tuple[float, float]) -> float:
+    """Where a scale of colours begins: at its least magnitude; where that is nothing or rounding, at 1e-4 of its end.
 
-    A scale that begins at no error, or at one that is nothing but rounding, begins at a ten-thousandth of its end.
+    Above 0, also for a scale of zeros alone.
     """
-    least = span[0] if span[0] >= ROUNDING * span[1] else 1e-4 * span[1]
-    low, high, here = np.log(np.maximum([*span, value], least or 1.0))
+    low, high = span
+    return (low if low >= ROUNDING * high else 1e-4 * high) or 1.0
+
+
+def level(value: float, span: tuple[float, float]) -> int:
+    """Place of a magnitude on a logarithmic scale of `LEVELS` colours: errors are factors apart, a few far off."""
+    low, high, here = np.log(np.maximum([*span, value], least_coloured(span)))
     return round(float(np.clip((here - low) / (high - low), 0, 1)) * (LEVELS - 1)) if high > low else 0
 
 

@@ -209,7 +209,8 @@ def _entry(chip: Chip) -> go.Scatter:
 def _bar(scale: Scale) -> go.Scatter:
     """Colour bar of a logarithmic scale, without a point on the plot."""
     steps = np.linspace(0, 1, palette.LEVELS)
-    low, high = (math.log10(max(value, 1e-3)) for value in (scale.low, scale.high))
+    least = palette.least_coloured((scale.low, scale.high))
+    low, high = (math.log10(max(value, least)) for value in (scale.low, scale.high))
     ticks = np.linspace(low, high, 4)
     marker = {
         "color": [low, high],

@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.report.figure import Figure
@@ -58,6 +59,32 @@ def test_a_logarithmic_axis_is_offered(simulation):
     ticks = figure.views["0-1"][0].figure.layout.yaxis
     written = [float(word.replace(" × 10", "e").translate(LOWERED)) for word in ticks.ticktext]
     assert written == list(ticks.tickvals)
+
+
+def test_of_many_models_some_have_a_line(simulation):
+    """41 lines are not told apart; those drawn are spread over A, with the best in validation and the rival."""
+    mine = [frame[frame.model.eq("high-1")] for frame in (simulation.models, simulation.cells)]
+    names = [f"f{k:02d}" for k in range(41)]
+    many = [pd.concat([one.assign(model=n, family=n, A=1.0 + k) for k, n in enumerate(names)]) for one in mine]
+    pure = [frame[frame.model.eq("no model")] for frame in (simulation.models, simulation.cells)]
+    models, cells = (pd.concat(pair, ignore_index=True) for pair in zip(many, pure, strict=True))
+    figure = gain(replace(simulation, models=models, cells=cells, best="f02"))
+    drawn = [name for name in traces(figure, "0-0") if name.startswith("f") and "seed" not in name]
+    assert len(drawn) == 13
+    assert {"f00", "f02", "f40"} <= set(drawn)
+    assert {chip.key for chip in figure.chips} == {*(f"model:{name}" for name in drawn), "model:no model", "naive"}
+    words = (
+        "Of 41 models with physics, 13 have a line: some spread over A and the best in validation; the others are in"
+    )
+    assert words in figure.how
+    assert "have a line" not in gain(simulation).how
+
+
+def test_errors_far_apart_begin_on_a_logarithmic_axis(simulation):
+    cells = simulation.cells
+    far = cells.assign(H=cells.H.where(cells.model.ne("no model"), 50.0))
+    starts = [gain(replace(simulation, cells=one)).controls[1].start for one in (cells, far)]
+    assert starts == [0, 1]
 
 
 def test_takeaway_speaks_of_the_best_in_validation_and_its_rival(simulation):
