@@ -27,6 +27,7 @@ from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.observer import AGE, Observer
 from shipid.physics.signals import SIGNALS, measurable
 from shipid.simulation.log import column_of
+from shipid.units import percent
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 
@@ -463,7 +464,9 @@ def fit(
     paths = physics.paths(windows.instants(known=commands == "known"))
     diverged = ~np.isfinite(paths).all(axis=(0, 2))
     if diverged.any():
-        raise DataError(f"the physics diverges on {diverged.mean():.1%} of the windows: take a smaller step, or rk4")
+        raise DataError(
+            f"the physics diverges on {percent(diverged.mean(), 1)} of the windows: take a smaller step, or rk4"
+        )
     task = Task(
         cases={name: Case(physics, paths)},
         windows=windows,

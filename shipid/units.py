@@ -1,4 +1,4 @@
-"""Factors from common units to SI: value in SI = value * factor; the acceleration of gravity; digits of lengths."""
+"""Factors from common units to SI: value in SI = value * factor; the acceleration of gravity; digits of numbers."""
 
 import math
 
@@ -26,6 +26,11 @@ def decimals_of(length: float) -> int:
 def length_text(length: float) -> str:
     """A length [m] as text, with the decimals of `decimals_of`."""
     return f"{length:.{decimals_of(length)}f}"
+
+
+def percent(share: float, decimals: int = 0, *, signed: bool = False) -> str:
+    """A share as text, with a space before the sign as after any number (ISO 80000-1): 0.284 is 28 %."""
+    return f"{100 * share:{'+' if signed else ''}.{decimals}f} %"
 
 
 def plural(count: int, one: str, many: str | None = None) -> str:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import pytest
 
+import shipid
 from shipid.logs.mapping import UNITS
-from shipid.units import DEGREE, KNOT, MINUTE, RPM, length_text
+from shipid.units import DEGREE, KNOT, MINUTE, RPM, length_text, percent
 
 
 @pytest.mark.parametrize(
@@ -32,3 +35,19 @@ def test_logs_use_the_same_factors() -> None:
 )
 def test_lengths_of_a_small_model_are_no_zeros(length: float, text: str) -> None:
     assert length_text(length) == text
+
+
+def test_percent_signs_stand_apart_from_their_number() -> None:
+    assert [percent(0.284), percent(0.0312, 1), percent(1.0), percent(-0.14, signed=True)] == [
+        "28 %",
+        "3.1 %",
+        "100 %",
+        "-14 %",
+    ]
+    assert percent(0.02, signed=True) == "+2 %"
+
+
+def test_there_is_one_way_to_write_percent() -> None:
+    """A format such as .0% joins the sign to its number."""
+    for file in Path(shipid.__file__).parent.rglob("*.py"):
+        assert not re.search(r":[+.\d]*%\}", file.read_text()), file

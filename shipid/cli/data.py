@@ -14,7 +14,7 @@ from shipid.cli.options import MappingName
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import criterion_table, measure_table, reading, table
 from shipid.errors import ShipidError
-from shipid.units import plural
+from shipid.units import percent, plural
 
 if TYPE_CHECKING:
     from shipid.logs.guess.pose import Frame
@@ -121,10 +121,10 @@ def _draft(
         {"column": c.name, "from": c.source, "unit": c.unit, "sure": c.confidence, "why": c.evidence}
         for c in guessed.columns
     ]
-    shown = ((*list(c.values())[:3], f"{c['sure']:.0%}", c["why"]) for c in columns)
+    shown = ((*list(c.values())[:3], percent(c["sure"]), c["why"]) for c in columns)
     answer.rows("columns", columns, table(["column", "from", "unit", "sure", "why"], shown))
     findings = [{"finding": f.kind, "sure": f.confidence, "what": f.sentence} for f in guessed.findings]
-    shown = ((f["finding"], f"{f['sure']:.0%}", f["what"]) for f in findings)
+    shown = ((f["finding"], percent(f["sure"]), f["what"]) for f in findings)
     answer.rows("findings", findings, table(["finding", "sure", "what"], shown) if findings else None)
     source = guessed.source
     if source.pattern is not None:

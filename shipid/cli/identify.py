@@ -14,7 +14,7 @@ from shipid.cli.completion import files
 from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
 from shipid.cli.terminal import digits, ended_by, iterations, steps, table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import plural
+from shipid.units import percent, plural
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
@@ -365,7 +365,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
         answer.say("To run next, by information per hour:")
         ranked = [
             [row["manoeuvre"], *(f"{row[name]:.2f}" for name in ("hours", "gain", "per_hour")), row["narrows"],
-             f"{1 - row['after'] / row['before']:.0%}"]
+             percent(1 - row['after'] / row['before'])]
             for row in outcome.programme.head(10).to_dict("records")
         ]  # fmt: skip
         heads = ["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"]

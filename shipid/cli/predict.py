@@ -11,6 +11,7 @@ from shipid.cli.completion import cells
 from shipid.cli.options import Adaptive, Folder, Kind, check_band
 from shipid.cli.outputs import check_output
 from shipid.errors import ShipidError
+from shipid.units import percent
 
 
 def predict(
@@ -38,5 +39,5 @@ def predict(
     if frame.attrs["gaps"]:
         typer.echo(f"{frame.attrs['gaps']}: a past over one of them is interpolated")
     if outside:
-        sentence = f"{outside:.0%} of the instants lie outside what the cell was trained on (column `outside`)"
+        sentence = f"{percent(outside)} of the instants lie outside what the cell was trained on (column `outside`)"
         typer.echo(sentence + (": no band is promised there" if level is not None else ""))

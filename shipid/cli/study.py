@@ -15,7 +15,7 @@ from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyN
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import counted, digits, draw, ended_by, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import decimals_of, length_text
+from shipid.units import decimals_of, length_text, percent
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -192,7 +192,7 @@ def study_screen(
     frame = screen.joined(list(blocks))
     write_table(file, frame)
     spread = screen.spread(frame)
-    shares = [f"{share:.0%}" for share in screen.SHARES]
+    shares = [percent(share) for share in screen.SHARES]
     rows = [[*map(str, row[:3]), *map(length_text, row[3:])] for row in spread.itertuples(index=False)]
     correlations = screen.drivers(frame)
     pairs = [
@@ -240,9 +240,9 @@ def study_rotate(
     for row in over.to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
         name = plan.label(row["foundation"], row["method"])
-        inside = "-" if row["coverage"] != row["coverage"] else f"{row['coverage']:.0%}"
+        inside = "-" if row["coverage"] != row["coverage"] else percent(row["coverage"])
         rows.append([name, *(digits(row[column]) for column in columns), inside, better])
-    band = f"in band of {plan.level:.0%}"
+    band = f"in band of {percent(plan.level)}"
     heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
     verdicts = rotate.turn_findings(frame, plan)
     naive = frame.groupby("test")["naive"].first().mean()
@@ -401,7 +401,7 @@ def _difference(row: Mapping[Any, Any], banded: bool) -> list[str]:
     interval = f" [{row['low']:+.{places}f}, {row['high']:+.{places}f}]" if known else ""
     amount = "A" if row["N_D"] == 0 else str(row["N_D"])
     shares = row["coverage_first"], row["coverage_other"]
-    inside = ", ".join("-" if share != share else f"{share:.0%}" for share in shares)
+    inside = ", ".join("-" if share != share else percent(share) for share in shares)
     return [
         *(row["family"], row["method"], amount, str(row["cells"])),
         *(f"{row[side]:.{places}f}" for side in ("first", "other")),
@@ -431,7 +431,7 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     if len(bands):
         level = worlds[0].plan.level
         answer.say(
-            f"bands of {level:.0%}: share of whole test paths inside, and mean radius [m], mean [least, greatest]:"
+            f"bands of {percent(level)}: share of whole test paths inside, and mean radius [m], mean [least, greatest]:"
         )
     rows = [
         [

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from shipid.errors import visible
-from shipid.units import length_text
+from shipid.units import length_text, percent
 
 if TYPE_CHECKING:
     from shipid.study.progress import Watch
@@ -98,7 +98,7 @@ def reading(log: Path) -> Iterator[Callable[[float], None]]:
         if step > last[0]:
             last[0] = step
             print(
-                f"{chr(13) if tty else ''}{log.name}: {share:.0%} read",
+                f"{chr(13) if tty else ''}{log.name}: {percent(share)} read",
                 end="" if tty else "\n",
                 file=sys.stderr,
                 flush=True,

@@ -33,7 +33,7 @@ from shipid.simulation.log import aboard, horizontal
 from shipid.simulation.manoeuvre import Approached, Excitation
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import shaft_speed, standard
-from shipid.units import GRAVITY, RPM
+from shipid.units import GRAVITY, RPM, percent
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -268,7 +268,9 @@ def _sensitivities(
             memory=tiled(cut.memory) if cut.memory else None, **how,
         )  # fmt: skip
         if path.diverged.any():
-            raise ShipidError(f"{vessel.name} diverges with a factor changed by {PERTURBED:.0%}: take a shorter step")
+            raise ShipidError(
+                f"{vessel.name} diverges with a factor changed by {percent(PERTURBED)}: take a shorter step"
+            )
         states = {name: path[name] for name in dynamics(vessel).state}
         seen = states | horizontal(states)
         return np.stack([seen[name] / width for name, width in signals.items()], axis=-1)

@@ -38,7 +38,7 @@ from shipid.identification.unstable import grows, growth_in
 from shipid.interrupts import uninterrupted
 from shipid.physics.signals import is_shaft
 from shipid.simulation.measured import measure_standard
-from shipid.units import plural
+from shipid.units import percent, plural
 from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -214,8 +214,8 @@ def without_shared(
         clocks = "where every run has its clock, metadata['clock'] must be 'run'"
         raise DataError(f"every run shares its moments with the runs held out: hold out others ({clocks})", path="runs")
     warnings = tuple(
-        f"run {run} shares {'less than 1%' if share < 0.01 else f'{share:.0%}'} of its rows in time with the runs held "
-        "out: " + ("they take no part in the fit" if run in left else "it takes no part in the fit")
+        f"run {run} shares {'less than 1 %' if share < 0.01 else percent(share)} of its rows in time with the runs "
+        "held out: " + ("they take no part in the fit" if run in left else "it takes no part in the fit")
         for run, share in lost.items()
         if share > 0
     )

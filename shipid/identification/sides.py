@@ -20,7 +20,7 @@ from shipid.data.dataset import Dataset
 from shipid.identification.free_run import MEASURED
 from shipid.identification.segments import near_a_row
 from shipid.physics.signals import steers
-from shipid.units import DEGREE
+from shipid.units import DEGREE, percent
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
@@ -151,9 +151,9 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
         chance = _chance(apart, float(np.hypot(worse["error"], better["error"])), freedom)
         if chance <= level and abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
             sentences.append(
-                f"the error of the turning{where} is {worse['turning']:+.0%} to {worse['side']} and "
-                f"{better['turning']:+.0%} to {better['side']}: the model lacks what makes the sides differ; to run "
-                f"next: turns to both sides{where}"
+                f"the error of the turning{where} is {percent(worse['turning'], signed=True)} to {worse['side']} and "
+                f"{percent(better['turning'], signed=True)} to {better['side']}: the model lacks what "
+                f"makes the sides differ; to run next: turns to both sides{where}"
             )
             continue
         better, worse = sorted(of, key=lambda row: float(row["r"]))

@@ -11,7 +11,7 @@ from shipid.measures.record import Array, Record, helm_over, plateaus, released
 from shipid.measures.turning import MIDSHIPS
 from shipid.measures.zigzag import last_over
 from shipid.physics.signals import is_command, is_shaft, orders_thrust, steers, turns_round
-from shipid.units import DEGREE
+from shipid.units import DEGREE, percent
 
 STATES = ("t", "north", "east", "psi", "u", "v", "r")
 LEAST_HELM, LEAST_TURN = 3 * DEGREE, 90 * DEGREE
@@ -112,7 +112,7 @@ def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
     within = slice(over.row, last)
     if straight and (share[within] <= -0.5).any() and off[within].max() < LEAST_TURN:
         both = float((np.abs(share[within]) >= 0.5).mean())
-        few = f"the helm is over to either side for {both:.0%} of the time only"
+        few = f"the helm is over to either side for {percent(both)} of the time only"
         return (("zigzag",), "") if both >= MOSTLY else ((), few)
     levels = {round(float(record.helm[b]) / APART) for _, b in plateaus(record.t, record.helm, APART / 4)}
     if len(levels) >= MANY:

@@ -16,7 +16,7 @@ from shipid.report.section import Section
 from shipid.report.selection import exemplars, sizes
 from shipid.report.tables import Cell, Table, figure, length_places, text
 from shipid.report.wording import counted, listed, metres
-from shipid.units import plural
+from shipid.units import percent, plural
 
 WORST = 12  # test runs in the table of those that pay
 BY = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
@@ -24,10 +24,6 @@ BY = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
 
 def _frame(content: ReportContent, name: str) -> pd.DataFrame:
     return content.frames.get(name, pd.DataFrame())
-
-
-def _percent(value: float) -> str:
-    return f"{100 * value:.0f} %"
 
 
 def _judged(frame: pd.DataFrame) -> float:
@@ -94,9 +90,7 @@ def coverage(content: ReportContent) -> Figure | None:
 
 
 def _words(row: dict[Hashable, Any]) -> str:
-    inside = (
-        f"{_percent(row['coverage'])} [{_percent(row['low'])}, {_percent(row['high'])}] of {_percent(row['level'])}"
-    )
+    inside = f"{percent(row['coverage'])} [{percent(row['low'])}, {percent(row['high'])}] of {percent(row['level'])}"
     return f"{inside}, mean radius {metres(row['width'])}"
 
 
@@ -109,7 +103,7 @@ def _takeaway(frame: pd.DataFrame, size: int) -> str:
     by_width = mine.sort_values("width")
     least, most = by_width.iloc[0], by_width.iloc[-1]
     text = (
-        f"With N_D = {size}, bands of {_percent(level)} hold {_percent(float(mine.coverage.mean()))} of the test paths "
+        f"With N_D = {size}, bands of {percent(level)} hold {percent(float(mine.coverage.mean()))} of the test paths "
     )
     text += f"on average over {counted(len(mine), 'model')}; "
     text += f"the mean radius is {metres(least.width)} ({least.model})"
@@ -153,7 +147,7 @@ def table(content: ReportContent) -> Table | None:
         [
             text(row["model"]),
             figure(row["N_D"], 0),
-            Cell(_percent(row["level"]), row["level"]),
+            Cell(percent(row["level"]), row["level"]),
             _share(row),
             figure(row["width"], width),
             figure(row["end"], end),
@@ -174,7 +168,7 @@ def table(content: ReportContent) -> Table | None:
 
 
 def _share(row: dict[Hashable, Any]) -> Cell:
-    return Cell(f"{_percent(row['coverage'])} [{_percent(row['low'])}, {_percent(row['high'])}]", row["coverage"])
+    return Cell(f"{percent(row['coverage'])} [{percent(row['low'])}, {percent(row['high'])}]", row["coverage"])
 
 
 def _refused(content: ReportContent) -> str:
@@ -217,7 +211,7 @@ def _lowest(frame: pd.DataFrame) -> str:
     if kinds.empty:
         return ""
     worst = kinds.sort_values("coverage").iloc[0]
-    text = f"Bands hold least at {worst.group} ({worst.model}): {_percent(worst.coverage)} of the paths."
+    text = f"Bands hold least at {worst.group} ({worst.model}): {percent(worst.coverage)} of the paths."
     better = worst.by == "kind" and not worst.note and kinds.group[kinds.by.eq("kind")].nunique() > 1
     return f"{text} --kind of shipid predict gives the band that is calibrated for this kind alone." if better else text
 
@@ -233,7 +227,7 @@ def worst(content: ReportContent) -> Table | None:
             text(row["run"]),
             text(row["kind"]),
             text(row["model"]),
-            Cell(_percent(row["coverage"]), row["coverage"]),
+            Cell(percent(row["coverage"]), row["coverage"]),
             figure(row["reach"], 2),
         ]
         for row in shown.to_dict("records")

@@ -23,7 +23,7 @@ from shipid.simulation.manoeuvre import Manoeuvre, order_keys, order_unit
 from shipid.simulation.perform import perform
 from shipid.simulation.sea import Sea, draw_components, share_outside, table_range, wave_loads
 from shipid.simulation.sensors import Sensor, measure
-from shipid.units import DEGREE
+from shipid.units import DEGREE, percent
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import uniform
@@ -147,8 +147,8 @@ def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
     low, high = table_range(vessel)
     lost = share_outside(sea, low, high)
     if lost > MOST_LOST:
-        message = f"{sea.T_p:g} s: {lost:.0%} of the sea's energy lies outside the tables of {truth.vessel}"
-        remedy = f"{low:g} to {high:g} rad/s; at most {MOST_LOST:.0%} may"
+        message = f"{sea.T_p:g} s: {percent(lost)} of the sea's energy lies outside the tables of {truth.vessel}"
+        remedy = f"{low:g} to {high:g} rad/s; at most {percent(MOST_LOST)} may"
         raise DocumentError(f"{message}, {remedy}", path="truth.waves.T_p")
 
 

@@ -32,7 +32,7 @@ from shipid.predictor import Predictor
 from shipid.study.apply import Band, along_run
 from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
-from shipid.units import length_text, plural
+from shipid.units import length_text, percent, plural
 
 Array = np.ndarray
 TRACK = ["run", "t", "north", "east"]
@@ -243,7 +243,9 @@ def summary(played: Played) -> list[str]:
         lines.append("the plan was: orders stay as they are, since at sea later orders are not known")
     latency = 1e3 * instants["latency"].to_numpy()
     lines.append(f"latency: median {np.median(latency):.1f} ms, 99 % below {np.quantile(latency, 0.99):.1f} ms")
-    lines.append(f"alarm: at {outside.sum()} of {len(outside)} instants ({outside.mean():.0%}) outside of the training")
+    lines.append(
+        f"alarm: at {outside.sum()} of {len(outside)} instants ({percent(outside.mean())}) outside of the training"
+    )
     lines += _spans(instants)
     lines += _promise(played)
     lines.append("error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm")
@@ -282,21 +284,21 @@ def _held(instants: pd.DataFrame, band: Band, bands: Bands) -> list[str]:
     judged = np.isfinite(reach)
     promised = judged & ~outside
     if not judged.any():
-        return [f"band of {band.level:.0%}: no whole path can be judged, the log ends before"]
+        return [f"band of {percent(band.level)}: no whole path can be judged, the log ends before"]
     held = reach <= instants["factor"].to_numpy()
     of = "" if band.kind is None else f" of the kind {band.kind!r}"
     adapts = "" if band.rate is None else f", adapting at {band.rate:g}"
     inside = "all in alarm, where nothing is promised"
     if promised.any():
-        inside = f"{held[promised].mean():.0%} of the {promised.sum()} without alarm, where it is promised"
+        inside = f"{percent(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
     lines = [
-        f"band of {band.level:.0%}{of}{adapts}: it held {held[judged].mean():.0%} of the {judged.sum()} whole "
-        f"paths that can be judged, {inside}"
+        f"band of {percent(band.level)}{of}{adapts}: it held {percent(held[judged].mean())} of the {judged.sum()} "
+        f"whole paths that can be judged, {inside}"
     ]
     if promised.any():
         _, most = share_interval(held[promised], instants["run"].to_numpy()[promised])
         if most < band.level:
-            lines.append(f"  that is fewer than {band.level:.0%} by more than chance: {CHANGED}")
+            lines.append(f"  that is fewer than {percent(band.level)} by more than chance: {CHANGED}")
         lines += _by_level(reach[promised], band, bands)
     return lines
 
@@ -308,7 +310,9 @@ def _by_level(reach: Array, band: Band, bands: Bands) -> list[str]:
     if band.rate is not None or not usual > 0:
         return []
     levels = sorted(level for level in {*STANDARD, band.level} if bands.promises(level, band.kind))
-    shares = (f"{level:.0%} held {(reach <= float(at_level(table, level) / usual)).mean():.0%}" for level in levels)
+    shares = (
+        f"{percent(level)} held {percent((reach <= float(at_level(table, level) / usual)).mean())}" for level in levels
+    )
     return [f"  by level, without alarm: {', '.join(shares)}"] if levels else []
 
 

@@ -21,7 +21,7 @@ from shipid.study.plan import Plan
 from shipid.study.results import Results, judged_cells, naive_summary
 from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, span, too_few
 from shipid.study.worth import Estimate, break_even, runs_without_physics
-from shipid.units import plural
+from shipid.units import percent, plural
 
 MANY = 3  # methods that learn: their comparison is what the study asks
 SHOWN = 5  # models that a sentence lists
@@ -181,7 +181,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     known = known[known["A"] > 0]  # an exact model has no error that could be left
     if len(known):
         left = known["H"] / known["A"]
-        share = span(f"{left.min():.0%}", f"{left.max():.0%}")
+        share = span(percent(left.min()), percent(left.max()))
         text = (
             f"Compensation with {runs(largest)} leaves {share} of the error of physics "
             f"alone (over {len(known)} {plural(len(known), 'model')})."

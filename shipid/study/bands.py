@@ -15,6 +15,7 @@ from shipid.hybrid.bands import Region
 from shipid.predictor import NO_BAND
 from shipid.study.results import Results
 from shipid.study.verdict import metres, named, span
+from shipid.units import percent
 
 Array = np.ndarray
 SHOWN = (0.5, 0.8, 0.9, 0.95)
@@ -164,15 +165,14 @@ def answer(results: Results) -> list[tuple[str, str]]:
     radius = span(metres(top["width"].min()), metres(top["width"].max()))
     amount = int(top["N_D"].iloc[0])
     mean = f"mean of {len(top)} models with {amount} runs; 95 % interval of one" if len(top) > 1 else ""
-    spread = f"{mean or f'with {amount} runs; 95 % interval'} {low:.0%} to {high:.0%}"
-    sentence = (
-        f"Bands of {level:.0%} held {share:.0%} of the whole test paths ({spread}); their mean radius is {radius}."
-    )
+    spread = f"{mean or f'with {amount} runs; 95 % interval'} {percent(low)} to {percent(high)}"
+    sentence = f"Bands of {percent(level)} held {percent(share)} of the whole test paths ({spread}); "
+    sentence += f"their mean radius is {radius}."
     sentences = [(sentence, "coverage")]
     groups = groups_frame(results)
     few = sorted(set(groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]))
     if few:
-        text = f"Too few runs calibrate a band of {level:.0%} for one kind of manoeuvre alone: {', '.join(few)}."
+        text = f"Too few runs calibrate a band of {percent(level)} for one kind of manoeuvre alone: {', '.join(few)}."
         sentences.append((text, "coverage-groups"))
     return sentences
 

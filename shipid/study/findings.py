@@ -39,6 +39,7 @@ from shipid.study.verdict import (
     verdict,
     words,
 )
+from shipid.units import percent
 
 Array = NDArray[np.float64]
 CLAIMS = {
@@ -117,7 +118,8 @@ def judged(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs
         f"{measured(about, 1)} less",
         "R3": f"gap {metres(before)} before, {metres(after)} after: {measured(gaps, 0 if narrower else 1)} less",
         "R4": (
-            f"pure data-driven is worst at {share:.0%} of the steps, physics alone included; most often worst: {worst}"
+            f"pure data-driven is worst at {percent(share)} of the steps, physics alone included; "
+            f"most often worst: {worst}"
             if len(rivals.steps[NO_MODEL]) > 1
             else f"worst over the horizon, physics alone included: {worst}"
         ),

@@ -38,6 +38,7 @@ from shipid.study.verdict import (
     undecided,
     verdict,
 )
+from shipid.units import percent
 
 Array = NDArray[np.float64]
 CLAIMS = {
@@ -74,13 +75,13 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     table = _width_table(results, physics, {cell: width for cell, (width, _) in bands.items()})
     sound = tuple(name for name in physics if name in table.H and name in table.A)
     if not table.amounts or len(sound) < 2:
-        return undecided(CLAIMS, f"no two models with physics have a band of {level:.0%}")
+        return undecided(CLAIMS, f"no two models with physics have a band of {percent(level)}")
     cells = judged_cells(results)
     cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin([*sound, NO_MODEL])]
     held = {name: [bands[cell][1] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
     shares = [float(np.mean(held[name])) for name in sound]
     first = narrower(Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals))
-    first["evidence"] += f"; these bands hold {span(f'{min(shares):.0%}', f'{max(shares):.0%}')} of whole paths"
+    first["evidence"] += f"; these bands hold {span(percent(min(shares)), percent(max(shares)))} of whole paths"
     second = kept_promise(np.mean([one for ones in held.values() for one in ones], axis=0), run, level)
     note = too_few(table.runs)
     few = f"; {note}" if note else ""
@@ -125,10 +126,11 @@ def kept_promise(held: Array, run: NDArray[np.str_], level: float) -> Finding:
     """Verdict on B2 from held (S,), the share of models whose band holds the path of a window, and its run (S,)."""
     low, high = share_interval(held, run)
     share, count = float(held.mean()), len(np.unique(run))
-    interval = "" if too_few(count) else f" [{low:.0%}, {high:.0%}]"
-    evidence = f"bands of {level:.0%} hold {share:.0%}{interval} of whole paths ({manoeuvres(count)})"
+    interval = "" if too_few(count) else f" [{percent(low)}, {percent(high)}]"
+    evidence = f"bands of {percent(level)} hold {percent(share)}{interval} of whole paths ({manoeuvres(count)})"
     decided = verdict(low >= level - SHORT, high < level)
-    return _finding("B2", decided if not too_few(count) else "undecided", evidence, **{f"share at {level:.0%}": share})
+    numbers = {f"share at {percent(level)}": share}
+    return _finding("B2", decided if not too_few(count) else "undecided", evidence, **numbers)
 
 
 def _finding(key: str, decided: Verdict, evidence: str, **numbers: float) -> Finding:

@@ -56,7 +56,7 @@ from shipid.study.verdict import (
     verdict,
     weakest,
 )
-from shipid.units import plural
+from shipid.units import percent, plural
 
 Array = NDArray[np.float64]
 CLAIMS = {
@@ -198,7 +198,7 @@ def _S2(grid: Grid) -> Finding:
     shown_for = f"{fallen.sum()} of {len(models)}" if fallen.any() else f"none of {len(models)}"
     evidence = (
         f"H is shown to fall for {shown_for} models; twice the runs lower it by {_range(falls)}; "
-        f"N_D = {grid.amounts[-1]} leaves {left:.0%} of the error at {grid.amounts[0]} in the median"
+        f"N_D = {grid.amounts[-1]} leaves {percent(left)} of the error at {grid.amounts[0]} in the median"
     )
     if not fallen.all():
         evidence += f"; not shown for: {named(m for m, good in zip(models, fallen, strict=True) if not good)}"
@@ -277,8 +277,8 @@ def _S4(grid: Grid) -> Finding:
         chance = _student(worst_moves - calm)
         moves = verdict(chance <= LEVEL, 1 - chance <= LEVEL)
         evidence += (
-            f"; over {orders} nested orders H of these varies by {worst_moves.mean():.0%}, of moderate models by "
-            f"{calm.mean():.0%}"
+            f"; over {orders} nested orders H of these varies by {percent(worst_moves.mean())}, of moderate models by "
+            f"{percent(calm.mean())}"
         )
         numbers |= {"variation of the worst": worst_moves.mean(), "variation of moderate models": calm.mean()}
     split = verdict(bool(better.any() and worse.any()), one_sided)

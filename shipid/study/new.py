@@ -32,7 +32,7 @@ from shipid.study.first_look import Look, first_look
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import all_windows, obtain, over_gaps, partition, prepare
 from shipid.study.survey import Survey, helm_sense, separation, survey, typical_runs
-from shipid.units import GRAVITY, RPM, plural
+from shipid.units import GRAVITY, RPM, percent, plural
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import order_of
@@ -348,7 +348,7 @@ def _flow(seen: Survey) -> str:
     assert seen.stream is not None
     current, share = seen.stream
     towards = float(np.degrees(np.angle(current))) % 360.0
-    return f"a steady {abs(current):.2g} m/s towards {towards:.0f} deg explains {share:.0%} of the difference"
+    return f"a steady {abs(current):.2g} m/s towards {towards:.0f} deg explains {percent(share)} of the difference"
 
 
 def _wrong_velocities(seen: Survey) -> Iterator[str]:

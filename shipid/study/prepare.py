@@ -41,7 +41,7 @@ from shipid.study.declared import Foundation
 from shipid.study.kinds import kinds_of
 from shipid.study.plan import Batch, Plan, beside, mapping_of
 from shipid.study.ranges import check_memory
-from shipid.units import plural
+from shipid.units import percent, plural
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, draw
 
@@ -302,7 +302,8 @@ def _roll_out(
                 drawn = _redraw(plan, foundation, families[foundation.family], share)
                 counter = drawn.variant.counter if drawn.variant else 0
                 notes.append(
-                    f"{foundation.name} diverged on {share:.1%} of the training windows: redrawn, counter {counter}"
+                    f"{foundation.name} diverged on {percent(share, 1)} of the training windows: "
+                    f"redrawn, counter {counter}"
                 )
                 again.append(drawn)
             else:
@@ -461,7 +462,7 @@ def _redraw(plan: Plan, foundation: Foundation, family: Family, share: float) ->
     if counter > MOST_REDRAWS or not any(block.drawn for block in family.perturb):
         tries = f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else ""
         raise DocumentError(
-            f"{foundation.name} diverges on {share:.1%} of the training windows{tries}: "
+            f"{foundation.name} diverges on {percent(share, 1)} of the training windows{tries}: "
             "take a smaller [prediction] step, rk4, or narrower factors",
             file=plan.file,
             path=f"family.{foundation.family}",

@@ -55,6 +55,7 @@ from shipid.study.prepare import (
     window_memory,
 )
 from shipid.study.workers import import_for_workers, on_workers
+from shipid.units import percent
 from shipid.version import __version__
 
 PACKAGES = ("casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
@@ -499,16 +500,15 @@ def _judged(
     words = ", ".join(f"{name} {chosen[name]:.3g}" for name in way.method.varied() if name in chosen)
     failed = ~np.isfinite(one.test_paths).all(axis=(0, 2))
     if failed.any():
-        share = f"physics diverges on {failed.mean():.1%} of the test windows"
+        share = f"physics diverges on {percent(failed.mean(), 1)} of the test windows"
         sentence = share if np.isfinite(one.paths).all() else one.sentence
         return _failed(sentence, "diverged") | {"hyperparameters": words}, None
     instants = instants_of(plan, predictor.vessel, prepared.data, test, one.estimates)
     paths = predictor.predict(instants, one.test_paths)
     failed = _beyond_ships(paths, test.step)
     if failed.any():
-        sentence = (
-            f"the prediction diverges on {failed.mean():.1%} of the test windows: it is farther away than any ship"
-        )
+        where = f"{percent(failed.mean(), 1)} of the test windows"
+        sentence = f"the prediction diverges on {where}: it is farther away than any ship"
         return _failed(sentence, "diverged") | {"hyperparameters": words}, None
     error = summary(position_error(paths, test.future))
     errors = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}

@@ -83,7 +83,7 @@ def test_a_fit_sees_no_moment_of_a_run_held_out(log: Dataset) -> None:
         fits.append(identify(off(), apart, runs, settings()).factors)
         assert runs == ("M01", "M02", "M03", "M04")
         assert warnings == (
-            "run M04 shares 18% of its rows in time with the runs held out: they take no part in the fit",
+            "run M04 shares 18 % of its rows in time with the runs held out: they take no part in the fit",
         )
     np.testing.assert_array_equal(*fits)
     done = run_identification(off(), shared, settings(), held_out=["M05"])
@@ -103,7 +103,7 @@ def test_runs_that_share_an_end_alone_are_not_said_to_share_nothing(log: Dataset
     apart, _, warnings = outcome.without_shared(Dataset(frame, {**log.metadata, "clock": "shared"}), ["M01"], ["M05"])
     assert len(apart.frame) == len(frame) - 1
     assert warnings == (
-        "run M01 shares less than 1% of its rows in time with the runs held out: they take no part in the fit",
+        "run M01 shares less than 1 % of its rows in time with the runs held out: they take no part in the fit",
     )
 
 

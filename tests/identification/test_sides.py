@@ -70,7 +70,7 @@ def test_an_error_that_comes_with_a_helm_is_found_at_that_helm_alone(seed: int, 
 
 def test_one_side_that_is_worse_is_reported_with_what_to_run_next() -> None:
     sentences = uneven(compared(port=-0.14, starboard=0.02))
-    assert sentences[0].startswith("the error of the turning is -14% to port and +2% to starboard")
+    assert sentences[0].startswith("the error of the turning is -14 % to port and +2 % to starboard")
     assert any(
         "at helm about 30 deg" in sentence and "to run next: turns to both sides" in sentence for sentence in sentences
     )

@@ -76,7 +76,7 @@ def test_a_run_that_is_a_part_of_a_longer_one_is_refused_in_either_order(turned:
     day = recording(3, ("a", "b", "c", "d", "e", "f"))
     cut = Dataset(day.frame[day.frame["run"] == "d"].reset_index(drop=True), day.metadata)
     whole = Dataset(day.frame.assign(run="day").astype({"run": "str"}), day.metadata)
-    with pytest.raises(DataError, match=r"run 'd' has 100% of its rows from day \d\.parquet: a copy would train"):
+    with pytest.raises(DataError, match=r"run 'd' has 100 % of its rows from day \d\.parquet: a copy would train"):
         joined(*((whole, cut) if turned else (cut, whole)))
 
 
@@ -173,7 +173,7 @@ def test_the_command_writes_one_dataset_and_none_over_another(tmp_path: Path) ->
 
 
 def test_a_copy_mixed_clocks_and_another_sea_are_refused() -> None:
-    with pytest.raises(DataError, match=r"day 1\.parquet: run 'a' has 100% of its rows from day 0\.parquet"):
+    with pytest.raises(DataError, match=r"day 1\.parquet: run 'a' has 100 % of its rows from day 0\.parquet"):
         joined(recording(1), recording(1))
     with pytest.raises(DataError, match=r"day 1\.parquet: its clock has no date, that of another has"):
         joined(recording(1, begin=1.7e9), recording(2, ("c",)))

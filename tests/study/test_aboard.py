@@ -19,6 +19,7 @@ from shipid.observer import Observer, observe
 from shipid.predictor import Predictor, fit
 from shipid.study import aboard, apply
 from shipid.study.aboard import play, summary, write
+from shipid.units import percent
 from shipid.vessel.load import load_vessel
 from tests.export.strange import bands_of, drawn
 
@@ -138,9 +139,9 @@ def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tm
         reach = np.hypot(along / path["band_along"], across / path["band_across"]).max()
         assert instants["reach"][i] == pytest.approx(reach, rel=1e-9)
         held.append(reach <= 1)
-    (line,) = (line for line in summary(played) if line.startswith("band of 90%"))
-    assert f"held {np.mean(held):.0%} of the {len(held)} whole paths" in line
-    assert any("50% held" in line and "95%" not in line for line in summary(played))  # ten runs do not promise 95 %
+    (line,) = (line for line in summary(played) if line.startswith("band of 90 %"))
+    assert f"held {percent(np.mean(held))} of the {len(held)} whole paths" in line
+    assert any("50 % held" in line and "95 %" not in line for line in summary(played))  # ten runs do not promise 95 %
     write(played, tmp_path / "seen.csv")
     assert {"band_along", "band_across", "band_course", "band_factor"} <= set(
         pd.read_csv(tmp_path / "seen.csv").columns
@@ -151,7 +152,7 @@ def test_a_summary_says_that_nothing_is_promised_in_alarm(banded, tmp_path):
     _, file = banded
     played = play(file, saved(log(), tmp_path), level=0.9)
     lines = summary(replace(played, instants=played.instants.assign(outside=True)))
-    (line,) = (line for line in lines if line.startswith("band of 90%"))
+    (line,) = (line for line in lines if line.startswith("band of 90 %"))
     assert line.endswith("whole paths that can be judged, all in alarm, where nothing is promised")
 
 
@@ -198,7 +199,7 @@ def test_a_band_adapts_to_the_past_alone(banded, tmp_path):
     assert first.instants["factor"].iloc[:4].eq(1).all()  # no path has ended yet
     for played in (first, second):
         held = (played.instants["reach"] <= played.instants["factor"])[played.instants["reach"].notna()].mean()
-        assert any(f"adapting at 0.3: it held {held:.0%}" in line for line in summary(played))
+        assert any(f"adapting at 0.3: it held {percent(held)}" in line for line in summary(played))
         assert any("times the calibrated one" in line for line in summary(played))
 
 

@@ -37,7 +37,7 @@ def test_best_model_and_its_worth_in_runs(made: Any) -> None:
     runs = 30 * 2 ** (np.log(4.0 / 1.5) / np.log(4.0 / 1.25))
     assert "How many runs? With 10 runs, good (best in validation) has 1.50 m mean error" in advice
     assert f"without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
-    assert "leaves 25% of the error of physics alone (over 2 models)" in advice
+    assert "leaves 25 % of the error of physics alone (over 2 models)" in advice
     assert "Keeping u, v and r constant gives 10.0 m: at 60 runs every model beats it." in advice
     assert "with 60 runs 1 of 2 physics models does better than no physics; bad does worse." in advice
 
@@ -354,7 +354,7 @@ def test_where_the_method_that_judges_has_no_result_others_may_have_one(made: An
 def test_an_exact_model_has_no_error_to_leave(made: Any) -> None:
     H = {"good": (0.1, 0.1), "bad": (3.0, 1.5), "none": (9.0, 4.0)}
     advice = text(made(grid(H), alone={"good": 0.0, "bad": 6.0}))
-    assert "leaves 25% of the error of physics alone (over 1 model)" in advice
+    assert "leaves 25 % of the error of physics alone (over 1 model)" in advice
 
 
 def test_the_map_carries_what_needs_it(made: Any) -> None:

@@ -111,7 +111,7 @@ def test_frames_agree_with_the_cells(results: Results) -> None:
     assert set(groups["by"]) == {"kind", "ahead", "speed"}
     assert (groups["low"] <= groups["coverage"] + 1e-9).all()
     assert set(worst["run"]) == set(results.test.spans)
-    assert bands.answer(results)[0][0].startswith("Bands of 80% held ")
+    assert bands.answer(results)[0][0].startswith("Bands of 80 % held ")
 
 
 def test_one_model_has_one_radius(results: Results) -> None:
@@ -127,7 +127,7 @@ def test_findings_say_what_the_cells_hold(results: Results) -> None:
     means = top.mean()
     ratio = means.loc["wrong", "width"] / means.loc["right", "width"]
     assert verdicts["B1"]["numbers"]["ratio of widths"] == pytest.approx(ratio)
-    assert verdicts["B2"]["numbers"]["share at 80%"] == pytest.approx(means["coverage"].mean())
+    assert verdicts["B2"]["numbers"]["share at 80 %"] == pytest.approx(means["coverage"].mean())
     assert verdicts["B2"]["verdict"] == "undecided", "two test runs decide nothing"
 
 

@@ -91,10 +91,10 @@ def test_data_driven_that_is_worst_at_most_steps(made: Any) -> None:
     curves = {("none", 30, 0): [9.0, 9.0, 9.0, 1.0]}
     results = made(one(1.0, 1.9, 7.0), curves=curves, runs=RUNS)
     assert verdicts(results)["R4"] == "undecided"
-    assert "worst at 75% of the steps" in findings(results)[3]["evidence"]
+    assert "worst at 75 % of the steps" in findings(results)[3]["evidence"]
     assert "most often worst: pure data-driven" in findings(results)[3]["evidence"], "`none` would mean nobody"
     results = made(one(1.0, 1.9, 3.0), runs=RUNS)
-    assert "worst at 0% of the steps" in findings(results)[3]["evidence"]
+    assert "worst at 0 % of the steps" in findings(results)[3]["evidence"]
     assert "most often worst: bad alone" in findings(results)[3]["evidence"]
 
 

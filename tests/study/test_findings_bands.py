@@ -82,7 +82,7 @@ def test_an_order_of_many_models_and_its_opposite_are_seen(power: float, expecte
 def test_a_share_has_an_interval_where_there_are_enough_manoeuvres(runs: int, interval: bool) -> None:
     finding = kept_promise(np.tile([1.0, 1.0, 1.0, 0.0], runs), np.repeat(np.arange(runs).astype(str), 4), LEVEL)
     assert ("[" in finding["evidence"]) == interval
-    assert finding["numbers"] == {"share at 90%": 0.75}
+    assert finding["numbers"] == {"share at 90 %": 0.75}
 
 
 @pytest.mark.filterwarnings("error")

@@ -153,7 +153,7 @@ def test_S3_an_order_that_comes_by_chance_is_undecided(judged: Any) -> None:
 def test_S4_worst_and_calm(judged: Any) -> None:
     calm = judged(seeds=5, wobble={"high-2": 0.001, "moderate-1": 0.05, "moderate-2": 0.05, "moderate-3": 0.05})["S4"]
     assert calm["verdict"] == "refuted"
-    assert "over 5 nested orders H of these varies by 0%, of moderate models by 6%" in calm["evidence"]
+    assert "over 5 nested orders H of these varies by 0 %, of moderate models by 6 %" in calm["evidence"]
     all_better = judged({**H, "high-2": (7.0, 3.0, 0.7)}, seeds=5)["S4"]
     assert all_better["verdict"] == "refuted"
     assert (

@@ -208,7 +208,7 @@ def test_divergence_on_test_windows_only_is_shown_never_redrawn(
     assert np.isnan(accuracy["mean"])
     rows = {row["foundation"]: row for row, *_ in run_batch(plan, prepared, plan.batches[0], "cpu")}
     assert rows["brittle-1"]["status"] == "diverged"
-    assert "50.0%" in rows["brittle-1"]["sentence"]
+    assert "50.0 %" in rows["brittle-1"]["sentence"]
     assert np.isnan(rows["brittle-1"]["H"])
     assert rows["none"]["status"] == "ok"
 
