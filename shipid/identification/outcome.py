@@ -219,6 +219,8 @@ def without_shared(
         for run, share in lost.items()
         if share > 0
     )
+    alone = [run for run, share in lost.items() if not share and run not in left]
+    warnings += tuple(f"run {run} has a single row: it takes no part in the fit" for run in alone)
     return apart, left, warnings
 
 

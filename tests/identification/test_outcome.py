@@ -107,6 +107,14 @@ def test_runs_that_share_an_end_alone_are_not_said_to_share_nothing(log: Dataset
     )
 
 
+def test_a_run_of_a_single_row_is_named_and_left_out(log: Dataset) -> None:
+    whole = log.select(["M01", "M02"])
+    single = Dataset(pd.concat([whole.frame, log.select(["M03"]).frame.head(1)], ignore_index=True), log.metadata)
+    _, runs, warnings = outcome.without_shared(single, single.runs, [])
+    assert runs == ("M01", "M02")
+    assert warnings == ("run M03 has a single row: it takes no part in the fit",)
+
+
 def test_it_tells_what_the_parts_tell(identified: Identified, log: Dataset) -> None:
     alone = identify(off(), log, ["M01", "M02", "M03", "M04"], settings())
     assert identified.runs == alone.runs
