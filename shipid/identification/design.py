@@ -168,6 +168,25 @@ def informed(
     return [Informed(one, each[cut.runs == number].sum(axis=0)) for number, one in enumerate(choice)]
 
 
+def informed_of_possible(vessel: Vessel, choice: Sequence[Candidate], *args: Any, **how: Any) -> list[Informed]:
+    """As `informed`, without the candidates that cannot be simulated; ShipidError where none can."""
+    try:
+        return informed(vessel, choice, *args, **how)
+    except ShipidError as error:
+        if len(choice) < 2:
+            raise
+        reason = error
+    result = []
+    for one in choice:
+        try:
+            result += informed(vessel, [one], *args, **how)
+        except ShipidError as error:  # the ship may perform the others
+            reason = error
+    if not result:
+        raise reason
+    return result
+
+
 def performed(
     vessel: Vessel,
     choice: Sequence[Candidate],

@@ -305,6 +305,10 @@ def run_identification(
         warnings += tuple(_unused(outputs, settings))
         groups = _groups(pair[AFTER], dataset, tested or fitted, settings)
         warnings += uneven(groups)
+        ranked = None
+        if programme:
+            ranked, missing = _programme(pair[AFTER], dataset, fitted, solution, judged)
+            warnings += tuple(filter(None, (missing,)))
         if refused:
             warnings = (*warnings, f"no bands on standard manoeuvres: {refused}")
         return Identified(
@@ -319,7 +323,7 @@ def run_identification(
             free=pairs,
             manoeuvres=manoeuvres,
             colours=_colours(solution),
-            programme=_programme(pair[AFTER], dataset, fitted, solution, judged) if programme else None,
+            programme=ranked,
             profiles=curves,
             warnings=warnings,
             groups=groups,
@@ -541,22 +545,32 @@ def _colours(solution: Solution) -> pd.DataFrame:
 
 def _programme(
     vessel: Vessel, dataset: Dataset, runs: Sequence[str], solution: Solution, judged: Statistics
-) -> pd.DataFrame:
-    """Ranked manoeuvres at the median speed of the fitted runs and at half of it, within the recorded shaft speeds."""
+) -> tuple[pd.DataFrame | None, str]:
+    """Ranked manoeuvres at the median speed of the fitted runs and at half of it, within the recorded shaft speeds.
+
+    Also a sentence on those that the identified vessel cannot perform; without any other there is no table.
+    """
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     speed = float(np.median(np.hypot(rows["u"], rows["v"])))
     shafts = [name for name in dynamics(vessel).commands if is_shaft(name)]
     most = 60 * max(float(rows[name].abs().max()) for name in shafts) if shafts else float("inf")
     unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
-    choice = design.candidates(vessel, (speed / 2, speed), design.Limits(n_rpm=most))
     motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
     spread = {name: width * (residual_level(judged, name) or EXACT) for name, width in motions.items()}
-    contributions = design.informed(
-        vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
-        interval=settings.step,
-    )  # fmt: skip
+    try:
+        choice = design.candidates(vessel, (speed / 2, speed), design.Limits(n_rpm=most))
+        contributions = design.informed_of_possible(
+            vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
+            interval=settings.step,
+        )  # fmt: skip
+    except ShipidError as error:  # no shaft speed gives these speeds, or the ship has no length
+        return None, f"no manoeuvres to run next: {error.message}"
+    possible = {one.candidate.title for one in contributions}
+    lacking = [one.title for one in choice if one.title not in possible]
+    words = f"not among the manoeuvres to run next, for the identified ship cannot perform them: {'; '.join(lacking)}"
     prior = np.where(np.isfinite(solution.prior_widths), 1 / solution.prior_widths**2, 0.0)
-    return design.rank(contributions, unknown.paths, judged.information + np.diag(prior))
+    table = design.rank(contributions, unknown.paths, judged.information + np.diag(prior))
+    return table, words if lacking else ""
 
 
 def residual_level(judged: Statistics, signal: str) -> float:

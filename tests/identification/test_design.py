@@ -9,7 +9,17 @@ import pytest
 
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
-from shipid.identification.design import Candidate, Informed, Limits, _cut, allowed, candidates, informed, rank
+from shipid.identification.design import (
+    Candidate,
+    Informed,
+    Limits,
+    _cut,
+    allowed,
+    candidates,
+    informed,
+    informed_of_possible,
+    rank,
+)
 from shipid.simulation.manoeuvre import (
     Approached,
     CrashStop,
@@ -109,6 +119,21 @@ def test_sensitivities_are_those_of_the_trajectory() -> None:
     sharp = informed(SHIP, CHOICE[:1], GROUPS, weights={k: w / 2 for k, w in WEIGHTS.items()})[0].information
     assert (np.diag(short) < np.diag(informed_choice()[0].information)).all()
     np.testing.assert_allclose(sharp, 4 * informed_choice()[0].information, rtol=1e-9)
+
+
+def test_what_the_ship_cannot_perform_is_left_out_and_the_others_are_as_they_were() -> None:
+    wild = SHIP.with_values({"hull.derivatives.N_rrr": 2e10})  # she spins up in a hard turn
+    with pytest.raises(ShipidError, match="diverges"):
+        informed(wild, CHOICE, GROUPS, weights=WEIGHTS)
+    some = informed_of_possible(wild, CHOICE, GROUPS, weights=WEIGHTS)
+    titles = {kind(one.candidate.title) for one in some}
+    assert "speed" in titles
+    assert "turning" not in titles
+    speed = next(one for one in some if kind(one.candidate.title) == "speed")
+    alone = informed(wild, [speed.candidate], GROUPS, weights=WEIGHTS)[0]
+    np.testing.assert_allclose(speed.information, alone.information, rtol=1e-9)
+    with pytest.raises(ShipidError, match="diverges"):
+        informed_of_possible(wild, [one for one in CHOICE if kind(one.title) == "turning"], GROUPS, weights=WEIGHTS)
 
 
 def test_limits_of_the_actuators_hold() -> None:

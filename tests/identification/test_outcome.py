@@ -6,8 +6,10 @@ import math
 import os
 import signal
 import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,6 +18,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.identification import outcome
+from shipid.identification.design import Candidate, Informed
 from shipid.identification.free_run import ALL, CHANNELS, MEASURED, free_runs
 from shipid.identification.outcome import (
     AFTER,
@@ -220,6 +223,31 @@ def test_a_programme_follows_data_without_noise(monkeypatch: pytest.MonkeyPatch)
     table = run_identification(off(), exact, settings(parameters=FEW[:1]), programme=True).programme
     assert table is not None
     assert np.isfinite(table.select_dtypes("number")).all(axis=None)
+
+
+@pytest.mark.parametrize("none", [False, True])
+def test_a_fit_stays_where_manoeuvres_to_run_next_cannot_be_performed(
+    none: bool, log: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before, one that diverged ended the command without a word of the fit."""
+    every = outcome.design.informed
+
+    def informed(vessel: Vessel, choice: Sequence[Candidate], *args: Any, **how: Any) -> list[Informed]:
+        if none or any(one.title.startswith("turning") for one in choice):
+            raise ShipidError("she diverges")
+        return every(vessel, choice, *args, **how)
+
+    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(outcome.design, "informed", informed)
+    done = run_identification(off(), log.select(["M01", "M02"]), settings(parameters=FEW[:1]), programme=True)
+    assert done.solution.status == "ok"
+    if none:
+        assert done.programme is None
+        assert "no manoeuvres to run next: she diverges" in done.warnings
+    else:
+        assert done.programme is not None
+        assert not done.programme["manoeuvre"].str.startswith("turning").any()
+        assert any(line.startswith("not among the manoeuvres to run next") for line in done.warnings)
 
 
 def test_the_programme_is_ranked(identified: Identified) -> None:
