@@ -45,7 +45,7 @@ SWEEPS = 2  # over all groups taken, once every one is taken
 WORTH = 0.06  # of the error that a further group must save
 SAVING = 0.15  # of the error that all groups together must save, else nothing is reported
 PENALTY = 3.0  # times the error of constant u, v, r: a prediction that diverges
-STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading and of the speed over the horizon: a steady straight run
+STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading at every step and of the speed at the end: a steady straight run
 TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from which the turning is judged
 FEW = 3  # windows
 MODEST = 5.0  # factor
@@ -450,8 +450,7 @@ def _turning(vessel: Vessel, windows: Windows, instants: Instants) -> float | No
 
 def _facts(vessel: Vessel, windows: Windows, share: float | None) -> Iterable[str]:
     """Sentences on speed against shaft, and turning against helm; share : as of `_turning`."""
-    turned = windows.states["psi"][-1] - windows.columns["psi"]
-    steady = _steady_speeds(vessel, windows, turned)
+    steady = _steady_speeds(vessel, windows)
     if steady is not None:
         seen, orders = steady
         held = steady_speed(vessel, orders)
@@ -481,17 +480,18 @@ def _unit(vessel: Vessel, seen: float, orders: Mapping[str, float]) -> str:
     return ""
 
 
-def _steady_speeds(vessel: Vessel, windows: Windows, turned: Array) -> tuple[float, dict[str, float]] | None:
+def _steady_speeds(vessel: Vessel, windows: Windows) -> tuple[float, dict[str, float]] | None:
     """Speed of the log [m/s], and its commands [SI], where it goes straight at its fastest; or None."""
     commands = dynamics(vessel).commands
     shafts = [name for name in commands if is_shaft(name) and name in windows.planned]
     if not shafts:
         return None
     u = windows.states["u"]
+    aside = np.abs(windows.states["psi"] - windows.columns["psi"]).max(axis=0)  # in a zigzag the heading comes back
     change = np.abs(u[-1] - windows.columns["u"]) < STEADY * np.abs(u[-1])
     orders = [windows.planned[name] for name in shafts]
     same = np.all([np.ptp(order, axis=0) <= STEADY * np.abs(order[0]) for order in orders], axis=0)
-    straight = change & same & (np.abs(turned) < STRAIGHT) & (u[-1] > 0)
+    straight = change & same & (aside < STRAIGHT) & (u[-1] > 0)
     if not straight.any():
         return None
     driving = max(orders, key=lambda order: float(np.abs(order[0, straight]).max()))[0]

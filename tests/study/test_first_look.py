@@ -181,6 +181,20 @@ def test_a_shaft_that_goes_astern_at_times_has_no_wrong_sign(log: Dataset) -> No
         assert _backwards(replace(windows, planned=planned)) == expected
 
 
+def test_a_zigzag_whose_heading_comes_back_within_the_horizon_is_no_straight_run() -> None:
+    """Its speed is that of a ship in turns, which the vessel that made the log does not hold straight ahead."""
+    ship = load_vessel("gunnerus-28.9")
+    how = {"n_rpm": 150.0, "duration": 90.0, "execute_at": 15.0}
+    frame = perform(
+        ship, [Zigzag(name=f"zz {angle}", angle_deg=angle, **how) for angle in (10, 20)], step=0.1, interval=1.0
+    )
+    frame = frame[[name for name in frame if not str(name).startswith("actual.")]]
+    dataset = Dataset(frame.astype({"run": "str"}), {"clock": "run", "flags": []})
+    for ahead in (20.0, 24.0, 28.0):
+        view = first_look(ship, dataset, dataset.runs, ahead=ahead, step=1.0)
+        assert not view.facts, view.sentence
+
+
 def test_steady_speed_is_that_of_the_published_approach() -> None:
     vessel, orders = load_vessel(SHIP), {"propeller.n": RPM / 60, "rudder.delta": 0.0}
     assert steady_speed(vessel, orders) == pytest.approx(1.179, rel=0.02)
