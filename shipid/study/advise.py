@@ -494,7 +494,7 @@ def _nominal(nominal: pd.DataFrame, largest: int, plan: Plan) -> list[str]:
 
 
 def _how_to_read(case: Case) -> list[str]:
-    """What "no physics" is, what identified models and known commands mean, and what the brackets are."""
+    """What "no physics" is, what identified models and known commands mean, and what brackets hold and do not hold."""
     plan, table, sentences = case.results.plan, case.table, []
     judged = next(way.method for way in plan.methods if way.name == plan.judged)
     mirrored = getattr(judged, "mirror", 0.0) > 0
@@ -531,4 +531,9 @@ def _how_to_read(case: Case) -> list[str]:
             f"Brackets are 95 % intervals over {manoeuvres(table.runs)} of one world; lists of names are corrected for "
             "their length (Holm)."
         )
+        if case.smallest < case.largest and case.results.cells["seed"].nunique() == 1:
+            sentences.append(
+                f"One seed drew the runs: another {case.smallest} may give errors outside the brackets, which more "
+                "grid.seeds show."
+            )
     return sentences

@@ -164,6 +164,21 @@ def test_test_manoeuvres_become_an_interval_and_seeds_do_not(made: Any) -> None:
     assert table.loc["good", ["H", "seeds"]].tolist() == [2.0, 3]
 
 
+def test_one_seed_cannot_see_what_other_runs_would_give(made: Any) -> None:
+    """At the largest amount all seeds may have the same runs; there is nothing to say where it is the only one."""
+    H, words = (
+        {"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (5.0, 4.0)},
+        "One seed drew the runs: another 10 may give",
+    )
+    assert words in text(made(grid(H), runs=8))
+    assert words not in text(made(grid(H)))  # one manoeuvre: no brackets
+    assert words not in text(made({(name, 10, 0): values[0] for name, values in H.items()}, runs=8))
+    cells = {
+        (name, N, seed): value for name in H for N, value in zip((10, 30), H[name], strict=True) for seed in (0, 1)
+    }
+    assert words not in text(made(cells, runs=8))
+
+
 def test_how_good_physics_must_be(made: Any) -> None:
     """H = A / 2 for five models, `none` has 3 m: physics pays below A = 6 m; with 30 runs it is all the same."""
     alone = {f"m{k}": 2.0**k for k in range(5)}
