@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from shipid.study.evidence import FEWEST_RUNS, LEVEL, SEED, resampled_means
 
 Array = NDArray[np.float64]
 FEWEST_MODELS = 4  # for a line of H over A
+STEPS = 400  # of A from its least to its greatest, in an interval
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,9 @@ def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate
     """Accuracy A [m] at which compensated physics is as good as none, at the amount of this place.
 
     A line ln H over ln A is fitted to the models by least squares, and crosses H of `none`; values beyond the models
-    that were tried are bounds. None with fewer than four models, or where all have the same A.
+    that were tried are bounds. The interval holds at least every A at which Student's test over manoeuvres cannot tell
+    the line from `none`: resampled values alone end too early where a few manoeuvres have most of the error. None with
+    fewer than four models, or where all have the same A.
     """
     if len(models) < FEWEST_MODELS:
         return None
@@ -81,19 +84,48 @@ def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate
     limits = float(A.min()), float(A.max())
     if np.isclose(*limits):
         return None
-    return _estimate(_crossing(means[None], limits), _crossing(drawn, limits), table.runs, limits)
+    estimate = _estimate(_crossing(means[None], limits), _crossing(drawn, limits), table.runs, limits)
+    if table.runs < FEWEST_RUNS:
+        return estimate
+    low, high = _open(values, table.counts, limits)
+    return replace(estimate, low=min(estimate.low, low), high=max(estimate.high, high))
+
+
+def _open(values: Array, counts: Array, limits: tuple[float, float]) -> tuple[float, float]:
+    """Least and greatest A within limits at which Student's test, by the jackknife, cannot tell the line from none.
+
+    values : (2, models and none, R).
+    """
+    runs, A = len(counts), np.geomspace(*limits, STEPS)
+    left = np.vstack([counts, counts * (1 - np.eye(runs))])  # all manoeuvres, and all without each in turn
+    centre, slope, margin = _line(np.moveaxis(values @ (left / left.sum(axis=1, keepdims=True)).T, -1, 0))
+    ahead = margin[:, None] - slope[:, None] * (np.log(A) - centre[:, None])  # of none, (1 + R, A)
+    wide = stdtrit(runs - 1, 1 - LEVEL) * np.sqrt(runs - 1) * ahead[1:].std(axis=0)
+    open_below, open_above = np.flatnonzero(ahead[0] <= wide), np.flatnonzero(ahead[0] >= -wide)
+    least = A[max(open_below[0] - 1, 0)] if len(open_below) else limits[1]  # where the least A is not shown to pay
+    most = A[min(open_above[-1] + 1, STEPS - 1)] if len(open_above) else limits[0]
+    return float(least), float(most)
+
+
+def _line(values: Array) -> tuple[Array, Array, Array]:
+    """Line of ln H over ln A: middle of ln A, slope, and how far ln H of none is above the mean of the models.
+
+    values : (B, 2, models and none); each result (B,).
+    """
+    logs = np.log(values)
+    x, y, none = logs[:, 0, :-1], logs[:, 1, :-1], logs[:, 1, -1]
+    middle = x.mean(axis=1)
+    centred = x - middle[:, None]
+    slope: Array = (centred * y).sum(axis=1) / np.maximum((centred**2).sum(axis=1), 1e-12)
+    return middle, slope, none - y.mean(axis=1)
 
 
 def _crossing(values: Array, limits: tuple[float, float]) -> Array:
     """Where the line through (A, H) of models reaches the H of none, within limits; values (B, 2, models and none)."""
-    logs = np.log(values)
-    x, y, none = logs[:, 0, :-1], logs[:, 1, :-1], logs[:, 1, -1]
-    centred = x - x.mean(axis=1, keepdims=True)
-    slope = (centred * y).sum(axis=1) / np.maximum((centred**2).sum(axis=1), 1e-12)
-    margin = none - y.mean(axis=1)  # above 0: the models are better than none in the mean
+    middle, slope, margin = _line(values)
     low, high = np.log(limits)
     rising = slope > 1e-9
-    at = x.mean(axis=1) + np.divide(margin, slope, out=np.zeros_like(margin), where=rising)
+    at = middle + np.divide(margin, slope, out=np.zeros_like(margin), where=rising)
     flat = np.where(margin > 0, high, low)  # no better for being more accurate: all pay, or none does
     crossing: Array = np.exp(np.clip(np.where(rising, at, flat), low, high))
     return crossing

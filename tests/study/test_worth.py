@@ -48,6 +48,35 @@ def test_break_even_by_hand() -> None:
     assert break_even(table(A, {m: [1.0] for m in [*A, "none"]}, (10,)), list(A)[:3], 0) is None
 
 
+@pytest.mark.parametrize("runs", [5, 8, 20])
+def test_a_limit_of_A_reaches_as_far_as_that_of_the_mean_error_of_unequal_manoeuvres(runs: int) -> None:
+    """All errors rise and fall with how hard a manoeuvre is, so ln A is that of its mean; resampling ends too early."""
+    hard = np.random.default_rng(runs).lognormal(0.0, 1.0, runs)
+    alone, trained = {m: a * hard for m, a in A.items()}, {m: a / 2 * hard for m, a in A.items()}
+    H = {name: values[None, None] for name, values in {**trained, "none": 2.1 * hard}.items()}
+    worth = break_even(ErrorTable((10,), np.ones(runs), alone, H), list(A), 0)
+    assert worth is not None
+    assert worth.value == pytest.approx(4.2 * hard.mean())
+    without = np.log((hard.sum() - hard) / (runs - 1))
+    error = np.sqrt((runs - 1) / runs * np.square(without - without.mean()).sum())
+    wide = stats.t.ppf(0.975, runs - 1) * error
+    least, most = worth.limits
+    assert worth.low <= max(worth.value * np.exp(-wide), least) * (1 + 1e-9)
+    assert worth.high >= min(worth.value * np.exp(wide), most) * (1 - 1e-9)
+
+
+def test_where_no_A_is_open_a_line_that_is_nearly_flat_takes_nothing_back() -> None:
+    """It would cross far beyond the models, nobody knows where; that the worst of them pays is sure all the same."""
+    suits = np.random.default_rng(1).normal(1.0, 0.1, (len(A) + 1, 20))
+    errors = {
+        name: H * one for (name, H), one in zip({**dict.fromkeys(A, 1.0), "none": 2.0}.items(), suits, strict=True)
+    }
+    H = {name: values[None, None] for name, values in errors.items()}
+    worth = break_even(ErrorTable((10,), np.ones(20), {m: np.full(20, a) for m, a in A.items()}, H), list(A), 0)
+    assert worth is not None
+    assert worth.low == worth.high == worth.limits[1]
+
+
 @pytest.mark.parametrize(("none", "where"), [(100.0, "above"), (0.01, "below")])
 def test_break_even_beyond_the_models_tried_is_a_bound(none: float, where: str) -> None:
     worth = break_even(table(A, {m: [a / 2] for m, a in A.items()} | {"none": [none]}, (10,)), list(A), 0)
