@@ -132,8 +132,9 @@ def intervals_frame(results: Results) -> pd.DataFrame:
     """95 % interval of H over test manoeuvres, of every model at every amount of data.
 
     Columns: model, N_D, low, high [m]; not numbers with fewer than five test manoeuvres. H is the mean over seeds; what
-    another training would give is in the interval.
+    another training would give is in the interval of every model that learns.
     """
+    learning = {way.name for way in results.plan.methods if way.method.compensates}
     _, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
     cells = results.cells[results.cells["cell"].map(results.paths.__contains__)]
     parts, weights, true = [], counts / counts.sum(), results.test.future
@@ -145,9 +146,11 @@ def intervals_frame(results: Results) -> pd.DataFrame:
             for model, same in mine.groupby("model", sort=False)
         }
         means = np.stack([each.mean(axis=0) for each in errors.values()])
-        noise = training_noise([each @ weights for each in errors.values()])
+        learns = (mine["method"].isin(learning) | mine["family"].isin(results.plan.fitted)).groupby(mine["model"]).any()
+        trained = np.array([bool(learns[model]) for model in errors])
+        noise = training_noise([each @ weights for each, moved in zip(errors.values(), trained, strict=True) if moved])
         seeds = np.array([len(each) for each in errors.values()])
-        judged = mean_errors(means, counts.astype(float), noise * (means @ weights) / np.sqrt(seeds))
+        judged = mean_errors(means, counts.astype(float), trained * noise * (means @ weights) / np.sqrt(seeds))
         parts.append(pd.DataFrame({"model": list(errors), "N_D": N_D, "low": judged.low, "high": judged.high}))
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["model", "N_D", "low", "high"])
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipid.study.error_table import ALONE, _by_run, error_table, intervals_frame
-from shipid.study.evidence import TRAINING, WORTH
+from shipid.study.evidence import TRAINING, WORTH, mean_errors
 from tests.study.byhand import grid
 
 H = {"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}
@@ -72,6 +72,23 @@ def test_intervals_are_about_the_mean_over_seeds_and_more_seeds_narrow_them(made
     expected = np.hypot(hard.std(ddof=1) / np.sqrt(8), noise)
     widths = [(frame["high"] - frame["low"]).to_numpy() for frame in (one, four)]
     np.testing.assert_allclose(widths[1] / widths[0], expected[1] / expected[0])
+
+
+def test_physics_alone_takes_no_training_and_makes_that_of_others_no_smaller(made: Any) -> None:
+    """Its seeds are alike, since it learns nothing: they say nothing of models that do."""
+    by_seed = {"good": (1.0, 1.5), "bad": (2.0, 3.0), "none": (4.0, 6.0)}
+    learned = {(name, 10, seed): H for name, both in by_seed.items() for seed, H in enumerate(both)}
+    still = {("still", 10, seed): 6.0 for seed in range(2)}
+    methods = {"method": [{"name": "drawn", "kind": "path-drawn"}, {"name": "alone", "kind": "alone"}]}
+    alone = dict.fromkeys(("good", "bad", "still"), 6.0)
+    results = made(learned | still, alone=alone, runs=8, planned=8, changes=methods)
+    cells = results.cells
+    mixed = replace(results, cells=cells.assign(method=cells["method"].where(cells["model"] != "still", "alone")))
+    frame, without = (intervals_frame(one).set_index("model") for one in (mixed, made(learned, runs=8)))
+    for name in by_seed:
+        assert frame.loc[name, ["low", "high"]].tolist() == without.loc[name, ["low", "high"]].tolist()
+    exact = mean_errors(6.0 * np.linspace(0.9, 1.1, 8)[None], np.ones(8))
+    assert frame.loc["still", ["low", "high"]].tolist() == pytest.approx([exact.low[0], exact.high[0]])
 
 
 @pytest.mark.parametrize("run", ["aabbb", "ababa", "abab", "bbaa"])
