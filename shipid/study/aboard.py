@@ -30,7 +30,7 @@ from shipid.logs.readers import span_of
 from shipid.observer import observe
 from shipid.predictor import Predictor
 from shipid.study.apply import Band, along_run
-from shipid.study.bands import share_interval
+from shipid.study.bands import share_interval, share_of
 from shipid.study.prepare import states_along
 from shipid.units import length_text, percent, plural
 
@@ -296,9 +296,13 @@ def _held(instants: pd.DataFrame, band: Band, bands: Bands) -> list[str]:
         f"whole paths that can be judged, {inside}"
     ]
     if promised.any():
-        _, most = share_interval(held[promised], instants["run"].to_numpy()[promised])
+        run = instants["run"].to_numpy()[promised]
+        _, most = share_interval(held[promised], run, by_run=True)
         if most < band.level:
-            lines.append(f"  that is fewer than {percent(band.level)} by more than chance: {CHANGED}")
+            share = percent(share_of(held[promised], run))
+            same = share == percent(held[promised].mean())
+            what = "that is" if same else f"in the mean over runs {share}, which is"
+            lines.append(f"  {what} fewer than {percent(band.level)} by more than chance: {CHANGED}")
         lines += _by_level(reach[promised], band, bands)
     return lines
 

@@ -24,7 +24,13 @@ CONFIDENCE = 0.95
 SPEEDS = 3  # groups of equal size
 
 
-def share_interval(held: Array, run: Array) -> tuple[float, float]:
+def share_of(held: Array, run: Array) -> float:
+    """Share of windows (S,) in the mean over runs, as a band promises it: a long run counts as much as a short one."""
+    _, place = np.unique(run, return_inverse=True)
+    return float((np.bincount(place, held) / np.bincount(place)).mean())
+
+
+def share_interval(held: Array, run: Array, by_run: bool = False) -> tuple[float, float]:
     """95 % interval of a share of windows, by Clopper and Pearson for so many windows as those of few runs are worth.
 
     Windows of one run are alike: the number of windows is reduced until their variance is that between runs, and is
@@ -34,19 +40,20 @@ def share_interval(held: Array, run: Array) -> tuple[float, float]:
 
     Parameters
     ----------
-    held : (S,) whether each window lies in its band. run : its run, (S,).
+    held : (S,) whether each window lies in its band. run : its run, (S,). by_run : the interval is of `share_of`.
     """
     _, place = np.unique(run, return_inverse=True)
     sizes = np.bincount(place)
     runs, windows = len(sizes), len(held)
-    share = float(np.mean(held))
-    alike = float(np.square(sizes / windows).sum())
+    shares = np.bincount(place, held) / sizes
+    weights = np.full(runs, 1 / runs) if by_run else sizes / windows
+    share = float(shares.mean() if by_run else np.mean(held))
+    alike = float(np.square(weights).sum())
     worth = 1 / alike  # runs
     count, tail = worth, (1 - CONFIDENCE) / 2
     if runs > 1 and 0 < share < 1:
-        excess = np.bincount(place, held - share)
-        variance = runs / (runs - 1) * float((excess**2).sum()) / windows**2
-        variance = max(variance, alike * float((np.bincount(place, held) / sizes).var(ddof=1)))
+        variance = runs / (runs - 1) * float(np.square(weights * (shares - share)).sum())
+        variance = max(variance, alike * float(shares.var(ddof=1)))
         freedom = (stdtrit(max(windows - 1, 1), tail) / stdtrit(runs - 1, tail)) ** 2
         count = float(np.clip(freedom * share * (1 - share) / max(variance, 1e-12), worth, windows))
     inside = share * count

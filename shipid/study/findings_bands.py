@@ -6,7 +6,8 @@ manoeuvre; it is judged as errors are (`shipid.study.evidence`).
 B1 : at every N_D that has bands the width rises along ln A over the physics models, and it would hardly do so if the
     models had their A in any other order. At full scale, with one accurate and one inaccurate model: the band of the
     inaccurate model is wider at the largest N_D.
-B2 : the share of whole test paths inside their bands is the level, at the largest N_D and in the mean over models.
+B2 : the share of whole test paths inside their bands is the level, at the largest N_D and in the mean over models; each
+    test manoeuvre counts the same, however long it is, as in the promise.
     Confirmed if its 95 % interval lies above the level less 5 points, refuted if it lies below the level.
 """
 
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.metrics import rank_correlation
-from shipid.study.bands import regions, share_interval
+from shipid.study.bands import regions, share_interval, share_of
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable, error_table
 from shipid.study.evidence import FEWEST_MODELS, by_chance, doubling
@@ -124,10 +125,12 @@ def narrower(widths: Widths) -> Finding:
 
 def kept_promise(held: Array, run: NDArray[np.str_], level: float) -> Finding:
     """Verdict on B2 from held (S,), the share of models whose band holds the path of a window, and its run (S,)."""
-    low, high = share_interval(held, run)
-    share, count = float(held.mean()), len(np.unique(run))
+    low, high = share_interval(held, run, by_run=True)
+    share, sizes = share_of(held, run), np.unique(run, return_counts=True)[1]
+    count = len(sizes)
     interval = "" if too_few(count) else f" [{percent(low)}, {percent(high)}]"
-    evidence = f"bands of {percent(level)} hold {percent(share)}{interval} of whole paths ({manoeuvres(count)})"
+    each = "" if (sizes == sizes[0]).all() else ", each counts the same"
+    evidence = f"bands of {percent(level)} hold {percent(share)}{interval} of whole paths ({manoeuvres(count)}{each})"
     decided = verdict(low >= level - SHORT, high < level)
     numbers = {f"share at {percent(level)}": share}
     return _finding("B2", decided if not too_few(count) else "undecided", evidence, **numbers)

@@ -79,8 +79,9 @@ def test_a_long_run_that_is_mostly_outside_breaks_no_promise(sizes: tuple[int, .
     rng, run, below = np.random.default_rng(2), np.repeat(np.arange(len(sizes)), sizes), 0
     for _ in range(400):
         chance = rng.beta(0.9, 0.1, len(sizes))  # of each run; 0.9 in the mean
-        below += bands.share_interval(rng.random(len(run)) < chance[run], run)[1] < 0.9
-    assert below <= binom.ppf(0.999, 400, 0.025)
+        held = rng.random(len(run)) < chance[run]
+        below += np.array([bands.share_interval(held, run, by_run)[1] < 0.9 for by_run in (False, True)])
+    assert (below <= binom.ppf(0.999, 400, 0.025)).all()
 
 
 def test_cells_keep_coverage_and_width(results: Results) -> None:

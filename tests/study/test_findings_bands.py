@@ -30,6 +30,19 @@ def test_a_kept_promise_is_refuted_and_a_broken_one_confirmed_in_at_most_5_perce
     assert sum(held(rng, LEVEL - 0.05) == "confirmed" for _ in range(count)) <= 14
 
 
+def test_long_manoeuvres_that_are_harder_break_no_promise() -> None:
+    """A band promises whole paths of a new run, long or short: 84 % in long and 96 % in short ones are 90 %."""
+    rng, verdicts = np.random.default_rng(6), []
+    share, windows = np.tile([0.84, 0.96], 12), np.tile([60, 6], 12)
+    run = np.repeat(np.arange(24).astype(str), windows)
+    for _ in range(120):
+        each = np.repeat(rng.beta(8 * share, 8 * (1 - share)), windows)
+        finding = kept_promise((rng.random(len(run)) < each).astype(float), run, LEVEL)
+        verdicts.append(finding["verdict"])
+    assert verdicts.count("refuted") <= 14
+    assert "(24 test manoeuvres, each counts the same)" in finding["evidence"]
+
+
 def test_a_plainly_kept_and_a_plainly_broken_promise_are_seen() -> None:
     rng = np.random.default_rng(4)
     assert [held(rng, 0.97, runs=60) for _ in range(20)].count("confirmed") >= 18
