@@ -32,7 +32,10 @@ PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose spe
 SETTLED = 1e-3  # m/s, rad/s: greatest change of a velocity over the last chunk, and greatest yaw rate
 SLOW = 0.02  # s: the same in U^2 / L, for a large and slow ship: her speed is then right to about 1 %
 STRAIGHT = 0.02  # rad in a ship length: a large and slow ship that turns less goes straight
-CREEPING = 0.02  # Froude number: a ship that is slower, or at rest, is taken for one of it
+CREEPING, AT_REST = (
+    0.02,
+    1e-4,
+)  # Froude numbers: a ship below the second, or astern, is taken for one of the first
 KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
 LENGTH, FASTEST = 100.0, 100.0  # m, of a ship whose document does not say; m/s
 REMEDY = 'let a helmsman hold the course (approach = "helmsman"), or start from rest (approach = "rest")'
@@ -257,8 +260,8 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
         orders |= _course(controls, n)
     moving = np.arange(count)
     num_steps = max(round(CHUNK / step), 1)
-    slowest = CREEPING * np.sqrt(GRAVITY * asked.length)
-    reached = np.array([max(_speed(controls, shaft), slowest) for shaft in speeds])
+    of_one, reached = np.sqrt(GRAVITY * asked.length), np.array([_speed(controls, shaft) for shaft in speeds])
+    reached = np.where(reached < AT_REST * of_one, CREEPING * of_one, reached)
     longest = max(LONGEST, *(PASSING * asked.length / reached))
     settled = np.minimum(SETTLED, SLOW * reached**2 / asked.length)
     for _ in range(int(longest / CHUNK)):

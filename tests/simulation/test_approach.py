@@ -150,6 +150,9 @@ def test_a_large_and_slow_ship_reaches_her_speed_whatever_time_that_takes() -> N
         steadily = steady(tanker, np.array([shaft]), step=1.0, method="euler", engine="casadi")
         balanced = fsolve(lambda u, n=shaft: acceleration(tanker.vessel, float(u[0]), tanker.ahead(n))[0], 8 * shaft)
         assert steadily.state["u"][0] == pytest.approx(balanced[0], rel=0.015)
+    creeping = balanced_shaft(tanker, 0.2) or 0.0  # she was said to be steady at 0.15 m/s, and at 0.1 m/s at rest
+    slowly = steady(tanker, np.array([creeping]), step=30.0, method="rk4", engine="casadi")
+    assert slowly.state["u"][0] == pytest.approx(0.2, rel=0.015)
     stopped = steady(tanker, np.array([0.0, 1e-4]), step=1.0, method="euler", engine="casadi")
     np.testing.assert_allclose(stopped.state["u"], 0.0, atol=0.05)  # at rest at once, not after hours of approach
 
