@@ -121,11 +121,11 @@ def _draft(
         {"column": c.name, "from": c.source, "unit": c.unit, "sure": c.confidence, "why": c.evidence}
         for c in guessed.columns
     ]
-    shown = ((*list(c.values())[:3], percent(c["sure"]), c["why"]) for c in columns)
+    shown = ((c.name, c.source, c.unit, percent(c.confidence), c.evidence) for c in guessed.columns)
     answer.rows("columns", columns, table(["column", "from", "unit", "sure", "why"], shown))
     findings = [{"finding": f.kind, "sure": f.confidence, "what": f.sentence} for f in guessed.findings]
-    shown = ((f["finding"], percent(f["sure"]), f["what"]) for f in findings)
-    answer.rows("findings", findings, table(["finding", "sure", "what"], shown) if findings else None)
+    lines = ((f.kind, percent(f.confidence), f.sentence) for f in guessed.findings)
+    answer.rows("findings", findings, table(["finding", "sure", "what"], lines) if findings else None)
     source = guessed.source
     if source.pattern is not None:
         count = f"{source.held} runs" if source.parts else "as many runs"

@@ -517,13 +517,12 @@ def _judged(
 
 
 def _beyond_ships(paths: Array, step: float) -> NDArray[np.bool_]:
-    """Which windows (S,) have a place of paths (T, S, 2) [m] that is no number, or that no ship can reach by then.
+    """Which windows (S,) have a place of paths (T, S, 2) [m] that is no number, or out of reach within the horizon.
 
     The limit of speed is that at which the physics has diverged, too.
     """
-    reach = SPEED_LIMIT * step * np.arange(1, len(paths) + 1)
-    beyond: NDArray[np.bool_] = ~(lengths(paths) <= reach[:, None]).all(axis=0)
-    return beyond
+    within = lengths(paths) <= SPEED_LIMIT * step * len(paths)
+    return np.asarray(~within.all(axis=0))
 
 
 def _promise(plan: Plan, predictor: Predictor, instants: Instants, paths: Array, test: Windows) -> dict[str, float]:
