@@ -114,13 +114,15 @@ def standard(
     n_rpm = (shaft_speed(controls, asked) if n is None else number("n", n)) / RPM
     passing = length / asked  # s for one length
     interval = _round(passing / ROWS) if step is None else step * STEPS
-    lead = float(np.ceil(LEAD * passing / interval) * interval)
+    lead = _in_rows(LEAD * passing, interval)
     course = 0.0 if name in ROUND else 90.0  # straight tracks are drawn from left to right
     how = {"n_rpm": n_rpm, "execute_at": lead, "course_deg": course, "approach": approach}
     if step is not None and step > passing / LEAST_STEPS:
         words = f"{step:g} s is too long for this ship, which runs a length in {passing:.3g} s"
         raise ShipidError(f"{words}: give {passing / LEAST_STEPS:.3g} s or less", path="--step")
     manoeuvre = build(angles, cast(Side, side), duration, passing, how)
+    if isinstance(manoeuvre, PullOut):  # between two rows the log would show the release after it
+        manoeuvre = manoeuvre.model_copy(update={"turn": _in_rows(manoeuvre.turn, interval)})
     manoeuvre.check(controls)
     steps = manoeuvre.length / interval * STEPS
     if steps > MOST_STEPS:
@@ -159,6 +161,11 @@ def _title(name: str, manoeuvre: Approached) -> str:
     if isinstance(manoeuvre, Spiral):
         return f"{words}, {max(manoeuvre.angles_deg):g} deg of helm to either side"
     return words
+
+
+def _in_rows(time: float, interval: float) -> float:
+    """The time [s] in whole intervals, rounded up."""
+    return float(np.ceil(time / interval) * interval)
 
 
 def _round(value: float) -> float:

@@ -41,6 +41,13 @@ def test_shaft_speed_gives_the_speed(speed: float) -> None:
     assert path["u"].iloc[0] == pytest.approx(speed, abs=0.02)  # an approach ends where it changes by 1 mm/s in 30 s
 
 
+@pytest.mark.parametrize("speed", [3.5, 3.7, 5.0])
+def test_a_pull_out_begins_at_the_rate_of_the_steady_turn(speed: float) -> None:
+    """The helm was let go between two rows, so that the rate was that of the next row, up to 8 % less."""
+    steady, pulled = measured("turning", 20.0, speed=speed), measured("pull-out", 20.0, speed=speed)
+    assert pulled["turning_rate"].value == pytest.approx(steady["steady_rate"].value, rel=1e-3)
+
+
 @pytest.mark.parametrize(("rpm", "diameter"), [(5000.0, 0.0375), (20000.0, 0.015)])
 def test_a_small_model_may_have_a_fast_shaft(rpm: float, diameter: float) -> None:
     particulars = Particulars(1.2, 0.2, 0.05, 0.5, 1.37, rpm=rpm, propeller_diameter=diameter)
