@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -132,6 +132,7 @@ class ReportContent:
     study_document, command : the document as TOML text and the command that reproduces the study.
     best : the physics model that validation prefers at the largest amount of data; every figure means it by "best".
     frames : further frames by name, for sections that show something new.
+    alone : models of the cells whose method learns nothing from data: their path is that of the physics.
     """
 
     title: str
@@ -158,4 +159,5 @@ class ReportContent:
     study_document: str = ""
     command: str = ""
     best: str = ""
+    alone: Collection[str] = ()
     frames: Mapping[str, pd.DataFrame] = field(default_factory=dict)

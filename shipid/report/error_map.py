@@ -31,7 +31,16 @@ from shipid.report.figure import (
 from shipid.report.gain import gain, unplotted
 from shipid.report.palette import INK, MUTED, level
 from shipid.report.section import Section
-from shipid.report.selection import FEW_MODELS, data_driven, left_out, overview, same_physics, spread, trained
+from shipid.report.selection import (
+    FEW_MODELS,
+    data_driven,
+    left_out,
+    nothing_learns,
+    overview,
+    same_physics,
+    spread,
+    trained,
+)
 from shipid.report.wording import counted, listed, metres, number, shortened
 
 HEIGHT, THICK = 580, 26  # of the plot and at most of a cell [px]
@@ -71,9 +80,9 @@ class Map(NamedTuple):
 
 
 def error_map(content: ReportContent) -> Figure | None:
-    """H over A and N_D; None where there is a single N_D or fewer than two physics models."""
+    """H over A and N_D; None where there is a single N_D, fewer than two physics models, or H is A: nothing learns."""
     drawn = _map(content)
-    if drawn is None:
+    if drawn is None or nothing_learns(content):
         return None
     rows, _, spots, span = drawn
     pieces, bounds = _pieces(drawn, content.frames.get("intervals"))

@@ -14,7 +14,7 @@ from shipid.report.content import Floats, Indices, ReportContent
 from shipid.report.figure import Chip, Control, Figure, Panel, Plot, Trace, apart, axis, layout, line, silent
 from shipid.report.palette import DASHES, INK, NAIVE, close_styles
 from shipid.report.section import Section
-from shipid.report.selection import FEW_RUNS, data_driven, exemplars, over_seeds, sizes, spread, thinned
+from shipid.report.selection import FEW_RUNS, data_driven, drawn_source, exemplars, over_seeds, sizes, spread, thinned
 from shipid.report.wording import counted, listed, metres, shortened
 
 BY = ["model", "source", "N_D"]
@@ -51,7 +51,7 @@ def horizon(content: ReportContent) -> Figure | None:
     views = {}
     for (i, (column, title, unit)), (j, size) in itertools.product(enumerate(statistics.values()), enumerate(counts)):
         traces = _traces(content, means[means.N_D.isin([0, size])], "ahead", column, unit)
-        traces = [*_seed_bands(traces, seeds[column][seeds[column].N_D.eq(size)]), *traces]
+        traces = [*_seed_bands(content, traces, seeds[column][seeds[column].N_D.eq(size)]), *traces]
         y = axis(f"{title} [{unit}]", rangemode="tozero")
         names = _names_at_the_end(traces)
         reach = float(means.ahead.max())
@@ -123,6 +123,7 @@ def model_chips(content: ReportContent, sources: set[str]) -> list[Chip]:
         Chip(f"model:{name}", name, looks[name].colour, width=looks[name].width, symbol=looks[name].symbol)
         for name in exemplars(content)
     ]
+    sources = {drawn_source(content, name, source) for name in exemplars(content) for source in sources}
     words = {"cooperative": "compensated or data-driven", "physics": "physics alone", "naive": "constant velocity"}
     return chips + [
         Chip(f"source:{source}", word, NAIVE if source == "naive" else INK, DASHES[source])
@@ -162,25 +163,23 @@ def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: st
     every = means[[across, column]].to_numpy(dtype=float)
     visible = _visible([every[mine] for _, mine in groups])
     for (key, _), points in zip(groups, visible, strict=True):
-        model, source = (str(part) for part in key)
+        model, given = (str(part) for part in key)
+        source = drawn_source(content, model, given)
         ink = {"color": NAIVE, "width": 1.5} if source == "naive" else {"color": looks[model].colour}
-        ink = {"width": looks[model].width if source == "cooperative" else 1.5, **ink} if model else ink
+        ink = {"width": looks[model].width if given == "cooperative" else 1.5, **ink} if model else ink
         name = "constant velocity" if source == "naive" else model if model == pure else f"{model}, {_word(source)}"
         keys = [f"source:{source}"] + ([f"model:{model}"] if model else [])
         traces.append(line(name, points[:, 0], points[:, 1], keys, unit, line={"dash": DASHES[source], **ink}))
-        if model and source == "cooperative":
+        if model and given == "cooperative":
             mark = {"symbol": looks[model].symbol, "size": 7, "color": ink["color"], "maxdisplayed": 9}
             traces[-1].update(mode="lines+markers", marker=mark)
     return traces
 
 
-def _seed_bands(traces: Sequence[Trace], seeds: pd.DataFrame) -> list[Trace]:
+def _seed_bands(content: ReportContent, traces: Sequence[Trace], seeds: pd.DataFrame) -> list[Trace]:
     """Areas from the least to the greatest seed at each time ahead, in the colours of the lines of their models."""
     colours = {
-        key: trace["line"]["color"]
-        for trace in traces
-        for key in trace["meta"]
-        if "source:cooperative" in trace["meta"]
+        key: trace["line"]["color"] for trace in traces for key in trace["meta"] if trace["mode"] == "lines+markers"
     }
     bands = []
     for name, mine in seeds[seeds["size"] > 1].groupby("model", sort=False):
@@ -188,7 +187,7 @@ def _seed_bands(traces: Sequence[Trace], seeds: pd.DataFrame) -> list[Trace]:
         x, y = np.concatenate([ahead, ahead[::-1]]), np.concatenate([mine["max"], mine["min"].to_numpy()[::-1]])
         colour = colours.get(f"model:{name}")
         if colour is not None:
-            keys = ["source:cooperative", f"model:{name}"]
+            keys = [f"source:{drawn_source(content, str(name), 'cooperative')}", f"model:{name}"]
             bands.append(line(f"{name}, seeds", x, y, keys, line={"width": 0}, fill="toself", fillcolor=colour))
             bands[-1] = silent(bands[-1]) | {"opacity": 0.18}
     return bands
@@ -208,7 +207,7 @@ def _names_at_the_end(traces: Sequence[Trace]) -> list[dict[str, Any]]:
     heights = apart([height for height, _, _ in ends], NAME * most, 1.1 * most)
     notes = []
     for height, (end, place, trace) in zip(heights, ends, strict=True):
-        short = trace["name"].removesuffix(", compensated")
+        short = trace["name"].removesuffix(f", {_word('cooperative')}").removesuffix(f", {_word('physics')}")
         short = shortened(short, LONGEST)
         colour = trace["line"]["color"]
         text = {"text": short, "xanchor": "left", "align": "left", "font": {"size": 11, "color": colour}}
@@ -290,8 +289,9 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     if together.empty:
         return "No compensated model gave a prediction."
     pure = data_driven(content)
-    best = content.best if content.best in together.index else str(together.index[0])
-    text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {best} is {metres(together[best])} off on average"
+    best = content.best if content.best in together.index else str(together.idxmin())
+    of = "" if content.best in together.index or len(together) < 2 else f", the least of {len(together)} models"
+    text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {best} is {metres(together[best])} off on average{of}"
     text += f", its physics alone {metres(alone[best])}" if best in alone.index else ""
     return text + (
         f"; pure data-driven {metres(together[pure])}." if pure and pure != best and pure in together.index else "."

@@ -25,7 +25,7 @@ from shipid.report.figure import (
     silent,
 )
 from shipid.report.palette import INK, NAIVE, Style, accuracy_range, styles
-from shipid.report.selection import data_driven, left_out, overview, spread, trained
+from shipid.report.selection import data_driven, left_out, nothing_learns, overview, spread, trained
 from shipid.report.wording import counted, listed, metres, shortened
 
 ROW = 46  # height of a model in the dumbbell figure [px]
@@ -55,11 +55,19 @@ HOW = (
 
 
 def gain(content: ReportContent) -> Figure | None:
-    """H over N_D, or the dumbbell A -> H when the study has a single N_D; None without cells."""
-    if content.cells.empty:
+    """H over N_D, or the dumbbell A -> H when the study has a single N_D.
+
+    None without cells, and where nothing learns and no model differs from one N_D to the next.
+    """
+    if content.cells.empty or (nothing_learns(content) and not _differs(content)):
         return None
     means = trained(content).merge(overview(content)[["model"]])
     return _over_size(content, means) if content.cells.N_D.nunique() > 1 else _dumbbell(content, means)
+
+
+def _differs(content: ReportContent) -> bool:
+    """Whether the H of some model differs from one cell to another, as that of identified physics does."""
+    return bool((content.cells.groupby("model").H.nunique() > 1).any())
 
 
 def unplotted(content: ReportContent) -> str:

@@ -18,7 +18,17 @@ from shipid.report.errors_over import model_chips
 from shipid.report.figure import Chip, Control, Figure, FixedWindow, Plot, line, plane
 from shipid.report.palette import DASHES, MUTED, NAIVE, TRUTH, close_styles
 from shipid.report.section import Section
-from shipid.report.selection import FEW_RUNS, data_driven, exemplars, families, middles, sizes, spread, thinned
+from shipid.report.selection import (
+    FEW_RUNS,
+    data_driven,
+    drawn_source,
+    exemplars,
+    families,
+    middles,
+    sizes,
+    spread,
+    thinned,
+)
 from shipid.report.wording import counted, listed, metres, number
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
@@ -182,7 +192,7 @@ def fixed_data(panels: Sequence[FixedWindow], data: dict[str, Any]) -> list[dict
     Panels of one window share their axes, so that they can be compared; these reach over the true path, the ship at
     both of its ends and what was compensated or learned. Physics alone and bands may leave them.
     """
-    together = {i for i, line in enumerate(data["lines"]) if "source:cooperative" in line["keys"]}
+    together = {i for i, line in enumerate(data["lines"]) if line["cell"]}
     result = []
     for panel in panels:
         shot = data["runs"][panel.run][panel.instant]
@@ -267,9 +277,12 @@ def _line(content: ReportContent, model: str, source: str) -> dict[str, Any]:
     style = close_styles(content).get(model)
     pure = model == data_driven(content)
     words = {"cooperative": model if pure else f"{model}, compensated", "physics": f"{model}, physics alone"}
-    width = style.width if style and source == "cooperative" else 1.5
+    of_cell = source == "cooperative"
+    width = style.width if style and of_cell else 1.5
+    source = drawn_source(content, model, source)
     return {
         "name": words.get(source, "constant velocity"),
+        "cell": of_cell,
         "keys": [f"source:{source}"] + ([f"model:{model}"] if model else []),
         "line": {"color": style.colour if style else NAIVE, "dash": DASHES[source], "width": width},
     }
@@ -349,9 +362,10 @@ def _mean_end_error(windows: list[Snapshot], keys: set[PathKey]) -> float:
 def _takeaway(content: ReportContent, size: int) -> str:
     """Mean end errors over all windows, per source."""
     pure, drawn, windows = data_driven(content), exemplars(content), content.snapshots
-    keys = {key for window in windows for key in window.paths if key[0] in drawn}
-    together = _mean_end_error(windows, {k for k in keys if k[1] == "cooperative" and k[2] == size and k[0] != pure})
-    alone = _mean_end_error(windows, {k for k in keys if k[1] == "physics"})
+    keys = {key for window in windows for key in window.paths if key[0] in drawn and key[2] in (0, size)}
+    called = {key: drawn_source(content, key[0], key[1]) for key in keys if key[0] != pure}
+    together = _mean_end_error(windows, {key for key, source in called.items() if source == "cooperative"})
+    alone = _mean_end_error(windows, {key for key, source in called.items() if source == "physics"})
     learned = _mean_end_error(windows, {k for k in keys if k[0] == pure and k[2] == size})
     parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, "pure data-driven")]
     errors = [f"{word} by {metres(value)}" for value, word in parts if np.isfinite(value)]
@@ -365,7 +379,13 @@ def _takeaway_row(content: ReportContent, windows: list[Snapshot], counts: list[
     """How far the compensated paths end from the truth in each panel, or those without physics where there are none."""
     pure, drawn = data_driven(content), exemplars(content)
     physics = [name for name in drawn if name != pure]
-    for models, words in ((physics, "the compensated paths"), ([pure], "the paths without physics")):
+    learned, alone = ([name for name in physics if (name in content.alone) == which] for which in (False, True))
+    sets = (
+        (learned, "the compensated paths"),
+        (alone, "the paths of physics alone"),
+        ([pure], "the paths without physics"),
+    )
+    for models, words in sets:
         means = []
         for window, size in zip(windows, counts, strict=False):
             keys = {k for k in window.paths if k[1] == "cooperative" and k[2] == size and k[0] in models}

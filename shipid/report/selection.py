@@ -48,6 +48,16 @@ def data_driven(content: ReportContent) -> str | None:
     return None if names.empty else str(names.iloc[0])
 
 
+def drawn_source(content: ReportContent, model: str, source: str) -> str:
+    """Source that a path is called by: `physics`, too, where the method of a cell learns nothing from data."""
+    return "physics" if source == "cooperative" and model in content.alone else source
+
+
+def nothing_learns(content: ReportContent) -> bool:
+    """Whether the method of every cell learns nothing from data, so that H is A and nothing is compensated."""
+    return bool(len(content.alone)) and bool(content.cells.model.isin(list(content.alone)).all())
+
+
 def middles(content: ReportContent) -> dict[str, str]:
     """Per family, the model of middle A; families of many members first, then by rising A."""
     frame = families(content)

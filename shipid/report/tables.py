@@ -11,6 +11,7 @@ import pandas as pd
 from markupsafe import Markup, escape
 
 from shipid.report.content import PUBLISHED, Floats, ReportContent
+from shipid.report.selection import nothing_learns
 from shipid.report.wording import counted, fixed, listed, number
 
 
@@ -160,13 +161,14 @@ def kinds(content: ReportContent) -> Table | None:
     pairs = zip(frame.source, frame.N_D, strict=True)
     how = [HOW[source] + (f", {N_D} runs" if N_D else "") for source, N_D in pairs]
     shown = frame.assign(how=how, model=frame.model.where(frame.source.ne("naive"), ""))
-    learned = frame[frame.source.eq("cooperative")]
+    of, source = ("of physics alone", "physics") if nothing_learns(content) else ("with data", "cooperative")
+    learned = frame[frame.source.eq(source)]
     best = learned.loc[learned.groupby("kind", sort=False)["mean"].idxmin()] if len(learned) else learned
     parts = [
         f"{row['kind']}: {number(row['mean'])} m, at the end {number(row['end'])} m ({row['model']})"
         for row in best.to_dict("records")
     ]
-    takeaway = f"Least error with data: {'; '.join(parts)}." if parts else "No model with data has a result."
+    takeaway = f"Least error {of}: {'; '.join(parts)}." if parts else "No model with data has a result."
     return _table("kinds", "Errors by kind of run", takeaway, shown, KINDS)
 
 

@@ -77,6 +77,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         study_document=results.plan.text(),
         command=results.plan.command,
         best=results.plan.label(best, results.plan.judged) if (best := advise.best_model(results)) else "",
+        alone=parts.alone_models(results),
         frames=frames,
     )
 

@@ -254,6 +254,19 @@ def shown_amounts(results: Results) -> list[int]:
     return sorted({amounts[0], min(amounts, key=lambda amount: abs(np.log(amount / middle))), amounts[-1]})
 
 
+def alone_models(results: Results) -> frozenset[str]:
+    """Models of the cells whose method learns nothing from data: each is the path of its physics."""
+    learning = {way.name for way in results.plan.methods if way.method.compensates}
+    return frozenset(row["model"] for row in results.rows if row["method"] not in learning)
+
+
+def _physics_beside(results: Results) -> list[tuple[str, np.ndarray]]:
+    """Finite paths of physics alone that are not those of a cell of that name, too: model, path."""
+    alone = alone_models(results)
+    known = [(model, path) for model, path in results.physics.items() if model != NO_MODEL and model not in alone]
+    return [(model, path) for model, path in known if np.isfinite(path).all()]
+
+
 def _shown_cells(results: Results) -> list[dict[str, Any]]:
     """Rows of the cells that have paths, at the shown amounts."""
     amounts = shown_amounts(results)
@@ -266,9 +279,8 @@ def horizon_frame(results: Results) -> pd.DataFrame:
     Of physics, cooperative models and the naive floor; x and y are those of the frame (11).
     """
     parts = [_horizon(results, constant_motion(results.test), "naive", 0, 0, "naive")]
-    for model, path in results.physics.items():
-        if model != NO_MODEL and np.isfinite(path).all():
-            parts.append(_horizon(results, path, model, 0, 0, "physics"))
+    for model, path in _physics_beside(results):
+        parts.append(_horizon(results, path, model, 0, 0, "physics"))
     for row in _shown_cells(results):
         path = results.paths[row["cell"]]
         parts.append(_horizon(results, path, row["model"], row["N_D"], row["seed"], "cooperative"))
@@ -330,9 +342,8 @@ def time_frame(results: Results) -> pd.DataFrame:
         parts.append(pd.DataFrame({**keys, "source": source, "error": over_time(error)[mask]}))
 
     add(results.naive, "naive", 0, "naive")
-    for model, path in results.physics.items():
-        if model != NO_MODEL and np.isfinite(path).all():
-            add(position_error(path, results.test.future), model, 0, "physics")
+    for model, path in _physics_beside(results):
+        add(position_error(path, results.test.future), model, 0, "physics")
     for row in _shown_cells(results):
         if row["seed"] == seed:
             add(
@@ -397,7 +408,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
     seed, test = int(results.cells["seed"].min()), results.test
     rows, naive, cells = [], constant_motion(test), _shown_cells(results)
-    level, edges = results.plan.level, {}
+    level, edges, alone = results.plan.level, {}, alone_models(results)
     for row in cells:
         bands_of_cell = results.bands.get(row["cell"])
         if bands_of_cell is not None and bands_of_cell.promises(level):
@@ -409,7 +420,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
             paths = {
                 (model, "physics", 0): path[:, index]
                 for model, path in results.physics.items()
-                if model != NO_MODEL and np.isfinite(path[:, index]).all()
+                if model not in (NO_MODEL, *alone) and np.isfinite(path[:, index]).all()
             }
             for row in cells:
                 if row["seed"] == seed:

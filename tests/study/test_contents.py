@@ -13,6 +13,10 @@ import pytest
 from shipid.errors import ResultError
 from shipid.files import read_json
 from shipid.report import errors_over
+from shipid.report.figure import Figure
+from shipid.report.paths import window_data
+from shipid.report.section import drawn
+from shipid.report.sections import SECTIONS
 from shipid.study import contents, seals
 from shipid.study.contents import report_content, share_pages, write_pages
 from shipid.study.plan import build_plan
@@ -123,3 +127,28 @@ def test_a_study_of_physics_alone_has_a_page_and_says_so(tmp_path: Path) -> None
     assert f"{cells['H'].min():.2f} m" in answer
     assert "best in validation" not in answer
     assert (folder / "report.html").stat().st_size > 1e5
+    content = report_content(read_results(folder))
+    assert content.alone == set(cells["model"])
+    shown = [item for section in drawn(SECTIONS, content) for item in section.items]
+    figures = [item for item in shown if isinstance(item, Figure)]
+    assert {"horizon", "over-time", "browser"} <= {figure.id for figure in figures}
+    assert not {"map", "gain"} & {figure.id for figure in figures}, "H is A everywhere"
+    words = [text for item in shown for text in (item.title, item.takeaway, getattr(item, "how", ""))]
+    words += [chip.label for figure in figures for chip in figure.chips]
+    panels = [panel for figure in figures for view in figure.views.values() for panel in view]
+    words += [str(trace.get("name")) for panel in panels for trace in panel.plot.traces]
+    words += (lines := [line["name"] for line in window_data(content)["lines"]])
+    assert not [text for text in words if "ompensat" in text]
+    assert len(lines) == len(set(lines))
+
+
+def test_a_line_of_physics_alone_beside_others_is_called_so(tmp_path: Path) -> None:
+    drawn_by = {"name": "drawn", "kind": "path-drawn", "trials": 1, "terms": 4, "units": 8}
+    document = tiny_plan(tmp_path).document | {
+        "method": [drawn_by, {"name": "bare", "kind": "alone", "families": ["right"]}]
+    }
+    run_here(build_plan(document | {"grid": {"N_D": [4]}}, tmp_path / "tiny.toml"), tmp_path / "run")
+    lines = {line["name"]: line for line in window_data(report_content(read_results(tmp_path / "run")))["lines"]}
+    assert {"right, compensated", "right + bare, physics alone"} <= lines.keys()
+    assert "right + bare, compensated" not in lines
+    assert "source:physics" in lines["right + bare, physics alone"]["keys"]
