@@ -1,7 +1,8 @@
-"""Commands that come half a row late: what that does to the estimates of a fit, and whether the log shows it."""
+"""Commands that come late or early: what that does to the estimates of a fit, and whether the log shows it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +21,12 @@ from shipid.identification.statistics import Statistics
 from shipid.vessel.dynamics import dynamics
 
 Array = NDArray[np.float64]
+HALF = 0.5  # rows by which commands that change between rows and are held from their row are late on average
 LEAST_ROWS = 0.2  # rows by which the fit is best with earlier commands: below, the log has them in time
+FARTHER = 0.5  # rows more or less than rows explain: the log, or an actuator, has another delay
+EXPLAINED = (
+    0.15  # of the squares of the residuals: so much of them only a delay has explained, not noise, wind, current
+)
 OUTSIDE = 1.0  # of half the interval: a larger change of an estimate is reported
 WORTH = 0.02  # of a factor: a smaller change is not
 
@@ -30,12 +36,13 @@ class Lateness:
     """What commands half a row earlier would do to a fit, linearised.
 
     between : from row to row [s]. rows : rows by which the fit is best with earlier commands. changes : (n,) of the
-        factors by half a row.
+        factors by half a row. explained : share of the squares of the residuals that those rows take away.
     """
 
     between: float
     rows: float
     changes: Array
+    explained: float
 
 
 def lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
@@ -46,7 +53,7 @@ def lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
     """
     settings = solution.settings
     between = interval_of(dataset, solution.runs)
-    if settings.commands == "between" or settings.step > COARSE * between:
+    if settings.step > COARSE * between:
         return None
     problem = build(solution.vessel, _earlier(dataset), solution.runs, settings)
     at = evaluate(problem, solution.factors, solution.point).at
@@ -58,35 +65,68 @@ def lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
     inverse = inverted(J.T @ J + np.diag(1 / solution.prior_widths[free] ** 2))[0]
     moved = -inverse @ (J.T @ change)
     left = change + J @ moved  # what no factor makes up for
-    size = float(left @ left)
+    size, along = float(left @ left), float(solution.residuals @ left)
     changes = np.zeros(len(free))
-    changes[free] = moved / 2
-    return Lateness(between, -float(solution.residuals @ left) / size if size > 0 else 0.0, changes)
+    changes[free] = HALF * moved
+    if not size > 0:
+        return Lateness(between, 0.0, changes, 0.0)
+    total = float(solution.residuals @ solution.residuals)
+    return Lateness(between, -along / size, changes, along**2 / (size * total) if total > 0 else 0.0)
 
 
 def late_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
-    """A sentence where commands half a row earlier move an estimate out of its interval and fit better; else none."""
+    """A sentence where commands at another time move an estimate out of its interval and fit better; else none.
+
+    Commands that are held come half a row late. What is more than that, or less than none, has another cause.
+    """
     late = lateness(solution, dataset)
-    if late is None or late.rows < LEAST_ROWS:
+    if late is None:
         return ""
+    held = solution.settings.commands == "held"
+    apart = not -FARTHER <= late.rows <= (HALF if held else 0.0) + FARTHER
+    if not apart and (not held or late.rows < LEAST_ROWS):
+        return ""
+    changes = late.changes * (late.rows / HALF if apart else 1.0)
     half = (judged.high - judged.low) / 2
-    share = np.where(np.isfinite(half) & judged.identifiable, np.abs(late.changes) / np.maximum(half, 1e-12), 0.0)
+    share = np.where(np.isfinite(half) & judged.identifiable, np.abs(changes) / np.maximum(half, 1e-12), 0.0)
     worst = int(np.argmax(share))
-    if share[worst] < OUTSIDE or abs(late.changes[worst]) < WORTH * abs(solution.factors[worst]):
+    shown = share[worst] >= OUTSIDE or (apart and late.explained >= EXPLAINED)
+    if not shown or abs(changes[worst]) < WORTH * abs(solution.factors[worst]):
         return ""
     name = short_names(unknowns(solution.vessel, solution.settings).paths)[worst]
     factor = solution.factors[worst]
-    change, width = 100 * late.changes[worst] / abs(factor), 100 * half[worst] / abs(factor)
-    vessel, fitted = solution.vessel, dataset.select(solution.runs)
-    gear = any(
-        fitted.frame[order].nunique() > 1 for order in dynamics(vessel).commands if order in dynamics(vessel).memory
-    )
+    change, width = 100 * changes[worst] / abs(factor), 100 * half[worst] / abs(factor)
+    moves = f"moves {name} by {change:+.2g} %, its interval is +-{width:.2g} %"
+    gear = _geared(solution, dataset)
+    if apart:
+        rows, seconds = abs(late.rows), digits(abs(late.rows) * late.between)
+        when = f"{seconds} s ({rows:.2g} rows) {'earlier' if late.rows > 0 else 'later'} than in the log: that {moves}"
+        return f"the fit is better with commands {when}; {_causes(late.rows > 0, gear)}"
     remedy = f"--set commands=between{f' --set step={late.between / 2:.3g}' if gear else ''}"
     remedy = f"compare with {remedy}" if not solution.settings.outputs else "log faster"
     return (
         f"commands count from their row, on average {digits(late.between / 2)} s late, and the fit is better with "
-        f"commands {late.rows:.2g} rows earlier: half a row moves {name} by {change:+.2g} %, its interval is "
-        f"+-{width:.2g} %; {remedy}"
+        f"commands {late.rows:.2g} rows earlier: half a row {moves}; {remedy}"
+    )
+
+
+def _geared(solution: Solution, dataset: Dataset) -> list[str]:
+    """Commands to actuators of the vessel that change in the fitted runs."""
+    model, fitted = dynamics(solution.vessel), dataset.select(solution.runs)
+    return [name for name in model.commands if name in model.memory and fitted.frame[name].nunique() > 1]
+
+
+def _causes(late: bool, gear: Sequence[str]) -> str:
+    """What makes commands late in a log, or early, and the remedy."""
+    if not late:
+        lag = "an actuator of the vessel is too fast" if gear else "the vessel lacks an actuator"
+        return f"{lag}, or the log has the motion late: compare with --nuisance latency"
+    if not gear:
+        return "the log has its commands late, as a feedback may be: shift their columns"
+    actuators = " and ".join(f"thruster.{name.replace('.', '.actuator.')}" for name in gear)
+    return (
+        f"the log has measured angles and no orders ({actuators}: off = true), an actuator is too slow, or the log has "
+        "its commands late"
     )
 
 

@@ -58,9 +58,9 @@ def log_of(seed: int, step: float, interval: float) -> Dataset:
     return Dataset(rows, {"vessel": ferry().name, "units": {}, "clock": "run"})
 
 
-def fitted(log: Dataset, step: float, commands: str = "held") -> Solution:
+def fitted(log: Dataset, step: float, commands: str = "held", vessel: Vessel | None = None) -> Solution:
     how = {"parameters": FEW, "weights": NOISE, "horizon": 66, "step": step, "commands": commands, "start": "base"}
-    solution = identify(ferry(), log, log.runs, Identify(**how))
+    solution = identify(vessel or ferry(), log, log.runs, Identify(**how))
     assert solution.status == "ok"
     return solution
 
@@ -92,3 +92,39 @@ def test_logs_that_have_their_orders_in_time_are_not_blamed(seed: int, step: flo
     log = log_of(seed, step, interval)
     solution = fitted(log, interval)
     assert sentence(solution, log) == ""
+
+
+def late_by(rows: int, log: Dataset, column: pd.Series) -> Dataset:
+    """The log with the helm of a column, so many rows late."""
+    late = column.groupby(log.frame["run"]).shift(rows).bfill()
+    return Dataset(log.frame.assign(**{"rudder.delta": late}), log.metadata)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_commands_that_the_log_has_late_or_early_are_named_with_what_that_does(seed: int) -> None:
+    """Before, half a row alone was judged: longer delays were named less often, a lag that the vessel lacks never."""
+    log, bare = log_of(seed, 1.0, 1.0), ferry().with_values({"thruster.rudder.actuator.delta.off": True})
+    orders, angles = log.frame["rudder.delta"], zigzags(seed, 1.0)["actual.rudder.delta"]
+    for given, vessel, when, cause in (
+        (late_by(3, log, orders), ferry(), "earlier", "an actuator is too slow, or the log has its commands late"),
+        (late_by(0, log, angles), ferry(), "earlier", "measured angles and no orders (thruster.rudder.actuator.delta:"),
+        (late_by(3, log, angles), bare, "earlier", "the log has its commands late, as a feedback may be"),
+        (late_by(0, log, orders), bare, "later", "the vessel lacks an actuator"),
+    ):
+        solution = fitted(given, 1.0, vessel=vessel)
+        found, late = sentence(solution, given), lateness(solution, given)
+        assert late is not None
+        assert f"rows) {when} than in the log: that moves" in found
+        assert cause in found
+        moved = late.changes * late.rows / 0.5
+        place = int(np.argmax(np.abs(moved)))
+        assert np.sign(moved[place]) == np.sign(1 - solution.factors[place])
+    right = late_by(0, log, angles)
+    assert " than in the log" not in sentence(fitted(right, 1.0, vessel=bare), right)
+    between = log_of(seed, 0.05, 1.0)
+    slow = late_by(3, between, between.frame["rudder.delta"])
+    solution = fitted(slow, 0.5, "between")
+    seen = lateness(solution, slow)
+    assert seen is not None
+    assert seen.rows == pytest.approx(3, abs=0.4)
+    assert "rows) earlier than in the log" in sentence(solution, slow)
