@@ -678,6 +678,8 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
         warnings.append(f"at a bound, so without an interval: {listed(bound)}")
     if "test" not in free:
         warnings.append("no run was held out: the accuracy on other runs is not known")
+    left_out = [name for name in solution.settings.widths if name != "initial_state"]  # a new run has none
+    without = f", which leave out {listed(left_out)}," if left_out else ""
     for name, runs in free.items():
         every = runs.errors[runs.errors["run"] == ALL].set_index("model")
         diverged = [str(model) for model in every.index if not np.isfinite(every["u"][model])]
@@ -685,7 +687,7 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
             warnings.append(f"free runs of the {name} runs diverge {listed(diverged)} identification")
         worse = [signal for signal in SIGNALS if float(every[signal][AFTER]) > float(every[signal][BEFORE])]
         if worse and not diverged:
-            warnings.append(f"free runs of the {name} runs are worse than before in {listed(worse)}")
+            warnings.append(f"free runs of the {name} runs{without} are worse than before in {listed(worse)}")
     return warnings
 
 

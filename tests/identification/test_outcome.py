@@ -454,6 +454,21 @@ def test_noisy_starts_are_named_as_a_cause_of_correlated_residuals_unless_they_a
 
 
 @pytest.mark.usefixtures("one_manoeuvre")
+def test_free_runs_that_are_worse_name_the_nuisances_that_they_leave_out() -> None:
+    """The numbers are right, but a free run is compared with an antenna 15 m ahead as if it were at the origin."""
+    log = trials(SHIP, runs=3, steps=60)
+    psi, r, v = (log.frame[name] for name in ("psi", "r", "v"))
+    ahead = changed(
+        log, v=v + 15 * r, north=log.frame["north"] + 15 * np.cos(psi), east=log.frame["east"] + 15 * np.sin(psi)
+    )
+    result = run_identification(off(), ahead, settings(horizon=0, nuisance={"lever_arm": 15.0}))
+    assert result.solution.factors[0] == pytest.approx(1 / 0.7, rel=0.02)
+    said = [warning for warning in result.warnings if "worse than before" in warning]
+    assert said
+    assert said[0].startswith("free runs of the fit runs, which leave out lever_arm, are worse than before in ")
+
+
+@pytest.mark.usefixtures("one_manoeuvre")
 def test_a_profile_of_a_factor_that_ends_at_a_bound_is_left_out_and_the_fit_stays() -> None:
     """Nobody knows before the fit which factor will end at a bound."""
     bounds = {FEW[0]: (1.6, 2.0)}  # the true factor is 1 / 0.7
