@@ -19,6 +19,7 @@ from shipid.data.dataset import Dataset, apart_from
 from shipid.data.outputs import common_outputs, compare_outputs
 from shipid.data.windows import gaps_in_words
 from shipid.document import short_names
+from shipid.engine.engines import REPEATED
 from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.files import write_new
 from shipid.identification import design
@@ -512,7 +513,7 @@ def _measured(
     vessel: Vessel, kind: str, angles: Sequence[float], logs: dict[str, pd.DataFrame] | None = None
 ) -> dict[str, dict[str, Any]]:
     """Simulate a standard manoeuvre in calm water; measure -> row of `shipid.measures.rows.measure_rows`."""
-    done = measure_standard(vessel, kind, angles)
+    done = measure_standard(vessel, kind, angles, engine=REPEATED)
     if logs is not None:
         logs[_title(kind, angles)] = done.frame
     return {row["measure"]: row for row in done.measures}

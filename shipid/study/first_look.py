@@ -20,6 +20,7 @@ from tomlkit.items import KeyType, SingleKey
 
 from shipid.data.dataset import Dataset, pieces
 from shipid.data.windows import Instants, PathSource, Windows, cut_windows
+from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError
 from shipid.hybrid.physics import Physics, check_columns
 from shipid.identification.late import Late, between_rows, late_commands
@@ -292,7 +293,7 @@ class _Trial:
                 for path, value in rows[place].items():
                     parameters[number, names.index(path)] = value
             physics = Physics(vessel, self.windows.horizon, self.windows.step, "rk4")
-            distances = physics.distances(self.instants(gear), self.windows.future, parameters)
+            distances = physics.distances(self.instants(gear), self.windows.future, parameters, engine=REPEATED)
             mean = np.where(distances.diverged, np.inf, distances.total / self.windows.horizon)
             capped = np.minimum(np.nan_to_num(mean, nan=np.inf), PENALTY * max(self.constant, 1e-9) * 10)
             for number, place in enumerate(places):
