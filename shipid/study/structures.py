@@ -47,6 +47,7 @@ from shipid.report.structures import StructuresContent
 from shipid.simulation.measured import Measured, measure_all
 from shipid.study.evidence import FEWEST_RUNS, contrasts
 from shipid.study.new import proposed_horizon
+from shipid.study.verdict import shown
 from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
@@ -80,7 +81,7 @@ class Compared:
         [m] of runs that the fit has not seen.
     table : `structure`, `numbers`, means over runs `u`, `v`, `r`, `position`; `test`, that of the position on the test
         runs; `more`, `low`, `high`: difference of the position to the chosen one with its interval; `equal`: whether
-        it is not shown to be worse; `note`.
+        it is not shown to be worse, corrected for how many there are (Holm); `note`.
     fits : structure -> the fit to all runs; structures that could not be fitted are missing.
     manoeuvres : `manoeuvre`, `measure`, `unit`, `structure`, `value`, `low`, `high`, `note`.
     spread : `manoeuvre`, `measure`, `unit`, `least`, `greatest` over the structures that are equally good, `spread`
@@ -123,8 +124,10 @@ class Compared:
             notes.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
         elif others:
             notes.append(f"not shown to be worse: {', '.join(others)}")
-        elif len(rows) > 1:
-            notes.append("all others are shown to be worse")
+        elif judged := int(self.table["low"].notna().sum()):
+            notes.append(
+                f"all others {'' if judged == len(rows) - 1 else 'that could be judged '}are shown to be worse"
+            )
         wide = [row for row in _records(self.spread) if row["spread"] > row["width"]]
         if wide:
             worst = max(wide, key=lambda row: float(row["spread"] / max(abs(row["least"]), abs(row["greatest"]))))
@@ -323,12 +326,14 @@ def _table(
     best = known[0]
     sound = [name for name in known if np.isfinite(list(position[name].values())).all()]
     intervals: dict[str, tuple[float, float]] = {}
+    worse: set[str] = set()
     if best in sound and len(sound) > 1:
         apart = np.array([[position[name][run] - position[best][run] for run in fitted] for name in sound[1:]])
         differences = contrasts(apart, np.ones(len(fitted)))
         intervals = dict(
             zip(sound[1:], zip(differences.low.tolist(), differences.high.tolist(), strict=True), strict=True)
         )
+        worse = {name for name, behind in zip(sound[1:], shown(differences.above), strict=True) if behind}
     rows: list[dict[str, Any]] = []
     for name in known:
         low, high = intervals.get(name, (np.nan, np.nan))
@@ -342,7 +347,7 @@ def _table(
                 "more": float(here["position"] - means["folds", best]["position"]) if name in sound else np.inf,
                 "low": low,
                 "high": high,
-                "equal": name == best or (name in sound and not low > 0),
+                "equal": name == best or (name in sound and name not in worse),
                 "note": "" if name in sound else "diverges on a run that was held out",
             }
         )
