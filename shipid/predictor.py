@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from shipid.arguments import by_name, names_of, number, numbers, of_class, one_of, path_of, whole_number
-from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, run_folds
+from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, locked, run_folds
 from shipid.document import plain
 from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DataError, ResultError, ShipidError, choices
@@ -141,7 +141,7 @@ class Predictor:
         if level is not None:
             self.check_level(level, kind)
         instants = self._known(instants)
-        alone = self._paths(self.physics.paths(instants) if paths is None else paths, instants)
+        alone = locked(self._paths(self.physics.paths(instants) if paths is None else paths, instants))
         try:
             predicted, lost = self.corrector.predict(self.physics, instants, alone), self._lost(instants)
         except KeyError as error:
@@ -149,8 +149,9 @@ class Predictor:
                 "the method was trained with this input, and the instants lack it", path=error.args[0]
             ) from error
         except (ValueError, TypeError, IndexError) as error:
-            raise DataError(f"the arrays of the instants and of the predictor do not fit together ({error})") from error
-        if predicted is paths or lost.any():  # the prediction is the caller's to change, too
+            raise DataError(f"the method {self.method!r} and the instants do not fit together ({error})") from error
+        predicted = self._paths(predicted, instants, f"paths of the method {self.method!r}")
+        if np.may_share_memory(predicted, alone) or lost.any():  # the prediction is the caller's to change
             predicted = predicted.copy()
             predicted[:, lost] = np.nan
         if level is None:
@@ -198,11 +199,11 @@ class Predictor:
             lost |= ~np.isfinite(values).all(axis=0)
         return lost
 
-    def _paths(self, paths: Array, instants: Instants) -> Array:
+    def _paths(self, paths: Array, instants: Instants, what: str = "paths") -> Array:
         """The paths as numbers; DataError unless they are (T, S, 2), of this horizon and these instants."""
-        paths, shape = numbers("paths", paths, DataError), (self.physics.horizon, len(instants), 2)
+        paths, shape = numbers(what, paths, DataError), (self.physics.horizon, len(instants), 2)
         if paths.shape != shape:
-            raise DataError(f"paths must be {shape}, not {paths.shape}")
+            raise DataError(f"{what} must be {shape}, not {paths.shape}")
         return paths
 
     def _checked(self, instants: Instants) -> Instants:
@@ -351,18 +352,18 @@ class Predictor:
 
 
 def _as_numbers(instants: Instants) -> Instants:
-    """The instants with arrays of floats, whatever they were; DataError for a column that is not (S,)."""
+    """The instants with arrays of floats that cannot be written to; DataError for a column that is not (S,)."""
     count = np.shape(instants.columns["u"])
     if len(count) != 1:
         raise DataError(f"must be (S,), a value for each instant, not {count}", path="u")
     columns = {}
     for name in (str(name) for name in instants.columns if name != "run"):  # the name of the run, as of a table
-        columns[name] = numbers(f"column {name!r}", instants.columns[name], DataError)
+        columns[name] = locked(numbers(f"column {name!r}", instants.columns[name], DataError))
         if columns[name].shape != count:
             raise DataError(f"must be {count} as 'u', not {columns[name].shape}", path=name)
 
     def floats(what: str, given: Mapping[str, Array], leading: int | None = None) -> dict[str, Array]:
-        arrays = {name: numbers(f"{what} {name!r}", values, DataError) for name, values in given.items()}
+        arrays = {name: locked(numbers(f"{what} {name!r}", values, DataError)) for name, values in given.items()}
         for name, array in arrays.items():
             if leading is not None and (array.ndim != leading + 1 or array.shape[leading:] != count):
                 wanted = f"({'P, ' * leading}{count[0]}{'' if leading else ','})"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from shipid.hybrid.alone import Alone, Unchanged
 from shipid.hybrid.features import Memory
 from shipid.hybrid.forest import Forest
 from shipid.hybrid.method import Fitted, Method, Task
+from shipid.hybrid.methods import METHODS
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
@@ -316,6 +317,72 @@ def test_a_prediction_is_no_view_of_what_was_passed_in() -> None:
     predicted = known.predict(instants, paths)
     predicted[:] = 0.0
     np.testing.assert_array_equal(paths, known.alone(instants))
+
+
+@dataclass(frozen=True)
+class Mistaken:
+    """A corrector that a user wrote; `predict` is the mistake."""
+
+    predict: Callable[[Physics, Instants, Any], Any]
+    past: float = 0.0
+    hyperparameters: Any = field(default_factory=dict)
+
+
+def added(physics: Physics, instants: Instants, paths: Any) -> Any:  # noqa: ARG001
+    """A path that is moved where it lies."""
+    paths += 1.0
+    return paths
+
+
+def centred(physics: Physics, instants: Instants, paths: Any) -> Any:  # noqa: ARG001
+    """Inputs that are normalised where they lie."""
+    columns: Any = instants.columns
+    columns["u"] -= columns["u"].mean()
+    return paths
+
+
+@pytest.mark.parametrize("predict", [added, centred])
+def test_a_method_changes_no_array_that_others_have(predict: Any) -> None:
+    """A corrector that added to the paths of the physics changed A, and H of the methods after it, without a word."""
+    instants, paths = WINDOWS.instants(), np.zeros((HORIZON, len(WINDOWS), 2))
+    with pytest.raises(DataError, match=r"the method 'mine' and the instants do not fit together \(.*read-only\)"):
+        Predictor(NONE, "mine", Mistaken(predict)).predict(instants, paths)
+    assert not paths.any()
+    paths += 1.0
+    instants.columns["u"] += 0.0  # those who passed them in may change them, as before
+
+
+def test_a_method_changes_no_window_that_others_are_fitted_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Greedy(Shared):
+        def fit(self, task: Task) -> dict[str, Fitted]:
+            for array in (task.windows.future, task.windows.columns["u"], task.cases["none"].paths):
+                with pytest.raises(ValueError, match="read-only"):
+                    array += 1.0
+            return {"none": Fitted(Unchanged({}), [], 0.0)}
+
+    monkeypatch.setitem(METHODS, "greedy", Greedy)
+    fit(Greedy(), NONE, WINDOWS)
+    assert WINDOWS.future.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("made", "message"),
+    [
+        (lambda paths: paths[..., 0], rf"must be \({HORIZON}, 150, 2\), not \({HORIZON}, 150\)"),
+        (lambda paths: paths.transpose(1, 0, 2), rf"must be \({HORIZON}, 150, 2\), not \(150, {HORIZON}, 2\)"),
+        (lambda paths: paths[1:], r"must be \(5, 150, 2\), not \(4, 150, 2\)"),
+        (lambda paths: paths + 0j, r"must be an array of numbers, not ndarray \(complex128\)"),
+        (lambda paths: None, r"must be \(5, 150, 2\), not \(\)"),  # noqa: ARG005
+    ],
+)
+def test_paths_of_a_method_that_are_none_are_named(made: Callable[[Any], Any], message: str) -> None:
+    """They came back as they were, or ended a study with a sentence that named no method."""
+    assert len(WINDOWS) == 150
+    known = Predictor(NONE, "mine", Mistaken(lambda _, __, paths: made(paths)))
+    with pytest.raises(DataError, match=f"^paths of the method 'mine' {message}"):
+        known.predict(WINDOWS.instants())
+    as_list = Predictor(NONE, "mine", Mistaken(lambda _, __, paths: (paths + 2.0).tolist()))
+    np.testing.assert_array_equal(as_list.predict(WINDOWS.instants()), np.full((HORIZON, 150, 2), 2.0))
 
 
 @pytest.mark.parametrize("level", ["0.9", [0.5, 0.9], np.array([0.5]), 90, np.nan])

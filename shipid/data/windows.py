@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -162,12 +162,26 @@ class Windows:
             states={name: values[:, chosen] for name, values in self.states.items()},
         )
 
+    def locked(self) -> Windows:
+        """The same windows, whose numbers nobody can change: who writes into them gets an error."""
+        parts: dict[str, Any] = {"t": locked(self.t), "future": locked(self.future)}
+        for name in ("columns", "planned", "past", "states"):
+            parts[name] = {key: locked(values) for key, values in getattr(self, name).items()}
+        return replace(self, **parts)
+
     def touching(self, intervals: Iterable[tuple[float, float]]) -> Mask:
         """Windows that share a moment, past and future included, with any closed interval of the recording, (S,)."""
         touched = np.zeros(len(self), dtype=bool)
         for start, end in intervals:
             touched |= (self.begin <= end) & (self.end >= start)
         return touched
+
+
+def locked(array: NDArray[Any]) -> NDArray[Any]:
+    """A view of an array that cannot be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def _places(chosen: Any, count: int) -> NDArray[Any] | slice:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from shipid.checked import Checked
-from shipid.data.windows import Instants, Windows
+from shipid.data.windows import Instants, Windows, locked
 from shipid.errors import DataError
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.physics import Physics
@@ -84,7 +84,7 @@ class Journal(Protocol):
 
 @dataclass(frozen=True)
 class Task:
-    """What a method is fitted to: foundations on the same windows.
+    """What a method is fitted to: foundations on the same windows. Its arrays cannot be written to: others use them.
 
     Parameters
     ----------
@@ -118,6 +118,9 @@ class Task:
     def __post_init__(self) -> None:
         if any(len(part) == 0 for fold in self.folds for part in fold):
             raise DataError("a fold has no windows to train on or to validate with: use more manoeuvres")
+        cases = {name: replace(case, paths=locked(case.paths)) for name, case in self.cases.items()}
+        object.__setattr__(self, "cases", cases)
+        object.__setattr__(self, "windows", self.windows.locked())
 
     def instants(self, name: str) -> Instants:
         """What a prediction of a foundation knows at each window."""
