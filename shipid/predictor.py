@@ -21,7 +21,7 @@ from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrated
-from shipid.hybrid.method import Case, Corrector, Index, Method, Task, widened
+from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, widened
 from shipid.hybrid.methods import METHODS, kind_of, listed
 from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.observer import AGE, Observer
@@ -476,7 +476,7 @@ def fit(
         known=commands == "known",
         seed=seed,
     )
-    fitted = method.fit(task)[name]
+    fitted = fit_all(method, task)[name]
     corrector, left_out = fitted.corrector, fitted.left_out
     if corrector is None:
         raise DataError("no training converged: check the windows for outliers, or widen the ranges of the method")

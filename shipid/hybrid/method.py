@@ -194,6 +194,26 @@ class Method(Checked, BaseModel, ABC):
         """Fit every foundation of a task; name of the foundation -> result."""
 
 
+TRIAL = ("number", "params", "value", "epochs", "seconds", "state")  # keys of the row of a trial
+
+
+def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
+    """Fit every foundation of a task; DataError where a method that somebody wrote gives something else."""
+    given, name, shape = method.fit(task), type(method).__name__, task.windows.future.shape
+    if not isinstance(given, Mapping):
+        raise DataError(f"{name}.fit must return a table, foundation -> Fitted, not {type(given).__name__}")
+    for case in task.cases:
+        one = given.get(case)
+        if not isinstance(one, Fitted):
+            raise DataError(f"{name}.fit must give a Fitted for {case!r}, not {type(one).__name__}")
+        lacking = next((key for row in one.trials for key in TRIAL if key not in row), None)
+        if lacking is not None:
+            raise DataError(f"{name}.fit: a trial lacks {lacking!r}: make it by shipid.hybrid.trials.row_of")
+        if one.left_out is not None and np.shape(one.left_out) != shape:
+            raise DataError(f"{name}.fit: left_out must be {shape}, not {np.shape(one.left_out)}")
+    return dict(given)
+
+
 def widened(low: float, high: float) -> tuple[float, float]:
     """Least and greatest value that training has seen, apart by their rounding: what equals one of them is inside."""
     slack = 1e-9 * max(1.0, abs(low), abs(high))

@@ -30,7 +30,7 @@ from shipid.files import make_folder, read_json, write_json
 from shipid.hybrid.compensator import shared_units
 from shipid.hybrid.device import use_threads, vectors
 from shipid.hybrid.journal import Journal
-from shipid.hybrid.method import Case, Corrector, Fitted, Task
+from shipid.hybrid.method import Case, Corrector, Fitted, Task, fit_all
 from shipid.hybrid.physics import Physics
 from shipid.metrics import lengths, position_error, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
@@ -438,7 +438,7 @@ def _fitted(
     """Results of one method for the foundations that it meets; no corrector where it cannot learn from these runs."""
     mine = {name: known[name] for name in way.foundations}
     try:
-        return way.method.fit(_task(plan, prepared, batch, windows, mine, way, device, journal))
+        return fit_all(way.method, _task(plan, prepared, batch, windows, mine, way, device, journal))
     except DataError as error:
         return {name: Fitted(None, [], 0.0, sentence=error.message) for name in mine}
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError
 from shipid.hybrid.features import Inputs, Memory
-from shipid.hybrid.method import Case, Fitted, Method, Task, same_table, shared_tables
+from shipid.hybrid.method import Case, Fitted, Method, Task, fit_all, same_table, shared_tables
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Searched
+from shipid.hybrid.trials import row_of
 from shipid.vessel.load import load_vessel
 from tests.study.test_whole import windy
 
@@ -90,6 +93,31 @@ def test_a_method_is_a_fit_and_its_settings() -> None:
     }
     with pytest.raises(DocumentError, match=r"Toy\.wieght: unknown key: did you mean 'weight'"):
         Toy(wieght=3.0)  # type: ignore[call-arg]
+
+
+ROW = row_of(0, {}, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("gives", "message"),
+    [
+        (None, "must return a table, foundation -> Fitted, not NoneType"),
+        ({}, "must give a Fitted for 'right', not NoneType"),
+        (dict.fromkeys(("right", "wrong", "none"), (None, [ROW], 0.0)), "must give a Fitted for 'right', not tuple"),
+        ({"right": Fitted(None, [{"number": 0}], 0.0)}, "a trial lacks 'params': make it by .*row_of"),
+        ({"right": Fitted(None, [ROW], 0.0, np.zeros((2, 4)))}, r"left_out must be \(3, \d+, 2\), not \(2, 4\)"),
+    ],
+)
+def test_what_a_method_gives_is_checked(gives: Any, message: str) -> None:
+    """A mistake in a method that somebody wrote was a traceback, or errors by runs of other windows."""
+
+    class Mine(Method):
+        def fit(self, given: Task) -> dict[str, Fitted]:  # noqa: ARG002
+            return gives  # type: ignore[no-any-return]
+
+    with pytest.raises(DataError, match=rf"^Mine\.fit:? {message}") as caught:
+        fit_all(Mine(), task())
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("kind", METHODS)
