@@ -263,7 +263,13 @@ class Predictor:
         return outside
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Write one `.npz` of arrays and a JSON header; it appears whole or not at all."""
+        """Write one `.npz` of arrays and a JSON header; it appears whole or not at all.
+
+        Raises
+        ------
+        ResultError : the file cannot be written.
+        DataError : the method gives what could not be read back, such as an array with NaN.
+        """
         target = path_of("file", file, ResultError)
         header = {
             "format": FORMAT,
@@ -279,16 +285,39 @@ class Predictor:
             "run_up": self.run_up,
             "provenance": plain(self.provenance),
             "method": self.method,
-            "corrector": self.corrector.header(),
+            "corrector": self._corrector_header(),
             "bands": None if self.bands is None else self.bands.header(),
         }
         if target.is_dir():
             raise ResultError("is a folder: name a file to write", file=target)
-        arrays = {"header": np.array(json.dumps(header, default=str)), **self.corrector.arrays()}
+        arrays = {"header": np.array(json.dumps(header, default=str)), **self._corrector_arrays()}
         if self.bands is not None:
             arrays |= {BANDS + name: values for name, values in self.bands.arrays().items()}
         write_arrays(target, arrays)  # not compressed: weights do not shrink
         return target
+
+    def _corrector_header(self) -> dict[str, Any]:
+        """What the method keeps beside its arrays; DataError for what would not be read back as it is."""
+        header = plain(self.corrector.header())
+        wrong = f"the header of the method {self.method!r} must be a table of texts, numbers and lists of them"
+        if not isinstance(header, dict):
+            raise DataError(f"{wrong}, not {type(header).__name__}")
+        try:
+            json.dumps(header)
+        except (TypeError, ValueError) as error:
+            raise DataError(f"{wrong} ({error})") from None
+        if not _named(header):
+            raise DataError(f"the header of the method {self.method!r}: {' and '.join(NAMES)} must be lists of texts")
+        return header
+
+    def _corrector_arrays(self) -> dict[str, Array]:
+        """The arrays of the method; DataError for what would not be read back."""
+        arrays = {str(name): np.asarray(values) for name, values in self.corrector.arrays().items()}
+        taken = next((name for name in arrays if name == "header" or name.startswith(BANDS)), None)
+        fault = _fault_of(arrays) if taken is None else f"{taken!r} is a name that is taken: use another"
+        if fault:
+            raise DataError(f"arrays of the method {self.method!r}: {fault}")
+        return arrays
 
     def export(
         self, to: str, out: str | os.PathLike[str], *, single: bool = False, name: str | None = None
@@ -320,7 +349,9 @@ class Predictor:
         kind: Any = header.get("method")
         if isinstance(kind, str) and kind not in METHODS:
             raise ResultError(f"made by the method {kind!r}, which is not known here: {listed(kind)}", file=file)
-        _check_arrays(arrays, file)
+        fault = _fault_of(arrays)
+        if fault:
+            raise ResultError(f"damaged: {fault}: run the study again", file=file)
         if not _named([header.get("corrector"), header.get("bands")]):
             raise ResultError("damaged: run the study again", file=file)
         band = {name.removeprefix(BANDS): arrays.pop(name) for name in [*arrays] if name.startswith(BANDS)}
@@ -405,15 +436,15 @@ def _named(header: Any) -> bool:
     return texts and all(_named(value) for key, value in header.items() if key not in NAMES)
 
 
-def _check_arrays(arrays: Mapping[str, Array], file: str | os.PathLike[str]) -> None:
-    """Raise ResultError for an array of anything but numbers, one with NaN, or a divisor that is not above 0."""
+def _fault_of(arrays: Mapping[str, Array]) -> str:
+    """Which array holds anything but numbers, or NaN, or is a divisor and not above 0; empty where none does."""
     for name, array in arrays.items():
         numbers = array.dtype.kind in "fiub"
         if not numbers or np.isnan(array).any():
-            what = "NaN" if numbers else f"{array.dtype}"
-            raise ResultError(f"damaged: {name!r} holds {what}: run the study again", file=file)
+            return f"{name!r} holds {'NaN' if numbers else array.dtype}"
         if name.rpartition(".")[2] in DIVISORS and not (array > 0).all():
-            raise ResultError(f"damaged: {name!r} must be above 0: run the study again", file=file)
+            return f"{name!r} must be above 0"
+    return ""
 
 
 def fit(

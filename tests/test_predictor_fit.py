@@ -385,6 +385,29 @@ def test_paths_of_a_method_that_are_none_are_named(made: Callable[[Any], Any], m
     np.testing.assert_array_equal(as_list.predict(WINDOWS.instants()), np.full((HORIZON, 150, 2), 2.0))
 
 
+@pytest.mark.parametrize(
+    ("header", "arrays", "message"),
+    [
+        ({}, {"points": np.array([1.0, np.nan])}, "arrays of the method 'mine': 'points' holds NaN"),
+        ({}, {"points": np.array([{}, 1], dtype=object)}, "arrays of the method 'mine': 'points' holds object"),
+        ({}, {"std": np.zeros(2)}, "arrays of the method 'mine': 'std' must be above 0"),
+        ({}, {"header": np.zeros(2)}, "arrays of the method 'mine': 'header' is a name that is taken: use another"),
+        ({}, {"bands.x": np.zeros(2)}, "arrays of the method 'mine': 'bands.x' is a name that is taken"),
+        ([1], {}, "the header of the method 'mine' must be a table of texts, numbers and lists of them, not list"),
+        ({"a": {1, 2}}, {}, "the header of the method 'mine' must be a table .* not JSON serializable"),
+        ({"names": [3]}, {}, "the header of the method 'mine': commands and names and modules must be lists of texts"),
+    ],
+)
+def test_what_could_not_be_read_back_is_not_saved(header: Any, arrays: Any, message: str, tmp_path: Path) -> None:
+    """A study ended well, and its predictors were said to be damaged; a set came back as a text."""
+    corrector = Mistaken(centred)
+    object.__setattr__(corrector, "header", lambda: header)
+    object.__setattr__(corrector, "arrays", lambda: arrays)
+    with pytest.raises(DataError, match=message):
+        Predictor(NONE, "mine", corrector).save(tmp_path / "mine.npz")  # type: ignore[arg-type]
+    assert not [*tmp_path.iterdir()]
+
+
 @pytest.mark.parametrize("level", ["0.9", [0.5, 0.9], np.array([0.5]), 90, np.nan])
 def test_what_is_no_level_is_refused(predictor: Predictor, level: Any) -> None:
     with pytest.raises(DataError, match="is no level of a band"):
