@@ -28,6 +28,7 @@ TEMPORARY = ".shipid-"
 """Beginning of the names of temporary folders."""
 TABLES = (".parquet", ".csv")
 """Endings of the files that `write_table` writes."""
+_SWEPT: set[Path] = set()  # folders that this process has looked through: one of 10,000 files takes milliseconds
 
 
 @contextmanager
@@ -36,8 +37,8 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
 
     The folder of the target is made if it is absent. Data are synced to disk before the target is replaced, and the
     folder after it, so that a power cut leaves the old file or the new one. A process that is killed leaves a
-    temporary folder, which `sweep` removes. A link stays, and the file that it leads to is replaced. Raises OSError
-    where the place cannot be written, and for a device or a pipe, which a file would replace.
+    temporary folder, which the next one that writes there removes. A link stays, and the file that it leads to is
+    replaced. Raises OSError where the place cannot be written, and for a device or a pipe, which a file would replace.
     """
     name, target = Path(target).name, Path(os.path.realpath(target))
     if target.is_symlink():
@@ -87,7 +88,13 @@ def sync(place: Path) -> None:
 
 @contextmanager
 def temporary_folder(parent: Path) -> Iterator[Path]:
-    """Give a folder for files that are not whole yet; its name says which process made it."""
+    """Give a folder for files that are not whole yet; its name says which process made it.
+
+    The first one that a process makes beside others removes those that killed processes left.
+    """
+    if parent not in _SWEPT:
+        _SWEPT.add(parent)
+        sweep(parent)
     with tempfile.TemporaryDirectory(dir=parent, prefix=f"{TEMPORARY}{socket.gethostname()}-{os.getpid()}-") as folder:
         yield Path(folder)
 

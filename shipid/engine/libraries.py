@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from shipid.errors import ShipidError, is_utf_8, visible
+from shipid.files import temporary_folder
 
 PROBE_LIMIT, LIMIT = 10.0, 120.0  # s that a compiler may take: for a probe of two lines, for a model
 
@@ -72,11 +73,11 @@ def build(command: Sequence[str], source: str, library: Path, limit: float = LIM
     command : compiler and options, with `{source}` and `{library}` where the names of the files belong.
     """
     try:
-        with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-            text, fresh = Path(folder) / "step.c", Path(folder) / "step.so"
+        with temporary_folder(library.parent) as folder:
+            text, fresh = folder / "step.c", folder / "step.so"
             text.write_text(source, encoding="utf-8")
             places = {"{source}": str(text), "{library}": str(fresh)}
-            complaint, _ = run_compiler([places.get(word, word) for word in command], Path(folder), limit)
+            complaint, _ = run_compiler([places.get(word, word) for word in command], folder, limit)
             if complaint is not None:
                 return complaint
             with fresh.open("ab") as stream:
@@ -154,8 +155,8 @@ def folder(wanted: str, probe: bytes) -> Path | None:
             if not is_utf_8(str(kept or tempfile.gettempdir())):  # threadpoolctl ends where it meets such a library
                 raise OSError(errno.EILSEQ, "a name that is not UTF-8")
             place = _passing() if kept is None else _kept(kept)
-            with tempfile.TemporaryDirectory(dir=place) as inside:
-                trial = Path(inside) / "probe.so"
+            with temporary_folder(place) as inside:
+                trial = inside / "probe.so"
                 trial.write_bytes(probe)
                 trial.chmod(0o700)
                 reason = stranger(trial)

@@ -254,6 +254,17 @@ def test_a_compiler_that_cannot_be_started_is_a_reason(tmp_path: Path) -> None:
     assert reason.startswith("cannot be started")
 
 
+def test_what_a_killed_process_was_compiling_does_not_stay_in_the_cache(tmp_path: Path) -> None:
+    process = os.fork()
+    if not process:
+        build(["kill", "-9", str(os.getpid())], SOURCE, tmp_path / "model.so")
+    os.waitpid(process, 0)
+    assert [place.name for place in tmp_path.glob(".shipid-*/*")] == ["step.c"]
+    assert build(["cp", "{source}", "{library}"], SOURCE, tmp_path / "model.so") is None
+    assert [place.name for place in tmp_path.glob("*.so")] == ["model.so"]
+    assert not list(tmp_path.glob(".shipid-*"))
+
+
 def test_a_cache_whose_name_is_not_utf_8_is_not_used(
     numbers: Callable[..., np.ndarray],
     monkeypatch: pytest.MonkeyPatch,
