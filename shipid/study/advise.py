@@ -240,7 +240,7 @@ def _good_enough(case: Case) -> str:
         elif limit is None:
             parts.append(_uncrossed(case, sides))
         else:
-            parts.append(_limit(limit))
+            parts.append(_limit(limit) + _but(case, limit, sides))
             limits = True
     begins = f"How good must the physics be, {_ahead(case.results)} ahead? " if limits else ""
     if len(parts) == 2 and (once := _once(parts, list(every))):
@@ -269,6 +269,17 @@ def _limit_of_A(case: Case, amount: int, sides: Sides) -> Estimate | None:
     if limit is None or (limit.above and sides.worse) or (limit.below and sides.better):
         return None
     return limit
+
+
+def _but(case: Case, limit: Estimate, sides: Sides) -> str:
+    """Models that are shown to do the opposite of what the interval of a limit says of their A."""
+    low, high = (limit.low, limit.high) if np.isfinite(limit.low) else (limit.value, limit.value)
+    A = {model: case.table.mean(model, ALONE) for model in case.fixed}
+    worse = [model for model in sides.worse if model in A and A[model] < low]
+    better = [model for model in sides.better if model in A and A[model] > high]
+    parts = [f"{named(worse)} with less {plural(len(worse), 'does', 'do')} worse"] if worse else []
+    parts += [f"{named(better)} with more {plural(len(better), 'does', 'do')} better"] if better else []
+    return f", but {' and '.join(parts)}" if parts else ""
 
 
 def _uncrossed(case: Case, sides: Sides) -> str:

@@ -209,6 +209,22 @@ def test_no_limit_of_A_where_better_physics_does_worse(made: Any) -> None:
     assert "physics does not pay" not in text(made(grid(H), alone=alone, claims=None, runs=8))
 
 
+def test_models_that_a_limit_of_A_does_not_hold_for_are_named_with_it(made: Any) -> None:
+    """A line through all models says that physics below 4 m pays, which is not so of the one of 2 m."""
+    alone = {f"m{k}": 2.0**k for k in range(5)}
+    H = {"m0": (1.0, 1.0), "m1": (4.5, 1.0), "m2": (1.5, 1.0), "m3": (5.0, 1.0), "m4": (6.0, 1.0), "none": (3.0, 1.5)}
+    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
+    assert re.search(
+        r"With 10 runs physics pays if its .* \[3\.\d, 5\.\d\], but m1 with less does worse; with 30", advice
+    )
+    H |= {"m1": (1.5, 1.0), "m2": (4.0, 1.0), "m3": (4.0, 1.0), "m4": (1.2, 1.0), "none": (2.0, 1.5)}
+    for runs in (1, 8):
+        advice = text(made(grid(H), alone=alone, claims=None, runs=runs))
+        assert re.search(r"m4 with more does better; with 30", advice), advice
+    H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (3.0, 1.5)}
+    assert "with less" not in text(made(grid(H), alone=alone, claims=None, runs=8))
+
+
 def test_no_limit_of_A_where_all_models_have_the_same(made: Any) -> None:
     alone = {f"m{k}": 2.0 for k in range(5)}
     H = {name: (1.0 + 0.1 * k, 1.0) for k, name in enumerate(alone)} | {"none": (3.0, 3.0)}
