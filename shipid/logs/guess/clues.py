@@ -171,6 +171,7 @@ class State:
     whose sign `columns` has turned. words : columns that hold words, with their first.
     commands : names of those of the vessel that the log is of, where it is known.
     turning : column that steers -> sign with which a positive value turns the ship to starboard, where that is seen.
+    astern : whether the ship goes astern nearly always.
     position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
@@ -192,6 +193,7 @@ class State:
     questions: list[Question] = field(default_factory=list)
     commands: tuple[str, ...] = ()
     turning: dict[str, float] = field(default_factory=dict)
+    astern: bool = False
     position: Complex | None = None
     psi: Array | None = None
     r: Array | None = None

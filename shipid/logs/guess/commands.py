@@ -76,12 +76,17 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
                 effect = float(1.01 * SEEN * np.sign(followed))
             else:
                 followed = 0.0
+        if state.astern and signal == "delta":
+            effect = -effect
+            words = "the ship goes astern, and a rudder is taken to turn her the other way there"
+            state.ask((signal,), f"{words}: is {name!r} positive to {'starboard' if effect > 0 else 'port'}?")
         if abs(effect) > SEEN:
             state.turning[name] = float(np.sign(effect))
             confidence = 0.95 if by_name else 0.55
             # sides to which it turns the ship, and to which it does not
             sides = ("starboard", "port") if effect > 0 else ("port", "starboard")
             seen = f"t value {abs(effect):.0f}" if followed == 0.0 else f"correlation {abs(followed):.2f}"
+            seen += ", the other way astern" * (state.astern and signal == "delta")
             why = f"positive turns the ship to {sides[0]} ({seen})"
             if (effect > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is taken for one aft of the origin
                 extra["sign"] = -1

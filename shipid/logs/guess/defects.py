@@ -268,10 +268,10 @@ def _heading_offset(state: State) -> None:
     rows = evidence.straight(r, state.t) & (np.abs(state.body) > 0.3 * np.percentile(np.abs(state.body), 90))
     if rows.mean() < 0.02:
         return
-    drift = np.angle(state.body[rows])
+    drift = np.angle(-state.body[rows] if state.astern else state.body[rows])
     angle = float(np.median(drift))
     scatter = float(np.median(np.abs(drift - angle)))
-    if abs(angle) > max(OFFSET, 1.5 * scatter):
+    if np.pi / 4 > abs(angle) > max(OFFSET, 1.5 * scatter):  # one of more is a drift, or the zero of the heading
         sentence = f"in straight runs the course leaves the heading by {np.degrees(angle):+.1f} deg"
         sentence += ": heading off, or wind and current"
         repair = {"kind": "heading_offset", "offset": round(angle, 4), "unit": "rad"}

@@ -20,11 +20,13 @@ from shipid.logs.guess.words import fits, is_magnetic, is_order, parts_of
 from shipid.logs.mapping import to_si
 
 POOR = 0.2  # misfit of a course and a heading: 1 - agreement
+UNSEEN = 0.5  # misfit from which a track says nothing of the heading: she is moored, or drifts to any side
 MIRROR = 2.0  # times smaller a misfit must be, to decide between a heading and its mirror
 STRAIGHT = 0.01  # 1 - |mean exp(i psi)| of a ship that hardly turns
 COMPASS = frozenset(("heading hdg hdt head compass kompass gyro kreisel kurs course baug psi steuer rumbo cap").split())
 YAW = frozenset(["yaw", "gier", "gir", "theta"])
 TURNED = np.radians(8.0)  # range of a heading that no name says, at least
+NEARLY_ALWAYS = 0.9  # share of the rows with a turning shaft in which it turns astern, of a ship that goes astern
 SEARCHED = 24  # columns at most, where no name helps
 
 Frame = Literal["ned", "enu", "zup", "ros"]
@@ -327,7 +329,7 @@ def plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
 
 def _take(state: State, best: Pose, sure: list[str]) -> None:
     """Take a hypothesis: decide sign, origin and frame of the heading, and ask where nothing decides."""
-    best = _other_way(state, _signed(state, best))
+    best = _unseen(state, best) if best.misfit > UNSEEN else _other_way(state, _signed(state, best))
     north, east, heading, unit = best.north, best.east, best.heading, best.unit
     turn = 2 * np.pi / to_si(unit, "psi")
     psi, false = evidence.heal(state.columns[heading], turn, state.t)
@@ -346,7 +348,7 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
         for name, meaning in ((north, "north"), (east, "east"))
     )
     phase = float(np.angle(best.mirrored if mirrored else best.same))
-    quarter = round(phase / (np.pi / 2))
+    quarter = _of_astern(state, best, -angle if mirrored else angle, round(phase / (np.pi / 2)))
     sign, offset = 1, 0.0
     agreement = max(abs(best.same), abs(best.mirrored))
     confidence = float(np.clip(1.0 - 0.5 * min(misfits) / max(max(misfits), 1e-9), 0.5, 0.99)) * min(
@@ -409,6 +411,62 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     state.chosen = evidence.windows(state.t, evidence.lively(state.t, state.psi, state.chosen))
 
 
+def _unseen(state: State, best: Pose) -> Pose:
+    """Return a hypothesis whose track says nothing of the heading, as of a moored ship, as the names have it."""
+    if state.numbered or best.settled:
+        return best
+    large = float(np.abs(state.columns[best.heading]).max()) > 2.2 * np.pi
+    unit = unit_in_name(best.heading, "rad") or ("deg" if large else "rad")
+    return replace(best, unit=unit, same=complex(1.0 - best.misfit), mirrored=0j)
+
+
+def _of_astern(state: State, best: Pose, psi: Array, quarter: int) -> int:
+    """Quarters of a turn from a heading psi (N,) [rad] to the course; 0 where the ship goes astern, which is asked."""
+    if abs(quarter) != 2:
+        return quarter
+    why = _astern(state, best, psi)
+    if why:
+        state.astern = True
+        sentence = f"course and heading differ by about 180 deg: the ship goes astern, as {why}"
+        state.find("astern", (best.heading,), 0.8, sentence)
+        return 0
+    words = f"does the ship go astern, or has {best.heading!r} another zero? If she goes astern, take the offset out"
+    state.ask(("psi", "u", "v"), f"course and heading differ by about 180 deg: {words}")
+    return quarter
+
+
+def _astern(state: State, best: Pose, psi: Array) -> str:
+    """Why a ship whose heading psi (N,) [rad] points against her track goes astern; empty where nothing says so.
+
+    The speed along the heading gives the track as it is; or the shaft turns astern when she moves.
+    """
+    track = state.chosen.change(plane(state, best.north, best.east, best.on_globe))
+    for name in state.called("u"):
+        change = state.chosen.change(evidence.integral(state.t, state.columns[name] * np.exp(1j * psi)))
+        if fits(name)["u"] > fits(name).get("velocity_north", 0.0) and _left(track, change) < POOR:
+            return f"{name!r} along the heading gives the track"
+    for name in state.called("n"):
+        turns = state.columns[name][state.columns[name] != 0.0]
+        if len(turns) and np.mean(turns < 0.0) > NEARLY_ALWAYS:
+            return f"{name!r} is negative"
+    return ""
+
+
+def _follows_course(state: State, best: Pose) -> bool:
+    """Whether a logged course over ground agrees with the track, so that the signs of the positions are right."""
+    track = state.chosen.change(plane(state, best.north, best.east, best.on_globe))
+    middle = (state.chosen.first + state.chosen.last) // 2
+    for name in state.all_called("course"):
+        if name == best.heading or is_order(name) or fits(name).get("psi", 0.0) >= fits(name)["course"]:
+            continue
+        for unit in ("deg", "rad"):
+            course, _ = evidence.heal(state.columns[name], 2 * np.pi / to_si(unit, "psi"), state.t)
+            same = evidence.agreement(track, to_si(unit, "psi") * course[middle])
+            if abs(same) > 1.0 - POOR and abs(np.angle(same)) < np.pi / 4:
+                return True
+    return False
+
+
 def _signed(state: State, best: Pose) -> Pose:
     """Return the hypothesis with the sign of latitude and longitude with which a compass agrees with the track.
 
@@ -419,10 +477,13 @@ def _signed(state: State, best: Pose) -> Pose:
     if not best.on_globe or not _is_compass(best.heading) or best.misfit > POOR:
         return best
     turned: tuple[str, ...] = ()
+    if _follows_course(state, best):
+        return best
     if mirrored:
         turned = (best.east,) if phase < np.pi / 4 else (best.north,) if phase > 3 * np.pi / 4 else ()
     elif phase > 3 * np.pi / 4:
-        turned = (best.north, best.east)
+        psi, _ = evidence.heal(state.columns[best.heading], 2 * np.pi / to_si(best.unit, "psi"), state.t)
+        turned = () if _astern(state, best, psi * to_si(best.unit, "psi")) else (best.north, best.east)
     unsigned = all(state.columns[name].min() >= 0 or name in state.negated for name in turned)
     agreements = sorted((abs(best.same), abs(best.mirrored)))
     if not turned or not unsigned or (mirrored and (1.0 - agreements[1]) * MIRROR > 1.0 - agreements[0]):

@@ -49,6 +49,17 @@ def test_what_steers(
     assert {finding.kind for finding in state.findings} == kinds
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_rudder_turns_a_ship_that_goes_astern_the_other_way(sign: int) -> None:
+    """Its sign is that which it has ahead, and it is asked."""
+    state = state_with_pose({"rudder": -sign * RUDDER})
+    state.r, state.astern = R, True
+    choose_commands(state)
+    assert described(state)["rudder.delta"] == ("rudder", "deg", sign)
+    (question,) = state.questions
+    assert f"is 'rudder' positive to {'starboard' if sign > 0 else 'port'}?" in question.sentence
+
+
 def test_the_sign_of_a_rudder_that_moves_nothing_is_not_known() -> None:
     (column,) = chosen({"rudder": RUDDER}, quiet=True).suggestions
     assert column.confidence <= 0.5

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pymap3d import ned2geodetic
 
 from shipid.errors import DataError
 from shipid.logs.guess.clues import State
@@ -213,6 +214,53 @@ def test_a_degree_of_latitude_is_sixty_miles() -> None:
     state = state_of({"lat": np.array([60.0, 60.5, 61.0]), "lon": np.array([5.0, 5.0, 6.0])}, np.arange(3.0))
     assert plane(state, "lat", "lon", on_globe=True)[1] == pytest.approx(30 * 1852, rel=5e-3)
     np.testing.assert_array_equal(plane(state, "lat", "lon", on_globe=False), [60 + 5j, 60.5 + 5j, 61 + 6j])
+
+
+ASTERN = (DEG + 180.0) % 360.0
+SURGE, SWAY = LOG["u"].to_numpy(), LOG["v"].to_numpy()
+
+
+def _on_earth() -> dict[str, np.ndarray]:
+    latitude, longitude, _ = ned2geodetic(NORTH, EAST, 0 * NORTH, 59.0, 10.0, 0.0)
+    return {"lat": latitude, "lon": longitude}
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ({"u": -SURGE, "v": -SWAY}, "'u' along the heading gives the track"),
+        ({"rpm": -60.0 - SURGE}, "'rpm' is negative"),
+        ({"rpm": -60.0 - SURGE, "cog": COURSE, "sog": np.hypot(SURGE, SWAY)}, "'rpm' is negative"),
+    ],
+)
+@pytest.mark.parametrize("place", [{"N": NORTH, "E": EAST}, _on_earth()], ids=["plane", "Earth"])
+def test_a_ship_that_goes_astern_all_the_time_keeps_her_heading(
+    place: dict[str, np.ndarray], more: dict[str, np.ndarray], why: str
+) -> None:
+    """Before, her heading was turned by 180 deg, or her positions to the other side of the Earth."""
+    state = chosen({**place, "heading": ASTERN, **more})
+    assert state.psi is not None
+    np.testing.assert_allclose(np.exp(1j * state.psi), -np.exp(1j * PSI), atol=1e-6)
+    assert not state.negated
+    assert [one.sentence for one in state.findings if one.kind == "astern" and why in one.sentence]
+    assert not state.questions
+
+
+def test_a_heading_against_the_track_is_asked_where_nothing_decides() -> None:
+    state = chosen({"N": NORTH, "E": EAST, "heading": ASTERN})
+    assert any("does the ship go astern" in one.sentence for one in state.questions)
+    state = chosen({**_on_earth(), "heading": ASTERN, "cog": COURSE})
+    assert not state.negated
+    assert any("does the ship go astern" in one.sentence for one in state.questions)
+
+
+def test_the_track_of_a_moored_ship_says_nothing_of_her_heading() -> None:
+    """Before, a heading of 100 deg was one in radians that counts to port, with an offset of 180 deg."""
+    random = np.random.default_rng(1)
+    place = {name: random.normal(0, 0.3, len(T)) for name in "NE"}
+    psi = 100.0 + 0.2 * np.sin(T / 40.0)
+    column = chosen({**place, "heading": psi.round(1)}).suggestions[-1]
+    assert (column.unit, column.extra, column.confidence < 0.2) == ("deg", {"wrap": True}, True)
 
 
 def test_a_heading_of_a_magnetic_compass_alone_is_asked() -> None:
