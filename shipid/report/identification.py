@@ -24,6 +24,7 @@ from shipid.report.wording import bound, counted, listed, number, scientific, sh
 
 ROW, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
 WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [px]
+MOST_NAMED = 16  # estimates whose names have room below the columns on a phone
 FARTHEST = 4.0  # an interval may reach so many spans of the estimates beyond them before it is cut
 BEFORE, AFTER = "before", "after"
 INKS = {LOG: INK, BEFORE: category(1), AFTER: category(0)}
@@ -221,7 +222,9 @@ def correlations(content: IdentificationContent) -> Figure | None:
     apart = np.abs(matrix - np.eye(len(names)))
     i, j = np.unravel_index(int(np.argmax(apart)), matrix.shape)
     y_axis = axis("", showgrid=False, tickmode="array", tickvals=names, ticktext=names, autorange="reversed")
+    many = len(names) > MOST_NAMED
     x_axis = axis("", showgrid=False, tickmode="array", tickvals=names, ticktext=names, tickangle=-90)
+    x_axis |= {"showticklabels": not many}
     plot = layout(x_axis, y_axis, hovermode="closest", margin={"l": 8, "r": 8, "t": 8, "b": 8})
     return Figure(
         id="correlations",
@@ -229,7 +232,8 @@ def correlations(content: IdentificationContent) -> Figure | None:
         takeaway=f"Most correlated are {content.estimates['name'].iloc[i]} and {content.estimates['name'].iloc[j]}: "
         f"{number(float(matrix[i, j]))}.",
         how="Correlations of the errors of the estimates: near 1 or −1, a change of one is compensated by a change "
-        "of the other, and only their combination is known.",
+        "of the other, and only their combination is known."
+        + (" Columns are in the order of the rows." if many else ""),
         alternative="Heat map of the correlations of all pairs of estimates.",
         height=WIDTH * len(names) + SIDE,
         views={"": [Panel(Plot([heat], plot))]},
@@ -327,13 +331,14 @@ def residuals(content: IdentificationContent) -> Figure | None:
         )
         for i, (name, mine) in enumerate(parts.items())
     ]
-    y = axis("autocorrelation [1]", nticks=6, zeroline=True, zerolinecolor=INK, range=[-0.55, 1.05])
+    least = min(-0.5, float(content.colours["correlation"].min()))
+    y = axis("autocorrelation [1]", nticks=6, zeroline=True, zerolinecolor=INK, range=[least - 0.05, 1.05])
     first = {name: float(mine["correlation"].iloc[1]) if len(mine) > 1 else 0.0 for name, mine in parts.items()}
     correlated = [f"{name} {number(value)}" for name, value in first.items()]
     return Figure(
         id="residuals",
         title="Autocorrelation of the residuals",
-        takeaway=f"One sample later, residuals correlate by {listed(correlated)}.",
+        takeaway=f"The correlation of residuals one sample apart is {listed(correlated)}.",
         how="Autocorrelation of the weighted residuals, pooled over runs. White residuals drop to 0; a long "
         "tail shows effects that the model, or the data on wind and current, lack; standard errors then count runs.",
         alternative="Autocorrelation of the residuals of each signal over lag.",

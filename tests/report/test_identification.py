@@ -121,6 +121,26 @@ def test_what_is_not_identified_is_hollow_and_its_bar_is_cut() -> None:
     assert high > 3.0
 
 
+def test_the_figure_of_residuals_holds_every_line() -> None:
+    colours = pd.DataFrame({"signal": "v", "lag": [0.0, 1.0, 2.0], "correlation": [1.0, 0.95, -0.93]})
+    figure = identification.residuals(replace(content(), colours=colours))
+    assert figure is not None
+    low, high = figure.views[""][0].figure.layout.yaxis.range
+    assert low < -0.93
+    assert high > 1.0
+    assert figure.takeaway == "The correlation of residuals one sample apart is v 0.95."
+
+
+@pytest.mark.parametrize(("count", "named"), [(3, True), (40, False)])
+def test_names_of_many_estimates_do_not_cover_each_other(count: int, named: bool) -> None:
+    one = content()
+    rows = one.estimates.iloc[[0] * count].assign(name=[f"N_{k}" for k in range(count)])
+    figure = identification.correlations(replace(one, estimates=rows, correlations=np.eye(count)))
+    assert figure is not None
+    assert figure.views[""][0].figure.layout.xaxis.showticklabels is named
+    assert ("Columns are in the order of the rows." in figure.how) is not named
+
+
 def test_pieces_are_not_joined_and_time_starts_at_zero() -> None:
     panels = identification.free_runs(content()).views["0"]
     speed = next(trace for trace in panels[0].figure.data if trace.name == "measured")
