@@ -25,7 +25,7 @@ from shipid.report.figure import (
     silent,
 )
 from shipid.report.palette import INK, NAIVE, Style, accuracy_range, styles
-from shipid.report.selection import data_driven, left_out, nothing_learns, overview, spread, trained
+from shipid.report.selection import data_driven, in_words, left_out, nothing_learns, overview, spread, trained
 from shipid.report.wording import counted, listed, metres, shortened
 
 ROW = 46  # height of a model in the dumbbell figure [px]
@@ -186,7 +186,11 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
     parts = []
     for size in (means.N_D.min(), means.N_D.max()):
         here = means[means.N_D.eq(size)].set_index("model").H
-        known = [f"{name} has H = {metres(here[name])}" for name in (content.best, pure) if name and name in here.index]
+        known = [
+            f"{in_words(content, name)} has H = {metres(here[name])}"
+            for name in (content.best, pure)
+            if name and name in here.index
+        ]
         parts.append(
             f"at N_D = {size}, {', '.join(known) or f'H runs from {metres(here.min())} to {metres(here.max())}'}"
         )
@@ -283,8 +287,9 @@ def _takeaway_dumbbell(content: ReportContent, means: pd.DataFrame) -> str:
         if best in after.index
         else "Compensation"
     )
-    text += f" improves {len(better)} of "
-    text += f"{counted(len(before), 'physics model')}"
+    text += f" improves {len(better)} of {counted(len(before), 'physics model')}"
+    if before.empty:
+        text = "No physics model has a result with data"
     if pure and pure in after.index:
         text += f"; pure data-driven has H = {metres(after[pure])}"
     return f"{text}; the naive floor is {metres(content.naive['mean'])}."

@@ -24,6 +24,7 @@ from shipid.report.selection import (
     drawn_source,
     exemplars,
     families,
+    in_words,
     middles,
     sizes,
     spread,
@@ -110,7 +111,11 @@ def snapshots(content: ReportContent) -> Figure | None:
             for name in models or [""]
             for i, c in enumerate(counts)
         ]
-        takeaway = _takeaway_models(window, models, counts) if models else _takeaway_row(content, [window] * 3, counts)
+        takeaway = (
+            _takeaway_models(content, window, models, counts)
+            if models
+            else _takeaway_row(content, [window] * 3, counts)
+        )
     else:
         run = max(range(len(names)), key=lambda i: len(runs[names[i]]))
         mine = runs[names[run]]
@@ -369,8 +374,9 @@ def _takeaway(content: ReportContent, size: int) -> str:
     learned = _mean_end_error(windows, {k for k in keys if k[0] == pure and k[2] == size})
     parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, "pure data-driven")]
     errors = [f"{word} by {metres(value)}" for value, word in parts if np.isfinite(value)]
+    where = f", N_D = {size}" if size else ""  # where no cell has a result there is physics alone
     return (
-        f"In the {counted(len(windows), 'window')} to look at, N_D = {size}, the models drawn miss the true place at "
+        f"In the {counted(len(windows), 'window')} to look at{where}, the models drawn miss the true place at "
         f"the end of the horizon on average: {'; '.join(errors)}."
     )
 
@@ -395,13 +401,13 @@ def _takeaway_row(content: ReportContent, windows: list[Snapshot], counts: list[
     return "No compensated path was recorded for these windows."
 
 
-def _takeaway_models(window: Snapshot, models: list[str], counts: list[int]) -> str:
+def _takeaway_models(content: ReportContent, window: Snapshot, models: list[str], counts: list[int]) -> str:
     """How far each model ends from the truth, by rising N_D."""
     parts = []
     for name in models:
         ends = [_mean_end_error([window], {(name, "cooperative", size)}) for size in counts]
         alone = _mean_end_error([window], {(name, "physics", 0)})
-        text = f"{name} {', '.join(number(end) for end in ends)} m"
+        text = f"{in_words(content, name)} {', '.join(number(end) for end in ends)} m"
         parts.append(text + (f" (physics alone {metres(alone)})" if np.isfinite(alone) else ""))
     numbers = listed([str(size) for size in counts])
     return f"Distance from the true place at the end, with N_D = {numbers}: {'; '.join(parts)}."

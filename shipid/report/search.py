@@ -238,7 +238,7 @@ def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
     """Return the median ratio of a trial to the best of its cell, and the hyperparameter most correlated with it."""
     if frame.ratio.isna().all():
         return f"None of {counted(len(frame), 'trial')} ended with a value."
-    text = f"The middle trial errs by {number(float(frame.ratio.median()))} times the best of its cell"
+    text = f"The median error of a trial is {number(float(frame.ratio.median()))} times that of the best of its cell"
     correlations = {name: importance(frame, name) for name in names}
     correlations = {name: value for name, value in correlations.items() if math.isfinite(value)}
     if correlations:

@@ -58,6 +58,11 @@ def nothing_learns(content: ReportContent) -> bool:
     return bool(len(content.alone)) and bool(content.cells.model.isin(list(content.alone)).all())
 
 
+def in_words(content: ReportContent, model: str) -> str:
+    """Name of a model in a sentence: of itself `none errs most` would say that nobody does."""
+    return f"{model} (pure data-driven)" if model == data_driven(content) else model
+
+
 def middles(content: ReportContent) -> dict[str, str]:
     """Per family, the model of middle A; families of many members first, then by rising A."""
     frame = families(content)

@@ -91,7 +91,8 @@ def test_takeaway_speaks_of_the_best_in_validation_and_its_rival(simulation):
     cells = simulation.cells
     means = cells[cells.N_D == 10].groupby("model").H.mean()
     text = gain(simulation).takeaway
-    assert f"At N_D = 10, nominal has H = {means['nominal']:.2f} m, no model has H = {means['no model']:.2f} m;" in text
+    assert f"At N_D = 10, nominal has H = {means['nominal']:.2f} m, no model (pure data-driven) has H = " in text
+    assert f"has H = {means['no model']:.2f} m; at N_D = 100, " in text
     assert text.endswith("nominal is the best in validation.")
 
 
@@ -118,6 +119,15 @@ def test_one_size_is_a_dumbbell(full_scale):
         "accurate (Gunnerus, 28.9 m), best in validation, has H = 0.94 m; compensation improves 2 of 2 physics models; "
         "pure data-driven has H = 4.30 m; the naive floor is 5.01 m."
     )
+
+
+def test_without_a_result_of_physics_nothing_is_counted(full_scale):
+    cells = full_scale.cells.copy()
+    lost = cells.family.ne("none")
+    cells.loc[lost, ["H", "H_90", "rms"]] = np.nan
+    cells.loc[lost, "status"] = "failed"
+    text = gain(replace(full_scale, cells=cells, best="")).takeaway
+    assert text.startswith("No physics model has a result with data; pure data-driven has H = 4.30 m;")
 
 
 def test_a_failed_model_keeps_its_physics_and_shows_no_result(full_scale):

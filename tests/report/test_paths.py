@@ -99,7 +99,7 @@ def test_the_takeaway_names_each_model_and_its_ends(simulation):
     first = data["runs"][figure.windows[0].run][figure.windows[0].instant]
     shot = next(s for s in simulation.snapshots if s.t == first["t"] and s.run == next(iter(windows_of(simulation))))
     ends = [np.linalg.norm(shot.paths["no model", "cooperative", c][-1] - shot.truth[-1]) for c in (10, 30, 100)]
-    assert f"no model {', '.join(number(end) for end in ends)} m" in figure.takeaway
+    assert f"no model (pure data-driven) {', '.join(number(end) for end in ends)} m" in figure.takeaway
 
 
 def test_panels_share_axes_and_show_one_model(simulation):
