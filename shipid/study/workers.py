@@ -13,6 +13,7 @@ from contextlib import ExitStack, contextmanager
 from itertools import islice
 from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection, wait
+from multiprocessing.reduction import ForkingPickler
 from queue import SimpleQueue
 from typing import Any, TypeVar, cast
 
@@ -92,7 +93,7 @@ def _start(work: Callable[[Any], Any], workers: ExitStack) -> Connection:
     process.start()
     there.close()
     workers.callback(process.join)
-    workers.callback(process.terminate)
+    workers.callback(process.kill)  # whatever the work has made of the signals
     return here
 
 
@@ -109,7 +110,24 @@ def _serve(connection: Connection, work: Callable[[Any], Any]) -> None:
         except Exception as error:
             error.add_note("".join(traceback.format_exception(error)))
             result = error
-        connection.send(result)
+        connection.send_bytes(_packed(result))
+
+
+def _packed(result: Any) -> Any:
+    """The result as bytes, or an error where it cannot be sent: what a user's own method makes may be of any class."""
+    try:
+        content = ForkingPickler.dumps(result)
+        if isinstance(result, Exception):
+            ForkingPickler.loads(content)  # one that is made of more than a message cannot be made again
+        return content
+    except Exception as error:
+        if isinstance(result, Exception):
+            other: Exception = RuntimeError(f"{type(result).__name__}: {result}")
+            other.add_note("\n".join(result.__notes__))
+        else:
+            words = f"what was computed cannot leave its process ({error}): give it classes and functions of a module"
+            other = ShipidError(words)
+        return ForkingPickler.dumps(other)
 
 
 def _listen(connection: Connection, tasks: SimpleQueue[Any]) -> None:

@@ -95,6 +95,37 @@ def test_a_killed_worker_is_one_line() -> None:
     assert not multiprocessing.active_children()
 
 
+class OfTwo(Exception):
+    def __init__(self, cell: str, number: int) -> None:
+        super().__init__(f"{cell} has {number}")
+
+
+def gives_what_cannot_be_sent(kind: str) -> object:
+    if kind == "lambda":
+        return lambda: None
+    raise OfTwo("a cell", 3)
+
+
+def test_what_cannot_be_sent_is_an_error_that_says_so() -> None:
+    """Before, a worker died of a method's own class, and memory was blamed; its own errors became a TypeError."""
+    with pytest.raises(ShipidError, match=r"cannot leave its process .*lambda.*: give it classes and functions of a"):
+        list(on_workers(gives_what_cannot_be_sent, ["lambda"], 1))
+    with pytest.raises(RuntimeError, match="OfTwo: a cell has 3") as caught:
+        list(on_workers(gives_what_cannot_be_sent, ["error"], 1))
+    assert "work(task)" in caught.value.__notes__[0]
+    assert not multiprocessing.active_children()
+
+
+def ignore(number: signal.Signals) -> None:
+    signal.signal(number, signal.SIG_IGN)
+
+
+def test_a_worker_that_ignores_signals_ends() -> None:
+    """Before, a study never ended where a user's method, or a library of it, answers SIGTERM."""
+    assert list(on_workers(ignore, [signal.SIGTERM], 1)) == [(signal.SIGTERM, None)]
+    assert not multiprocessing.active_children()
+
+
 def test_closing_ends_busy_workers() -> None:
     results = on_workers(time.sleep, [0, 3600], 2)
     assert next(results) == (0, None)
