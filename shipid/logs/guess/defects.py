@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
@@ -27,6 +28,7 @@ HELD_SHARE, HELD_ROWS = 0.2, 60  # of the rows; repeats in a row that are no res
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
+STEPS_ABOUT = 5  # steps before and after a row, at least, whose median is usual there
 FARTHER = 2.0  # times the way from row to row that a ship would go in a hole of the clock, at least
 STREAM = 0.5  # of the misfit of positions and velocities: less is no current
 NOTHING, OFTEN = 0.3, 20.0  # share of the rows that are 0 for no value, at most; s of a speed that count as a spike
@@ -125,12 +127,27 @@ def defects_of_motion(state: State) -> None:
             )  # or the tests below would report the same delay again
             if state.body is not None and not _is_earth_fixed(state):
                 state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
+    if state.position is not None and state.velocity is None:
+        _jumps(state, _own_path(state), spikes=False)
     if state.velocity is None or state.position is None or state.body is None:
         return
     _ask_for_set_clock(state)
     path = evidence.integral(state.t, state.velocity)
     _jumps(state, _arm_or_delay(state, path))
     _heading_offset(state)
+
+
+def _own_path(state: State) -> Complex:
+    """Path (N,) [m] by the medians of the steps of the position about each row, where no velocities are logged."""
+    assert state.position is not None
+    steps = pd.Series(np.diff(state.t))
+    rows = 2 * max(STEPS_ABOUT, round(0.5 * evidence.WINDOW / float(steps.median()))) + 1
+    rates = np.diff(state.position) / steps.to_numpy()
+    usual = [
+        pd.Series(part).rolling(rows, center=True, min_periods=1).median().to_numpy()
+        for part in (rates.real, rates.imag)
+    ]
+    return np.asarray(np.append(0j, np.cumsum((usual[0] + 1j * usual[1]) * steps.to_numpy())))
 
 
 def _ask_for_set_clock(state: State) -> None:
@@ -229,7 +246,8 @@ def _find_late(state: State, what: str, against: str, delay: float, explained: f
     state.find(f"late {late}", (late,), float(np.clip(explained, 0.2, 0.95)), sentence, repair)
 
 
-def _jumps(state: State, path: Complex) -> None:
+def _jumps(state: State, path: Complex, spikes: bool = True) -> None:
+    """Report where positions leave a path (N,) [m]; of velocities also where they come back: `spikes`."""
     assert state.position is not None
     unit = to_si(state.clock_unit, "t")
     lost = [span for one in state.findings if one.kind == "no fix" and one.repair for span in one.repair["intervals"]]
@@ -239,7 +257,7 @@ def _jumps(state: State, path: Complex) -> None:
         if not any(unit * start <= place[1] and place[0] <= unit * end for start, end in lost)
     ]
     stay = [place for place in places if place[2] > 5.0]
-    spikes = [place for place in places if place[2] <= 5.0]
+    back = [place for place in places if place[2] <= 5.0 and spikes]
     repair: dict[str, Any]
     if stay and state.joined:
         count = f"at {len(stay)} place{'s' * (len(stay) > 1)}"
@@ -249,9 +267,9 @@ def _jumps(state: State, path: Complex) -> None:
         words = ", ".join(f"{when(state, start)} to {when(state, end)} ({far:.0f} m)" for start, end, far in stay[:6])
         repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
         state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
-    if spikes and not any(one.kind == "position spikes" for one in state.findings):  # one repair mends them all
-        words = ", ".join(when(state, (start + end) / 2) for start, end, _ in spikes[:6])
-        words = f"at {len(spikes)} place{'s' * (len(spikes) > 1)} of the files" if state.joined else f"near {words}"
+    if back and not any(one.kind == "position spikes" for one in state.findings):  # one repair mends them all
+        words = ", ".join(when(state, (start + end) / 2) for start, end, _ in back[:6])
+        words = f"at {len(back)} place{'s' * (len(back) > 1)} of the files" if state.joined else f"near {words}"
         state.find("position spikes", (), 0.8, f"the position leaves and comes back {words}", OF_POSITIONS)
 
 

@@ -73,6 +73,16 @@ DEFECTS: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
 }
 
 
+@pytest.mark.parametrize("far", [80.0, -660e3])
+def test_positions_that_jump_are_reported_without_velocities_too(far: float, tmp_path: Path) -> None:
+    """As where the zone of UTM changes, or a receiver starts anew; a clean log has none."""
+    for size in (far, 0.0):
+        east = CLEAN["E"] + np.where(CLEAN["time"] >= 300.0, size, 0.0)
+        findings = {one.kind: one for one in guessed(tmp_path, CLEAN.drop(columns=["u", "v"]).assign(E=east)).findings}
+        assert ("position jumps" in findings) == bool(size)
+        assert not size or findings["position jumps"].repair is not None
+
+
 @pytest.mark.parametrize("kind", DEFECTS)
 def test_a_defect_is_reported_with_its_size(kind: str, tmp_path: Path) -> None:
     spoil, sentence = DEFECTS[kind]
