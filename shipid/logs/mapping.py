@@ -75,6 +75,8 @@ _ANGLE = re.compile(
     r"(?:[°º˚:\s-]\s*(?:(\d+(?:\.\d*)?)\s*(?:['′’´:\s-]\s*(?:(\d+(?:\.\d*)?)\s*(?:[\"″”]|'')?)?)?)?)?[\s,]*([NSEW]?)"
 )
 """An angle as text: side or sign, degrees, perhaps minutes and seconds, side."""
+_COMMA = re.compile(r"(?<=\d),(?=\d+\s*(?:['′’´\"″”°º˚]|[NSEW]\b))")
+"""A decimal comma of degrees, minutes or seconds, also in a log whose numbers have points."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
 ESTIMATED = ("u", "v", "r")
 Manoeuvre = Literal[
@@ -360,7 +362,7 @@ def degrees_in_text(texts: pd.Series[Any], sides: str) -> NDArray[np.float64]:
     a longitude says the one that they name. All texts have a letter or none has. Where one has four digits before the
     point or more, all that are one number are degrees and minutes in one, with six or more also seconds.
     """
-    upper = texts.astype(str).str.strip().str.upper()
+    upper = texts.astype(str).str.strip().str.upper().str.replace(_COMMA, ".", regex=True)
     found = upper.str.extract(rf"^(?:{_ANGLE.pattern})$")
     others = found[2].isna()
     if others.any():

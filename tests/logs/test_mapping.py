@@ -213,12 +213,17 @@ def test_columns_are_interpolated_where_their_instants_differ(plain_mapping: Wri
         ("59°26.2'N 010°36'W", "EW", -10.6),
         ("N59 26.2, W010 36.0", "EW", -10.6),
         ("5926.2N/01036.0W", "EW", -10.6),
+        ("59°26,205'N", "NS", 59 + 26.205 / 60),
+        ("59°26'12,3\"N 10°36,5'W", "NS", 59 + 26 / 60 + 12.3 / 3600),
+        ("59°26'12,3\"N 10°36,5'W", "EW", -(10 + 36.5 / 60)),
+        ("59,4367N", "NS", 59.4367),
         ("59°26'E", "NS", np.nan),  # another side
         ("-33°51'S", "NS", np.nan),
         ("59 61.0N", "NS", np.nan),
         ("59.5°26'N", "NS", np.nan),
         ("95°N", "NS", np.nan),
         ("10°36'O", "EW", np.nan),  # Ost, or ouest
+        ("59,10", "NS", np.nan),
         ("---", "NS", np.nan),
     ],
 )
