@@ -20,6 +20,7 @@ from shipid.logs.guess.words import fits, is_magnetic, is_order, parts_of
 from shipid.logs.mapping import to_si
 
 POOR = 0.2  # misfit of a course and a heading: 1 - agreement
+ABREAST = np.radians(0.5)  # by which two headings of one ship may differ
 UNSEEN = 0.5  # misfit from which a track says nothing of the heading: she is moored, or drifts to any side
 MIRROR = 2.0  # times smaller a misfit must be, to decide between a heading and its mirror
 STRAIGHT = 0.01  # 1 - |mean exp(i psi)| of a ship that hardly turns
@@ -108,7 +109,25 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
     elif not best.on_globe and best.misfit <= POOR:
         best = _by_course(state, best)
         best = best if best.settled else _by_velocities(state, best)
+    _ask_for_second(state, best, [name for name in sure if not is_magnetic(name)])
     _take(state, best, sure)
+
+
+def _ask_for_second(state: State, best: Pose, headings: list[str]) -> None:
+    """Ask where another heading, as of a second gyro, goes with the one that is taken and differs from it."""
+    if best.heading not in headings:
+        return
+    angles = {}
+    for name in headings:
+        turn = to_si(unit_in_name(name, "rad") or best.unit, "psi")
+        angles[name] = np.exp(1j * turn * state.columns[name])
+    for name in headings:
+        apart = np.angle(angles[name] * np.conj(angles[best.heading]))
+        usual = float(np.median(apart))
+        together = float(np.median(np.abs(apart - usual))) < ABREAST
+        if ABREAST < abs(usual) < np.pi / 4 and together:
+            words = f"{best.heading!r} and {name!r} differ by {np.degrees(abs(usual)):.1f} deg: which is the heading? "
+            state.ask(("psi", "v"), f"{words}{best.heading!r} is drafted, as it keeps closer to the track")
 
 
 def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:

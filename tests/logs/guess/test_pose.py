@@ -216,6 +216,15 @@ def test_a_degree_of_latitude_is_sixty_miles() -> None:
     np.testing.assert_array_equal(plane(state, "lat", "lon", on_globe=False), [60 + 5j, 60.5 + 5j, 61 + 6j])
 
 
+@pytest.mark.parametrize(("off", "asked"), [(5.0, True), (0.2, False)])
+def test_two_headings_that_differ_are_asked(off: float, asked: bool) -> None:
+    """Before, that which kept closer to the track was taken without a word, though the ship drifts."""
+    state = chosen({"N": NORTH, "E": EAST, "heading": DEG, "heading2": (DEG + off) % 360.0})
+    said = [one.sentence for one in state.questions if "differ by" in one.sentence]
+    assert len(said) == asked
+    assert not asked or "5.0 deg: which is the heading?" in said[0]
+
+
 ASTERN = (DEG + 180.0) % 360.0
 SURGE, SWAY = LOG["u"].to_numpy(), LOG["v"].to_numpy()
 
