@@ -20,6 +20,7 @@ from shipid.report.wording import distance, number
 POINTS = 2000  # a line needs no more
 OUTLINES = 12  # ships drawn along the track
 TOGETHER = np.deg2rad(120)  # a heading that stays within this is drawn with the helm
+ROUNDING = 1e-9  # deg, m/s, deg/s, rpm: what changes by less is constant, and an axis is no picture of its rounding
 # what the page says first of each kind
 FIRST = {
     "zigzag": ("overshoot 1", "overshoot 2", "initial turning", "period"),
@@ -96,9 +97,11 @@ def measures(content: ManoeuvreContent) -> Table:
 
 def _decimals(value: float, unit: str) -> int:
     """Return the number of decimals for three digits: at most three; none for a count."""
-    if not np.isfinite(value) or abs(value) < 1e-3:
+    if not np.isfinite(value):
         return 2
-    return 0 if unit == "-" and value == round(value) else int(np.clip(2 - np.floor(np.log10(abs(value))), 0, 3))
+    if unit == "-" and value == round(value):
+        return 0
+    return 2 if abs(value) < 1e-3 else int(np.clip(2 - np.floor(np.log10(abs(value))), 0, 3))
 
 
 def criteria(content: ManoeuvreContent) -> Table | None:
@@ -206,6 +209,9 @@ def _panel(title: str, traces: list[Trace], content: ManoeuvreContent | None = N
         for level in ((heading, -heading) if np.isfinite(heading) else ())
     ]
     y = axis(title, nticks=6, zeroline=True, zerolinecolor=GRID)
+    drawn = np.concatenate([trace["y"] for trace in [*marks, *traces]])
+    if len(drawn) and np.nanmax(drawn) - np.nanmin(drawn) < ROUNDING:
+        y["range"] = [float(np.nanmin(drawn)) - 1, float(np.nanmax(drawn)) + 1]
     return Panel(Plot([*marks, *traces], layout(axis("time [s]", nticks=6), y, hovermode="closest")))
 
 

@@ -114,6 +114,21 @@ def test_a_heading_of_few_degrees_is_drawn_with_the_helm(span: float, together: 
     assert np.ptp(helm) == pytest.approx(20.0)
 
 
+def test_rounding_is_not_drawn() -> None:
+    """A stop on a straight course: a yaw rate of 1e-25 filled its panel."""
+    made = content("stop")
+    figure = manoeuvre.histories(replace(made, log=made.log.assign(r=np.linspace(0, 3e-25, len(made.log)))))
+    (panel,) = (one.plot for one in figure.views[""] if one.plot.layout["yaxis"]["title"]["text"] == "yaw rate [deg/s]")
+    low, high = panel.layout["yaxis"]["range"]
+    assert high - low >= 1
+
+
+def test_counts_have_no_decimals() -> None:
+    rows = {row[0].text: row[1].text for row in manoeuvre.measures(content("spiral")).rows}
+    assert rows["levels"] == f"{int(rows['levels'])}"
+    assert rows["levels not steady"] == f"{int(rows['levels not steady'])}"
+
+
 def test_ships_are_drawn_to_scale_where_they_were() -> None:
     """Bow and stern of an outline lie on the heading, the bow half a length ahead; starboard of east is south."""
     shape = np.array([[60.0, 0.0], [-60.0, 0.0], [0.0, 9.0]])
