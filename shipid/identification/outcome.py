@@ -676,7 +676,8 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
         ]
     bound = [path for path, there in zip(solution.paths, solution.at_bound, strict=True) if there]
     if bound:
-        warnings.append(f"at a bound, so without an interval: {listed(bound)}")
+        others = "the intervals of the others hold if the bound is the true value"
+        warnings.append(f"at a bound, so without an interval: {listed(bound)}; {others}")
     if "test" not in free:
         warnings.append("no run was held out: the accuracy on other runs is not known")
     left_out = [name for name in solution.settings.widths if name != "initial_state"]  # a new run has none

@@ -475,6 +475,10 @@ def test_a_profile_of_a_factor_that_ends_at_a_bound_is_left_out_and_the_fit_stay
     result = run_identification(off(), trials(SHIP, runs=2), settings(bounds=bounds), profiles=FEW[:2])
     assert [curve.path for curve in result.profiles] == FEW[1:2]
     assert f"no profile of {FEW[0]}: it is at a bound, fixed or dropped" in result.warnings
+    said = (
+        f"at a bound, so without an interval: {FEW[0]}; the intervals of the others hold if the bound is the true value"
+    )
+    assert said in result.warnings
 
 
 @pytest.mark.usefixtures("one_manoeuvre")
