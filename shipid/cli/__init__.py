@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from collections.abc import Callable, Collection, Sequence
 from typing import Annotated, Any
@@ -30,6 +31,11 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "export": export.export,
     "aboard": export.aboard,
 }
+NAMELESS = {  # errors of the system that name no file -> what helps
+    errno.EAGAIN: "this user has too many processes and threads: end some, raise `ulimit -u`, or take fewer --workers",
+    errno.EMFILE: "raise `ulimit -n`",
+    errno.ENOENT: "the working folder was removed: change to another one",
+}
 GROUPS = {"vessel": vessel.app, "data": data.app, "study": study.app}
 
 
@@ -56,8 +62,16 @@ def main() -> None:
             f"error: {error.path}: cannot be loaded ({error.msg}): raise `ulimit -v`, or install it anew\n"
         )
         sys.exit(1)
+    except RuntimeError as error:
+        if "start new thread" not in str(error):
+            raise
+        sys.stderr.write(f"error: system: {error}: {NAMELESS[errno.EAGAIN]}\n")
+        sys.exit(1)
     except OSError as error:  # a full disk, a folder that is a file, a place where one may not write
-        sys.stderr.write(f"error: {error.filename or 'system'}: {error.strerror or error}\n")
+        words = error.strerror or str(error)
+        if not error.filename and error.errno in NAMELESS:
+            words = f"{words}: {NAMELESS[error.errno]}"
+        sys.stderr.write(f"error: {error.filename or 'system'}: {words}\n")
         sys.exit(1)
 
 

@@ -101,7 +101,11 @@ def _serve(connection: Connection, work: Callable[[Any], Any]) -> None:
     """Do the tasks that come; errors are results that keep where they arose."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tasks: SimpleQueue[Any] = SimpleQueue()
-    threading.Thread(target=_listen, args=(connection, tasks), daemon=True).start()
+    try:
+        threading.Thread(target=_listen, args=(connection, tasks), daemon=True).start()
+    except RuntimeError as error:  # no more threads for this user
+        connection.send_bytes(_packed(error))
+        return
     while True:
         result = None
         task = tasks.get()
@@ -123,7 +127,7 @@ def _packed(result: Any) -> Any:
     except Exception as error:
         if isinstance(result, Exception):
             other: Exception = RuntimeError(f"{type(result).__name__}: {result}")
-            other.add_note("\n".join(result.__notes__))
+            other.add_note("\n".join(getattr(result, "__notes__", [])))
         else:
             words = f"what was computed cannot leave its process ({error}): give it classes and functions of a module"
             other = ShipidError(words)

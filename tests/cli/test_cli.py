@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import subprocess
@@ -47,6 +48,35 @@ def test_help_reads_the_same_whatever_is_built_for_it() -> None:
         assert light.exit_code == whole.exit_code == 0
         assert light.output == whole.output
     assert cli._named(["no-such"]) is cli._named([]) is app
+
+
+@pytest.mark.parametrize(
+    ("raised", "line"),
+    [
+        (RuntimeError("can't start new thread"), "error: system: can't start new thread: .*raise `ulimit -u`, or .*"),
+        (
+            OSError(errno.EAGAIN, "Busy"),
+            "error: system: Busy: this user has too many processes and threads: end some.*",
+        ),
+        (OSError(errno.EMFILE, "Too many"), "error: system: Too many: raise `ulimit -n`"),
+        (OSError(errno.ENOENT, "None"), "error: system: None: the working folder was removed: change to another one"),
+        (OSError(errno.ENOENT, "None", "a.toml"), r"error: a\.toml: None"),
+    ],
+)
+def test_an_error_of_the_system_that_names_no_file_says_what_helps(
+    raised: Exception, line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def command(_: Any) -> Any:
+        raise raised
+
+    monkeypatch.setattr(sys, "argv", ["shipid", "study"])
+    monkeypatch.setattr(cli, "_named", command)
+    with pytest.raises(SystemExit, match="1"):
+        cli.main()
+    assert re.fullmatch(line + "\n", capsys.readouterr().err)
+    raised = RuntimeError("another one")
+    with pytest.raises(RuntimeError, match="another"):
+        cli.main()
 
 
 def test_a_compiled_package_that_cannot_be_loaded_is_one_line(
