@@ -25,6 +25,7 @@ from shipid.units import DEGREE
 
 ROUND = 5 * DEGREE  # execute headings are usually multiples of it
 MOST = 4  # overshoots that are measured: later ones repeat them
+HALF = 0.5  # of the execute heading: a ship that goes from there to the other side has turned back
 NEAR = 1.5 * DEGREE  # tolerance of the execute heading at a reversal
 
 
@@ -55,14 +56,14 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
     around = value_at(t, record.psi, start) if course is None else course
     off = over.side * (record.psi - around)
     angle = _seen(record, off, over) if execute_heading is None else abs(execute_heading)
-    executes = _executes(t, off, angle, start)
+    executes, why_no_more = _executes(t, off, angle, start)
     before = float(np.interp(start, t, record.speed)) if np.isfinite(start) else NAN
     measures.add("execute", start, "s", STILL)
     measures.add("helm", helm if helm else NAN, "rad", STILL)
     measures.add("execute_heading", angle, "rad", "the helm is never reversed")
     measures.add("approach_speed", before, "m/s", STILL)
     second, third, fourth = (*executes, *[NAN] * 3)[:3]
-    missing = "the log ends before the {} execute".format
+    missing = why_no_more.format
     measures.add("initial_turning", integral(t, record.speed, start, second), "m", missing("second"))
     measures.add("initial_turning_time", second - start, "s", missing("second"))
     for number, (moment, until) in enumerate(_legs(executes, float(t[-1])), start=1):
@@ -93,16 +94,23 @@ def last_over(record: Record, over: HelmOver) -> int:
     return int(ends[long[0]] if len(long) else ends[-1])
 
 
-def _executes(t: Array, off: Array, angle: float, start: float) -> list[float]:
-    """Times [s] of the second, third, ... execute: the change of heading passes +angle, -angle, +angle, ... [rad]."""
+def _executes(t: Array, off: Array, angle: float, start: float) -> tuple[list[float], str]:
+    """Times [s] of the second, third, ... execute, and why there are no more, with a place for the next one's name.
+
+    The change of heading passes +angle, -angle, +angle, ... [rad]. If it turns back without, the pass lies between rows.
+    """
     instants: list[float] = []
     moment, sense = start, 1.0
     while np.isfinite(moment) and np.isfinite(angle):
-        moment = crossing(t, sense * off, angle, moment)
+        before, moment = moment, crossing(t, sense * off, angle, moment)
+        swing = sense * off[(t > before) & (t < moment if np.isfinite(moment) else True)] / angle
+        over = np.maximum.accumulate(swing) if len(swing) else swing
+        if (swing[over > HALF] < -HALF).any():
+            return instants, "rows are too far apart: the heading passes that of the {} execute between them"
         if np.isfinite(moment):
             instants.append(moment)
         sense = -sense
-    return instants
+    return instants, "the log ends before the {} execute"
 
 
 def _legs(executes: list[float], end: float) -> list[tuple[float, float]]:

@@ -26,6 +26,8 @@ from tests.measures.made_records import (
     zigzag_legs,
 )
 
+RECORDED = ("t", "north", "east", "psi", "u", "v", "r", "helm")
+
 
 @pytest.mark.parametrize(("helm", "heading"), [(10, 10), (20, 20), (20, 10), (10, 5), (15, 1)])
 @pytest.mark.parametrize("interval", [0.1, 1.0])
@@ -137,3 +139,23 @@ def test_a_helm_that_holds_the_course_before_is_no_execute(held: float, wait: fl
     assert measures["execute_heading"].value == pytest.approx(10 * DEGREE)
     assert measures["initial_turning_time"].value == pytest.approx(needed, abs=0.3)
     assert measures["overshoot_1"].value > 0
+
+
+@pytest.mark.parametrize("interval", [0.5, 2.0, 4.0, 6.0])
+def test_a_pass_between_two_rows_is_said_and_no_later_one_takes_its_place(interval: float) -> None:
+    """Where an overshoot lies between two rows, the pass was taken from the next cycle, and the period was doubled."""
+    t, cycle, unseen = clock(250.0), 46.0, 0
+    phase = 2 * np.pi * np.maximum(t - START, 0) / cycle
+    psi, r = 10.3 * DEGREE * np.sin(phase), np.gradient(10.3 * DEGREE * np.sin(phase), t)
+    executes = np.floor((phase + np.arccos(10 / 10.3)) / np.pi + 0.5).astype(int)  # passes of 10 deg so far
+    helm = np.where(t < START, 0.0, np.where(executes % 2, -1, 1) * 10 * DEGREE)
+    fine = made_record(t, psi, r, helm, np.full_like(t, 5.0), 0 * t)
+    for first in range(0, int(interval / FINE), 25):
+        record = Record(*(getattr(fine, name)[first :: int(interval / FINE)] for name in RECORDED))
+        period = zigzag(record, execute_heading=10 * DEGREE, course=0.0)["period"]
+        unseen += "rows are too far apart" in period.why
+        if np.isfinite(period.value):
+            assert period.value == pytest.approx(cycle, abs=interval)
+        else:
+            assert "rows are too far apart" in period.why
+    assert (unseen > 0) == (interval > 2)
