@@ -133,6 +133,7 @@ DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in {**EPOCHS, "
 modified Julian dates to 2008 are the same numbers."""
 TICKS = {11_644_473_600: "1601, as Windows does", 62_135_596_800: "the year 1, as .NET does"}
 """Seconds from the begin of a clock of ticks of 100 ns to 1970 -> who counts so."""
+COUNTERS, LONG_STEP = (2**16, 2**32), 10.0  # numbers of a counter; usual steps that lie over its end, at most
 SHORT_YEAR = 2e-6  # years, a minute: no clock of a ship has steps of as many seconds, or hours, without a unit
 SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
 NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
@@ -936,9 +937,10 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
     if called and called[0] in finite:
         first = clock_seconds(first, _unit_of_clock(called[0], first))
-    fault = (
-        f"{called[0]!r} {_unread(table, called[0], first) or _fault(first)}" if called else "none rises from row to row"
-    )
+    counted = _counter(finite[called[0]]) if called and called[0] in finite else ""
+    fault = "none rises from row to row"
+    if called:
+        fault = f"{called[0]!r} {counted or _unread(table, called[0], first) or _fault(first)}"
     if called and called[0] in finite and _is_years(called[0], finite[called[0]]):
         fault = f"{called[0]!r} {OF_YEARS.format(finite[called[0]][0])}"
     raise DataError(f"no column can be the clock: {fault}", file=file)
@@ -1193,6 +1195,18 @@ def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
     what = "a leap second" if re.search(r":60(\D|$)", text) else "a comment" if text[:1] in "#%/;" else "no time"
     lines = "the line" if wrong.sum() == 1 else f"the {wrong.sum()} such lines"
     return f"{begin}, {what}: remove {lines}"
+
+
+def _counter(values: Array) -> str:
+    """Say where a counter of a few bits (N,) is full and begins again; empty where it is none."""
+    steps = np.diff(values)
+    back = np.flatnonzero(steps < 0)
+    for size in COUNTERS:
+        over = steps[back] + size
+        if len(back) and values.max() < size and np.all((over > 0) & (over < LONG_STEP * np.median(steps))):
+            row = int(back[0]) + 2
+            return f"is a counter that begins again at {size} in row {row}: add {size} from there on, and so each time"
+    return ""
 
 
 def _fault(values: Array) -> str:

@@ -639,6 +639,15 @@ def test_a_year_with_decimals_is_no_clock_in_seconds(name: str, digits: int, tmp
         sniff(tmp_path / "log.csv")
 
 
+@pytest.mark.parametrize(("size", "step"), [(2**16, 500), (2**32, 500_000)])
+def test_a_counter_that_is_full_has_its_remedy(size: int, step: int, tmp_path: Path) -> None:
+    """As of milliseconds in 16 bits, or microseconds in 32."""
+    values = [(size - 100 * step + 7 + step * k) % size for k in range(600)]
+    with_clock("time", values).assign(north=0.0).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=rf"'time' is a counter that begins again at {size} in row 101: add {size}"):
+        sniff(tmp_path / "log.csv")
+
+
 def test_a_clock_that_goes_back_by_less_than_a_day_is_refused(tmp_path: Path) -> None:
     values = [86280 + 0.5 * k if k < 300 else 40000 + 0.5 * k for k in range(600)]
     with_clock("Seconds of day", values).assign(north=0.0).to_csv(tmp_path / "log.csv", index=False)
