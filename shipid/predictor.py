@@ -572,7 +572,7 @@ def _no_band(provenance: Mapping[str, Any]) -> str:
 
 
 NO_BAND = "this predictor has no band: "
-NO_REFITS = "its errors on runs left out need further fits: set `refits` (of a study `bands.refits`), such as 5"
+NO_REFITS = "errors on runs left out need further fits: set `refits` (of a study `bands.refits`), such as 5"
 
 
 def bands_of(

@@ -508,7 +508,7 @@ def _judged(
     failed = _beyond_ships(paths, test.step)
     if failed.any():
         where = f"{percent(failed.mean(), 1)} of the test windows"
-        sentence = f"the prediction diverges on {where}: it is farther away than any ship"
+        sentence = f"the prediction diverges on {where}: no ship gets so far"
         return _failed(sentence, "diverged") | {"hyperparameters": words}, None
     error = summary(position_error(paths, test.future))
     errors = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}

@@ -346,3 +346,12 @@ def test_write_report(tmp_path, plain):
     assert file.read_text(encoding="utf-8").startswith("<!doctype html>")
     with pytest.raises(ResultError, match="cannot be written"):
         write_report(plain, file / "report.html")
+
+
+def test_no_line_of_a_caption_breaks_before_a_unit_or_a_sign(pages):
+    """95 % and N_D = 10 in what is below a figure, too."""
+    for _, _, page in pages.values():
+        below = [text for _, text in page.all("figcaption")]
+        below += [text for attributes, text in page.all("p") if attributes.get("class") == "caption"]
+        assert below
+        assert not [text for text in below if re.search(r"\d (?:%|m\b|s\b)|N_D = ", text)]

@@ -264,7 +264,7 @@ def test_a_method_without_errors_on_runs_left_out_says_which_key_gives_them(tiny
     results = read_results(tiny_run)
     without = replace(results, no_band=dict.fromkeys(results.paths, f"{NO_BAND}{NO_REFITS}"))
     ((sentence, _),) = bands.answer(without)
-    assert sentence.startswith("No band is promised: its errors on runs left out need")
+    assert sentence.startswith("No band is promised: errors on runs left out need")
     assert "`bands.refits`" in sentence
 
 
