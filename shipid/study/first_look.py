@@ -269,12 +269,14 @@ class _Trial:
     windows: Windows
     constant: float
     known: dict[Gear, Instants] = field(default_factory=dict)
+    reached: dict[Gear, dict[str, Array] | None] = field(default_factory=dict)  # by actuators, in any current
 
     def instants(self, gear: Gear = ()) -> Instants:
         """Instants for the vessel with changed actuators: planned commands, and positions of the actuators."""
         if gear not in self.known:
-            hidden = window_memory(self.vessel.with_values(dict(gear)), self.dataset, self.windows)
-            self.known[gear] = self.windows.instants(known=True, hidden=hidden)
+            if gear not in self.reached:
+                self.reached[gear] = window_memory(self.vessel.with_values(dict(gear)), self.dataset, self.windows)
+            self.known[gear] = self.windows.instants(known=True, hidden=self.reached[gear])
         return self.known[gear]
 
     def errors(self, rows: Sequence[Mapping[str, float]]) -> list[float]:
@@ -311,7 +313,7 @@ def _between(trial: _Trial) -> _Trial:
         columns = {name: rows[name].to_numpy() for name in ("t", *trial.dataset.commands)}
         for name, values in between_rows(trial.vessel, columns, middle[:, inside]).items():
             planned[name][:, inside] = values
-    return replace(trial, windows=replace(windows, planned=planned), known={})
+    return replace(trial, windows=replace(windows, planned=planned), known={}, reached={})
 
 
 def _in_current(trial: _Trial, V_c: float, beta_c: float) -> _Trial:
