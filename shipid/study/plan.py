@@ -25,6 +25,7 @@ from shipid.files import as_argument
 from shipid.logs.importing import digest_of, sha256_of
 from shipid.logs.mapping import read_mapping
 from shipid.simulation.truth import Truth, check_truth, vessel_of
+from shipid.study.code import of_users, users_code
 from shipid.study.declared import (
     NO_MODEL,
     Foundation,
@@ -156,8 +157,15 @@ class Plan:
     @property
     def program(self) -> str:
         """The command line that knows the methods: `shipid`, or the user's script where one of them is the user's."""
-        known = all(type(way.method).__module__.partition(".")[0] == "shipid" for way in self.methods)
-        return "shipid" if known else shlex.join(["python", _script() or USER_SCRIPT])
+        return "shipid" if not self.code else shlex.join(["python", _script() or USER_SCRIPT])
+
+    @property
+    def code(self) -> dict[str, str]:
+        """Name of each method that the user wrote -> digest of its file and of that of its corrector."""
+        kinds = {way.name: type(way.method) for way in self.methods}
+        return {
+            name: users_code((kind, getattr(kind, "corrector", kind))) for name, kind in kinds.items() if of_users(kind)
+        }
 
     @property
     def command(self) -> str:

@@ -123,7 +123,7 @@ def run_study(
     with Claims(folder) as claims:
         for words in _mended(folder, claims):
             yield Event("note", words)
-        for words in _other_session(folder, claims, device):
+        for words in _other_session(plan, folder, claims, device):
             yield Event("note", words)
         if not seals.is_sealed(folder, DATA):
             yield Event("note", plan.obtaining)
@@ -226,16 +226,16 @@ def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
     seals.write_seal(folder, COMMON, [folder / name for name in (store.TEST, store.ENVELOPE, store.FOUNDATIONS)])
 
 
-def _other_session(folder: Path, claims: Claims, device: str) -> Iterator[str]:
+def _other_session(plan: Plan, folder: Path, claims: Claims, device: str) -> Iterator[str]:
     """Note what this run is computed with; a sentence where earlier results were computed with something else."""
     with claims.alone(SESSIONS):
-        changed = store.note_session(folder, session_on(device))
+        changed = store.note_session(folder, session_on(device, plan.code))
     if changed:
         yield f"earlier results were computed otherwise: {'; '.join(changed)}"
 
 
-def session_on(device: str) -> dict[str, Any]:
-    """What results depend on beside the plan, to the last digit: versions, engine, processor and device."""
+def session_on(device: str, methods: Mapping[str, str]) -> dict[str, Any]:
+    """What results depend on beside the plan, to the last digit: versions, engine, device, methods of users."""
     computer = machine()
     others = {name: version for name, version in computer["packages"].items() if name != "shipid"}
     return {
@@ -245,6 +245,7 @@ def session_on(device: str) -> dict[str, Any]:
         "python": computer["python"],
         "device": device,
         "packages": others,
+        **({"code of the method": dict(methods)} if methods else {}),
     }
 
 
@@ -615,7 +616,7 @@ def _compute(
 def _there(shared: tuple[Plan, Prepared, str, Path, Holder], unit: Unit) -> tuple[dict[str, Any], Results | str]:
     """A unit on a machine of a cluster: what it was computed with, and the results."""
     plan, prepared, device, trials, holder = shared
-    return session_on(device), _claimed(plan, prepared, unit, device, trials, holder)
+    return session_on(device, plan.code), _claimed(plan, prepared, unit, device, trials, holder)
 
 
 def _claimed(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path, holder: Holder) -> Results | str:

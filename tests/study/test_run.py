@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import shutil
@@ -18,6 +19,7 @@ from shipid.data.dataset import read_dataset
 from shipid.errors import ResultError, ShipidError
 from shipid.files import read_json, write_json
 from shipid.hybrid.method import Fitted, Task
+from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.metrics import position_error, summary
 from shipid.predictor import Predictor
@@ -28,6 +30,7 @@ from shipid.study.contents import write_pages
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.results import provenance_words, read_results
+from shipid.study.rotate import kept_folder
 from shipid.study.run import run_batch, run_study, run_unit
 from shipid.version import __version__
 from shipid.vessel.load import load_vessel
@@ -87,6 +90,25 @@ def test_another_shipid_that_goes_on_is_noted(
         assert read_json(folder / store.PROVENANCE)["machine"]["packages"]["shipid"] == other
         stored = [Predictor.load(file).provenance["shipid"] for file in (folder / "cells").glob("*.npz")]
         assert set(stored) == {__version__, other}
+
+
+def test_a_method_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The finished cells are those of the method as it was; nothing said so."""
+    file = tmp_path / "mine.py"
+    file.write_text("from shipid.hybrid.path_drawn import PathDrawn\n\n\nclass Mine(PathDrawn):\n    pass\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setitem(METHODS, "mine", importlib.import_module("mine").Mine)
+    method = {"name": "own", "kind": "mine", "trials": 1, "units": 8, "terms": 4}
+    plan, folder = tiny_plan(tmp_path, {"method": [method], "grid.N_D": [4]}), tmp_path / "run"
+    run_here(plan, folder)
+    dataset = read_dataset(folder / store.DATASET)
+    kept = kept_folder(tmp_path / "rows.csv", plan, dataset)
+    assert not any("otherwise" in event.text for event in events_here(plan, folder))
+    file.write_text(file.read_text() + "\n")
+    notes = [event.text for event in events_here(plan, folder) if event.kind == "note"]
+    assert any("earlier results were computed otherwise: code of the method.own was" in note for note in notes)
+    assert "code of the method.own" in provenance_words(read_results(folder))["computed in parts"]
+    assert kept_folder(tmp_path / "rows.csv", plan, dataset) != kept
 
 
 def test_a_dask_cluster_gives_the_same_numbers(tmp_path: Path, tiny_run: Path) -> None:
