@@ -37,7 +37,11 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
     """Return the method of a kind with settings; DocumentError with the path for a wrong kind, key or value."""
     if kind not in METHODS:
         raise DocumentError(f"{kind!r} is no kind of method: {listed(kind)}", path=f"{path}.kind")
-    method: Method = parse(METHODS[kind], dict(settings), None, path)
+    known: Any = METHODS[kind]
+    if not (isinstance(known, type) and issubclass(known, Method)) or known.__abstractmethods__:
+        what = "needs `fit`" if isinstance(known, type) and issubclass(known, Method) else "must be a class of Method"
+        raise DocumentError(f"METHODS[{kind!r}] {what}, such as shipid.hybrid.alone.Alone", path=f"{path}.kind")
+    method: Method = parse(known, dict(settings), None, path)
     return method
 
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from shipid.errors import DataError, DocumentError, ResultError
-from shipid.hybrid.method import Case, Fitted
+from shipid.hybrid.alone import Alone
+from shipid.hybrid.method import Case, Fitted, Method
 from shipid.hybrid.methods import METHODS, kind_of, method_of
 from shipid.hybrid.physics import Physics
 from tests.documented import module
@@ -210,3 +211,25 @@ def test_a_past_that_is_too_short_is_refused(kind, here, fitted):
 def test_the_made_up_truth_is_not_what_the_physics_says(here):
     """The laws would be empty in a world where nothing is missing."""
     assert here.error(case_of(here.physics, here.test, known=True).paths) > 0.05
+
+
+class Unfinished(Method):
+    """A method without `fit`."""
+
+
+@pytest.mark.parametrize(
+    ("listed", "message"),
+    [
+        (Alone(), "must be a class of Method"),
+        (int, "must be a class of Method"),
+        ("Alone", "must be a class of Method"),
+        (Unfinished, "needs `fit`"),
+    ],
+)
+def test_what_is_listed_and_no_method_is_one_line(
+    listed: object, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A line of a user's script; it ended in a traceback."""
+    monkeypatch.setitem(METHODS, "mine", listed)
+    with pytest.raises(DocumentError, match=rf"^method\.kind: METHODS\['mine'\] {message}"):
+        method_of("mine", {})
