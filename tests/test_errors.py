@@ -40,6 +40,22 @@ def test_choices_suggest_what_is_close() -> None:
     assert choices("derivativs", ["derivatives", "crossflow"]) == "did you mean 'derivatives'?"
 
 
+@pytest.mark.parametrize(
+    ("typed", "hint"),
+    [
+        ("fr\u043em", "its '\u043e' is CYRILLIC SMALL LETTER O: did you mean 'from'?"),
+        ("\uff4d/s", "its '\uff4d' is FULLWIDTH LATIN SMALL LETTER M: did you mean 'm/s'?"),
+        ("from\u200b", r"its '\u200b' is ZERO WIDTH SPACE: did you mean 'from'?"),
+        ("\u03b4", "its '\u03b4' is GREEK SMALL LETTER DELTA: valid: frame, from, m/s"),
+        ("fr\u00f6m", "did you mean 'from'?"),
+    ],
+)
+def test_a_letter_that_looks_like_another_is_named(typed: str, hint: str) -> None:
+    """Before, `from` with another alphabet's o was an unknown key, and nobody sees why."""
+    assert choices(typed, ["from", "frame", "m/s"]) == hint
+    assert choices("\u03b4 [deg]", ["\u03b4 [grad]", "\u03b4 rudder"]) == "did you mean '\u03b4 [grad]'?"
+
+
 def test_choices_list_what_is_valid() -> None:
     assert choices("zzz", ["beta", "alpha"]) == "valid: alpha, beta"
     assert choices("zzz", (f"n{i:02}" for i in range(20))).endswith("n11, ...")
