@@ -97,7 +97,7 @@ def last_over(record: Record, over: HelmOver) -> int:
 def _executes(t: Array, off: Array, angle: float, start: float) -> tuple[list[float], str]:
     """Times [s] of the second, third, ... execute, and why there are no more, with a place for the next one's name.
 
-    The change of heading passes +angle, -angle, +angle, ... [rad]. If it turns back without, the pass lies between rows.
+    The change of heading passes +angle, -angle, +angle, ... [rad]. Where it turns back before, rows are too far apart.
     """
     instants: list[float] = []
     moment, sense = start, 1.0
