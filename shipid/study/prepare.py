@@ -281,6 +281,7 @@ def _test_runs(plan: Plan, windows: Windows) -> list[str]:
 
 
 Pair = tuple[Array, Array]
+Alike = tuple[str, ...]  # structure of a vessel and the numbers of its actuators: their hidden states are equal
 
 
 def _roll_out(
@@ -295,9 +296,10 @@ def _roll_out(
     families = {family.name: family for family in plan.families}
     finished: dict[str, tuple[Foundation, Pair]] = {}
     waiting = [one for one in plan.foundations if one.base and one.identify is None and one.observer is None]
+    known: dict[Alike, list[Instants]] = {}
     while waiting:
         again = []
-        for foundation, paths, share in _one_round(plan, dataset, parts, waiting, device):
+        for foundation, paths, share in _one_round(plan, dataset, parts, waiting, device, known):
             if share:
                 drawn = _redraw(plan, foundation, families[foundation.family], share)
                 counter = drawn.variant.counter if drawn.variant else 0
@@ -315,8 +317,8 @@ def _roll_out(
             same, paths = finished[foundation.variant.name]
             derived = replace(foundation, variant=same.variant)
             if derived.observer is not None and not derived.fitted:
-                estimates[derived.name] = known = estimates_of(plan, derived, dataset, parts[1])
-                paths = paths_of(plan, dataset, parts, derived, device, known)
+                estimates[derived.name] = estimated = estimates_of(plan, derived, dataset, parts[1])
+                paths = paths_of(plan, dataset, parts, derived, device, estimated)
             finished[foundation.name] = (derived, paths)
         finished.setdefault(foundation.name, (foundation, zeros))
     foundations = tuple(finished[foundation.name][0] for foundation in plan.foundations)
@@ -411,24 +413,30 @@ def at_instants(dataset: Dataset, windows: Windows, estimates: Estimates | None)
 
 
 def _one_round(
-    plan: Plan, dataset: Dataset, parts: Sequence[Windows], foundations: Sequence[Foundation], device: str
+    plan: Plan,
+    dataset: Dataset,
+    parts: Sequence[Windows],
+    foundations: Sequence[Foundation],
+    device: str,
+    known: dict[Alike, list[Instants]],
 ) -> Iterator[tuple[Foundation, Pair, float]]:
     """Paths of each foundation on (pool, test) and the share of pool windows on which it diverged.
 
-    Foundations of one structure are one rollout.
+    Foundations of one structure are one rollout. known : instants of earlier rounds, to which those of this are added.
     """
-    alike: dict[tuple[str, ...], list[tuple[Foundation, Vessel]]] = {}
+    alike: dict[Alike, list[tuple[Foundation, Vessel]]] = {}
     for foundation in foundations:
         vessel = foundation.vessel
         assert vessel is not None
         lags = (f"{path} {value}" for path, value in vessel.parameters.items() if ".actuator." in path)
-        alike.setdefault((vessel.structure, *lags), []).append((foundation, vessel))  # equal lags: equal hidden states
-    for group in alike.values():
+        alike.setdefault((vessel.structure, *lags), []).append((foundation, vessel))
+    for key, group in alike.items():
         vessel = group[0][1]
+        if key not in known:
+            known[key] = [instants_of(plan, vessel, dataset, windows) for windows in parts]
         parameters = np.array([one.variant.parameters for one, _ in group if one.variant is not None])
         (pool, pool_bad), (test, test_bad) = (
-            physics_of(plan, vessel).variant_paths(instants_of(plan, vessel, dataset, windows), parameters, device)
-            for windows in parts
+            physics_of(plan, vessel).variant_paths(instants, parameters, device) for instants in known[key]
         )
         for position, (foundation, _) in enumerate(group):
             paths = (pool[:, position], test[:, position])

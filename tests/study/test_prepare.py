@@ -35,7 +35,7 @@ from shipid.study.prepare import (
     window_memory,
 )
 from shipid.study.run import run_batch
-from shipid.vessel.load import load_vessel
+from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import draw, resolve
 from tests.study.tiny import logged, tiny_plan
 
@@ -152,8 +152,18 @@ def test_the_model_of_the_truth_is_exact(tmp_path: Path) -> None:
     np.testing.assert_array_equal(prepared.test_paths["none"], 0.0)
 
 
-def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path) -> None:
-    """The next counter draws anew, the others keep theirs, and it is reported; the same again gives the same."""
+def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The next counter draws anew, the others keep theirs, and it is reported; the same again gives the same.
+
+    The actuators, which all members have alike, are followed once for the pool and once for the test, not every round.
+    """
+    followed: list[int] = []
+
+    def counted(vessel: Vessel, dataset: Dataset, windows: Windows) -> Any:
+        followed.append(len(windows))
+        return window_memory(vessel, dataset, windows)
+
+    monkeypatch.setattr(module, "window_memory", counted)
     family = {"name": "wild", "base": "gunnerus-28.9", "members": 6}
     family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0]}]
     plan = tiny_plan(tmp_path, {"family": [family]})
@@ -170,6 +180,7 @@ def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path) -> None:
             assert model.variant == planned.variant
         assert np.isfinite(prepared.pool_paths[model.name]).all()
     assert 0 < redrawn < 6
+    assert len(followed) == 2
     again = prepare(plan, obtain(plan))
     assert [m.variant for m in again.foundations] == [m.variant for m in prepared.foundations]
 
