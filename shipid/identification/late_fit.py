@@ -24,9 +24,7 @@ Array = NDArray[np.float64]
 HALF = 0.5  # rows by which commands that change between rows and are held from their row are late on average
 LEAST_ROWS = 0.2  # rows by which the fit is best with earlier commands: below, the log has them in time
 FARTHER = 0.5  # rows more or less than rows explain: the log, or an actuator, has another delay
-EXPLAINED = (
-    0.15  # of the squares of the residuals: so much of them only a delay has explained, not noise, wind, current
-)
+EXPLAINED = 0.15  # of the squares of the residuals: more than noise, wind or current has looked like a delay
 OUTSIDE = 1.0  # of half the interval: a larger change of an estimate is reported
 WORTH = 0.02  # of a factor: a smaller change is not
 
