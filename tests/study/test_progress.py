@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from math import inf
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -115,7 +116,8 @@ def test_quick_trials_are_written_while_the_search_goes_on(monkeypatch: pytest.M
 
     clock = [0.0]
     monkeypatch.setattr(searches.time, "monotonic", lambda: clock[0])
-    task = Task({}, None, (), (), journal=Here())  # type: ignore[arg-type]
+    windows = SimpleNamespace(locked=lambda: None)  # not looked at
+    task = Task({}, windows, (), (), journal=Here())  # type: ignore[arg-type]
     search = searches.Search(task, ["a"], PathDrawn(trials=5), again=True)
     for number in range(5):
         clock[0] += 0.6 * searches.TOGETHER
