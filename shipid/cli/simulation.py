@@ -143,9 +143,15 @@ def manoeuvre(
     done = measure_standard(
         ship, name, angles or (), speed=speed, side=side, duration=duration, step=step, approach=approach
     )
-    title = done.standard.title
+    title, approached_by = done.standard.title, done.standard.manoeuvre
     with answering(as_json) as answer:
-        answer.say(f"{ship.name}: {title}, {approached(done.standard)}", title=title, speed=done.standard.speed)
+        answer.say(
+            f"{ship.name}: {title}, {approached(done.standard)}",
+            title=title,
+            approach=approached_by.approach,
+            speed=done.standard.speed,
+            n=approached_by.n_rpm / 60,
+        )
         answer.rows("measures", done.measures, measure_table(done.measures, []))
         answer.rows("criteria", done.criteria, criterion_table(done.criteria, []) if done.criteria else None)
         if csv is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -30,6 +31,14 @@ def test_manoeuvre_measures_what_it_writes(tmp_path: Path, monkeypatch: pytest.M
     assert "1 runs measured, 0 not" in text
     again = pd.read_csv("again.csv").set_index("measure")
     pd.testing.assert_series_equal(again["value"], table["value"])
+
+
+def test_programs_get_the_approach_of_a_manoeuvre_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    answer = json.loads(output_of("manoeuvre", "gunnerus-28.9", "turning", 20, "--json"))
+    text = output_of("manoeuvre", "gunnerus-28.9", "turning", 20)
+    assert f"approach at {answer['speed']:.3g} m/s ({60 * answer['n']:.4g} rpm)" in text
+    assert answer["approach"] == "steady"
 
 
 def test_manoeuvres_that_cannot_be() -> None:
