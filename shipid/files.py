@@ -10,6 +10,7 @@ import shutil
 import socket
 import tempfile
 import time
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -28,6 +29,7 @@ TEMPORARY = ".shipid-"
 """Beginning of the names of temporary folders."""
 TABLES = (".parquet", ".csv")
 """Endings of the files that `write_table` writes."""
+_NOT_WHOLE = (zipfile.BadZipFile, zlib.error, EOFError, tokenize.TokenError, SyntaxError)  # an array begins with Python
 _SWEPT: set[Path] = set()  # folders that this process has looked through: one of 10,000 files takes milliseconds
 
 
@@ -251,7 +253,7 @@ def read_arrays(file: str | os.PathLike[str], *beginnings: str) -> dict[str, np.
     try:
         with open_file(file) as stream, np.load(stream, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files if name.startswith(beginnings or "")}
-    except (zipfile.BadZipFile, zlib.error, EOFError, TypeError, AttributeError, NotImplementedError) as error:
+    except (*_NOT_WHOLE, TypeError, AttributeError, NotImplementedError) as error:
         raise ValueError(f"{file} is not a whole .npz") from error
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -183,6 +184,16 @@ def test_arrays_in_an_unknown_compression_are_a_value_error(tmp_path: Path) -> N
         content[content.index(sign) + place] = 99
     file.write_bytes(content)
     with pytest.raises(ValueError, match=r"a\.npz is not a whole \.npz"):
+        files.read_arrays(file)
+
+
+@pytest.mark.parametrize("header", ["{'descr': '<f8', 'shape': (2,", "{'descr': '<f8'\n  x", "((((", "{" * 300])
+def test_an_array_whose_header_is_damaged_is_a_value_error(header: str, tmp_path: Path) -> None:
+    """NumPy reads it as a piece of Python: what has no end was an error of the tokenizer, with a traceback."""
+    file, text = tmp_path / "a.npz", f"{header}\n".encode()
+    with zipfile.ZipFile(file, "w") as stored:
+        stored.writestr("x.npy", b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + bytes(16))
+    with pytest.raises(ValueError, match=r"a\.npz is not a whole \.npz|Cannot parse header|header"):
         files.read_arrays(file)
 
 
