@@ -29,7 +29,8 @@ TEMPORARY = ".shipid-"
 """Beginning of the names of temporary folders."""
 TABLES = (".parquet", ".csv")
 """Endings of the files that `write_table` writes."""
-_NOT_WHOLE = (zipfile.BadZipFile, zlib.error, EOFError, tokenize.TokenError, SyntaxError)  # an array begins with Python
+# The header of an array is a piece of Python: the last two.
+_NOT_WHOLE = (zipfile.BadZipFile, zlib.error, EOFError, tokenize.TokenError, SyntaxError)
 _SWEPT: set[Path] = set()  # folders that this process has looked through: one of 10,000 files takes milliseconds
 
 

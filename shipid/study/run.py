@@ -235,7 +235,7 @@ def _other_session(plan: Plan, folder: Path, claims: Claims, device: str) -> Ite
 
 
 def session_on(device: str, methods: Mapping[str, str]) -> dict[str, Any]:
-    """What results depend on beside the plan, to the last digit: versions, engine, device, methods of users."""
+    """What results depend on beside the plan, to the last digit: versions, engine, processor, device, users' code."""
     computer = machine()
     others = {name: version for name, version in computer["packages"].items() if name != "shipid"}
     return {
