@@ -13,7 +13,7 @@ import os
 import platform
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache, lru_cache
@@ -27,6 +27,7 @@ from shipid.engine import libraries
 from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
 from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_compiler
 from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, Printed, print_function
+from shipid.engine.tables import Table, even_tables, find_tables
 from shipid.engine.threads import in_parallel, threaded
 from shipid.engine.vectors import DOUBLE, SINGLE, Precision, Target, head
 from shipid.metrics import BINS, BINS_AN_OCTAVE, LEAST, OCTAVES, SHIFT
@@ -241,9 +242,12 @@ def integrated(
 class _Source(Parts):
     """C source of one model: terms of parameters are computed once, terms of inputs once while they are constant."""
 
-    def __init__(self, model: Dynamics, step: float, method: Method) -> None:
-        self.model, self.step, self.method = model, step, method
-        self.equations = [print_function(f, STAGES, C) for f in (model.rates, model.advance)]
+    def __init__(
+        self, model: Dynamics, step: float, method: Method, wanted: Target, tables: Mapping[int, Table]
+    ) -> None:
+        self.model, self.step, self.method, self.wanted = model, step, method, wanted
+        rates = print_function(model.rates, STAGES, replace(C, lookup=wanted.lookup), tables)
+        self.equations = [rates, print_function(model.advance, STAGES, C)]
         self.sums = [print_function(term.function, _SUM_STAGES, C) for term in model.sums]
         self.all = [*self.equations, *self.sums]
 
@@ -296,9 +300,9 @@ const V dt[1] = {{ K(step) }};
         copy = f"for (int i = 0; i < {nx}; ++i) x[i] = {after}[i];"
         return "\n".join([*lines, copy, f"for (int i = 0; i < {nm}; ++i) m[i] = {later}[i];"])
 
-    def text(self, wanted: Target) -> str:
+    def text(self) -> str:
         """The complete C source for the target processor."""
-        model = self.model
+        model, wanted = self.model, self.wanted
         nx, nm, n = len(model.state) + len(model.hidden), len(model.memory), model.num_dof
         nc, ne, parameters = len(model.commands), len(model.environment), len(model.parameters)
         widths = [sum(term.widths.values()) for term in model.drawn]
@@ -356,6 +360,7 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
   }}
 }}"""
         return f"""{head(wanted)}
+{wanted.lookup.head() if wanted.lookup else ""}
 {self.functions()}
 {_measure(wanted.precision)}
 #define AT(array, row) ((U *)((array) + (row) * stride + g * W))
@@ -368,9 +373,10 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
 
 
 @lru_cache(maxsize=64)
-def _library(model: Dynamics, step: float, method: Method, precision: Precision = DOUBLE) -> Any:
-    """The compiled function `run` of a model, from the cache if possible."""
-    return compiled_for(lambda: _Source(model, step, method).text(target(precision)))
+def _library(model: Dynamics, step: float, method: Method, precision: Precision, looked_up: Sequence[int]) -> Any:
+    """The compiled function `run` of a model, from the cache if possible; some of its tables are looked up."""
+    tables = {k: find_tables(model.rates)[k] for k in looked_up}
+    return compiled_for(lambda: _Source(model, step, method, target(precision), tables).text())
 
 
 def compiled_for(source: Callable[[], str]) -> Any:
@@ -499,7 +505,8 @@ def _run(model: Dynamics, batch: Batch, job: Job, precision: Precision, **wanted
     }
     sizes = (parts, wide, batch.state.shape[1], job.num_steps, job.every, len(job.rows))
     work = wide / lanes / parts * job.num_steps * (1 + sum(part.shape[1] for part in drawn))
-    run = _library(model, job.step, job.method, precision)
+    looked_up = tuple(even_tables(model.rates, batch.parameters)) if target(precision).lookup else ()
+    run = _library(model, job.step, job.method, precision, looked_up)
     in_parallel(run, sizes, (arrays.get(name) for name in _ARRAYS), parts * len(batch.parameters), work)
 
 

@@ -9,8 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import casadi as ca
+
+from shipid.engine.tables import Lookup, Table
 
 ARITHMETIC = {  # the same in every dialect
     ca.OP_NEG: "(-{0})",
@@ -39,12 +42,16 @@ _TAKES_TRUTH = {ca.OP_NOT: 1, ca.OP_AND: 2, ca.OP_OR: 2, ca.OP_IF_ELSE_ZERO: 1} 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a language writes an operation, an assignment `a = ...`, a plain number, and a truth value as a number."""
+    """How a language writes an operation, an assignment `a = ...`, a plain number, and a truth value as a number.
+
+    lookup : how it looks up a table whose numbers are known early; None: the table is the sum that it is.
+    """
 
     operations: Mapping[int, str]
     assignment: str
     constant: Callable[[float], str]
     number: str
+    lookup: Lookup | None = None
 
 
 STAGES = (("parameters",), ("commands", "environment"))  # once a rollout; once a window while commands are held
@@ -71,9 +78,17 @@ class Printed:
         return [name for name, place in zip(self.names, self.stage_of, strict=True) if place == stage]
 
 
-def print_function(function: ca.Function, stages: Sequence[Sequence[str]], dialect: Dialect) -> Printed:
-    """Print an SX function of dense vectors with one output; ValueError for an instruction the dialect lacks."""
-    printer = _Printer(function, stages, dialect)
+def print_function(
+    function: ca.Function,
+    stages: Sequence[Sequence[str]],
+    dialect: Dialect,
+    tables: Mapping[int, Table] = MappingProxyType({}),
+) -> Printed:
+    """Print an SX function of dense vectors with one output; ValueError for an instruction the dialect lacks.
+
+    tables : those to be looked up, by the number of the instruction that gives them.
+    """
+    printer = _Printer(function, stages, dialect, tables)
     for k in range(function.n_instructions()):
         printer.instruction(k)
     return printer.finish()
@@ -91,7 +106,9 @@ class _Value:
 class _Printer:
     """Prints instructions as lines, each in the earliest stage that knows its operands."""
 
-    def __init__(self, function: ca.Function, stages: Sequence[Sequence[str]], dialect: Dialect) -> None:
+    def __init__(
+        self, function: ca.Function, stages: Sequence[Sequence[str]], dialect: Dialect, tables: Mapping[int, Table]
+    ) -> None:
         self.function = function
         self.dialect = dialect
         self.names = [function.name_in(i) for i in range(function.n_in())]
@@ -101,7 +118,10 @@ class _Printer:
         self.lines: list[list[str]] = [[] for _ in range(self.last + 1)]
         self.saved: list[dict[str, int]] = [{} for _ in stages]
         self.slot: dict[int, _Value] = {}
+        self.values: dict[int, _Value] = {}  # of instructions
         self.outputs: dict[int, _Value] = {}
+        self.tables = tables if dialect.lookup else {}
+        self.axes: dict[tuple[int, ...], str] = {}  # where x of tables on one axis lies
 
     def instruction(self, k: int) -> None:
         """Print one instruction, or note a number, an input or an output."""
@@ -114,7 +134,31 @@ class _Printer:
         elif operation == ca.OP_OUTPUT:
             self.outputs[target[1]] = self.slot[source[0]]
         else:
-            self.slot[target[0]] = self.operation(k, operation, [self.slot[i] for i in source])
+            found = self.looked_up(k) if k in self.tables else None
+            self.slot[target[0]] = found or self.operation(k, operation, [self.slot[i] for i in source])
+        if operation != ca.OP_OUTPUT:
+            self.values[k] = self.slot[target[0]]
+
+    def looked_up(self, k: int) -> _Value | None:
+        """Print a lookup in a table whose numbers the first stage knows; None for another table."""
+        table, lookup = self.tables[k], self.dialect.lookup
+        x, size = self.values[table.x], len(table.knots)
+        numbers = [self.values[i] for i in (*table.knots, table.ordinate, table.slope, *table.bends)]
+        if lookup is None or x.stage != self.last or any(value.stage > 0 for value in numbers):
+            return None
+        texts = [self.use(value, 0) for value in numbers]
+        axis = self.axes.setdefault((table.x, *table.knots), f"axis{k}")
+        if axis == f"axis{k}":
+            on = self.kept(*lookup.axis(axis, texts[0], texts[size - 1], size))
+            self.lines[-1].append(lookup.place(axis, self.use(x, self.last), on, size))
+        rows = self.kept(*lookup.table(f"table{k}", axis, texts[size], texts[size + 1], texts[size + 2 :]))
+        self.lines[-1].append(self.dialect.assignment.format(f"a{k}", lookup.value(axis, rows, size)))
+        return _Value(f"a{k}", self.last)
+
+    def kept(self, line: str, texts: Sequence[str]) -> list[str]:
+        """Print a line into the first stage and save what it computes: the texts of it in main."""
+        self.lines[0].append(line)
+        return [self.use(_Value(text, 0), self.last) for text in texts]
 
     def operation(self, k: int, operation: int, operands: list[_Value]) -> _Value:
         """Print an operation; one on numbers alone is done here and now."""

@@ -257,6 +257,8 @@ def finite(batch: Batch) -> Array:
     """Whether every input of a (variant, sample) is a number: fmin and fmax may hide a NaN in CasADi."""
     drawn = (part.swapaxes(1, 2) for part in batch.components)
     inputs = (batch.state, batch.memory, batch.commands, batch.environment, batch.tau_extra, *drawn)
+    if all(np.isfinite(array.sum()) for array in (*inputs, batch.parameters)):  # a sum hides nothing, and is fast
+        return np.ones((len(batch.parameters), batch.state.shape[1]), dtype=bool)
     samples = np.all([np.isfinite(array).all(axis=tuple(range(array.ndim - 1))) for array in inputs], axis=0)
     return np.asarray(np.isfinite(batch.parameters).all(axis=1)[:, None] & samples)
 
@@ -302,10 +304,12 @@ def _channels(
         column = numbers(f"{what} {name!r}", given[name])
         if column.shape not in shapes:
             raise ShipidError(f"{what} {name!r} must be {' or '.join(map(str, shapes))}: {column.shape}")
-        columns.append(np.atleast_2d(column))
-    length = max((len(column) for column in columns), default=1)
-    stacked = [np.broadcast_to(column, (length, num_samples)) for column in columns]
-    return np.stack(stacked, axis=1) if stacked else np.zeros((1, 0, num_samples))
+        columns.append(column)
+    length = num_steps if any(column.ndim == 2 for column in columns) else 1
+    stacked = np.empty((length, len(columns), num_samples))
+    for i, column in enumerate(columns):
+        stacked[:, i] = column
+    return stacked
 
 
 def _memory(model: Dynamics, memory: Mapping[str, Array] | None, batch: Batch, num_steps: int, vessel: Vessel) -> Array:

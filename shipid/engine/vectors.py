@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from shipid.engine.tables import Lookup
+
 
 @dataclass(frozen=True)
 class Precision:
@@ -112,6 +114,11 @@ class Target:
     prefix: str = ""
     fused: bool = False
     precision: Precision = DOUBLE
+
+    @property
+    def lookup(self) -> Lookup | None:
+        """How tables are looked up; None where no instruction picks from two vectors (that came with AVX-512)."""
+        return Lookup(self.lanes, self.precision.packed) if self.lanes * self.precision.bits == 512 else None
 
 
 _ONE, _TWO = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"), ("pow", "atan2")

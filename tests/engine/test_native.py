@@ -16,7 +16,7 @@ from shipid.engine import native
 from shipid.engine.integrate import Batch, Job
 from shipid.engine.native import compiler, run_native, target
 from shipid.engine.rollout import distances, rollout
-from shipid.engine.vectors import Target
+from shipid.engine.vectors import DOUBLE, Target
 from shipid.errors import ShipidError
 from shipid.metrics import position_error, tally
 from shipid.vessel import dynamics as module
@@ -153,7 +153,7 @@ def test_threads_may_make_the_same_library_at_once(empty_cache: Path) -> None:
     """Many at a time, as on a shared cache: each compiles for itself, and one file is left."""
     model = dynamics(SHIP)
     with ThreadPoolExecutor(3) as pool:
-        for future in [pool.submit(native._library.__wrapped__, model, 1.0, "euler") for _ in range(3)]:
+        for future in [pool.submit(native._library.__wrapped__, model, 1.0, "euler", DOUBLE, ()) for _ in range(3)]:
             future.result()
     assert len(list(empty_cache.iterdir())) == 1
 

@@ -1,0 +1,211 @@
+"""Tables in the equations: piecewise linear functions, found in a CasADi function and looked up by vectors of C.
+
+`shipid.physics.wind.interpolate` writes a table as a sum of ramps, which every engine can compute and differentiate:
+y_0 + b_0 (x - k_0) + sum_i (b_i - b_(i-1)) max(x - k_i, 0). That is three operations for each knot. A processor that
+permutes vectors (AVX-512) finds the interval of x once for all tables with the same knots. Then ordinate and slope come
+from one instruction for each 16 intervals (32 in single precision). The values are those of the ramps to rounding.
+This needs knots that are evenly apart; with others the ramps are as fast.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from shipid.engine.integrate import Array
+
+LEAST = 6  # intervals: shorter tables are as fast as ramps
+EVEN = 1e-15  # of the greatest knot: what rounding moves one
+
+
+@dataclass(frozen=True)
+class Table:
+    """A sum of ramps in a function; each entry is the number of the instruction that computes it.
+
+    x, ordinate, slope : argument, and value and slope at the first knot. knots (n,), bends (n - 1,) : where intervals
+    begin, and by how much the slope changes there, the first knot left out.
+    """
+
+    x: int
+    ordinate: int
+    slope: int
+    knots: tuple[int, ...]
+    bends: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """C that looks up tables in vectors of `lanes` numbers, which instructions `vpermt2{packed}` permute.
+
+    Ordinates of a table, then slopes, lie in an even number of vectors each: a permutation picks from two.
+    """
+
+    lanes: int
+    packed: str
+
+    def head(self) -> str:
+        """C functions. `v_place` gives the interval of x, and how far x is in it, in widths of an interval."""
+        return f"""
+static inline V v_found(const V *table, M place, int rows) {{
+  V all = K(0);
+  for (int i = 0; i < rows; i += 2) {{
+    V r = table[i];
+    __asm__("vpermt2{self.packed} %2, %1, %0" : "+v"(r) : "v"(place), "vm"(table[i + 1]));
+    all = i ? v_pick(place >= i * W, r, all) : r;
+  }}
+  return all;
+}}
+static inline V v_place(V x, V first, V scale, int count, M *place) {{
+  V along = (x - first) * scale, whole = v_min(v_max(along - K(0.5), K(0)), K(count - 1)) + K(ROUND);
+  *place = (M)whole - (M)K(ROUND);
+  return along - (whole - K(ROUND));
+}}
+static void v_table(V *table, REAL width, REAL y, REAL slope, const REAL *bends, int count, int rows) {{
+  for (int i = 0; i < rows * W; ++i) {{
+    table[i / W][i % W] = y;
+    table[rows + i / W][i % W] = slope * width;
+    if (i < count - 1) {{ y += slope * width; slope += bends[i]; }}
+  }}
+}}
+"""
+
+    def axis(self, name: str, first: str, last: str, size: int) -> tuple[str, list[str]]:
+        """C of an axis of so many knots, and what is saved of it: the first knot, and one over an interval."""
+        return f"V {name}[] = {{ {first}, K({size - 1}) / ({last} - {first}) }};", [f"{name}[0]", f"{name}[1]"]
+
+    def table(self, name: str, axis: str, ordinate: str, slope: str, bends: Sequence[str]) -> tuple[str, list[str]]:
+        """C that lays out a table on an axis, and what is saved of it."""
+        size, rows = len(bends) + 1, self.rows(len(bends) + 1)
+        line = (
+            f"const REAL bends_{name}[] = {{ {', '.join(f'({bend})[0]' for bend in bends)} }}; V {name}[{2 * rows}]; "
+        )
+        line += f"v_table({name}, 1 / {axis}[1][0], ({ordinate})[0], ({slope})[0], bends_{name}, {size}, {rows});"
+        return line, [f"{name}[{i}]" for i in range(2 * rows)]
+
+    def place(self, name: str, x: str, axis: Sequence[str], size: int) -> str:
+        """C that finds `x` on an axis, of which this was saved."""
+        return f"M at_{name}; const V {name} = v_place({x}, {', '.join(axis)}, {size}, &at_{name});"
+
+    def value(self, place: str, table: Sequence[str], size: int) -> str:
+        """C: the value of a table of so many knots, of which this was saved."""
+        rows = self.rows(size)
+        ordinate, slope = (f"v_found(&{table[first]}, at_{place}, {rows})" for first in (0, rows))
+        return f"({ordinate} + {place} * {slope})"
+
+    def rows(self, size: int) -> int:
+        """Vectors for so many numbers."""
+        return 2 * -(-size // (2 * self.lanes))
+
+
+@lru_cache(maxsize=64)
+def find_tables(function: ca.Function) -> Mapping[int, Table]:
+    """Tables of an SX function with at least `LEAST` intervals, by the number of the instruction that gives them."""
+    return _Search(function).tables()
+
+
+def even_tables(function: ca.Function, parameters: Array) -> Mapping[int, Table]:
+    """Tables whose knots depend on the input `parameters` alone, and are evenly apart for all rows (V, P) of these."""
+    return {k: table for k, table in find_tables(function).items() if _are_even(function, table.knots, parameters)}
+
+
+def _are_even(function: ca.Function, wanted: tuple[int, ...], parameters: Array) -> bool:
+    known = _knots(function, wanted)
+    if known is None:
+        return False
+    entries, compute = known
+    knots = np.array(compute(np.unique(parameters[:, entries], axis=0).T))
+    first, last = knots[0], knots[-1]
+    even = first + (last - first) * np.linspace(0, 1, len(knots))[:, None]
+    return bool(np.all((last > first) & (np.abs(knots - even) <= EVEN * np.abs(knots).max(axis=0))))
+
+
+@lru_cache(maxsize=64)
+def _knots(function: ca.Function, wanted: tuple[int, ...]) -> tuple[list[int], ca.Function] | None:
+    """Entries of `parameters` that give the knots, and their function; None if the knots depend on other inputs."""
+    return _Search(function).of_parameters(wanted)
+
+
+class _Search:
+    """The instructions of a function as a graph: operation and operands of each, by number."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self.function = function
+        self.operation: list[int] = []
+        self.operands: list[tuple[int, ...]] = []
+        slots: dict[int, int] = {}
+        for k in range(function.n_instructions()):
+            operation = function.instruction_id(k)
+            source = () if operation in (ca.OP_CONST, ca.OP_INPUT) else function.instruction_input(k)
+            self.operation.append(operation)
+            self.operands.append(tuple(slots[i] for i in source))
+            if operation != ca.OP_OUTPUT:
+                slots[function.instruction_output(k)[0]] = k
+
+    def tables(self) -> dict[int, Table]:
+        """All tables; one that is the beginning of a longer one is left out."""
+        found: dict[int, Table] = {}
+        for k in range(len(self.operation)):
+            table = self.extended(k, found) or self.begun(k)
+            if table is not None:
+                found[k] = table
+        beginnings = {part for k in found for part in self.operands[k]}
+        return {k: table for k, table in found.items() if k not in beginnings and len(table.knots) >= LEAST}
+
+    def extended(self, k: int, found: dict[int, Table]) -> Table | None:
+        """A table and one more ramp."""
+        for before, ramp in self.pairs(k, ca.OP_ADD):
+            table = found.get(before)
+            for bend, corner in self.pairs(ramp, ca.OP_MUL) if table else ():
+                for beyond, zero in self.pairs(corner, ca.OP_FMAX):
+                    if self.operation[beyond] == ca.OP_SUB and self.is_zero(zero):
+                        x, knot = self.operands[beyond]
+                        if table is not None and x == table.x:
+                            knots, bends = (*table.knots, knot), (*table.bends, bend)
+                            return Table(x, table.ordinate, table.slope, knots, bends)
+        return None
+
+    def begun(self, k: int) -> Table | None:
+        """The line before the second knot: ordinate + slope * (x - knot)."""
+        for ordinate, line in self.pairs(k, ca.OP_ADD):
+            for slope, beyond in self.pairs(line, ca.OP_MUL):
+                if self.operation[beyond] == ca.OP_SUB:
+                    x, knot = self.operands[beyond]
+                    return Table(x, ordinate, slope, (knot,), ())
+        return None
+
+    def pairs(self, k: int, operation: int) -> tuple[tuple[int, int], ...]:
+        """Both orders of the operands of an instruction that commutes; nothing if it is another operation."""
+        if self.operation[k] != operation:
+            return ()
+        first, second = self.operands[k]
+        return (first, second), (second, first)
+
+    def is_zero(self, k: int) -> bool:
+        """Whether an instruction is the number 0."""
+        return self.operation[k] == ca.OP_CONST and self.function.instruction_constant(k) == 0
+
+    def of_parameters(self, wanted: Sequence[int]) -> tuple[list[int], ca.Function] | None:
+        """Entries of the input `parameters` that give some instructions, and their function; None for other inputs."""
+        place = self.function.name_in().index("parameters")
+        entries: dict[int, ca.SX] = {}
+
+        def value(k: int) -> ca.SX:
+            operation, source = self.operation[k], [value(i) for i in self.operands[k]]
+            if operation == ca.OP_CONST:
+                return ca.SX(self.function.instruction_constant(k))
+            if operation == ca.OP_INPUT:
+                given, entry = self.function.instruction_input(k)
+                if given != place:
+                    raise LookupError
+                return entries.setdefault(entry, ca.SX.sym(f"p{entry}"))
+            return ca.SX.unary(operation, *source) if len(source) == 1 else ca.SX.binary(operation, *source)
+
+        try:
+            knots = ca.vertcat(*map(value, wanted))
+        except LookupError:
+            return None
+        return list(entries), ca.Function("knots", [ca.vertcat(*entries.values())], [knots])
