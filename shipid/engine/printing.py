@@ -146,13 +146,15 @@ class _Printer:
         numbers = [self.values[i] for i in (*table.knots, table.ordinate, table.slope, *table.bends)]
         if lookup is None or x.stage != self.last or any(value.stage > 0 for value in numbers):
             return None
-        texts = [self.use(value, 0) for value in numbers]
+        texts, part = [self.use(value, 0) for value in numbers], lookup.part(size)
         axis = self.axes.setdefault((table.x, *table.knots), f"axis{k}")
         if axis == f"axis{k}":
             on = self.kept(*lookup.axis(axis, texts[0], texts[size - 1], size))
-            self.lines[-1].append(lookup.place(axis, self.use(x, self.last), on, size))
-        rows = self.kept(*lookup.table(f"table{k}", axis, texts[size], texts[size + 1], texts[size + 2 :]))
-        self.lines[-1].append(self.dialect.assignment.format(f"a{k}", lookup.value(axis, rows, size)))
+            self.lines[-1].append(lookup.place(axis, self.use(x, self.last), on, part))
+        ordinate, slope, *bends = texts[size:]
+        rows = self.kept(*lookup.table(f"table{k}", axis, ordinate, slope, bends[: part - 1]))
+        terms = [lookup.value(axis, rows, part), *(self.values[i].text for i in table.ramps[part - 1 :])]
+        self.lines[-1].append(self.dialect.assignment.format(f"a{k}", " + ".join(terms)))
         return _Value(f"a{k}", self.last)
 
     def kept(self, line: str, texts: Sequence[str]) -> list[str]:

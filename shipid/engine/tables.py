@@ -19,6 +19,7 @@ import numpy as np
 from shipid.engine.integrate import Array
 
 LEAST = 6  # intervals: shorter tables are as fast as ramps
+FEW = 4  # intervals: as ramps they cost less than another permutation of each table
 EVEN = 1e-15  # of the greatest knot: what rounding moves one
 
 
@@ -27,7 +28,7 @@ class Table:
     """A sum of ramps in a function; each entry is the number of the instruction that computes it.
 
     x, ordinate, slope : argument, and value and slope at the first knot. knots (n,), bends (n - 1,) : where intervals
-    begin, and by how much the slope changes there, the first knot left out.
+    begin, and by how much the slope changes there, the first knot left out. ramps (n - 1,) : what each bend adds.
     """
 
     x: int
@@ -35,6 +36,7 @@ class Table:
     slope: int
     knots: tuple[int, ...]
     bends: tuple[int, ...]
+    ramps: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,11 @@ static void v_table(V *table, REAL width, REAL y, REAL slope, const REAL *bends,
         rows = self.rows(size)
         ordinate, slope = (f"v_found(&{table[first]}, at_{place}, {rows})" for first in (0, rows))
         return f"({ordinate} + {place} * {slope})"
+
+    def part(self, size: int) -> int:
+        """How many of so many intervals to look up: a few beyond those of whole permutations are left to ramps."""
+        beyond = size % (2 * self.lanes)
+        return size - beyond if beyond <= FEW and beyond < size else size
 
     def rows(self, size: int) -> int:
         """Vectors for so many numbers."""
@@ -164,8 +171,8 @@ class _Search:
                     if self.operation[beyond] == ca.OP_SUB and self.is_zero(zero):
                         x, knot = self.operands[beyond]
                         if table is not None and x == table.x:
-                            knots, bends = (*table.knots, knot), (*table.bends, bend)
-                            return Table(x, table.ordinate, table.slope, knots, bends)
+                            knots, bends, ramps = (*table.knots, knot), (*table.bends, bend), (*table.ramps, ramp)
+                            return Table(x, table.ordinate, table.slope, knots, bends, ramps)
         return None
 
     def begun(self, k: int) -> Table | None:
@@ -174,7 +181,7 @@ class _Search:
             for slope, beyond in self.pairs(line, ca.OP_MUL):
                 if self.operation[beyond] == ca.OP_SUB:
                     x, knot = self.operands[beyond]
-                    return Table(x, ordinate, slope, (knot,), ())
+                    return Table(x, ordinate, slope, (knot,), (), ())
         return None
 
     def pairs(self, k: int, operation: int) -> tuple[tuple[int, int], ...]:
