@@ -116,18 +116,26 @@ def find_tables(function: ca.Function) -> Mapping[int, Table]:
 
 def even_tables(function: ca.Function, parameters: Array) -> Mapping[int, Table]:
     """Tables whose knots depend on the input `parameters` alone, and are evenly apart for all rows (V, P) of these."""
-    return {k: table for k, table in find_tables(function).items() if _are_even(function, table.knots, parameters)}
+    tables = find_tables(function)
+    even = {knots for knots in {table.knots for table in tables.values()} if _are_even(function, knots, parameters)}
+    return {k: table for k, table in tables.items() if table.knots in even}
 
 
 def _are_even(function: ca.Function, wanted: tuple[int, ...], parameters: Array) -> bool:
     known = _knots(function, wanted)
     if known is None:
         return False
-    entries, compute = known
-    knots = np.array(compute(np.unique(parameters[:, entries], axis=0).T))
-    first, last = knots[0], knots[-1]
-    even = first + (last - first) * np.linspace(0, 1, len(knots))[:, None]
-    return bool(np.all((last > first) & (np.abs(knots - even) <= EVEN * np.abs(knots).max(axis=0))))
+    rows = parameters[:, known[0]]
+    alike = (rows == rows[0]).all()  # as a rule: angles of a table are not varied
+    return all(_is_even(known[1], row.tobytes()) for row in (rows[:1] if alike else np.unique(rows, axis=0)))
+
+
+@lru_cache(maxsize=1024)
+def _is_even(knots: ca.Function, numbers: bytes) -> bool:
+    """Whether the knots are evenly apart, and increase, for these parameters."""
+    values = np.array(knots(np.frombuffer(numbers))).ravel()
+    even = np.linspace(values[0], values[-1], len(values))
+    return bool(values[-1] > values[0] and (np.abs(values - even) <= EVEN * np.abs(values).max()).all())
 
 
 @lru_cache(maxsize=64)
