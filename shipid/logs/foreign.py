@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
+from shipid.errors import DataError
 from shipid.logs.workbook import is_workbook
 
 ENOUGH = 4096  # first bytes that tell
@@ -98,3 +100,11 @@ def foreign(head: bytes) -> Foreign | None:
     if is_workbook(start):
         return None
     return next((one for one in FOREIGN if re.match(one.starts, start, re.DOTALL | re.IGNORECASE)), None)
+
+
+def refuse_foreign(file: Path) -> None:
+    """Raise DataError with the remedy where a file is of a kind that no reader reads."""
+    with file.open("rb") as stream:
+        other = foreign(stream.read(ENOUGH))
+    if other is not None:
+        raise DataError(other.sentence, file=file, path="format.kind")

@@ -29,6 +29,8 @@ from shipid.data.dataset import (
 )
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices, is_utf_8
+from shipid.logs.dates import date_texts, dated, hour_twice, moment_of, seconds, span_of, time_texts
+from shipid.logs.formats import Format, SheetFormat, TableFormat, TextFormat
 from shipid.logs.mapping import (
     SIDES,
     Clock,
@@ -50,23 +52,7 @@ from shipid.logs.mapping import (
     to_si,
     yaw_of,
 )
-from shipid.logs.readers import (
-    Format,
-    Progress,
-    SheetFormat,
-    TableFormat,
-    TextFormat,
-    date_texts,
-    dated,
-    hour_twice,
-    in_points,
-    moment_of,
-    read_table,
-    require_file,
-    seconds,
-    span_of,
-    time_texts,
-)
+from shipid.logs.readers import Progress, in_points, read_table, require_file
 from shipid.logs.repairs import (
     FLAGS,
     REPAIRS,

@@ -15,7 +15,9 @@ from pydantic import Field, SerializeAsAny
 from shipid import document
 from shipid.data.dataset import DATED, STANDARD_DEVIATIONS, optional, required, unit_of
 from shipid.errors import DocumentError, choices
-from shipid.logs.readers import DAY, LAST_DATE, NEXT_DAY, READERS, Format, TextFormat, over_midnights
+from shipid.logs.dates import DAY, LAST_DATE, NEXT_DAY, over_midnights
+from shipid.logs.formats import Format, TextFormat
+from shipid.logs.readers import READERS
 from shipid.logs.repairs import (
     INPUTS,
     REPAIRS,

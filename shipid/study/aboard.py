@@ -24,9 +24,9 @@ from shipid.errors import DataError
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Bands, Region, at_level
 from shipid.hybrid.physics import assumed, check_columns
+from shipid.logs.dates import span_of
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
-from shipid.logs.readers import span_of
 from shipid.observer import observe
 from shipid.predictor import Predictor
 from shipid.study.apply import Band, along_run

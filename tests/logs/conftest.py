@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
+from shipid.logs.importing import import_log, read_mapping
 
 REPOSITORY = Path(__file__).parents[2]
 PLAIN = REPOSITORY / "tests" / "bad" / "logs" / "plain.toml"
@@ -98,3 +99,30 @@ def as_log(frame: pd.DataFrame, file: Path, clock: str = "s", speed: str = "m/s"
     )
     log.to_csv(file, index=False)
     return file
+
+
+T = np.arange(0.0, 60.0, 0.5)
+STATES = ["t", "north", "east", "psi", "u", "v", "r", "propeller.n"]
+NAMES = ["time", "N", "E", "heading", "u", "v", "rot", "rpm"]
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> pd.DataFrame:
+    return pd.read_csv(as_log(turning(T), tmp_path / "plain.csv"))
+
+
+def mapping_with(tmp_path: Path, form: str, *changes: tuple[str, str]) -> Path:
+    text = PLAIN.read_text().replace("[clock]", f"[format]\n{form}\n[clock]")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    file = tmp_path / "mapping.toml"
+    file.write_text(text)
+    return file
+
+
+def assert_is_the_motion(mapping: Path, file: Path) -> None:
+    frame = import_log(read_mapping(mapping), file).frame
+    motion = turning(T).rename(columns={"port.n": "propeller.n"})
+    for name in STATES:
+        np.testing.assert_allclose(frame[name], motion[name], atol=1e-6, err_msg=name)

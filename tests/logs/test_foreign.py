@@ -16,8 +16,9 @@ import pytest
 
 from shipid.errors import DataError
 from shipid.logs.foreign import foreign
+from shipid.logs.formats import MatFormat, NmeaFormat, ParquetFormat, TextFormat
 from shipid.logs.guess.sniff import sniff
-from shipid.logs.readers import MatFormat, NmeaFormat, ParquetFormat, TextFormat, read_table
+from shipid.logs.readers import read_table
 
 TABLE = pd.DataFrame({"time": np.arange(30.0), "north": 2.0 * np.arange(30.0), "heading": 0.1})
 TEXT = TABLE.to_csv(index=False).encode()

@@ -14,12 +14,13 @@ from openpyxl import Workbook, load_workbook
 
 from shipid.errors import DataError
 from shipid.logs import workbook
+from shipid.logs.formats import SheetFormat, TextFormat
 from shipid.logs.guess.columns import guess
 from shipid.logs.guess.draft import draft_mapping
 from shipid.logs.guess.sniff import sniff
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
-from shipid.logs.readers import SheetFormat, TextFormat, read_table
+from shipid.logs.readers import read_table
 from tests.logs.simulated import as_bridge, si_log
 
 BRIDGE = as_bridge(si_log()).round(4)

@@ -9,12 +9,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
+from shipid.logs.dates import date_of
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.mapping import is_date, to_si
-from shipid.logs.readers import date_of
 from shipid.physics.signals import is_shaft
 
 POSITIONS = ("latitude", "longitude", "north", "east")

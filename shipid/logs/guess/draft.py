@@ -13,11 +13,12 @@ import tomlkit
 
 from shipid.errors import ShipidError
 from shipid.logs import segments as cutting
+from shipid.logs.dates import date_of
 from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
 from shipid.logs.guess.columns import Guess
 from shipid.logs.importing import import_log, sha256_of
 from shipid.logs.mapping import Mapping, Segment, degrees_of, is_date, is_dated, read_mapping, to_si
-from shipid.logs.readers import LARGE, date_of
+from shipid.logs.readers import LARGE
 from shipid.physics.signals import is_command
 
 NOT_YET = "# Cannot be imported as it is: "

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import Array
+from shipid.logs.dates import DAY
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, names_another, unit_in_name
 from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.words import fits, is_order
 from shipid.logs.mapping import UNITS, is_dated, to_si
-from shipid.logs.readers import DAY
 from shipid.physics.signals import named
 from shipid.units import GRAVITY
 

@@ -19,7 +19,26 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
+from shipid.logs.dates import (
+    DAY,
+    DAY_OF,
+    HALF_DAY,
+    HOUR,
+    NEXT_DAY,
+    TIME_OF_DAY,
+    date_of,
+    date_texts,
+    dated,
+    days_by,
+    hour_twice,
+    in_one_number,
+    moment_of,
+    seconds,
+    time_texts,
+    ways_of,
+)
 from shipid.logs.foreign import foreign
+from shipid.logs.formats import LOOKED_AT, SheetFormat, TableFormat, TextFormat
 from shipid.logs.guess.words import fits, is_run, known_words, parts_of, units_in
 from shipid.logs.importing import OFF_ONE, even_clock, repeated_rows, rounding_of
 from shipid.logs.mapping import (
@@ -36,33 +55,13 @@ from shipid.logs.mapping import (
     yaw_of,
 )
 from shipid.logs.readers import (
-    DAY,
-    DAY_OF,
-    HALF_DAY,
-    HOUR,
     LONGEST_LINE,
-    LOOKED_AT,
-    NEXT_DAY,
     READERS,
-    TIME_OF_DAY,
-    SheetFormat,
-    TableFormat,
-    TextFormat,
-    date_of,
-    date_texts,
-    dated,
-    days_by,
     grouped_by,
-    hour_twice,
-    in_one_number,
     in_points,
-    moment_of,
     parse_text,
     read_table,
     require_file,
-    seconds,
-    time_texts,
-    ways_of,
     widest,
 )
 from shipid.logs.workbook import NOT_CALCULATED, SEPARATOR, sheet_text, sheets_of

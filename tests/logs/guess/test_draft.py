@@ -17,7 +17,7 @@ from shipid.logs.mapping import UNITS, Segment
 from shipid.logs.segments import kind_of
 from tests.logs.conftest import DATES, stamps
 from tests.logs.simulated import KNOT, SCHEDULE, as_bridge, si_log
-from tests.logs.test_readers import bridge_log
+from tests.logs.test_nmea import bridge_log
 
 
 def test_the_draft_of_a_clean_log_imports_to_the_motion(tmp_path: Path) -> None:

@@ -12,10 +12,11 @@ import pytest
 from scipy.io import savemat
 
 from shipid.errors import DataError
+from shipid.logs.formats import TextFormat
 from shipid.logs.guess.columns import guess
 from shipid.logs.guess.sniff import _is_time_of_day, cells, plain, sniff
 from shipid.logs.mapping import clock_seconds
-from shipid.logs.readers import TextFormat, read_table
+from shipid.logs.readers import read_table
 
 T = np.arange(0.0, 10.0, 0.5)
 TABLE = pd.DataFrame({"time": T, "N": 1.5 * T, "psi": 30.0 + T})

@@ -1,0 +1,235 @@
+"""Dates and times of day as they are written in logs, as seconds; and seconds as dates."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.dataset import DATED, Array
+
+DAY, HALF_DAY = 86400.0, 43200.0  # s
+NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, but for those that go back by an hour
+HOUR = 3600.0  # s: by which local time goes back at the end of daylight saving
+TIME_OF_DAY = r"\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?(\s*[AaPp][Mm])?\s*"
+DAY_OF = (
+    r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)|\d\d?(?P<gap>[- ])[A-Za-z]{3}(?P=gap)\d{4}"
+)
+"""A date without a time."""
+ORDINAL = r"^(\d{4})[-:/ ](\d{3})[-:/ T](\d\d:\d\d:\d\d(?:\.\d+)?)Z?$"
+"""A date with the day of the year: 2024-135 08:00:00, 2024:135:08:00:00.5."""
+UTC_BEHIND = r"\s+(?:UTC|GMT)$"
+"""The end of a date that says in letters that it has no other zone."""
+COMPACT = r"^(\d{8})[-_ ]?(\d{6})(?:\.?(\d{1,9}))?$"
+"""A date and a time of day in one number, or nearly: 20240514080000, 20240514080000.5, 20240514_080000."""
+DURATION = (
+    r"[+-]?\d+(?:\.\d+)? ?(?:d|days?|h|hrs?|hours?|min|minutes?|s|secs?|seconds?|ms)(?: \+?\d+:\d\d:\d\d(?:\.\d+)?)?"
+)
+"""A time since the begin of a log as MATLAB and pandas write it: 0.5 sec, 0 days 00:00:00.5."""
+ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
+"""The end of a date in ISO 8601 that says its zone."""
+DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y")
+DAYS += ("%d-%m-%Y", "%m-%d-%Y", "%y/%m/%d", "%d-%b-%Y", "%d %b %Y")
+HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
+WAYS = (*(f"{day} {hour}" for day in DAYS for hour in HOURS), *(f"%Y-%m-%d {hour}" for hour in HOURS if "%p" in hour))
+"""Ways in which a date and a time of day may be written, but for ISO 8601."""
+LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
+SAMPLES = 60  # texts by which the way of writing is looked for
+
+
+def seconds(dates: pd.Series[Any]) -> Array:
+    """Return dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
+
+    Read are ISO 8601, dates and durations of pandas, durations as text, and `DAYS` with `HOURS`; of those that every
+    row can be, that with which the log is shorter, else day/month. A time of day goes on after midnight. NaN where
+    there is none, and where a date has no zone while others have one.
+    """
+    if isinstance(dates.dtype, pd.CategoricalDtype):
+        dates = dates.astype(object)
+    if pd.api.types.is_timedelta64_dtype(dates.dtype):
+        return np.array(dates.dt.total_seconds(), dtype=np.float64)
+    if pd.api.types.is_numeric_dtype(dates.dtype) and in_one_number(dates.to_numpy(dtype=np.float64, na_value=np.nan)):
+        dates = dates.map(lambda one: f"{one:.16g}")
+    if pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object:
+        texts = dates.dropna().astype(str).str.strip()
+        if texts.str.contains(",", regex=False).any():
+            texts = texts.str.replace(r",\s+", " ", regex=True).str.replace(",", ".")
+        if len(texts) and texts.str.contains(UTC_BEHIND).all():
+            texts = texts.str.replace(UTC_BEHIND, "", regex=True)
+            dates = texts.reindex(dates.index)
+        if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
+            return _since_midnight(dates)
+        if len(texts) and texts.str.fullmatch(DURATION).all():
+            since = pd.to_timedelta(texts, errors="coerce").dt.total_seconds()
+            return np.array(since.reindex(dates.index), dtype=np.float64)
+        ordinal = texts.str.extract(ORDINAL)
+        if len(texts) and ordinal.notna().all(axis=None):
+            joined = ordinal[0] + " " + ordinal[1] + " " + ordinal[2]
+            return _since_1970(_moments(joined, "%Y %j %H:%M:%S").reindex(dates.index))
+        compact = texts.str.extract(COMPACT)
+        if len(texts) and compact[[0, 1]].notna().all(axis=None):
+            joined = compact[0] + " " + compact[1] + "." + compact[2].fillna("0")
+            return _since_1970(_moments(joined, "%Y%m%d %H%M%S.%f").reindex(dates.index))
+        written = ways_of(texts)
+        if written:
+            moments = min((_moments(texts, one) for one in written), key=_unlikely)
+            return _since_1970(moments.reindex(dates.index))
+        zoned = texts.str.contains(ZONE)
+        dates = (texts[zoned] if zoned.any() else texts).reindex(dates.index)
+    return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))
+
+
+def in_one_number(values: Array) -> bool:
+    """Whether numbers (N,) are dates and times of day, as 20240514080000 is: year, month, day, hour, minute, second."""
+    if not len(values) or not np.all((values > 1.9e13) & (values < 2.1e13)):
+        return False
+    fields = ((values // 10.0**place % 100).astype(int) for place in (8, 6, 4, 2, 0))
+    limits = ((1, 12), (1, 31), (0, 23), (0, 59), (0, 60))
+    return all(bool(np.all((one >= low) & (one <= high))) for one, (low, high) in zip(fields, limits, strict=True))
+
+
+def ways_of(texts: pd.Series[Any]) -> list[str]:
+    """Ways in which dates (N,) of text may be written, none for ISO 8601: most of a sample can be read so."""
+    places = np.random.default_rng(0).integers(0, max(1, len(texts)), SAMPLES)  # a stride may meet one kind
+    some = texts.iloc[np.unique(places)] if len(texts) else texts
+    some = some[some.str.fullmatch(rf"(?:{DAY_OF})\s+{TIME_OF_DAY}")]
+    shown = some.tolist()
+    ways = [one for one in WAYS if sum(_shape(one).fullmatch(text) is not None for text in shown) > 0.5 * len(some)]
+    return [one for one in ways if _moments(some, one).notna().mean() > 0.5] if len(some) else []
+
+
+@cache
+def _shape(way: str) -> re.Pattern[str]:
+    """A regular expression of the texts that may be dates of a way of writing: it is much faster to ask first."""
+    digits = {"Y": r"\d{4}", "b": "[A-Za-z]{3}", "S": r"\d\d?(?:\.\d+)?", "p": "[AaPp][Mm]"}
+    letters = re.escape(way).replace("\\ ", r"\s+")
+    return re.compile(re.sub("%(.)", lambda one: digits.get(one[1], r"\d\d?"), letters))
+
+
+def days_by(texts: pd.Series[Any], way: str) -> Array:
+    """Dates (N,) of one of the `ways_of` writing as seconds since 1970, NaN for others."""
+    return _since_1970(_moments(texts, way))
+
+
+def _moments(texts: pd.Series[Any], way: str) -> pd.Series[Any]:
+    """Dates of one way of writing, NaT for others; a second may have a fraction, or none."""
+    moments = pd.to_datetime(texts, format=way, utc=True, errors="coerce").dt.as_unit("us")
+    missing = moments.isna()
+    if "%S" in way and missing.any():
+        again = pd.to_datetime(texts[missing], format=way.replace("%S", "%S.%f"), utc=True, errors="coerce")
+        moments = moments.fillna(again.dt.as_unit("us"))
+    return moments
+
+
+def _unlikely(moments: pd.Series[Any]) -> tuple[int, float]:
+    """Rows that are no dates, then the time between the first and the last."""
+    return int(moments.isna().sum()), float((moments.max() - moments.min()).total_seconds())
+
+
+def date_of(moment: float) -> str:
+    """A moment in seconds since 1970 as date and time in UTC, the reverse of `seconds`."""
+    return datetime.fromtimestamp(moment, UTC).strftime("%Y-%m-%d %H:%M:%S")
+
+
+def moment_of(t: float) -> str:
+    """A time [s] of a log in words: a date where it counts from 1970, else seconds."""
+    return f"{date_of(t)} UTC" if DATED < t < LAST_DATE else f"{t:.10g} s"
+
+
+def span_of(first: float, last: float) -> str:
+    """Two times [s] of a log in words: dates where they count from 1970, else seconds."""
+    dates = min(first, last) > DATED and max(first, last) < LAST_DATE
+    return f"{date_of(first)} to {date_of(last)} UTC" if dates else f"{first:.10g} to {last:.10g} s"
+
+
+def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
+    """Return dates and times of day, of two columns (N,) of text, as one column of text for `seconds`."""
+    text = dates.astype("string").str.strip() + " " + times.astype("string").str.strip().str.replace(",", ".")
+    return text.astype(object)
+
+
+def date_texts(parts: list[Array]) -> pd.Series[Any]:
+    """Return year, month and day, or year and day of the year (N,), as text for `dated`; None where there is no such.
+
+    Years of two digits are of 1969 to 2068, as everywhere in Python.
+    """
+    year, last = parts[0], 31 if len(parts) == 3 else 366
+    year = np.where((year >= 0) & (year < 100), year + np.where(year < 69, 2000, 1900), year)
+    limits = [(1900, 9999), *([(1, 12)] if len(parts) == 3 else []), (1, last)]
+    form = "{:.0f}-{:02.0f}-{:02.0f}" if len(parts) == 3 else "{:.0f}-{:03.0f}"
+    known = _all_whole([year, *parts[1:]], limits)
+    cells = zip(*(part.tolist() for part in (year, *parts[1:])), strict=True)
+    return pd.Series(
+        [form.format(*cell) if one else None for one, cell in zip(known, cells, strict=True)], dtype=object
+    )
+
+
+def time_texts(parts: list[Array]) -> pd.Series[Any]:
+    """Return hour, minute and, if there is a third, second (N,), as text for `seconds`; None where there is no such."""
+    hour, minute, *rest = parts
+    second = rest[0] if rest else np.zeros(len(hour))
+    known = _all_whole([hour, minute, np.floor(second)], [(0, 23), (0, 59), (0, 60)])
+    micros = np.round(1e6 * (3600.0 * hour + 60.0 * minute + second)[known]).astype(np.int64)
+    texts = pd.Series([None] * len(hour), dtype=object)
+    whole = micros // 1_000_000
+    numbers = zip(whole // 3600, whole // 60 % 60, whole % 60, micros % 1_000_000, strict=True)
+    texts[known] = ["{:02d}:{:02d}:{:02d}.{:06d}".format(*one) for one in numbers]
+    return texts
+
+
+def _all_whole(parts: list[Array], limits: list[tuple[int, int]]) -> NDArray[np.bool_]:
+    """Whether all parts (N,) are whole numbers from the first to the second of their limits."""
+    pairs = zip(parts, limits, strict=True)
+    inside = [(part >= low) & (part <= high) & (part % 1 == 0) for part, (low, high) in pairs]
+    return np.asarray(np.all(inside, axis=0), dtype=np.bool_)
+
+
+def _since_1970(moments: pd.Series[Any]) -> Array:
+    since = (moments - pd.Timestamp("1970-01-01", tz="UTC")).dt.total_seconds()
+    return np.array(since, dtype=np.float64)
+
+
+def _since_midnight(times: pd.Series[Any]) -> Array:
+    texts = times.astype("string").str.strip().str.replace(",", ".")
+    half = texts.str[-2:].str.lower()
+    of_twelve = half.isin(["am", "pm"]).to_numpy(dtype=bool, na_value=False)
+    parts = texts.where(~of_twelve, texts.str[:-2]).str.split(":", expand=True)
+    numbers = parts.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
+    since = np.nansum(numbers * [3600.0, 60.0, 1.0][: numbers.shape[1]], axis=1)
+    afternoon = half.eq("pm").to_numpy(dtype=bool, na_value=False)
+    since[of_twelve] = since[of_twelve] % HALF_DAY + HALF_DAY * afternoon[of_twelve]  # 12:30 AM is half past midnight
+    since[np.isnan(numbers[:, 0])] = np.nan
+    return over_midnights(since)
+
+
+def over_midnights(since: Array) -> Array:
+    """Times of day (N,) [s] as seconds since the first midnight: after one that goes back, the next day has begun.
+
+    Where it goes back by an hour it is not the next day: see `hour_twice`.
+    """
+    steps = np.diff(since, prepend=since[:1])
+    return np.asarray(since + DAY * np.cumsum((steps < -NEXT_DAY) & ~_hour_back(steps)), dtype=np.float64)
+
+
+def hour_twice(t: Array) -> tuple[int, str] | None:
+    """Row (from 0) of a log at t (N,) [s] that begins an hour anew, and what to do; None if no row does.
+
+    So local time does at the end of daylight saving. A pause of up to ten minutes may lie between the rows.
+    """
+    steps = np.diff(t)
+    row = int(np.argmax(steps < 0)) + 1 if np.any(steps < 0) else 0
+    if row == 0 or not _hour_back(steps[row - 1]):
+        return None
+    last, first = (date_of(one) if DATED < one < LAST_DATE else date_of(one % DAY)[11:] for one in t[row - 1 : row + 1])
+    remedy = "write UTC, or in every row the zone that holds there; else sort or split the log"
+    return row, f"time goes back by an hour, from {last} to {first}: is it local time as daylight saving ends? {remedy}"
+
+
+def _hour_back(steps: Any) -> Any:
+    """Whether steps (N,) [s] of a clock go back by an hour, less a pause of up to ten minutes."""
+    return (steps >= -HOUR) & (steps <= NEXT_DAY - HOUR)

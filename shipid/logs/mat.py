@@ -1,0 +1,110 @@
+"""MATLAB files up to version 7: their vectors as columns, and what is said of all else in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.errors import DataError
+from shipid.logs.foreign import refuse_foreign
+from shipid.logs.formats import MatFormat
+
+
+def read_mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
+    """Return the vectors of a MATLAB file that are as long as the clock, as a table.
+
+    `attrs["other"]` says of every other variable what it is, and how to make a vector of it; `attrs["to save anew"]`
+    names those that MATLAB must save otherwise.
+    """
+    from scipy.io import loadmat
+
+    refuse_foreign(file)
+    try:
+        variables = loadmat(file, simplify_cells=True)
+        vectors, further = dict(_vectors(variables)), list(_no_vectors(variables))
+    except NotImplementedError:
+        message = "a MATLAB file of version 7.3: save it with save(..., '-v7')"
+        raise DataError(message, file=file, path="format.kind") from None
+    except Exception as error:  # scipy defines no error class: a damaged file raises any of a dozen
+        message = f"not a MATLAB file, or damaged ({type(error).__name__}): set [format] kind"
+        raise DataError(message, file=file, path="format.kind") from None
+    other = {name: f"{what}: {remedy}" if remedy else what for name, what, remedy in further}
+    if not vectors:
+        first = next(iter(other), None)
+        which = f"; {first!r} is {other[first]}" if first is not None else ""
+        raise DataError(f"no variable of this MATLAB file is a vector of numbers{which}", file=file)
+    longest = max(vectors, key=lambda name: len(vectors[name]))
+    measure = clock if clock in vectors else longest
+    length = len(vectors[measure])
+    for name, values in vectors.items():
+        if len(values) != length:
+            other[name] = f"of {len(values)} values, and {measure!r} has {length}: a column has a value for every time"
+    table = pd.DataFrame({name: values for name, values in vectors.items() if len(values) == length})
+    table.attrs["other"] = other
+    table.attrs["to save anew"] = list(dict.fromkeys(name for name, _, remedy in further if remedy))
+    return table
+
+
+def _vectors(variables: dict[str, Any]) -> Iterable[tuple[str, np.ndarray[Any, Any]]]:
+    """Dotted name and values of every numeric vector, structs and matrices opened."""
+    for name, value in _opened(variables):
+        if isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.number) and not np.iscomplexobj(value):
+            if value.ndim == 1:
+                yield name, value.astype(float)
+            elif value.ndim == 2:
+                yield from (
+                    (f"{name}.{column + 1}", value[:, column].astype(float)) for column in range(value.shape[1])
+                )
+
+
+def _opened(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
+    """Dotted name and value of every variable, structs opened."""
+    for key, value in variables.items():
+        if key.startswith("__"):
+            continue
+        if isinstance(value, dict):
+            yield from _opened(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str, str]]:
+    """Dotted name of every variable that is no vector of numbers, what it is, and how MATLAB makes a vector of it.
+
+    The last is empty where nothing has to be saved anew.
+    """
+    for name, value in _opened(variables):
+        last = name.rpartition(".")[2]
+        cells = list(value.flat) if isinstance(value, np.ndarray) and value.dtype == object else value
+        if isinstance(value, np.ndarray) and value.dtype.names:  # a datetime, a table: scipy does not open them
+            about = [text.decode() if isinstance(text, bytes) else str(text) for text in value.ravel()[0]][:3]
+            remedy = "save seconds(t - t(1)) of a datetime, table2struct(T, 'ToScalar', true) of a table"
+            yield about[0], f"an object of class {about[2]}, not a vector of numbers", remedy
+        elif isinstance(cells, list) and cells and isinstance(cells[0], dict):
+            field = next(iter(cells[0]), "x")
+            remedy = f"save a struct of vectors, such as s.{field} = [{name}.{field}]"
+            yield name, f"an array of {len(cells)} structs, not a struct of vectors", remedy
+            yield from ((f"{name}.{key}", "in an array of structs", remedy) for key in cells[0])
+        elif isinstance(cells, list):
+            remedy = f"save {last} = cell2mat({last}), or datenum({last}) of dates"
+            yield name, f"an array of {len(cells)} cells, not a vector of numbers", remedy
+        elif np.asarray(value).dtype.kind == "U":
+            yield name, "text, not a vector of numbers", f"save str2double({last}), or datenum({last}) of dates"
+        elif np.iscomplexobj(value):
+            yield name, "complex, not a vector of real numbers", f"save real({last})"
+        elif np.ndim(value) > 2:
+            shape = " x ".join(map(str, value.shape))
+            yield name, f"an array of {shape}, not a vector or matrix", f"save squeeze({last}), or one part of it"
+        elif np.ndim(value) == 0:
+            yield name, "a single number, not a vector", ""
+        elif np.ndim(value) == 2:
+            yield name, f"a matrix: its columns are {name}.1 to {name}.{value.shape[1]}", ""
+
+
+def is_mat(_: Path, head: bytes) -> dict[str, Any] | None:
+    """Recognise a MATLAB file by its first words; one of version 7.3, too, which has a remedy."""
+    return {"kind": "mat"} if head.startswith((b"MATLAB 5.0", b"MATLAB 7.3")) else None

@@ -1,0 +1,207 @@
+"""Dates and times of day in every way in which logs have them, and moments as dates."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.errors import DataError, DocumentError
+from shipid.logs import dates
+from shipid.logs.dates import date_of, moment_of, seconds, span_of
+from shipid.logs.guess.sniff import sniff
+from shipid.logs.importing import import_log, read_mapping
+from tests.logs.conftest import T, mapping_with
+
+
+def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
+    since = pd.Timestamp("2022-10-27T08:00:00Z")
+    log.assign(time=[(since + pd.Timedelta(seconds=t)).isoformat() for t in log["time"]]).to_csv(tmp_path / "log")
+    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
+    frame = import_log(read_mapping(mapping), tmp_path / "log").frame
+    np.testing.assert_allclose(frame["t"] - 1666857600.0, T, atol=1e-5)  # date -u -d 2022-10-27T08:00 +%s
+
+
+@pytest.mark.parametrize(
+    ("style", "unix"),
+    [
+        ("%d.%m.%Y %H:%M:%S.%f", True),
+        ("%Y/%m/%d %H:%M:%S.%f", True),
+        ("%Y-%m-%d %H:%M:%S.%f", True),
+        ("%d.%m.%y %H:%M:%S.%f", True),
+        ("%d/%m/%Y %H:%M:%S.%f", True),
+        ("%m/%d/%Y %H:%M:%S.%f", True),
+        ("%m/%d/%Y %I:%M:%S.%f %p", True),
+        ("%d-%m-%Y %I:%M:%S.%f %p", True),
+        ("%d-%b-%Y %H:%M:%S.%f", True),
+        ("%d %b %Y %H:%M:%S.%f", True),
+        ("%y/%m/%d %H:%M:%S.%f", True),
+        ("%d/%m/%Y, %H:%M:%S.%f", True),
+        ("%m/%d/%Y, %I:%M:%S.%f %p", True),
+        ("%Y%m%d%H%M%S.%f", True),
+        ("%Y%m%d%H%M%S%f", True),
+        ("%Y%m%d_%H%M%S.%f", True),
+        ("%Y-%m-%d %H:%M:%S.%f UTC", True),
+        ("%d.%m.%Y %H:%M:%S.%f GMT", True),
+        ("%H:%M:%S.%f UTC", False),
+        ("%H:%M:%S.%f", False),
+        ("%I:%M:%S.%f %p", False),
+    ],
+)
+def test_dates_as_they_are_written(style: str, unix: bool) -> None:
+    """From a minute before midnight; a time of day goes on after it."""
+    moments = pd.Timestamp("2022-10-26T23:59:30.5") + pd.to_timedelta(T, "s")
+    times = seconds(pd.Series(moments.strftime(style)))
+    np.testing.assert_allclose(times, T + (1666828770.5 if unix else 86370.5), atol=1e-5)
+
+
+def test_few_ways_of_writing_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each costs milliseconds, in each of two thousand files of a folder: only those are tried that a text may have."""
+    tried: list[str] = []
+    by_pandas = dates._moments
+    monkeypatch.setattr(dates, "_moments", lambda texts, way: tried.append(way) or by_pandas(texts, way))
+    for way in dates.WAYS:
+        tried.clear()
+        moments = pd.Timestamp("2022-10-26T23:40:30.5") + pd.to_timedelta(T * 20, "s")
+        assert way in dates.ways_of(pd.Series(moments.strftime(way.replace("%S", "%S.%f"))))
+        assert len(tried) <= 8, way
+    tried.clear()
+    assert dates.ways_of(pd.Series(moments.strftime("%Y-%m-%d %H:%M:%S"))) == []
+    assert tried == []
+
+
+@pytest.mark.parametrize("kind", ["int64", "float64"])
+def test_dates_in_one_number(kind: str) -> None:
+    moments = pd.Timestamp("2022-10-26T23:59:30") + pd.to_timedelta(np.arange(90), "s")
+    times = seconds(pd.Series(moments.strftime("%Y%m%d%H%M%S").astype("int64").astype(kind)))
+    assert times.tolist() == (1666828770 + np.arange(90)).tolist()
+
+
+TWICE = {
+    "date": ("%Y-%m-%d %H:%M:%S.%f", "2024-10-27 02:59:59 to 2024-10-27 02:00:00"),
+    "time of day": ("%H:%M:%S.%f", "02:59:59 to 02:00:00"),
+    "time of day, of twelve hours": ("%I:%M:%S.%f %p", "02:59:59 to 02:00:00"),
+    "hhmmss": ("%H%M%S.%f", "02:59:59 to 02:00:00"),
+    "whole minutes": ("%H:%M", "02:59:00 to 02:00:00"),
+}
+
+
+@pytest.mark.parametrize("every", ["", "\nevery = 0.5"])
+@pytest.mark.parametrize("name", TWICE)
+def test_an_hour_that_occurs_twice_is_refused(name: str, every: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    """Half a minute before the clocks of Berlin were set back to half a minute after."""
+    style, span = TWICE[name]
+    moments = pd.Timestamp("2024-10-27T00:59:30Z").tz_convert("Europe/Berlin") + pd.to_timedelta(T, "s")
+    log.assign(time=moments.strftime(style)).to_csv(tmp_path / "log.csv", index=False)
+    unit = "hhmmss" if name == "hhmmss" else "date"
+    mapping = mapping_with(tmp_path, "", ('from = "time"', f'from = "time"\nunit = "{unit}"{every}'))
+    message = f"time goes back by an hour, from {span}: is it local time as daylight saving ends"
+    with pytest.raises(DataError, match=message) as caught:
+        import_log(read_mapping(mapping), tmp_path / "log.csv")
+    assert caught.value.path == "row 61"
+    if name != "hhmmss":  # numbers that go back may be anything
+        with pytest.raises(DataError, match=message) as caught:
+            sniff(tmp_path / "log.csv")
+        assert caught.value.path == "row 61"
+
+
+@pytest.mark.parametrize("style", ["%Y-%m-%dT%H:%M:%S.%f%z", "%H:%M:%S.%f"])
+def test_the_end_of_daylight_saving_in_times_that_say_their_zone_or_are_utc(style: str) -> None:
+    zone = "Europe/Berlin" if "z" in style else "UTC"
+    moments = pd.Timestamp("2024-10-27T00:59:30Z").tz_convert(zone) + pd.to_timedelta(T, "s")
+    np.testing.assert_allclose(np.diff(seconds(pd.Series(moments.strftime(style)))), 0.5, atol=1e-6)
+
+
+@pytest.mark.parametrize("style", ["%d/%m/%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S"])
+def test_of_day_and_month_that_is_taken_with_which_the_log_is_short(style: str) -> None:
+    """From 5 June to 6 June, not from 6 May; and where nothing decides, the day comes first."""
+    moments = pd.Timestamp("2025-06-05T23:59:00") + pd.to_timedelta(10.0 * np.arange(20), "s")
+    times = seconds(pd.Series(moments.strftime(style)))
+    np.testing.assert_allclose(np.diff(times), 10.0)
+    one_day = seconds(pd.Series(["05/06/2025 10:00:00", "05/06/2025 10:00:01"]))
+    assert date_of(one_day[0]) == "2025-06-05 10:00:00"
+    assert date_of(times[0]) == "2025-06-05 23:59:00"
+
+
+def test_noon_and_midnight_of_twelve_hours() -> None:
+    texts = ["12:00:00 AM", "12:30:00 am", "1:00:00 AM", "12:00:00 PM", "12:15:00PM", "11:59:59 pm"]
+    np.testing.assert_allclose(seconds(pd.Series(texts)), [0, 1800, 3600, 43200, 44100, 86399])
+
+
+def test_what_is_no_date_is_not_a_number() -> None:
+    times = seconds(pd.Series(["27.10.2022 08:00:00", "later", "27.10.2022 08:00:01"]))
+    np.testing.assert_array_equal(times, [1666857600.0, np.nan, 1666857601.0])
+
+
+@pytest.mark.parametrize("zone", ["Z", "+02:00", "-0330", "+02"])
+def test_a_date_without_a_zone_beside_others_with_one_is_refused(zone: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    """As UTC it would be hours off; with no zone anywhere every row is UTC."""
+    moments = (pd.Timestamp("2024-05-14T08:00:00") + pd.to_timedelta(log["time"], "s")).dt.strftime(
+        "%Y-%m-%dT%H:%M:%S.%f"
+    )
+    zoned = moments + zone
+    assert np.isfinite(seconds(zoned)).all()
+    assert np.isfinite(seconds(moments)).all()
+    zoned[3] = moments[3]
+    log.assign(time=zoned).to_csv(tmp_path / "log", index=False)
+    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
+    with pytest.raises(DataError, match=f"{moments[3]}' has no time zone, while other rows have one") as caught:
+        import_log(read_mapping(mapping), tmp_path / "log")
+    assert caught.value.path == "row 4"
+
+
+@pytest.mark.parametrize("text", ["14.05.2024 08:00:00 +02:00", "1715731140.5", "080000"])
+def test_a_time_that_cannot_be_read_is_shown(text: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    log.assign(time=text).to_csv(tmp_path / "log", index=False)
+    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
+    with pytest.raises(DataError, match=rf"'{re.escape(text)}' is no date or time of day .* unit = \"s\"") as caught:
+        import_log(read_mapping(mapping), tmp_path / "log")
+    assert caught.value.path == "row 1"
+
+
+@pytest.mark.parametrize(("day", "time"), [("%d.%m.%Y", "%H:%M:%S.%f"), ("%Y-%m-%d", "%H:%M:%S,%f")])
+def test_date_and_time_in_two_columns(day: str, time: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    moments = pd.Timestamp("2022-10-26T23:59:30") + pd.to_timedelta(log["time"], "s")
+    split = log.assign(time=moments.dt.strftime(time), day=moments.dt.strftime(day))
+    split.to_csv(tmp_path / "log", sep=";", index=False)
+    clock = 'from = "time"\nunit = "date"\ndate = "day"'
+    mapping = mapping_with(tmp_path, 'separator = ";"', ('from = "time"', clock))
+    frame = import_log(read_mapping(mapping), tmp_path / "log").frame
+    np.testing.assert_allclose(frame["t"] - 1666828770.0, T, atol=1e-5)
+    mapping.write_text(mapping.read_text().replace('unit = "date"\n', ""))
+    with pytest.raises(DocumentError, match=r"clock\.date: .*write unit = 'date'"):
+        read_mapping(mapping)
+
+
+def test_times_of_day_that_go_back_are_of_the_next_day() -> None:
+    """Trials of three days in one file, each from eight in the morning; a minute back is an error, and stays one."""
+    hours = pd.Series(["08:00:00", "11:30:00", "08:15:00", "16:00:00", "08:05:00", "08:04:00"])
+    times = seconds(hours)
+    np.testing.assert_allclose(np.diff(times) / 3600, [3.5, 20.75, 7.75, 16 + 5 / 60, -1 / 60])
+
+
+def test_a_moment_and_its_date() -> None:
+    text = "2022-11-30 09:15:02"
+    t = float(seconds(pd.Series([text]))[0])
+    assert date_of(t) == text
+    assert moment_of(t) == f"{text} UTC"
+    assert span_of(t, t + 60.0) == f"{text} to 2022-11-30 09:16:02 UTC"
+
+
+@pytest.mark.parametrize("t", [-1e308, -5.0, 0.0, 12.5, 9.99e7, 1e13, 1e308, float("inf"), float("nan")])
+def test_a_moment_without_a_date_is_seconds(t: float) -> None:
+    """A damaged clock too: no date is beyond the year 9999."""
+    assert moment_of(t) == f"{t:.10g} s"
+    assert span_of(0.0, t) == f"0 to {t:.10g} s"
+    assert span_of(t, 1.7e9).endswith(" s")
+
+
+@pytest.mark.parametrize("rate", [1, 2, 5, 10, 20])
+@pytest.mark.parametrize("style", ["%d.%m.%Y %H:%M:%S.%f", "%m/%d/%Y %I:%M:%S.%f %p", "%Y-%m-%d %I:%M:%S.%f %p"])
+def test_whole_seconds_may_be_written_without_a_fraction(style: str, rate: int) -> None:
+    moments = pd.Timestamp("2024-02-01T10:00:00") + pd.to_timedelta(np.arange(1200) / rate, "s")
+    texts = pd.Series(moments.strftime(style)).str.replace(".000000", "", regex=False)
+    times = seconds(texts)
+    np.testing.assert_allclose(np.diff(times), 1 / rate, atol=1e-5)
+    np.testing.assert_array_equal(seconds(texts.astype("category")), times)

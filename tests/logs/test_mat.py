@@ -1,0 +1,82 @@
+"""What a MATLAB file may hold beside vectors, and how it is read or named."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import savemat
+
+from shipid.errors import DataError
+from shipid.logs.formats import MatFormat
+from shipid.logs.importing import import_log, read_mapping
+from shipid.logs.mat import _no_vectors
+from shipid.logs.readers import read_table
+from tests.logs.conftest import NAMES, T, assert_is_the_motion, mapping_with
+
+
+def test_matlab_structs_and_matrices(log: pd.DataFrame, tmp_path: Path) -> None:
+    log_struct = {"t": log["time"].to_numpy(), "xy": log[["N", "E"]].to_numpy(), "note": "sea state 2", "scale": 3.0}
+    others = {name: log[name].to_numpy() for name in NAMES[3:]}
+    savemat(tmp_path / "log.mat", {"log": log_struct, "gps": np.arange(7.0), **others})
+    changes = [('"time"', '"log.t"'), ('"N"', '"log.xy.1"'), ('"E"', '"log.xy.2"')]
+    assert_is_the_motion(mapping_with(tmp_path, 'kind = "mat"', *changes), tmp_path / "log.mat")
+
+
+def cells(values: np.ndarray) -> np.ndarray:
+    array = np.empty(len(values), dtype=object)
+    array[:] = list(values)
+    return array
+
+
+NO_VECTORS: dict[str, tuple[Any, str]] = {
+    "cells": (cells(T), r"'rpm' is an array of 120 cells, not a vector of numbers: save rpm = cell2mat\(rpm\)"),
+    "text": ("120 rpm", "'rpm' is text, not a vector of numbers: save str2double"),
+    "complex": (T + 1j, r"'rpm' is complex, not a vector of real numbers: save real\(rpm\)"),
+    "of another length": (T[:7], "'rpm' is of 7 values, and 'time' has 120"),
+    "a single number": (2.0, "'rpm' is a single number, not a vector"),
+    "a matrix": (np.stack([T, T], axis=1), r"'rpm' is a matrix: its columns are rpm\.1 to rpm\.2"),
+    "of three axes": (np.zeros((120, 2, 2)), "'rpm' is an array of 120 x 2 x 2, not a vector or matrix"),
+}
+
+
+@pytest.mark.parametrize("name", NO_VECTORS)
+def test_a_matlab_variable_that_is_no_vector_is_named(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    value, message = NO_VECTORS[name]
+    savemat(tmp_path / "log.mat", {**{name: log[name].to_numpy() for name in log}, "rpm": value})
+    with pytest.raises(DataError, match=message) as caught:
+        import_log(read_mapping(mapping_with(tmp_path, 'kind = "mat"')), tmp_path / "log.mat")
+    assert caught.value.path == "columns.propeller.n.from"
+
+
+def test_a_matlab_array_of_structs_is_named(log: pd.DataFrame, tmp_path: Path) -> None:
+    """Alone it is all that the file holds; beside vectors its fields are columns that the mapping may name."""
+    rows = log.to_records(index=False)
+    file = tmp_path / "log.mat"
+    savemat(file, {"log": rows})
+    message = r"no variable .* 'log' is an array of 120 structs, .* such as s\.time = \[log\.time\]"
+    with pytest.raises(DataError, match=message):
+        read_table(file, MatFormat(kind="mat"), "time")
+    savemat(file, {**{name: log[name].to_numpy() for name in log}, "log": rows})
+    changes = [('from = "rpm"', 'from = "log.rpm"')]
+    with pytest.raises(DataError, match=r"'log\.rpm' is in an array of structs: save"):
+        import_log(read_mapping(mapping_with(tmp_path, 'kind = "mat"', *changes)), file)
+
+
+def test_a_matlab_object_of_a_class_is_named() -> None:
+    """As scipy returns a datetime: its name, the system of types, its class and numbers."""
+    kind = [("s0", "O"), ("s1", "O"), ("s2", "O"), ("arr", "O")]
+    opaque = np.array([(b"t", b"MCOS", b"datetime", np.zeros(6))], dtype=kind)
+    ((name, what, remedy),) = _no_vectors({"None": opaque, "__function_workspace__": np.zeros(3)})
+    assert name == "t"
+    assert what == "an object of class datetime, not a vector of numbers"
+    assert remedy.startswith("save seconds(t - t(1))")
+
+
+def test_a_matlab_file_of_version_7_3_has_its_remedy(tmp_path: Path) -> None:
+    """As MATLAB writes its first 128 bytes: text, no subsystem, version 0x0200, byte order; HDF5 follows."""
+    (tmp_path / "log.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM" + bytes(600))
+    with pytest.raises(DataError, match=r"a MATLAB file of version 7\.3: save it with") as caught:
+        import_log(read_mapping(mapping_with(tmp_path, 'kind = "mat"')), tmp_path / "log.mat")
+    assert caught.value.path == "format.kind"

@@ -1,0 +1,225 @@
+"""NMEA 0183: sentences come back as the motion that they tell, with their times."""
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.errors import DataError
+from shipid.logs.formats import NmeaFormat
+from shipid.logs.importing import import_log, read_mapping
+from shipid.logs.readers import READERS, read_table
+from tests.logs.conftest import T, turning
+
+
+def sentence(body: str) -> str:
+    """NMEA 0183: $body*checksum, the exclusive or of all characters of the body."""
+    check = 0
+    for character in body:
+        check ^= ord(character)
+    return f"${body}*{check:02X}"
+
+
+def degrees_minutes(value: float, width: int) -> str:
+    degrees = int(abs(value))
+    return f"{degrees:0{width}d}{60 * (abs(value) - degrees):011.8f}"
+
+
+NMEA = """
+name = "bridge"
+[format]
+kind = "nmea"
+[clock]
+from = "time"
+max_gap = 5.0
+step = 0.5
+[origin]
+latitude = 63.45
+longitude = 10.4
+[columns.latitude]
+from = "latitude"
+unit = "deg"
+[columns.longitude]
+from = "longitude"
+unit = "deg"
+[columns.psi]
+from = "heading"
+unit = "deg"
+wrap = true
+[columns.speed]
+from = "sog"
+unit = "kn"
+[columns.course]
+from = "cog"
+unit = "deg"
+wrap = true
+[columns.r]
+from = "rot"
+unit = "deg/min"
+[columns.V_w]
+from = "apparent_speed"
+unit = "m/s"
+[columns.beta_w]
+from = "apparent_angle"
+unit = "deg"
+direction = "from"
+relative = true
+wrap = true
+[columns."rudder.delta"]
+from = "rudder"
+unit = "deg"
+"""
+
+
+def bridge_log(time: str, midnight: float, motion: pd.DataFrame) -> tuple[str, pd.DataFrame]:
+    """Sentences of a ship in a steady turn in a wind of 8 m/s towards the east; 2 of them are damaged."""
+    radius = 6378137.0  # m; close enough to the ellipsoid's for a check to 1 %
+    lines = ["!AIVDM,1,1,,A,14eG;o@034o8sd<L9i:a;WF>062D,0*7D", "$GPRMC,noise"]
+    course = np.degrees(motion["psi"] + np.arctan2(motion["v"], motion["u"])) % 360
+    speed = np.hypot(motion["u"], motion["v"]) * 3600 / 1852
+    for row in motion.itertuples():
+        index = row.Index
+        clock = (midnight + row.t) % 86400
+        stamp = f"{int(clock // 3600):02d}{int(clock % 3600 // 60):02d}{clock % 60:05.2f}"
+        latitude = 63.45 + np.degrees(row.north / radius)
+        longitude = 10.4 + np.degrees(row.east / radius / np.cos(np.radians(63.45)))
+        where = f"{degrees_minutes(latitude, 2)},N,{degrees_minutes(longitude, 3)},E"
+        psi = np.degrees(row.psi) % 360
+        ahead, abeam = 8 * np.sin(row.psi) - row.u, 8 * np.cos(row.psi) - row.v
+        comes_from = (np.degrees(np.arctan2(abeam, ahead)) + 180) % 360
+        bodies = [
+            f"GPRMC,{stamp},A,{where},{speed[index]:.6f},{course[index]:.5f},271022,,,A",
+            f"HEHDT,{psi:.5f},T",
+            f"TIROT,{np.degrees(row.r) * 60:.5f},A",
+            f"WIMWV,{comes_from:.4f},R,{np.hypot(ahead, abeam):.5f},M,A",
+            "AGRSA,10.0,A,,",
+        ]
+        before = f"{row.t:.1f} " if time == "line" else ""
+        lines += [before + sentence(body) for body in bodies]
+    return "\r\n".join(lines) + "\r\n", motion
+
+
+def test_values_that_a_sentence_calls_invalid_are_not_taken(tmp_path: Path) -> None:
+    begin = [
+        "GPRMC,120000,A,4807.0,N,01131.0,E,5.0,84.0,271022,,,A",
+        "AGRSA,10.5,A,4.0,V",
+        "GPVTG,54.0,T,,M,5.5,N,,K,A",
+    ]
+    later = ["GPRMC,120001,A,4807.0,N,01131.0,E,,,271022,,,A", "AGRSA,33.0,V,,", "GPVTG,99.0,T,,M,77.0,N,,K,N"]
+    (tmp_path / "log").write_text("\n".join(map(sentence, begin + later)))
+    table = read_table(tmp_path / "log", NmeaFormat(kind="nmea"), "time")
+    assert table["rudder"].tolist() == pytest.approx([10.5, np.nan], nan_ok=True)
+    assert table["rudder_port"].isna().all()
+    assert table["sog"].tolist() == pytest.approx([5.0, np.nan], nan_ok=True)
+    assert table.attrs["unreadable"] == 0
+
+
+@pytest.mark.parametrize(
+    ("fixes", "hours"),
+    [
+        (["GGA 230000", "RMC 230000 271022", "GGA 010000", "RMC 010000 281022"], [0, 2]),
+        (["RMC 080000 271022", "GGA 080100", "GGA 090000", "RMC 090000 281022"], [0, 1 / 60, 25]),
+        (["RMC 080000 271022", "RMC 070000 301022", "GGA 070100"], [0, 71, 71 + 1 / 60]),
+        (["ZDA 080000 271022", "GGA 090000", "ZDA 090000 281022"], [0, 25]),
+        (["RMC 235959 311222", "RMC 000000 311222", "RMC 000001 010123"], [0, 1 / 3600, 2 / 3600]),
+        (["RMC 080000 271022", "RMC 090000 -"], [0, 1]),
+        (["GGA 230000", "GGA 010000"], [0, 2]),
+    ],
+)
+def test_a_fix_is_of_the_day_that_the_sentences_say(fixes: list[str], hours: list[float], tmp_path: Path) -> None:
+    """Before, a log that was off for 25 h went on after one; a date that changes a second late makes no day."""
+    lines = []
+    for kind, time, *date in map(str.split, fixes):
+        day = (date or ["-"])[0].replace("-", "")
+        if kind == "RMC":
+            lines.append(f"GPRMC,{time},A,4807.0,N,01131.0,E,5.0,84.0,{day},,,A")
+        elif kind == "ZDA":
+            lines.append(f"GPZDA,{time},{day[:2]},{day[2:4]},20{day[4:]},00,00")
+        else:
+            lines.append(f"GPGGA,{time},4807.0,N,01131.0,E,1,8,0.9,5.0,M,46.9,M,,")
+    (tmp_path / "log").write_text("\n".join(map(sentence, lines)))
+    t = read_table(tmp_path / "log", NmeaFormat(kind="nmea"), "time")["time"]
+    np.testing.assert_allclose((t - t[0]) / 3600, hours)
+    assert 0 <= t[0] < 86400
+
+
+@pytest.mark.parametrize("speed", ["10.0,N,,M", ",N,5.1444,M", "10.0,N,5.1444,M"])
+def test_the_true_wind_is_read_in_knots_too(speed: str, tmp_path: Path) -> None:
+    fixes = [f"GPRMC,12000{k},A,4807.0,N,01131.0,E,5.0,84.0,271022,,,A" for k in (0, 1)]
+    lines = [line for fix in fixes for line in (fix, f"WIMWD,120.0,T,118.0,M,{speed}")]
+    (tmp_path / "log").write_text("\n".join(map(sentence, lines)))
+    table = read_table(tmp_path / "log", NmeaFormat(kind="nmea"), "time")
+    assert table["wind_speed"].tolist() == pytest.approx([5.1444, 5.1444], abs=1e-4)
+
+
+@pytest.mark.parametrize(("time", "midnight"), [("fix", 0.0), ("fix", 86400.0 - 30.0), ("line", 0.0)])
+def test_nmea(time: str, midnight: float, tmp_path: Path) -> None:
+    text, motion = bridge_log(time, midnight, turning(T))
+    if time == "line":
+        text = "\n".join(text.splitlines()[2:])
+    (tmp_path / "bridge.nmea").write_text(text)
+    (tmp_path / "mapping.toml").write_text(NMEA.replace('"nmea"', f'"nmea"\ntime = "{time}"'))
+    dataset = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "bridge.nmea")
+    frame = dataset.frame
+    assert len(frame) == len(T)
+    np.testing.assert_allclose(frame["t"], T + midnight, atol=1e-6)
+    for name, tolerance in {"psi": 1e-6, "u": 1e-5, "v": 1e-5, "r": 1e-6}.items():
+        np.testing.assert_allclose(frame[name], motion[name], atol=tolerance, err_msg=name)
+    extent = np.ptp(motion["north"])
+    for name in ("north", "east"):
+        np.testing.assert_allclose(frame[name], motion[name], atol=0.01 * extent, err_msg=name)
+    np.testing.assert_allclose(frame["V_w"], 8.0, atol=1e-3)
+    np.testing.assert_allclose(np.sin(frame["beta_w"]), 1.0, atol=1e-3)
+    np.testing.assert_allclose(np.degrees(frame["rudder.delta"]), 10.0)
+    counted = [record["count"] for record in dataset.metadata["repairs"] if record["kind"] == "unreadable"]
+    assert counted == ([2] if time == "fix" else [])
+    assert dataset.metadata["origin"] == {"latitude": 63.45, "longitude": 10.4}
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        lambda moment: f"{moment.timestamp():.3f} ",
+        lambda moment: f"{moment:%d.%m.%Y};{moment:%H:%M:%S.%f};",
+        lambda moment: f"{moment:%d.%m.%Y %H:%M:%S.%f},",
+        lambda moment: f"{moment:%Y-%m-%dT%H:%M:%S.%f}Z ",
+        lambda moment: f"{moment:%Y%m%dT%H%M%S.%f} ",
+        lambda moment: f"{moment:%Y/%m/%d %H:%M:%S.%f},",
+        lambda moment: f"\\g:1-1-1234,s:r3669961,c:{round(1000 * moment.timestamp())}*5F\\",
+    ],
+)
+@pytest.mark.parametrize("source", ["S", "E", "both"])
+def test_stamps_before_sentences_and_speeds_of_shafts(written: Any, source: str, tmp_path: Path) -> None:
+    """6 May, not 5 June; shafts and engines by their number."""
+    begin = datetime(2025, 5, 6, 7, 8, 9, 500000, tzinfo=UTC)
+    lines = []
+    for second in range(20):
+        bodies = [f"{kind},{number},{100.0 * factor + 10 * number + second},,A" for kind, factor in (("E", 5), ("S", 1))
+                  for number in (1, 2) if source in (kind, "both")]  # fmt: skip
+        stamp = written(begin + timedelta(seconds=second))
+        lines += [stamp + sentence(f"IIRPM,{body}") for body in bodies] + [stamp + sentence("HEHDT,10.0,T")]
+    file = tmp_path / "bridge.nmea"
+    file.write_text("\n".join(lines))
+    assert READERS["nmea"].detect is not None
+    assert READERS["nmea"].detect(file, file.read_bytes()) == {"kind": "nmea", "time": "line"}
+    table = READERS["nmea"].read(file, NmeaFormat(kind="nmea", time="line"), "time")
+    np.testing.assert_allclose(table["time"], begin.timestamp() + np.arange(20.0), atol=1e-3)
+    for kind, name, base in (("S", "rpm", 100.0), ("E", "engine_rpm", 500.0)):
+        for column, number in ((name, 1), (f"{name}_2", 2)):
+            logged = source in (kind, "both")
+            expected = base + 10 * number + np.arange(20) if logged else np.full(20, np.nan)
+            np.testing.assert_allclose(table[column], expected)
+
+
+@pytest.mark.parametrize("stamp", ["06/05/2025 12:00:00,", "12:00:01 ", "\\s:GPS*1C\\", "bridge "])
+def test_a_stamp_that_is_no_moment_is_refused(stamp: str, tmp_path: Path) -> None:
+    """A time without a date, or a date that may be two days; a guess takes the time of the fix."""
+    file = tmp_path / "bridge.nmea"
+    file.write_text(stamp + sentence("HEHDT,10.0,T") + "\n")
+    assert READERS["nmea"].detect is not None
+    assert READERS["nmea"].detect(file, file.read_bytes()) == {"kind": "nmea", "time": "fix"}
+    with pytest.raises(DataError, match=r"row 1: no .*: set \[format\] time = 'fix'"):
+        READERS["nmea"].read(file, NmeaFormat(kind="nmea", time="line"), "time")
