@@ -17,6 +17,7 @@ from shipid.arguments import names_of, of_class, one_of, path_of
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
+from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.clues import Finding, Question, State, Suggestion
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from shipid.logs.guess.defects import (
@@ -31,7 +32,7 @@ from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import Frame, choose_pose
 from shipid.logs.guess.scales import take_scales
-from shipid.logs.guess.sniff import Sniffed, is_clock
+from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.guess.sources import Source, read_source
 from shipid.logs.guess.stuck import find_stuck
 from shipid.logs.guess.unused import reasons

@@ -1,0 +1,544 @@
+"""The clock of an unknown log: its column or columns, unit and rate, what is doubtful in it, and what is wrong."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Array
+from shipid.errors import DataError
+from shipid.logs.dates import (
+    DAY,
+    DAY_OF,
+    HALF_DAY,
+    HOUR,
+    NEXT_DAY,
+    TIME_OF_DAY,
+    date_of,
+    date_texts,
+    dated,
+    days_by,
+    hour_twice,
+    in_one_number,
+    moment_of,
+    seconds,
+    time_texts,
+    ways_of,
+)
+from shipid.logs.guess.words import NO_VALUE, is_run, parts_of, units_in
+from shipid.logs.importing import even_clock, repeated_rows, rounding_of
+from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, names_of, since_midnight, to_si
+from shipid.logs.workbook import NOT_CALCULATED
+
+Rows = NDArray[np.bool_]
+LONG = 1e4  # rows between two runs that have a clock each
+FEWEST_TIMES = 10  # of a second clock that are compared with the first
+APART, OFF = 10, 0.02  # steps of the first clock, and share of its span, by which a second one may go otherwise
+LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
+REPEATED = 0.05  # share of the rows that may repeat the row before, at most
+CLOCK_WORDS = frozenset(
+    (
+        "t tvec time timestamp stamp clock sec secs seconds date datetime utc ms zeit messzeit zeitstempel "
+        "tid tidspunkt sekunden millis epoch zulu hora temps heure elapsed stempel mess uhrzeit klokke tiempo "
+        "gmt datenum tow itow sow sod ticks filetime mjd jd julian"
+    ).split()
+)
+WRITTEN = {
+    "ns": "ns nsec nanos nanosec nanoseconds",
+    "us": "us usec micros microsec microseconds",
+    "ms": "ms msec millis millisec milliseconds",
+    "s": "s sec secs second seconds sekunden",
+    "min": "min mins minute minutes minuten",
+    "h": "h hr hrs hour hours stunden",
+    "d": "d day days tage",
+}
+"""Unit of a clock -> words for it, in brackets or at the end of a name."""
+FIELDS = {
+    "year": ("year yr yyyy yy jahr annee anno ano jaar aar ar", 0.0, 2100.0),
+    "month": ("month mon mo mm m monat mois mese mes maand maaned manad", 1.0, 12.0),
+    "day": ("day dd d dom tag jour giorno dia dag", 1.0, 31.0),
+    "day of the year": ("doy yday jday", 1.0, 366.0),
+    "hour": ("hour hours hr hh h stunde heure ora hora uur timme", 0.0, 23.0),
+    "minute": ("minute minutes min mm m mi minuto minuut minutt", 0.0, 59.0),
+    "second": ("second seconds sec ss s sekunde seconde secondo segundo sekund sek", 0.0, 60.0),
+}
+"""Field of a date or time in columns -> words for it, and its least and largest number."""
+YEARS = 1990.0, 2050.0  # of a log
+OF_YEARS = "is a year with decimals, {:.12g}: write a date, 2024-05-14 08:00:00, or seconds"
+FINE = {"ns": (1e17, 1e8), "us": (1e14, 1e5)}
+"""Unit of a clock -> least number that counts from 1970 in it, and least step of whole numbers: 0.1 s."""
+DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in {**EPOCHS, "d": 0.0}.items()}
+"""Unit of a clock in days -> its numbers of 1990 and 2050, `d` since 1970. Those of Excel from 2031 and
+modified Julian dates to 2008 are the same numbers."""
+TICKS = {11_644_473_600: "1601, as Windows does", 62_135_596_800: "the year 1, as .NET does"}
+"""Seconds from the begin of a clock of ticks of 100 ns to 1970 -> who counts so."""
+COUNTERS, LONG_STEP = (2**16, 2**32), 10.0  # numbers of a counter; usual steps that lie over its end, at most
+SHORT_YEAR = 2e-6  # years, a minute: no clock of a ship has steps of as many seconds, or hours, without a unit
+SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
+NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
+
+
+def are_whole(values: Array, most: float) -> bool:
+    """Whether all numbers (N,) that are there are whole, and at most that large."""
+    known = values[np.isfinite(values)]
+    return bool(len(known) and np.all(known % 1 == 0.0) and np.all(np.abs(known) <= most))
+
+
+def _fields(columns: dict[str, Array]) -> dict[str, str]:
+    """Field of a date or time -> column of whole numbers that is called so: year, month, day, hour, minute, second."""
+    found: dict[str, str] = {}
+    names, order = [*columns], [one for one in FIELDS if one != "day of the year"]
+    for place in range(len(names) - len(order) + 1 if all(map(str.isdecimal, names)) else 0):
+        six = dict(zip(order, names[place:], strict=False))  # as datevec of MATLAB writes
+        limits = {**FIELDS, "year": ("", *YEARS)}
+        parts = [np.floor(columns[name]) if one == "second" else columns[name] for one, name in six.items()]
+        inside = zip(parts, order, strict=True)
+        if all(are_whole(part, limits[one][2]) and np.min(part) >= limits[one][1] for part, one in inside):
+            return six
+    for name, values in columns.items():
+        word = (parts_of(name) or ("",))[-1]
+        called = [one for one, (words, _, _) in FIELDS.items() if word in words.split() and one not in found]
+        one = "minute" if "minute" in called and "hour" in found else next(iter(called), "")
+        if one and one in ("minute", "second") and "hour" not in found:
+            continue
+        whole = np.floor(values) if one == "second" else values
+        if one and are_whole(whole, FIELDS[one][2]) and np.nanmin(whole) >= FIELDS[one][1]:
+            found[one] = name
+    return found
+
+
+def _day_in(fields: dict[str, str]) -> list[str]:
+    """Columns of year, month and day, or of year and day of the year; none where one is not there."""
+    ways = (("year", "month", "day"), ("year", "day of the year"))
+    return next(([fields[one] for one in way] for way in ways if {*way} <= fields.keys()), [])
+
+
+def _in_columns(
+    table: pd.DataFrame, columns: dict[str, Array], dates: str | None
+) -> tuple[dict[str, Any], Array] | None:
+    """Return the clock of a log with hour, minute and second in columns; `dates` is a column of dates."""
+    fields = _fields(columns)
+    times, days = [fields[one] for one in ("hour", "minute", "second") if one in fields], _day_in(fields)
+    if not {"hour", "minute"} <= fields.keys():
+        return None
+    texts = time_texts([columns[name] for name in times])
+    day: str | list[str] | None = dates or days or None
+    if day is not None:
+        written = column_called(table, day) if isinstance(day, str) else date_texts([columns[name] for name in day])
+        texts = dated(written, texts)
+    since = seconds(texts)
+    if not np.isfinite(since).all():
+        return None
+    keys = {"from": times, "unit": "date"} | ({"date": day} if day is not None else {})
+    if np.all(np.diff(since) > 0):
+        return keys, since
+    rate = _rate(since)
+    return None if rate is None else (keys | {"every": rate[0]}, rate[1])
+
+
+def restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, int], dict[str, Array] | None]:
+    """Return the column that says the run with the number of runs, and the clock, where it begins again with each.
+
+    The clock goes on from run to run then, after a time of `LONG` rows.
+    """
+    for name in filter(is_clock, columns):
+        steps = np.diff(columns[name])
+        if not np.isfinite(columns[name]).all() or not np.any(steps < 0) or _again(columns[name]):
+            continue
+        for run in (str(run) for run in table.columns if str(run) and is_run(str(run))):
+            texts = column_called(table, run).astype(str).str.strip().to_numpy(dtype=object)
+            changed = texts[1:] != texts[:-1]
+            if np.all(changed[steps < 0]) and np.mean(changed) < 0.1:
+                length = float(np.ptp(columns[name])) + LONG * float(np.median(steps))
+                return {run: 1 + int(changed.sum())}, {name: columns[name] + np.append(0, np.cumsum(changed)) * length}
+    return {}, None
+
+
+def clock_once(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array, Rows]:
+    """Return the clock, its times, and which rows it takes: all but a few that repeat the row before."""
+    again = repeated_rows(table)
+    if 0 < again.sum() <= REPEATED * len(table):
+        kept = {name: values[~again] for name, values in columns.items()}
+        clock, t = _clock(table.loc[~again].reset_index(drop=True), kept, file)
+        return {**clock, "repeated": "drop"}, t, ~again
+    try:
+        return *_clock(table, columns, file), np.ones(len(table), dtype=bool)
+    except DataError:
+        once = _once(table, columns)
+        if once is None:
+            raise
+        kept = {name: values[once] for name, values in columns.items()}
+        clock, t = _clock(table.loc[once].reset_index(drop=True), kept, file)
+        if "every" in clock:  # a rounded clock has rows of one time that are not repeated
+            raise
+        return {**clock, "repeated": "drop"}, t, once
+
+
+def _once(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | None:
+    """Return the rows that do not say the time of the row before once more; None where no clock has a few of these."""
+    for name in map(str, table.columns):
+        if not is_clock(name):
+            continue
+        times = columns[name] if name in columns else seconds(column_called(table, name))
+        steps = np.diff(times, prepend=-np.inf)
+        if np.isfinite(times).all() and np.all(steps >= 0) and 0 < np.sum(steps == 0) <= REPEATED * len(table):
+            return np.asarray(steps > 0)
+    return None
+
+
+def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
+    """Return the clock: a column that rises, by its name if several do; dates; or a rounded one, by its rate."""
+    finite = {name: values for name, values in columns.items() if np.isfinite(values).all() and len(values)}
+    rising = [name for name, values in finite.items() if np.all(np.diff(values) > 0)]
+    called = [name for name in columns if is_clock(name)]
+    texts = [name for name in map(str, table.columns) if name not in columns and name]
+    times: dict[str, Array] = {}
+    for name in sorted(texts, key=lambda name: not is_clock(name)):
+        column = column_called(table, name)
+        of_day = column.dropna().astype(str).str.fullmatch(TIME_OF_DAY)
+        whole = len(of_day) and of_day.all()
+        day = (_dates(table, texts) or _day_in(_fields(columns))) if whole else None
+        if day:
+            of_date = column_called(table, day) if isinstance(day, str) else date_texts([columns[one] for one in day])
+            with_date = seconds(dated(of_date, column))
+            if np.isfinite(with_date).all() and np.all(np.diff(with_date) > 0):
+                return {"from": name, "unit": "date", "date": day}, with_date
+        since = seconds(column) if is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
+        times[name] = since
+        if not np.isfinite(since).all():
+            called += [name] if is_clock(name) else []
+            continue
+        if np.all(np.diff(since) > 0):
+            return {"from": name, "unit": "date"}, since
+        rate = _rate(since)
+        if rate is not None:
+            return {"from": name, "unit": "date", "every": rate[0]}, rate[1]
+        called.append(name)
+    in_columns = _in_columns(table, columns, _dates(table, texts))
+    if in_columns is not None:
+        return in_columns
+    if not any(name in called for name in rising):  # another column that happens to rise is no clock then
+        for name, since in times.items():
+            if np.isfinite(since).all() and np.any(np.diff(since) < 0):
+                twice = hour_twice(since)
+                if twice is not None:
+                    raise DataError(twice[1], file=file, path=f"row {twice[0] + 1}")
+                raise DataError(f"no column can be the clock: {name!r} {_fault(since)}", file=file)
+        dates = _dates(table, texts)
+        called = [name for name in called if name != dates] or called  # that repeat: the times beside them are at fault
+        for name in called if dates is not None else ():
+            if name in texts:
+                fault = _unread(table, name, times[name]) or _fault(times[name])
+                raise DataError(f"no column can be the clock: {name!r} {fault}", file=file)
+    candidates = [name for name in rising if name in called] or [name for name in rising if not _counts(columns[name])]
+    unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
+    rounded = [name for name in called or unnamed if name in finite and name not in rising]
+    for name in [*candidates[:1], *rounded] if candidates and candidates[0] in called else [*rounded, *candidates[:1]]:
+        unit, t = _read_clock(table, name, finite[name], file)
+        rises = bool(np.all(np.diff(t) > 0))  # after midnight, too
+        rate = _rate(t) if not rises or _is_coarse(t) else None
+        if rate is not None:
+            return {"from": name, "unit": unit, "every": rate[0]}, rate[1]
+        if rises:
+            return {"from": name, "unit": unit}, t
+    if rising:
+        unit, t = _read_clock(table, rising[0], finite[rising[0]], file)
+        return {"from": rising[0], "unit": unit}, t
+    first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
+    if called and called[0] in finite:
+        first = clock_seconds(first, _unit_of_clock(called[0], first))
+    counted = _counter(finite[called[0]]) if called and called[0] in finite else ""
+    fault = "none rises from row to row"
+    if called:
+        fault = f"{called[0]!r} {counted or _unread(table, called[0], first) or _fault(first)}"
+    if called and called[0] in finite and _is_years(called[0], finite[called[0]]):
+        fault = f"{called[0]!r} {OF_YEARS.format(finite[called[0]][0])}"
+    raise DataError(f"no column can be the clock: {fault}", file=file)
+
+
+def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[str]:
+    """Yield questions on dates and times of day at t (N,) [s] that may mean another moment."""
+    if clock["unit"] == "excel" and DATES["mjd"][0] < t[0] / DAY + EPOCHS["excel"]:
+        excel, other = (date_of(t[0] + days * DAY)[:10] for days in (0.0, EPOCHS["excel"] - EPOCHS["mjd"]))
+        yield f"{clock['from']!r} is read as a day of Excel, {excel}: or is it a modified Julian date (mjd), {other}?"
+    if clock["unit"] not in ("date", "hhmmss") or {type(clock["from"]), type(clock.get("date", ""))} != {str}:
+        return
+    texts = column_called(table, clock["from"])
+    texts = dated(column_called(table, clock["date"]), texts) if "date" in clock else texts
+    if pd.api.types.is_string_dtype(texts.dtype):
+        texts = texts.astype(str).str.strip()
+        ways = ways_of(texts)
+        spans = {way: days_by(texts, way) for way in ways}
+        least = min((since[-1] - since[0] for since in spans.values()), default=0.0)
+        alike = [s for s in spans.values() if np.all(np.diff(s) >= 0) and s[-1] - s[0] == least]  # false where NaN
+        firsts = sorted({date_of(since[0])[:10] for since in alike} - {date_of(t[0])[:10]})
+        if firsts and len(alike) > 1:
+            others = " or ".join(firsts)
+            yield f"{texts.iloc[0]!r} is read as {date_of(t[0])[:10]}: or is it {others}? Then write 2024-05-14"
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    of_day = t % DAY
+    late = np.flatnonzero((steps >= HALF_DAY) & (steps <= HALF_DAY + NEXT_DAY))
+    if len(late) and t[-1] - t[0] < 3 * DAY and of_day.min() >= HOUR and of_day.max() < HOUR + HALF_DAY:
+        before, after = (date_of(of_day[late[0] + k])[11:] for k in (0, 1))
+        words = f"after {before} comes {after}, read as 12 hours later: has the clock twelve hours without AM and PM?"
+        yield f"{words} Then write 24 hours"
+    for row in np.flatnonzero((steps >= HOUR) & (steps <= HOUR + 3 * usual)):
+        if -t[row] % HOUR <= t[row + 1] - t[row] - HOUR:  # from one full hour to the next
+            before, after = date_of(t[row])[11:], date_of(t[row + 1])[11:]
+            words = f"after {before} comes {after}: is it local time as daylight saving begins, and no pause?"
+            yield f"{words} Then write UTC, or in every row the zone that holds there"
+            return
+
+
+def other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str, Any], t: Array) -> Iterator[str]:
+    """Yield a question for each further clock that goes otherwise than the times t (N,) [s] of the rows.
+
+    So it is where each channel has a time beside it, or where a second log is beside the first.
+    """
+    of_rows = {one for key in ("from", "date") if key in clock for one in names_of(clock[key])}
+    for name in map(str, table.columns):
+        if name in of_rows or not is_clock(name):
+            continue
+        other = columns[name] if name in columns else seconds(column_called(table, name))
+        known = np.isfinite(other)
+        values, times = other[known], t[known]
+        if len(values) < FEWEST_TIMES or not np.all(np.diff(values) > 0):
+            continue
+        since = clock_seconds(values, _unit_of_clock(name, values)) if name in columns else values
+        off = float(np.ptp(since - times))
+        if off > max(APART * float(np.median(np.diff(t))), OFF * float(times[-1] - times[0])):
+            how = f"{name!r} is a clock, too, and goes otherwise than that of the rows: they part by {off:.3g} s"
+            yield f"{how}. Are the columns beside it of its times? Then write them to another file ([file.<name>])"
+
+
+def column_called(table: pd.DataFrame, name: str) -> pd.Series[Any]:
+    """Return the first column of this name."""
+    return table.iloc[:, list(map(str, table.columns)).index(name)]
+
+
+def _dates(table: pd.DataFrame, names: list[str]) -> str | None:
+    """Return the first of these columns that holds a date in every row, without a time."""
+    for name in names:
+        cells = column_called(table, name).astype(str).str.strip()
+        if cells.str.fullmatch(DAY_OF).all():
+            return name
+    return None
+
+
+def is_clock(name: str) -> bool:
+    """Whether a column has the name of a clock."""
+    parts = set(parts_of(name)) | {plain(name)}
+    return bool(parts & CLOCK_WORDS) and not parts & NO_CLOCK_WORDS
+
+
+def _looks_dated(column: pd.Series[Any]) -> bool:
+    texts = column.dropna().astype(str).head(20)
+    dated = texts.str.fullmatch(rf"{TIME_OF_DAY}|\d{{4}}-\d\d-\d\d[T ].*|(?:{DAY_OF}),? .*")
+    return bool(len(texts) and dated.all())
+
+
+def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tuple[str, Array]:
+    """Return the unit of a clock of numbers, and its times [s]."""
+    if in_one_number(values):
+        return "date", seconds(column_called(table, name))
+    if values.min() > 1e9 and _is_time_of_day(values % 1e6):
+        message = f"{name!r} is a date and a time of day in one number, {values[0]:.15g}: write 2024-05-14 08:00:00"
+        raise DataError(f"no column can be the clock: {message}", file=file)
+    if _is_years(name, values):
+        message = f"{name!r} {OF_YEARS.format(values[0])}"
+        raise DataError(f"no column can be the clock: {message}", file=file)
+    for epoch, what in TICKS.items():
+        if DATES["d"][0] < (values[0] / 1e7 - epoch) / DAY < DATES["d"][1] and np.median(np.diff(values)) >= 1e5:
+            message = f"{name!r} counts 100 ns since {what}: write seconds since 1970, value / 1e7 - {epoch}"
+            raise DataError(f"no column can be the clock: {message}", file=file)
+    unit = _unit_of_clock(name, values)
+    return unit, clock_seconds(values, unit)
+
+
+def _is_years(name: str, values: Array) -> bool:
+    """Whether a clock is in years with decimals: its name says so, or it says no unit and a minute is no step of it."""
+    inside = YEARS[0] < values[0] < YEARS[1] and np.ptp(values) < 1.0 and np.any(values % 1)
+    said = {*FIELDS["year"][0].split(), "years"} & {*parts_of(name)}
+    return bool(inside and (said or (not units_in(name) and float(np.median(np.diff(values))) < SHORT_YEAR)))
+
+
+def _unit_of_clock(name: str, values: Array) -> str:
+    """Return the unit of a clock: as its name says; else dates, times of day, or ms, us or ns if it counts so."""
+    again = _again(values)
+    if again is not None and not _is_time_of_day(values):
+        return again
+    inside = [text.strip().lower().replace("µ", "u").replace("μ", "u") for text in units_in(name)]
+    parts = parts_of(name)
+    last = [] if "of" in parts else parts[-1:]  # seconds of the day
+    written, ends = (next((one for one in WRITTEN if {*WRITTEN[one].split()} & {*said}), "") for said in (inside, last))
+    steps = np.diff(values)
+    rising = steps[steps > 0]  # a rounded clock often stands
+    short = len(rising) > 0 and float(np.median(rising)) < SHORT_DAY
+    dates = next((unit for unit in _calendars(parts) if DATES[unit][0] < values[0] < DATES[unit][1]), "")
+    if dates and (written == "d" if written else short and ends in ("", "d")):
+        return dates
+    if written or ends not in ("", "s"):
+        return written or ends
+    if {"day", "year"} <= set(parts) or {"doy", "yday", "jday"} & set(parts):
+        return "d"  # the day of the year
+    if _is_time_of_day(values):
+        return "hhmmss"
+    if ends and DATES["d"][0] < values[0] / DAY < DATES["d"][1]:
+        return "s"  # since 1970, however far apart; without the name it may be milliseconds of some weeks
+    if len(steps) and np.median(steps) >= 20 and not np.any(values % 1):
+        slow = DATES["d"][0] < 1e-3 * values[0] / DAY < DATES["d"][1]  # milliseconds since 1970, however far apart
+        step = 0.0 if slow else float(np.median(steps))
+        return next((unit for unit, (least, far) in FINE.items() if values[0] > least or step >= far), "ms")
+    return "s"
+
+
+def _calendars(parts: tuple[str, ...]) -> list[str]:
+    """Units of clocks in days that count from a date, first the one that a name with these parts says."""
+    said = "mjd" if {"mjd", "modified"} & {*parts} else ""
+    return sorted(EPOCHS, key=lambda unit: unit != said)
+
+
+def _again(values: Array) -> str | None:
+    """Return the unit of a clock that begins again after a day or a week; None where none does.
+
+    A row may be missing there, so that a clock goes back by a little less than that, but not by an hour.
+    """
+    steps = np.diff(values)
+    back = steps[steps < 0]
+    for unit, seconds_of in AGAIN.items():
+        period, next_day = seconds_of / to_si(unit, "t"), NEXT_DAY / to_si(unit, "t")
+        if len(back) and values.min() >= 0 and values.max() < period and np.all(back + period < next_day):
+            return unit
+    return None
+
+
+def _is_time_of_day(values: Array) -> bool:
+    """Whether numbers (N,) are hours, minutes and seconds: only so do they go on evenly where a minute is full.
+
+    As seconds they would leave out 41 s in every minute: 123059, 123100.
+    """
+    since, steps = since_midnight(values), np.diff(values)
+    full = np.flatnonzero(steps - np.diff(since) > 1.0)
+    if not np.isfinite(since).all() or not len(full):
+        return False
+    usual = float(np.median(np.diff(since)))
+    return bool(np.median(np.diff(since)[full]) <= 1.5 * usual and np.median(steps[full]) > 1.2 * np.median(steps))
+
+
+def _is_coarse(t: Array) -> bool:
+    """Whether the steps of a rising clock differ as if it were rounded: they take few values, a quantum apart."""
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    spread = float(np.percentile(np.abs(steps - usual), 90))
+    if spread < 0.05 * usual or len(t) < 20:
+        return False
+    return len(np.unique(np.round(steps / usual, 6))) <= max(4, len(steps) // 50)
+
+
+def _rate(t: Array) -> tuple[float, Array] | None:
+    """Return the step [s] of even rows and their instants (N,) that explain a rounded clock; None if none does."""
+    if len(t) < 20 or np.any(np.diff(t) < 0) or len(np.unique(t)) < 10:
+        return None
+    _values, first = np.unique(t, return_index=True)
+    early = float(np.median(np.diff(t[: max(3, int(first[min(len(first) - 1, 40)]))])))
+    mean = float(t[-1] - t[0]) / (len(t) - 1)
+    rounding = rounding_of(t)
+    slack = float(rounding[-1]) / (len(t) - 1)
+    stretches = [  # whatever rows were lost, most short stretches are whole
+        _roundest(float(np.median(t[far:] - t[:-far])) / far, float(rounding[-1]) / far)
+        for far in (min(len(t) - 1, most) for most in (200, 60))
+    ]
+    for step in (_roundest(mean, slack), *stretches, early, mean):
+        if not step > 0:
+            continue
+        even, _ = even_clock(t, step)
+        ahead = np.diff(even) / step
+        lost = float((ahead[ahead < 4 + 2 * rounding[1:] / step] - 1).sum())
+        if lost > LOST * len(t) and step is not mean:
+            continue
+        if np.all(np.abs(even - t) <= 0.6 * rounding + 0.5 * step) and np.all(np.diff(even) > 0):
+            return float(f"{step:.9g}"), even
+    return None
+
+
+def _roundest(value: float, slack: float) -> float:
+    """Return the number with the fewest digits within `slack` of a value, or one over such a number."""
+    for digits in range(1, 7):
+        near = float(f"{value:.{digits}g}")
+        if abs(near - value) <= slack:
+            return near
+        inverse = float(f"{1 / value:.{digits}g}") if value > 0 else 0.0
+        if inverse and abs(1 / inverse - value) <= slack:
+            return 1.0 / inverse
+    return value
+
+
+def _counts(values: Array) -> bool:
+    """Whether a column only counts rows."""
+    return bool(np.all(np.diff(values) == 1.0) and values[0] in (0.0, 1.0))
+
+
+def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
+    """Say which text in a clock is no time, or that there is none; empty where all are."""
+    wrong = ~np.isfinite(values)
+    if not wrong.any():
+        text = str(column_called(table, name).iloc[0]).strip()
+        short = re.fullmatch(r"\d([.,]\d+)?[eE]\+?\d+", text) and np.any(np.diff(values) == 0)
+        return f"holds {text!r} in row 1, with too few digits: export it with all of them" if short else ""
+    texts = column_called(table, name).astype(str).str.strip()
+    of_day = texts.str.fullmatch(TIME_OF_DAY).to_numpy(dtype=bool)
+    wrong = ~of_day if wrong.all() and of_day.mean() > 0.5 else wrong  # a single other text, and none is read
+    row = int(np.argmax(wrong))
+    text = texts.iloc[row]
+    if NO_VALUE.fullmatch(text.lower()):
+        return f"has no value in row {row + 1}"
+    begin = f"holds {text[:40]!r} in row {row + 1}"
+    if re.fullmatch(r"\d{1,3}([,.' \u00a0]\d{3})+([.,]\d*)?", text):
+        return f"{begin}: take the mark of thousands out of the log"
+    if text.startswith("="):
+        return f"{begin}, {NOT_CALCULATED}"
+    if wrong.all() and re.fullmatch(r"\d{1,2}:\d\d[.,]\d+", text):
+        return f"{begin}, without the hour, as Excel shows times: show them as hh:mm:ss.000, and export again"
+    if wrong.all():
+        return f"{begin}, no number, date or time of day that can be read: write dates as 2024-05-14 08:00:00"
+    what = "a leap second" if re.search(r":60(\D|$)", text) else "a comment" if text[:1] in "#%/;" else "no time"
+    lines = "the line" if wrong.sum() == 1 else f"the {wrong.sum()} such lines"
+    return f"{begin}, {what}: remove {lines}"
+
+
+def _counter(values: Array) -> str:
+    """Say where a counter of a few bits (N,) is full and begins again; empty where it is none."""
+    steps = np.diff(values)
+    back = np.flatnonzero(steps < 0)
+    for size in COUNTERS:
+        over = steps[back] + size
+        if len(back) and values.max() < size and np.all((over > 0) & (over < LONG_STEP * np.median(steps))):
+            row = int(back[0]) + 2
+            return f"is a counter that begins again at {size} in row {row}: add {size} from there on, and so each time"
+    return ""
+
+
+def _fault(values: Array) -> str:
+    if not np.isfinite(values).any():
+        return "holds no numbers and no dates"
+    if not np.isfinite(values).all():
+        return f"has no value in row {int(np.argmax(~np.isfinite(values))) + 1}"
+    row = int(np.argmax(np.diff(values) < 0)) + 1
+    if values[row] < values[row - 1]:  # rows of one time alone may be a rounded clock
+        before, after = moment_of(values[row - 1]), moment_of(values[row])
+        return (
+            f"goes back from {before} to {after} in row {row + 1}: sort the log, or split it there, and join the parts"
+        )
+    return f"repeats in row {int(np.argmax(np.diff(values) == 0)) + 2}"
+
+
+def plain(name: str) -> str:
+    """Return a name in lower case without its unit in brackets."""
+    return re.sub(r"[\[(].*", "", name).strip().lower().replace(" ", "_").replace("-", "_")

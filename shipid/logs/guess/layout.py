@@ -1,0 +1,312 @@
+"""How an unknown log is written: kind of file, encoding, separator, decimal sign, marks of thousands, header."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import re
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shipid.errors import DataError
+from shipid.logs.dates import DAY_OF, TIME_OF_DAY
+from shipid.logs.foreign import foreign
+from shipid.logs.formats import LOOKED_AT, SheetFormat
+from shipid.logs.guess.clock import is_clock
+from shipid.logs.guess.words import NO_VALUE, fits, known_words
+from shipid.logs.readers import READERS, grouped_by
+from shipid.logs.workbook import SEPARATOR, sheet_text, sheets_of
+
+ELSEWHERE = ("cp932", "gb18030", "cp949", "cp1251")  # encodings of texts whose words no other one shows
+SEPARATORS = (",", ";", "\t", "|", "whitespace")
+GROUPS = (",", ".", "'", "’", " ", "\u00a0", "\u202f")  # marks of thousands
+MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a comment
+LONG_WIDTH = 8  # cells, at most, of a row with one value: time, name, value, unit, quality and the like
+MOST_HEADS = 3  # lines above the data: names in two, and units
+WIDE = 0.9  # share of every second byte that is 0, in text of two bytes a character
+NUMERIC = 0.8  # share of the cells of a line of data that are numbers
+_UNIT = re.compile(
+    r"[\[(]?(s|secs?|seconds|ms|us|ns|mins?|minutes|h|hrs?|hours?|d|days?|m|mm|cm|km|meters?|metres?|ft|deg(rees)?|°|grad|rad|m/s|mps|m\*s-1|kn|kts?|knots?|km/h|kmh|mph|cm/s|mm/s|"
+    r"(deg|°|grad)/(s|sec|min)|dps|rad/s(ec)?|rpm|rps|1/(s|min)|u/min|min-1|s-1|hz|n|kn|nm|knm|kw|w|%|pct|percent|bar|v|a|°c|c|"
+    r"l/h|kg/h|t|t/h|m/s2|m/s\^2|m/s²|-|utc|iso|\[-\]|)[\])]?$"
+)
+
+
+def format_of(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
+    """Return the keys of [format] of a log by its first bytes; `names` are its columns if it is text without a header.
+
+    Raises
+    ------
+    DataError : it is of a kind that no reader reads, or no table.
+    """
+    other = foreign(head)
+    if other is not None:
+        raise DataError(other.sentence, file=file)
+    for reader in READERS.values():
+        form = reader.detect(file, head) if reader.detect else None
+        if form is not None:
+            return form
+    encoding = _encoding(head, file)
+    return _text_format(head.decode(encoding, "ignore").splitlines()[:LOOKED_AT], encoding, file, names)
+
+
+def format_of_sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], str, tuple[str, ...]]:
+    """Keys of [format] of a workbook, the lines of its largest sheet with a clock, and what is said of the others."""
+    found = sheets_of(file)
+    sheet, lines = found[0], sheet_text(file, found[0])
+    for other in found[1:] if not _has_clock(lines) else ():
+        text = sheet_text(file, other)
+        if _has_clock(text):
+            sheet, lines = other, text
+            break
+    others = [name for name in found if name != sheet]
+    layout = _text_format(lines.splitlines()[:LOOKED_AT], "utf-8", file, names, (SEPARATOR,))
+    keys = {key: value for key, value in layout.items() if key in SheetFormat.model_fields}
+    notes = (f"of the workbook the sheet {sheet!r} is read, not {', '.join(map(repr, others))}",) if others else ()
+    named = {"sheet": sheet} if others else {}  # each run of a folder may have a sheet of another name
+    return {"kind": "sheet"} | named | keys, lines, notes
+
+
+def _has_clock(lines: str) -> bool:
+    """Whether one of the first lines of a sheet has the name of a clock in a cell."""
+    first = lines.split("\n", LOOKED_AT)[:LOOKED_AT]
+    return any(is_clock(cell) for line in first for cell in cells(line, SEPARATOR) if cell and not _is_number(cell))
+
+
+def _encoding(head: bytes, file: Path) -> str:
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    for order, zeros, others in (("utf-16-le", head[1::2], head[::2]), ("utf-16-be", head[::2], head[1::2])):
+        if zeros.count(b"\0") > WIDE * len(zeros) and b"\0" not in others:  # without the mark of its order
+            return order
+    if b"\0" in head:
+        raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
+    begin = head[:-4] if len(head) > 4 else head  # the last character may be cut
+    utf8 = "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8"
+    with suppress(UnicodeDecodeError):
+        begin.decode(utf8)
+        return utf8
+    words = {one: known_words(begin.decode(one, "ignore")) for one in ELSEWHERE}
+    best = max(ELSEWHERE, key=lambda one: words[one])
+    if words[best] > 1:
+        return best
+    with suppress(UnicodeDecodeError):
+        begin.decode("cp1252")
+        return "cp1252"
+    return "latin-1"
+
+
+def _text_format(
+    lines: list[str], encoding: str, file: Path, names: tuple[str, ...], separators: tuple[str, ...] = SEPARATORS
+) -> dict[str, Any]:
+    """Return the keys of [format] of a text, or of a sheet, by its first lines; the header is above the data."""
+    score, separator, decimal, mark = _marks(lines, separators)
+    _refuse_long([cells(line, separator) for line in lines if line.strip()] if separator else [], file)
+    if score < NUMERIC / 2:
+        raise DataError("no table of numbers with any separator: export it as CSV", file=file)
+    rows = [cells(line, separator) for line in lines]
+    width = Counter(len(row) for row in rows if any(row)).most_common(1)[0][0]
+    places = _places_of_numbers([row for row in rows if len(row) == width], decimal, mark)
+    shares = [_number_share([row[k] for k in places if k < len(row)], decimal, mark) for row in rows]
+    usual = float(np.median([share for row, share in zip(rows, shares, strict=True) if len(row) == width]))
+    least = max(NUMERIC / 2, usual - 0.9 / width)  # a header may hold numbers, too, but fewer
+    data = next(
+        (i for i, row in enumerate(rows) if len(row) == width and shares[i] >= least),
+        next(i for i, row in enumerate(rows) if len(row) == width and shares[i] >= NUMERIC / 2),
+    )
+    form: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
+    form |= {"thousands": mark} if mark is not None else {}
+    if names:
+        return form | {"skip_rows": data, "names": list(names)}
+    words = {i: line.split() for i, line in enumerate(lines[:data])}
+    marked = [i for i, some in words.items() if some and some[0] in MARKS]  # a header as a comment, as NumPy writes it
+    for i in marked:
+        blanks = len(words[i]) == width + 1 and rows[i][0] not in MARKS  # between names, and not between numbers
+        rows[i] = words[i][1:] if blanks else rows[i][rows[i][0] in MARKS :]
+    above = [i for i in range(data - 1, -1, -1) if any(rows[i])][:MOST_HEADS]
+    if above and separator == "whitespace" and len(rows[above[0]]) > width:
+        joined = cells(re.sub(r"\s+(?=[\[(])", "", lines[above[0]]), separator)[above[0] in marked :]
+        if len(joined) == width:  # blanks before units
+            return form | {"skip_rows": data, "names": _distinct(joined)}
+    heads = [i for i in above if width - 1 <= len(rows[i]) <= width]
+    dated_at = _date_and_time(rows[data]) if separator == "whitespace" else None
+    if dated_at is not None and heads and len(rows[heads[0]]) == width - 1:  # one name for date and time
+        wide = [[*rows[i][:dated_at], "date", *rows[i][dated_at:]] for i in heads if len(rows[i]) == width - 1]
+        if len(wide) > 1 and _is_units(rows[heads[0]]):
+            pairs = zip(wide[1], ["" if k == dated_at else unit for k, unit in enumerate(wide[0])], strict=True)
+            return form | {"skip_rows": data, "names": _distinct([_with_unit(*pair) for pair in pairs])}
+        return form | {"skip_rows": data, "names": _distinct(wide[0])}
+    called = _called_in([[*rows[i], ""][:width] for i in heads])
+    if called:
+        return form | {"skip_rows": data, "names": _distinct(called)}
+    if heads and heads[0] == above[0] and heads[0] in marked and rows[heads[0]] != cells(lines[heads[0]], separator):
+        return form | {"skip_rows": data, "names": _distinct([*rows[heads[0]], ""][:width])}
+    if heads and heads[0] == above[0]:
+        return form | {"skip_rows": heads[0]}
+    longer = [i for i in range(data) if len(rows[i]) > width and all(rows[i][:width]) and not shares[i]]
+    if longer and not heads:  # a table beside the log ends above this line
+        beside = [""] * (max(len(row) for row in rows[longer[-1] + 1 :]) - width)
+        return form | {"skip_rows": longer[-1] + 1, "names": [*_distinct(rows[longer[-1]][:width]), *beside]}
+    return form | {"skip_rows": data, "header": False}
+
+
+def _marks(lines: list[str], separators: tuple[str, ...]) -> tuple[float, str, str, str | None]:
+    """Return the separator, decimal sign and mark of thousands that give most numbers in lines of equal length.
+
+    Before them stands their share of numbers, less for lines of another length; 0 where there are none.
+    """
+    best: tuple[float, str, str, str | None] = (0.0, "", "", None)
+    quoted = any('"' in line for line in lines)  # between quotes a decimal comma separates nothing
+    for separator in separators:
+        rows = [cells(line, separator) for line in lines if line.strip()]
+        width, count = Counter(len(row) for row in rows).most_common(1)[0]
+        for decimal in (".", ",") if separator != "," or quoted else (".",):
+            mark = _thousands(rows, decimal)
+            share = float(np.mean([_number_share(row, decimal, mark) for row in rows if len(row) == width]))
+            score = share * count / len(rows) * (width > 1) * (1 + width / 1000)
+            score *= 0.97 if separator == "whitespace" else 1.0  # names may have blanks
+            if score > best[0]:  # the first of equals: tabs are blanks, too
+                best = (score, separator, decimal, mark)
+    return best
+
+
+def _refuse_long(rows: list[list[str]], file: Path) -> None:
+    """Raise DataError where a row has one value, and a cell that says of what, as historians write."""
+    width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
+    held = [row for row in rows if len(row) == width][1:]
+    for place in range(width if 3 <= width <= LONG_WIDTH else 0):
+        column = [row[place] for row in held]
+        quantities = {next(filter(None, fits(cell)), "") for cell in {*column}} - {""}
+        if any(map(_is_number, column)) or len(quantities) < 3 or len({*column}) > len(column) / 2:
+            continue
+        if np.mean([one != other for one, other in itertools.pairwise(column)]) > 0.5:  # the tags take turns
+            first = ", ".join(map(repr, list(dict.fromkeys(column))[:3]))
+            message = f"a row for each value, called {first} and so on: write a row for each time, a column for each"
+            how = "such as with pandas: pivot_table(index=..., columns=..., values=...)"
+            raise DataError(f"{message}, {how}", file=file)
+
+
+def _called_in(heads: list[list[str]]) -> list[str]:
+    """Return the names that lines above the data give the columns, the nearest line first; none where that one has all.
+
+    A line of units goes behind the names. Of two others the line is taken that names most quantities, or both: the
+    upper one has groups, such as GPS, over the first of their columns.
+    """
+    units = next((row for row in heads if _is_units(row)), None) if len(heads) > 1 else None
+    lines = [row for row in heads if row is not units][:2]
+    if not lines:
+        return []
+    ways = list(lines)
+    if len(lines) == 2:
+        group = ""
+        upper = [group := cell or group for cell in lines[1]]
+        ways.append([" ".join(filter(None, pair)) for pair in zip(upper, lines[0], strict=True)])
+    sense = [_sense(way) for way in ways]
+    best = ways[int(np.argmax(sense))] if max(sense) > sense[0] + 0.5 else ways[0]
+    if len(ways) == 3 and len({*ways[2]}) == len(ways[2]):  # Wind and Wind over Speed and Direction
+        twice = {name for name, count in Counter(best).items() if count > 1}
+        best = [both if name in twice else name for name, both in zip(best, ways[2], strict=True)] if twice else best
+    if best is heads[0] and units is None:
+        return []
+    named = [_with_unit(*pair) for pair in zip(best, units or [""] * len(best), strict=True)]
+    while named and not named[-1]:
+        named.pop()
+    return named
+
+
+def _sense(names: list[str]) -> float:
+    """How much the names of columns say: the sum of how well they fit a quantity, or a clock."""
+    known = {name for name in names if name}
+    return sum(1.0 if is_clock(name) else max([0.0, *(fits(name)[one] for one in fits(name) if one)]) for name in known)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit in brackets."""
+    return f"{name} [{unit.strip('[]()')}]" if unit else name
+
+
+def _date_and_time(row: list[str]) -> int | None:
+    """Return the index of a cell that is a date before a time of day; None where there is none."""
+    pairs = enumerate(itertools.pairwise(row))
+    return next(
+        (k for k, (one, other) in pairs if re.fullmatch(DAY_OF, one) and re.fullmatch(TIME_OF_DAY, other)), None
+    )
+
+
+def _distinct(names: list[str]) -> list[str]:
+    """Return the names with a number added to those that are there already or empty."""
+    result: list[str] = []
+    for index, name in enumerate(names):
+        known = name or f"column {index + 1}"
+        while known in result:
+            known += " (2)"
+        result.append(known)
+    return result
+
+
+def _is_units(row: list[str]) -> bool:
+    """Whether the cells of a line are units."""
+    words = [cell.lower() for cell in row if cell]
+    fitting = sum(bool(_UNIT.match(cell)) for cell in words)
+    return len(words) >= 2 and fitting >= 0.7 * len(words)
+
+
+def cells(line: str, separator: str) -> list[str]:
+    """Split a line of text into cells; a separator between quotes is part of a cell."""
+    if separator == "whitespace":
+        return line.split()
+    row = line.split(separator)
+    if '"' in line:
+        with suppress(csv.Error):  # a line with a NUL
+            row = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    return [cell.strip().strip('"') for cell in row]
+
+
+def _thousands(rows: list[list[str]], decimal: str) -> str | None:
+    """Return the mark of thousands in the cells of lines, where all cells with that mark are numbers in groups.
+
+    1,800 alone may be 1.8: it is 1800 where another number has a decimal point.
+    """
+    held = {cell for row in rows for cell in row if re.fullmatch(r"[+-]?\d[\d.,'’ \u00a0\u202f]*", cell)}
+    whole = any(re.fullmatch(rf"[+-]?\d+{re.escape(decimal)}(\d{{1,2}}|\d{{4,}})", cell) for cell in held)
+    for mark in GROUPS:
+        cells = [cell for cell in held if mark in cell]
+        if mark == decimal or not cells or not all(re.fullmatch(grouped_by(decimal, mark), cell) for cell in cells):
+            continue
+        if mark not in ".," or whole or any(decimal in cell or cell.count(mark) > 1 for cell in cells):
+            return mark
+    return None
+
+
+def _places_of_numbers(rows: list[list[str]], decimal: str, thousands: str | None) -> list[int]:
+    """Places of a line's cells that hold numbers in most lines where they hold anything; all where none do.
+
+    Words beside the first lines, such as the weather, are in other cells.
+    """
+    found = []
+    for place in range(len(rows[0])):
+        column = [row[place] for row in rows]
+        if _number_share(column, decimal, thousands) > 0.5:
+            found.append(place)
+    return found or [*range(len(rows[0]))]
+
+
+def _number_share(row: list[str], decimal: str, thousands: str | None = None) -> float:
+    """Return the share of cells that are numbers; empty cells are not counted."""
+    cells = [cell for cell in row if not NO_VALUE.fullmatch(cell.lower())]
+    grouped = re.compile(grouped_by(decimal, thousands)) if thousands is not None else None
+    cells = [cell.replace(str(thousands), "") if grouped and grouped.fullmatch(cell) else cell for cell in cells]
+    cells = [cell.replace(",", ".") if decimal == "," else cell for cell in cells]
+    return sum(map(_is_number, cells)) / len(cells) if cells else 0.0
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,481 @@
+"""The clock of logs that nobody has seen: found, read in its unit, asked about or refused with its remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.errors import DataError
+from shipid.logs.guess.clock import _is_time_of_day
+from shipid.logs.guess.columns import guess
+from shipid.logs.guess.sniff import sniff
+from shipid.logs.mapping import clock_seconds
+from tests.logs.guess.conftest import SUMMER_TIME_ENDS, TABLE, T, log_of, text
+
+
+@pytest.mark.parametrize(
+    ("clock", "unit", "t"),
+    [
+        ((1000 * T).astype(int), "ms", T),
+        ((1e3 * (1.7e9 + 240 * T)).astype(np.int64), "ms", 1.7e9 + 240 * T),
+        ((1e6 * T).astype(np.int64), "us", T),
+        ((1e9 * (5.0 + T)).astype(np.int64), "ns", 5.0 + T),
+        ((1e6 * (1.7e9 + T)).astype(np.int64), "us", 1.7e9 + T),
+        ((1e9 * (1.7e9 + T)).astype(np.int64), "ns", 1.7e9 + T),
+        (1.7e9 + T, "s", 1.7e9 + T),
+        (pd.to_datetime(1.7e9 + T, unit="s").strftime("%Y-%m-%dT%H:%M:%S.%f"), "date", 1.7e9 + T),
+    ],
+)
+def test_the_unit_of_the_clock(clock: object, unit: str, t: np.ndarray, tmp_path: Path) -> None:
+    TABLE.assign(time=clock).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "time", "unit": unit}
+    np.testing.assert_allclose(sniffed.t, t, atol=1e-6)
+
+
+@pytest.mark.parametrize("step", [0.2, 1.0, 10.0])
+@pytest.mark.parametrize("stored", ["csv", "parquet"])
+def test_a_date_and_a_time_in_one_number_are_no_seconds(step: float, stored: str, tmp_path: Path) -> None:
+    """Before, every minute had a hole of 41 s."""
+    t = step * np.arange(900)
+    moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(t, "s")
+    numbers = moments.strftime("%Y%m%d%H%M%S.%f").str[:-4]
+    log = pd.DataFrame({"time": numbers, "N": t, "psi": t})
+    if stored == "csv":
+        log.to_csv(tmp_path / "log", index=False)
+    else:
+        log.assign(time=numbers.astype(float)).to_parquet(tmp_path / "log")
+    sniffed = sniff(tmp_path / "log")
+    assert sniffed.clock == {"from": "time", "unit": "date"}
+    np.testing.assert_allclose(sniffed.t, t + pd.Timestamp("2024-05-14 08:13:20").timestamp(), atol=5e-3)
+
+
+@pytest.mark.parametrize(("epoch", "who"), [(11_644_473_600, "Windows"), (62_135_596_800, ".NET")])
+def test_ticks_of_100_ns_are_refused_with_what_to_write(epoch: int, who: str, tmp_path: Path) -> None:
+    rows = [f"{(1_715_673_600 + k + epoch) * 10**7},{k % 7}" for k in range(80)]
+    with pytest.raises(DataError, match=rf"as {who} does: write seconds since 1970, value / 1e7 - {epoch}"):
+        sniff(log_of(tmp_path, ["Timestamp,x", *rows]))
+
+
+def test_a_date_without_a_century_in_one_number_is_refused(tmp_path: Path) -> None:
+    moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(np.arange(200), "s")
+    log = pd.DataFrame({"time": moments.strftime("%d%m%y%H%M%S"), "N": 1.0, "psi": 2.0})
+    log.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match="'time' is a date and a time of day in one number, 140524081320: write 2024"):
+        sniff(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("name", ["utc", "time", "t"])
+@pytest.mark.parametrize("step", [0.2, 1.0, 10.0])
+def test_hours_minutes_and_seconds_in_one_number_are_no_seconds(name: str, step: float, tmp_path: Path) -> None:
+    t = step * np.arange(900)
+    moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(t, "s")
+    log = pd.DataFrame({name: moments.strftime("%H%M%S.%f").str[:-4], "N": t, "psi": t})
+    log.to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": name, "unit": "hhmmss"}
+    np.testing.assert_allclose(sniffed.t, 8 * 3600 + 13 * 60 + 20 + t, atol=1e-6)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 50.0, 60.0, 100.0])
+@pytest.mark.parametrize("begin", [0.0, 37.0, 120.0, 86340.0, 123000.0])
+def test_seconds_are_no_hours_minutes_and_seconds(step: float, begin: float) -> None:
+    for count in (5, 40, 400):
+        assert not _is_time_of_day(begin + step * np.arange(count))
+
+
+START = pd.Timestamp("2024-05-14 08:00:05")
+DAYS_OF = {
+    "datenum": START.toordinal() + 366 + 8 / 24,
+    "excel": (START - pd.Timestamp(1899, 12, 30)) / pd.Timedelta("1D"),
+}
+DAYS_OF["datenum"] += 5 / 86400
+
+
+@pytest.mark.parametrize("unit", DAYS_OF)
+@pytest.mark.parametrize("name", ["time", "Time [d]", "datenum", "t_days", "Time [days]"])
+@pytest.mark.parametrize("step", [0.01, 0.5, 10.0])
+def test_days_of_matlab_and_excel_are_known_by_their_size(unit: str, name: str, step: float, tmp_path: Path) -> None:
+    """A double has such a day to 1e-5 s, a table to as much as it writes."""
+    t = step * np.arange(60)
+    table = pd.DataFrame({name: [f"{DAYS_OF[unit] + one / 86400:.10f}" for one in t], "N": t, "psi": t})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": name, "unit": unit}
+    np.testing.assert_allclose(sniffed.t, START.timestamp() + t, atol=3e-5)
+
+
+@pytest.mark.parametrize("unit", DAYS_OF)
+@pytest.mark.parametrize(("step", "digits"), [(0.25, 5), (0.5, 6), (1.0, 5)])
+def test_rounded_days_keep_their_rate(unit: str, step: float, digits: int, tmp_path: Path) -> None:
+    """Five digits of a day are 0.86 s: rows of 4 Hz appear three or four times at one time."""
+    t = step * np.arange(400)
+    stamps = [f"{DAYS_OF[unit] + one / 86400:.{digits}f}" for one in t]
+    pd.DataFrame({"time": stamps, "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "time", "unit": unit, "every": pytest.approx(step, rel=1e-3)}
+    np.testing.assert_allclose(sniffed.t, START.timestamp() + t, atol=1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "unit"),
+    [
+        ("t_min", T / 60, "min"),
+        ("Time [hours]", T / 3600, "h"),
+        ("elapsed_hours", T / 3600, "h"),
+        ("Zeit / min", T / 60, "min"),
+        ("Time (d)", T / 86400, "d"),
+        ("time_d", 134.3 + T / 86400, "d"),  # the day of the year
+        ("Time [d]", 60443.3 + T / 86400, "mjd"),  # no date of Excel
+        ("JD", 2460444.8 + T / 86400, "jd"),
+        ("mjd_utc", 54000.3 + T / 86400, "mjd"),
+        ("time", 54000.3 + T / 86400, "excel"),
+        ("time", 45000.0 + T, "s"),  # seconds of a day, half past twelve
+        ("time", np.floor(45000.0 + T), "s"),  # the same, in whole seconds: most steps are 0
+        ("time_of_day", 45000.0 + T, "s"),
+        ("time_s", 45000.0 + T / 1e4, "s"),
+        ("Time [s]", 738000.3 + T / 1e4, "s"),
+        ("time", 738000.3 + T, "s"),
+        ("time_s", 1.7e9 + 40 * T, "s"),  # since 1970, a row every 20 s
+        ("time", 1.7e9 + 40 * T, "ms"),  # since 20 days, a row every 20 ms
+    ],
+)
+def test_what_a_clock_counts_in(name: str, values: np.ndarray, unit: str, tmp_path: Path) -> None:
+    table = TABLE.assign(time=values).rename(columns={"time": name})
+    table.to_csv(tmp_path / "log.csv", index=False, float_format="%.10f")
+    assert sniff(tmp_path / "log.csv").clock["unit"] == unit
+
+
+def test_a_row_of_units_says_that_of_the_clock(tmp_path: Path) -> None:
+    lines = ["time,u,v", "h,mph,mm/s", *(f"{k / 3600:.8f},{0.1 * k:.1f},{k}" for k in range(30))]
+    sniffed = sniff(log_of(tmp_path, lines))
+    assert sniffed.clock == {"from": "time [h]", "unit": "h"}
+    np.testing.assert_allclose(sniffed.t, np.arange(30), atol=1e-4)
+    assert list(sniffed.columns) == ["u [mph]", "v [mm/s]"]
+
+
+@pytest.mark.parametrize("day", ["%d.%m.%Y", "%Y-%m-%d", "%Y/%m/%d", "%m/%d/%Y", "%d.%m.%y"])
+def test_a_date_beside_times_of_day(day: str, tmp_path: Path) -> None:
+    moments = pd.to_datetime(1.7e9 + T, unit="s")
+    split = TABLE.assign(time=moments.strftime("%H:%M:%S.%f"))
+    split.insert(0, "Day", moments.strftime(day))
+    split.to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "time", "unit": "date", "date": "Day"}
+    np.testing.assert_allclose(sniffed.t, 1.7e9 + T, atol=1e-5)
+    assert sniffed.notes == ()
+
+
+def test_a_clock_rounded_to_seconds_has_its_rate(tmp_path: Path) -> None:
+    t = np.arange(0.0, 60.0, 0.1)
+    pd.DataFrame({"time": np.floor(t + 1e-9), "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "time", "unit": "s", "every": 0.1}
+    np.testing.assert_allclose(np.diff(sniffed.t), 0.1, rtol=1e-6)
+
+
+def test_a_clock_is_preferred_by_its_name_and_to_numbers_of_rows(tmp_path: Path) -> None:
+    counted = TABLE.rename(columns={"time": "time_s"})
+    counted.insert(0, "row", range(len(T)))
+    counted.to_csv(tmp_path / "log.csv", index=False)
+    assert sniff(tmp_path / "log.csv").clock["from"] == "time_s"
+    counted.rename(columns={"time_s": "x"}).assign(N=1.0, psi=2.0).to_csv(tmp_path / "log.csv", index=False)
+    assert sniff(tmp_path / "log.csv").clock["from"] == "x"
+
+
+@pytest.mark.parametrize(
+    ("first", "style", "jump", "words"),
+    [
+        (
+            "2024-05-08 08:00",
+            "%d/%m/%Y %H:%M:%S",
+            0,
+            "'08/05/2024 08:00:00' is read as 2024-05-08: or is it 2024-08-05",
+        ),
+        (
+            "2024-05-08 08:00",
+            "%m/%d/%Y %H:%M:%S",
+            0,
+            "'05/08/2024 08:00:00' is read as 2024-08-05: or is it 2024-05-08",
+        ),
+        ("2024-05-08 12:59:30", "%I:%M:%S", 0, "after 12:59:59 comes 01:00:00, read as 12 hours later"),
+        ("2024-03-31 01:59:30", "%Y-%m-%d %H:%M:%S", 3600, "after 01:59:59 comes 03:00:00: is it local time"),
+        ("2024-05-08 08:00", "%d.%m.%Y %H:%M:%S", 0, ""),
+        ("2024-05-14 08:00", "%d/%m/%Y %H:%M:%S", 0, ""),
+        ("2024-05-05 08:00", "%d/%m/%Y %H:%M:%S", 0, ""),
+        ("2024-05-08 12:59:30", "%H:%M:%S", 0, ""),
+        ("2024-05-08 23:59:30", "%H:%M:%S", 0, ""),
+        ("2024-03-31 01:50:10", "%Y-%m-%d %H:%M:%S", 3605, ""),
+    ],
+)
+def test_dates_that_may_be_other_moments_are_asked(
+    first: str, style: str, jump: int, words: str, tmp_path: Path
+) -> None:
+    moments = pd.Timestamp(first) + pd.to_timedelta([k + jump * (k >= 30) for k in range(60)], "s")
+    rows = [f"{one.strftime(style)},{k % 7}" for k, one in enumerate(moments)]
+    doubts = sniff(log_of(tmp_path, ["time,x", *rows])).doubts
+    assert [words in doubt for doubt in doubts] == [True] * bool(words)
+
+
+def test_dates_that_rise_are_the_clock_beside_dates_that_go_back(tmp_path: Path) -> None:
+    """A receiver's clock set back is no reason to refuse the logger's own."""
+    table = TABLE.assign(
+        time=SUMMER_TIME_ENDS, utc=pd.date_range("2025-10-26", periods=len(T), freq="500ms").astype(str)
+    )
+    (tmp_path / "log.csv").write_text(text(table=table))
+    assert sniff(tmp_path / "log.csv").clock["from"] == "utc"
+
+
+def test_rows_that_repeat_the_row_before_are_dropped_and_reported(tmp_path: Path) -> None:
+    rows = [f"{0.2 * k:.1f},{np.sin(k):.3f},{np.cos(k):.3f}" for k in range(60)]
+    twice = sorted(rows + rows[7:9], key=lambda row: float(row.split(",")[0]))
+    sniffed = sniff(log_of(tmp_path, ["time,x,y", *twice]))
+    assert sniffed.clock == {"from": "time", "unit": "s", "repeated": "drop"}
+    np.testing.assert_allclose(sniffed.t, 0.2 * np.arange(60))
+    assert all(len(values) == 60 for values in sniffed.columns.values())
+    assert any("repeat" in note for note in sniffed.notes)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_rounded_clock_keeps_its_rate_where_rows_are_lost(tmp_path: Path, seed: int) -> None:
+    """Stamps of whole seconds at 2 or 4 Hz, some rows lost and a long pause: no instant is off by more than a step."""
+    rng = np.random.default_rng(seed)
+    every, count = (0.5, 0.25)[seed % 2], 900
+    true = every * np.arange(count) + np.where(np.arange(count) < 500, 0.0, 300.0)
+    true = true[rng.random(count) > 0.006]
+    stamp = [f"{int(t // 3600) + 8:02d}:{int(t // 60) % 60:02d}:{int(t % 60):02d}" for t in true]
+    x = rng.normal(size=len(true))
+    sniffed = sniff(log_of(tmp_path, ["time,x", *(f"{s},{value:.4f}" for s, value in zip(stamp, x, strict=True))]))
+    assert sniffed.clock["every"] == pytest.approx(every)
+    off = sniffed.t - sniffed.t[0] - (true - true[0])
+    assert np.ptp(off) < 1.0 + every, "within the rounding"
+    assert (np.diff(sniffed.t) > 0).all()
+
+
+START_OF_DAY = pd.Timestamp("2024-05-14 23:58:00") + pd.to_timedelta(0.5 * np.arange(600), unit="s")
+
+
+def with_clock(name: str, values: list[object]) -> pd.DataFrame:
+    return pd.DataFrame({name: values, "north": np.arange(600.0), "heading": 0.1})
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "unit"),
+    [
+        ("UTC", [moment.strftime("%H%M%S.%f")[:9] for moment in START_OF_DAY], "hhmmss"),
+        ("Seconds of day", [(86280 + 0.5 * k) % 86400 for k in range(600)], "s of day"),
+        ("TOW [s]", [(604680 + 0.5 * k) % 604800 for k in range(600)], "s of week"),
+        ("TOW [ms]", [(604680000 + 500 * k) % 604800000 for k in range(600)], "ms of week"),
+        ("ms of day", [(86280000 + 500 * k) % 86400000 for k in range(600)], "ms of day"),
+        ("Time", [moment.strftime("%Y-%j %H:%M:%S.%f") for moment in START_OF_DAY], "date"),
+        ("Time", [moment.strftime("%Y:%j:%H:%M:%S.%f") for moment in START_OF_DAY], "date"),
+        ("Day of year", [135.9986 + 0.5 * k / 86400 for k in range(600)], "d"),
+    ],
+)
+def test_clocks_that_begin_again_and_days_of_the_year(
+    name: str, values: list[object], unit: str, tmp_path: Path
+) -> None:
+    """Rows are 0.5 s apart, over midnight or the end of the week, in the draft and in the import."""
+    file = tmp_path / "log.csv"
+    with_clock(name, values).to_csv(file, index=False)
+    sniffed = sniff(file)
+    assert sniffed.clock == {"from": name, "unit": unit}
+    np.testing.assert_allclose(np.diff(sniffed.t), 0.5, atol=1e-4)
+    if unit == "date":
+        assert sniffed.t[0] == pytest.approx(START_OF_DAY[0].timestamp())
+        return
+    read = clock_seconds(pd.read_csv(file)[name].to_numpy(float), unit)
+    np.testing.assert_allclose(np.diff(read), 0.5, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "write", ["{:g} sec", "{:g}s", lambda t: f"{t / 60:.9f} min", lambda t: f"0 days 00:{t // 60:02.0f}:{t % 60:09.6f}"]
+)
+def test_durations_as_text(write: Callable[[float], str] | str, tmp_path: Path) -> None:
+    """As MATLAB writes those of a timetable, and pandas its own."""
+    times = [write.format(0.5 * k) if isinstance(write, str) else write(0.5 * k) for k in range(600)]
+    with_clock("Time", times).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "Time", "unit": "date"}
+    np.testing.assert_allclose(sniffed.t, 0.5 * np.arange(600), atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "digits"), [("Decimal year", 12), ("time", 12), ("Jahr", 12), ("time", 4)])
+def test_a_year_with_decimals_is_no_clock_in_seconds(name: str, digits: int, tmp_path: Path) -> None:
+    """With four digits an hour has one number, which repeats."""
+    with_clock(name, [f"{2024.3655 + 0.5 * k / 366 / 86400:.{digits}f}" for k in range(600)]).to_csv(
+        tmp_path / "log.csv", index=False
+    )
+    with pytest.raises(DataError, match=rf"'{name}' is a year with decimals, 2024.3655.*: write a date"):
+        sniff(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(("size", "step"), [(2**16, 500), (2**32, 500_000)])
+def test_a_counter_that_is_full_has_its_remedy(size: int, step: int, tmp_path: Path) -> None:
+    """As of milliseconds in 16 bits, or microseconds in 32."""
+    values = [(size - 100 * step + 7 + step * k) % size for k in range(600)]
+    with_clock("time", values).assign(north=0.0).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=rf"'time' is a counter that begins again at {size} in row 101: add {size}"):
+        sniff(tmp_path / "log.csv")
+
+
+def test_a_clock_that_goes_back_by_less_than_a_day_is_refused(tmp_path: Path) -> None:
+    values = [86280 + 0.5 * k if k < 300 else 40000 + 0.5 * k for k in range(600)]
+    with_clock("Seconds of day", values).assign(north=0.0).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=r"goes back from .* in row 301"):
+        sniff(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("# operator, zigzag,2", "holds '# operator' in row 31, a comment: remove the line"),
+        ("2016-12-31T23:59:60Z,1,2", "a leap second: remove the line"),
+        ("later,1,2", "holds 'later' in row 31, no time: remove the line"),
+    ],
+)
+def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -> None:
+    lines = ["time,north,heading", *(f"{k},{2 * k},0.1" for k in range(60))]
+    with pytest.raises(DataError) as caught:
+        sniff(log_of(tmp_path, [*lines[:31], line, *lines[31:]]))
+    assert words in caught.value.message
+
+
+@pytest.mark.parametrize("time", ["", "---"])
+def test_a_time_that_is_missing_beside_dates_is_named(time: str, tmp_path: Path) -> None:
+    """Not the dates, that repeat from row to row."""
+    rows = [f"2024/05/14,{time if k == 30 else f'08:00:{k:02}'},{2 * k},0.1" for k in range(60)]
+    with pytest.raises(DataError, match="'Time' has no value in row 31"):
+        sniff(log_of(tmp_path, ["Date,Time,north,heading", *rows]))
+
+
+def test_a_line_below_times_of_day_is_named(tmp_path: Path) -> None:
+    """The first row has a time that can be read: it was said to have none."""
+    lines = ["Time,north,heading", *(f"08:00:{k:02},{2 * k},0.1" for k in range(60)), "Average,59,0.1"]
+    with pytest.raises(DataError, match="holds 'Average' in row 61, no time: remove the line"):
+        sniff(log_of(tmp_path, lines))
+    moments = [f"2024-05-14 {line}" for line in lines[1:-1]]
+    for below, which in (
+        ("Run,1,2", "the line"),
+        ("Run,1,2\n1,1,2\n2,1,2", "the 3 such lines"),
+    ):  # a number made it no column of dates
+        with pytest.raises(DataError, match=f"holds 'Run' in row 61, no time: remove {which}"):
+            sniff(log_of(tmp_path, [lines[0], *moments, below]))
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        (
+            [f"14/05/2024 08.{k // 60:02}.{k % 60:02}" for k in range(90)],
+            "holds '14/05/2024 08.00.00' in row 1, no number",
+        ),
+        ([f'"{k:,.1f}"' for k in range(680, 1070)], "'1,000.0' in row 321: take the mark of thousands out of the log"),
+        ([str(k) if k % 9 != 8 else "late" for k in range(90)], "'late' in row 9, no time: remove the 10 such lines"),
+        ([f"{1.715e12 + 500 * k:.5E}" for k in range(90)], "'1.71500E+12' in row 1, with too few digits: export it"),
+        (
+            [f"{k // 60:02}:{k % 60:02}.5" for k in range(90)],
+            "'00:00.5' in row 1, without the hour, as Excel shows times",
+        ),
+        (
+            [str(1000 * (k + (604_755 if k < 45 else 5000))) for k in range(90)],
+            "goes back from 604799 s to 5045 s in row 46",
+        ),
+    ],
+)
+def test_a_clock_that_cannot_be_read_says_its_text(times: list[str], words: str, tmp_path: Path) -> None:
+    lines = ["GPS time [ms],north,heading", *(f"{time},{200 - k},{k % 7}" for k, time in enumerate(times))]
+    with pytest.raises(DataError, match="no column can be the clock: 'GPS time") as caught:
+        sniff(log_of(tmp_path, lines))
+    assert words in caught.value.message
+
+
+def test_rows_in_too_short_a_time_name_the_clock(tmp_path: Path) -> None:
+    frame = pd.DataFrame({"t": 1e-5 * np.arange(6), "N": np.arange(6.0), "E": 0.0, "heading": 0.1})
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=r"6 rows over 5e-05 s are too few .* is 't' the clock, in s\?"):
+        guess(tmp_path / "log.csv")
+
+
+def in_columns(frame: pd.DataFrame, fields: dict[str, str], begin: str = "2024-02-29T23:59:57.5") -> pd.DataFrame:
+    """A log with its moments in columns: name -> what `strftime` makes of a moment, as a number."""
+    moments = pd.Timestamp(begin) + pd.to_timedelta(frame["time"], "s")
+    written = {name: moments.dt.strftime(form).astype(float) for name, form in fields.items()}
+    return pd.concat([pd.DataFrame(written), frame.drop(columns="time")], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("fields", "clock", "zero"),
+    [
+        (
+            {"Year": "%Y", "Month": "%m", "Day": "%d", "Hour": "%H", "Minute": "%M", "Second": "%S.%f"},
+            {"from": ["Hour", "Minute", "Second"], "date": ["Year", "Month", "Day"]},
+            1709251197.5,
+        ),
+        (
+            {"dd": "%d", "mm": "%m", "yy": "%y", "hh": "%H", "MM": "%M", "ss": "%S.%f"},
+            {"from": ["hh", "MM", "ss"], "date": ["yy", "mm", "dd"]},
+            1709251197.5,
+        ),
+        ({"Jahr": "%Y", "DOY": "%j", "Stunde": "%H", "Minute": "%M", "Sekunde": "%S.%f"}, {}, 1709251197.5),
+        ({"UTC hour": "%H", "UTC minute": "%M", "UTC second": "%S.%f"}, {}, 86397.5),
+    ],
+)
+def test_a_date_in_columns_is_the_clock(
+    fields: dict[str, str], clock: dict[str, object], zero: float, tmp_path: Path
+) -> None:
+    file = tmp_path / "log.csv"
+    in_columns(TABLE, fields).to_csv(file, index=False)
+    sniffed = sniff(file)
+    np.testing.assert_allclose(sniffed.t, zero + T, atol=1e-5)
+    assert sniffed.clock.items() >= clock.items()
+    assert list(sniffed.columns) == ["N", "psi"]
+
+
+def test_a_date_in_columns_without_names_is_the_clock(tmp_path: Path) -> None:
+    """As datevec of MATLAB has it, beside a count of rows."""
+    fields = {"Year": "%Y", "Month": "%m", "Day": "%d", "Hour": "%H", "Minute": "%M", "Second": "%S.%f"}
+    log = in_columns(TABLE, fields)
+    log.insert(0, "row", range(1, 1 + len(log)))
+    log.to_csv(tmp_path / "log.csv", index=False, header=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert (sniffed.clock["from"], sniffed.clock["date"]) == (["5", "6", "7"], ["2", "3", "4"])
+    np.testing.assert_allclose(sniffed.t, 1709251197.5 + T, atol=1e-5)
+    assert list(sniffed.columns) == ["1", "8", "9"]
+
+
+def test_a_date_in_columns_beside_a_time_of_day(tmp_path: Path) -> None:
+    log = in_columns(TABLE, {"Day": "%d", "Month": "%m", "Year": "%Y"})
+    moments = pd.Timestamp("2024-02-29T23:59:57.5") + pd.to_timedelta(T, "s")
+    log.assign(Time=moments.strftime("%H:%M:%S.%f")).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "Time", "unit": "date", "date": ["Year", "Month", "Day"]}
+    np.testing.assert_allclose(sniffed.t, 1709251197.5 + T, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("second", "asked"),
+    [
+        ({"Time 2": 2.0 * T}, True),
+        ({"Time 2": np.where(np.arange(len(T)) < 15, 2.0 * T, np.nan)}, True),
+        ({"Time 2": 1e3 * T}, False),  # milliseconds of the same clock
+        ({"timestamp": 1.7e9 + T}, False),
+        ({"Time received": T + 0.05 * np.sin(T)}, False),
+    ],
+)
+def test_a_second_clock_that_goes_otherwise_is_asked(
+    second: dict[str, np.ndarray], asked: bool, tmp_path: Path
+) -> None:
+    """Each channel of some recorders has a time beside it, and a row then holds moments that do not belong together."""
+    long = np.arange(0.0, 100.0, 5.0)
+    log = TABLE.assign(
+        time=long, **{name: 10.0 * values if name != "timestamp" else values for name, values in second.items()}
+    )
+    log = log.assign(timestamp=1.7e9 + long) if "timestamp" in second else log
+    log.to_csv(tmp_path / "log.csv", index=False)
+    doubts = sniff(tmp_path / "log.csv").doubts
+    assert [doubt.partition(",")[0] for doubt in doubts] == [f"{next(iter(second))!r} is a clock"] * asked

@@ -1,0 +1,257 @@
+"""How logs are written that nobody has seen: encodings, separators, headers, marks of thousands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.errors import DataError
+from shipid.logs.formats import TextFormat
+from shipid.logs.guess.clock import plain
+from shipid.logs.guess.sniff import sniff
+from shipid.logs.readers import read_table
+from tests.logs.guess.conftest import TABLE, T, log_of, text
+
+
+@pytest.mark.parametrize(
+    ("content", "form"),
+    [
+        (text(), {"separator": ",", "decimal": ".", "skip_rows": 0}),
+        (text(";"), {"separator": ";", "decimal": "."}),
+        (text(";", ","), {"separator": ";", "decimal": ","}),
+        (text("\t"), {"separator": "\t"}),
+        (
+            "\n".join(",".join(f'"{cell}"' for cell in line.split(";")) for line in text(";", ",").splitlines()),
+            {"separator": ",", "decimal": ","},
+        ),
+        (text(above="Trial of the ship\nof last May\n"), {"separator": ",", "skip_rows": 2}),
+        (
+            "s,m,deg\n".join(text().split("\n", 1)).replace("psis", "psi\ns"),
+            {"skip_rows": 2, "names": ["time [s]", "N [m]", "psi [deg]"]},
+        ),
+        (
+            text(" ", above="# by numpy.savetxt\n# time N psi\n", header=False),
+            {"separator": "whitespace", "skip_rows": 2, "names": ["time", "N", "psi"]},
+        ),
+        (
+            text("\t", above="%\ttime\tN\tpsi\n%\ts\tm\tdeg\n", header=False),
+            {"skip_rows": 2, "names": ["time [s]", "N [m]", "psi [deg]"]},
+        ),
+        (
+            text("\t", above="% time N psi\n% s m deg\n", header=False),
+            {"skip_rows": 2, "names": ["time [s]", "N [m]", "psi [deg]"]},
+        ),
+        (text(above="# time,N,psi\n", header=False), {"skip_rows": 0}),
+        (
+            text(" ", above="# time [s] N [m] psi [deg]\n", header=False),
+            {"skip_rows": 1, "names": ["time[s]", "N[m]", "psi[deg]"]},
+        ),
+    ],
+)
+def test_a_text_log_is_recognised(content: str, form: dict[str, object], tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text(content)
+    sniffed = sniff(file)
+    assert sniffed.form.items() >= form.items()
+    np.testing.assert_allclose(sniffed.t, T)
+    assert [plain(name) for name in sniffed.columns] == ["n", "psi"]
+    np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
+
+
+def test_a_log_without_a_header_has_numbers_or_the_names_that_are_given(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text(text(header=False))
+    numbered = sniff(file)
+    assert numbered.form["header"] is False
+    assert all(name.isdecimal() for name in numbered.columns)
+    assert list(sniff(file, ("clock", "N", "psi")).columns) == ["N", "psi"]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "expected"),
+    [("utf-8", "utf-8"), ("utf-8-sig", "utf-8-sig"), ("cp1252", "cp1252"), ("utf-16", "utf-16")],
+)
+def test_encodings(encoding: str, expected: str, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_bytes(text(table=TABLE.rename(columns={"psi": "psi [°]"})).encode(encoding))
+    sniffed = sniff(file)
+    assert sniffed.form["encoding"] == expected
+    assert "psi [°]" in sniffed.columns
+
+
+@pytest.mark.parametrize(
+    ("names", "encoding"),
+    [
+        (("時刻", "船首方位", "舵角"), "cp932"),
+        (("时间", "艏向", "舵角"), "gb18030"),
+        (("시간", "선수방위", "타각"), "cp949"),
+        (("Время", "Курс", "Угол руля"), "cp1251"),
+        (("時刻", "船首方位", "舵角"), "utf-8"),
+    ],
+)
+def test_encodings_of_other_scripts(names: tuple[str, ...], encoding: str, tmp_path: Path) -> None:
+    table = TABLE.set_axis(names, axis=1)
+    (tmp_path / "log.csv").write_bytes(text(table=table).encode(encoding))
+    sniffed = sniff(tmp_path / "log.csv")
+    assert (sniffed.form["encoding"], sniffed.clock["from"]) == (encoding, names[0])
+    assert tuple(sniffed.columns) == names[1:]
+    pd.testing.assert_frame_equal(
+        read_table(tmp_path / "log.csv", TextFormat(encoding=encoding), names[0]), table.astype(str)
+    )
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_text_of_two_bytes_without_a_mark_is_read(encoding: str, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_bytes("\n".join(["time,x", *(f"{k},{k % 7}.5" for k in range(80))]).encode(encoding))
+    sniffed = sniff(file)
+    assert sniffed.form["encoding"] == encoding
+    np.testing.assert_array_equal(sniffed.t, np.arange(80))
+
+
+def test_many_lines_that_end_in_a_carriage_return_alone_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_bytes("\r".join(["time,x,y", *(f"{k},{k % 7}.5,1" for k in range(8000))]).encode())
+    np.testing.assert_array_equal(sniff(file).t, np.arange(8000))
+
+
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_a_separator_between_quotes_is_part_of_a_name(separator: str, tmp_path: Path) -> None:
+    """Such a header was taken for no header, and columns were called by their numbers."""
+    names = ["time", f"Rudder angle [deg{separator} + port]", f"x{separator} y", "n"]
+    rows = "".join(f"{t}{separator}{t % 7}{separator}1.5{separator}{t * t}\n" for t in range(50))
+    header = separator.join(f'"{name}"' if separator in name else name for name in names)
+    (tmp_path / "log.csv").write_text(f"{header}\n{rows}")
+    sniffed = sniff(tmp_path / "log.csv")
+    assert list(sniffed.columns) == names[1:]
+    assert "header" not in sniffed.form
+
+
+def test_one_name_over_a_date_and_a_time(tmp_path: Path) -> None:
+    lines = ["  time            east  north", "  -                 m      m"]
+    lines += [f"2023-11-12 08:17:{k:02d}.5  {k}  {2 * k}" for k in range(30)]
+    sniffed = sniff(log_of(tmp_path, lines, "log.dat"))
+    assert sniffed.clock["date"] == "date"
+    np.testing.assert_allclose(np.diff(sniffed.t), 1.0)
+    assert list(sniffed.columns) == ["east [m]", "north [m]"]
+
+
+def test_the_header_again_and_lines_of_words_are_left_out(tmp_path: Path) -> None:
+    lines = ["time,north,heading", *(f"{k},{2 * k},0.1" for k in range(60))]
+    file = log_of(tmp_path, [*lines[:20], "# zigzag", *lines[20:40], lines[0], *lines[40:]])
+    sniffed = sniff(file)
+    assert sniffed.form["ragged"] == "drop"
+    assert sniffed.notes == (
+        "2 lines repeat the header or have another number of cells, the first is line 21: left out",
+    )
+    np.testing.assert_array_equal(sniffed.t, np.arange(60.0))
+    with pytest.raises(DataError, match="repeats the header: remove the line") as caught:
+        read_table(log_of(tmp_path, [*lines[:40], lines[0], *lines[40:]]), TextFormat(), "time")
+    assert caught.value.path == "line 41"
+
+
+@pytest.mark.parametrize(
+    ("above", "names"),
+    [
+        ("time,GPS,\n,N,psi\n", ["time", "GPS N", "GPS psi"]),
+        ("time,GPS,\n,North,Heading\ns,m,deg\n", ["time [s]", "GPS North [m]", "GPS Heading [deg]"]),
+        ("time,North,Heading\nT01,AI02,AI03\n", ["time", "North", "Heading"]),
+        ("T01,AI02,AI03\ntime,North,Heading\n", None),
+        ("time,Wind,Wind\n,Speed,Direction\n", ["time", "Wind Speed", "Wind Direction"]),
+        ("time,North,Heading\ns,m,deg\nDOUBLE,DOUBLE,DOUBLE\n", ["time [s]", "North [m]", "Heading [deg]"]),
+        ("s,m,deg\ntime,North,Heading\n", ["time [s]", "North [m]", "Heading [deg]"]),
+        ("Trial,Ada,\ntime,North,Heading\n", None),
+    ],
+)
+def test_names_in_several_lines(above: str, names: list[str] | None, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text(text(above=above, header=False))
+    sniffed = sniff(file)
+    assert sniffed.form.get("names") == names
+    assert [sniffed.clock["from"], *sniffed.columns] == (names or ["time", "North", "Heading"])
+    np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
+
+
+def test_a_table_beside_the_first_lines_is_left_out(tmp_path: Path) -> None:
+    """A block of statistics has made the header longer than the rows, and the names of the log were lost."""
+    lines = text().splitlines()
+    beside = ["channel,mean", "psi,34.75", "N,7.1"]
+    lines = [",".join([line, "", *beside[i : i + 1]]) if i < len(beside) else line for i, line in enumerate(lines)]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    sniffed = sniff(tmp_path / "log.csv")
+    assert list(sniffed.columns) == ["N", "psi"]
+    np.testing.assert_allclose(sniffed.columns["psi"], 30.0 + T[2:])
+    assert any("2 lines repeat the header or have another number of cells" in note for note in sniffed.notes)
+    table = read_table(tmp_path / "log.csv", TextFormat.model_validate(sniffed.form), "time")
+    np.testing.assert_allclose(table["psi"].astype(float), 30.0 + T[2:])
+
+
+def test_words_beside_the_first_lines_are_no_header(tmp_path: Path) -> None:
+    """Notes on the weather, on the right, have made the third line one of names, such as 0.5 and 30.5."""
+    lines = text().splitlines()
+    beside = ["Weather", "Sea state 2", "Depth 54 m"]
+    lines = [f"{line},,{beside[i] if i < len(beside) else ''}" for i, line in enumerate(lines)]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    sniffed = sniff(tmp_path / "log.csv")
+    assert list(sniffed.columns)[:2] == ["N", "psi"]
+    np.testing.assert_allclose(sniffed.columns["psi"], 30.0 + T)
+
+
+@pytest.mark.parametrize(
+    ("decimal", "mark", "separator"),
+    [
+        (".", ",", ";"),
+        (",", ".", ";"),
+        (".", "'", ","),
+        (",", " ", ";"),
+        (",", "\u00a0", "\t"),
+        (".", ",", ","),
+        (".", ",", "\t"),
+    ],
+)
+@pytest.mark.parametrize("digits", [0, 2])
+def test_marks_of_thousands_are_read(decimal: str, mark: str, separator: str, digits: int, tmp_path: Path) -> None:
+    """Also of whole numbers, as 1,800 rpm, where the positions show which sign is the decimal one."""
+
+    def written(value: float) -> str:
+        text = f"{value:,.{digits}f}"
+        return text.replace(",", "#").replace(".", decimal).replace("#", mark)
+
+    large = np.round(7_034_120.4 + 97.3 * T * (-1) ** np.arange(len(T)), digits) if digits else np.round(1800 + 3 * T)
+    table = TABLE.assign(lat=63.4399978 + 1e-5 * T, N=[written(one) for one in large])
+    table.to_csv(tmp_path / "log.csv", index=False, sep=separator, decimal=decimal)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.form.items() >= {"decimal": decimal, "thousands": mark, "separator": separator}.items()
+    np.testing.assert_allclose(sniffed.columns["N"], large)
+    np.testing.assert_allclose(sniffed.columns["lat"], table["lat"])
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_three_decimals_are_no_groups(decimal: str, tmp_path: Path) -> None:
+    """1,800 is 1.8 where nothing in the log says that it is 1800."""
+    table = TABLE.assign(time=TABLE["time"] + 1.0)
+    table.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=decimal, float_format="%.3f")
+    sniffed = sniff(tmp_path / "log.csv")
+    assert "thousands" not in sniffed.form
+    np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
+
+
+@pytest.mark.parametrize("more", ["", ",192"])
+def test_a_row_for_each_value_is_named(more: str, tmp_path: Path) -> None:
+    """As historians write: what the value is stands in a cell beside it."""
+    tags = ("GPS1.LAT", "GPS1.LON", "GYRO1.HDG", "STG.RUDDER")
+    rows = [f"2024-05-14 08:00:{t:02},{tag},{t + k / 7:.3f}{more}" for t in range(50) for k, tag in enumerate(tags)]
+    with pytest.raises(
+        DataError, match=r"a row for each value, called 'GPS1.LAT', 'GPS1.LON', .*: write a row for each"
+    ):
+        sniff(log_of(tmp_path, [f"Timestamp,Tag,Value{',Quality' * bool(more)}", *rows]))
+
+
+def test_a_header_longer_than_its_rows_keeps_its_names(tmp_path: Path) -> None:
+    """As LabVIEW writes: a column of comments has a name and no cells."""
+    lines = text().splitlines()
+    sniffed = sniff(log_of(tmp_path, [f"{lines[0]},,Comment", *lines[1:]]))
+    assert list(sniffed.columns) == ["N", "psi"]
