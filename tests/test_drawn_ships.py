@@ -11,7 +11,7 @@ from shipid.engine.gradient import rollout_gradient, squared_distance
 from shipid.engine.native import compiler
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.export.blocks import Precision
-from shipid.export.c import vessel_files
+from shipid.export.c_vessel import vessel_files
 from shipid.physics import TERMS
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel

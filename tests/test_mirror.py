@@ -17,7 +17,10 @@ ELSEWHERE = {
     "report/__init__.py": "report/test_page.py",
     "study/apply.py": "study/test_whole.py",
     # the parts of one graph: what is written from them equals Python, for every method
-    **{f"export/{part}.py": "export/test_c.py" for part in ("blocks", "correctors", "equations", "known", "model")},
+    **{
+        f"export/{part}.py": "export/test_c.py"
+        for part in ("blocks", "c_predictor", "c_vessel", "correctors", "equations", "known", "model")
+    },
     "report/replay.py": "cli/test_replay.py",
     "report/motion.py": "cli/test_replay.py",
 }

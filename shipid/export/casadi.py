@@ -16,7 +16,7 @@ from casadi import MX
 from shipid.engine.integrate import Method
 from shipid.export.band import CHOICE, COLUMNS
 from shipid.export.blocks import Precision
-from shipid.export.c import VesselParts
+from shipid.export.c_vessel import VesselParts
 from shipid.export.model import Model
 from shipid.files import whole, write_json
 from shipid.hybrid.bands import FEWEST, LEVELS

@@ -22,7 +22,9 @@ from shipid.engine.native import compiler
 from shipid.errors import ShipidError
 from shipid.export.band import CHOICE, COLUMNS
 from shipid.export.blocks import Precision
-from shipid.export.c import Files, PredictorParts, VesselParts, predictor_files, vessel_files
+from shipid.export.c import Files
+from shipid.export.c_predictor import PredictorParts, predictor_files
+from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.model import Model
 from shipid.files import whole
 from shipid.physics.signals import SIGNALS, neutral

@@ -12,7 +12,9 @@ from shipid.arguments import of_class, one_of, path_of
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.export.blocks import Precision
-from shipid.export.c import Files, c_name, predictor_files, vessel_files
+from shipid.export.c import Files, c_name
+from shipid.export.c_predictor import predictor_files
+from shipid.export.c_vessel import vessel_files
 from shipid.export.casadi import band_function, listing_of, predictor_function, vessel_function, write_function
 from shipid.export.fmu import Packed, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import Exportable, Model, model

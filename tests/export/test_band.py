@@ -13,7 +13,7 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.export.band import band_graph, radii
 from shipid.export.blocks import Precision, c_functions
-from shipid.export.c import predictor_files
+from shipid.export.c_predictor import predictor_files
 from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.bands import Region, adapted, adaptive, factor

@@ -17,7 +17,9 @@ from shipid.data.windows import Instants, past_of
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
 from shipid.export.blocks import Precision
-from shipid.export.c import Files, c_name, predictor_files, strings, vessel_files
+from shipid.export.c import Files, c_name, strings
+from shipid.export.c_predictor import predictor_files
+from shipid.export.c_vessel import vessel_files
 from shipid.export.casadi import predictor_function
 from shipid.export.equations import Equations
 from shipid.export.model import model

@@ -12,7 +12,7 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.engine.casadi import memory_along
 from shipid.export.blocks import Precision
-from shipid.export.c import predictor_files
+from shipid.export.c_predictor import predictor_files
 from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
