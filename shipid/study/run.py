@@ -296,11 +296,6 @@ def _shared(
         wait = pause(wait) if len(known) == before else WAIT
 
 
-def run_batch(plan: Plan, prepared: Prepared, batch: Batch, device: str) -> Results:
-    """All cells of one batch at once."""
-    return run_unit(plan, prepared, plan.whole(batch), device)
-
-
 def run_unit(
     plan: Plan,
     prepared: Prepared,

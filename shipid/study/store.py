@@ -297,7 +297,8 @@ def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
     frame = pd.DataFrame(rows)
     for name in METRICS:
         frame[name] = frame[name].astype(float) if name in frame else np.nan
-    place = {pair: number for number, pair in enumerate(plan.whole(plan.batches[0]).pairs)} if plan is not None else {}
+    pairs = [(name, way.name) for name, way in plan.pairs] if plan is not None else []
+    place = {pair: number for number, pair in enumerate(pairs)}
     frame["place"] = [place.get(pair, 0) for pair in zip(frame["foundation"], frame["method"], strict=True)]
     return frame.sort_values(["N_D", "seed", "place"], kind="stable").drop(columns="place").reset_index(drop=True)
 

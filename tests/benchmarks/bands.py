@@ -34,7 +34,7 @@ from shipid.predictor import limits_of
 from shipid.study.bands import share_interval
 from shipid.study.plan import Batch, read_plan
 from shipid.study.prepare import instants_of, obtain, partition, prepare
-from shipid.study.run import run_batch
+from shipid.study.run import run_unit
 from shipid.vessel.load import Vessel, load_vessel
 from tests.benchmarks import coverage
 from tests.benchmarks.worlds import World, world
@@ -258,7 +258,7 @@ def recorded(folder: Path, commands: str) -> pd.DataFrame:
         study = least.model_copy(update={"grid": least.grid.model_copy(update={"N_D": [amount]})})
         turn = replace(plan, study=study, batches=(Batch(amount, 0),))
         prepared = prepare(turn, dataset)
-        for row, predictor, _ in run_batch(turn, prepared, turn.batches[0], "cpu"):
+        for row, predictor, _ in run_unit(turn, prepared, turn.whole(turn.batches[0]), "cpu"):
             assert predictor is not None
             instants = instants_of(turn, predictor.vessel, dataset, prepared.test)
             frame = pd.DataFrame({"test": test, "model": plan.label(row["foundation"], row["method"]), "H": row["H"]},

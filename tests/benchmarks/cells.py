@@ -8,7 +8,7 @@ from typing import Any
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
-from shipid.study.run import run_batch
+from shipid.study.run import run_unit
 
 
 def run() -> dict[str, Any]:
@@ -19,7 +19,7 @@ def run() -> dict[str, Any]:
     result: dict[str, Any] = {"simulate, roll out [s]": round(time.perf_counter() - start, 2)}
     for batch in plan.batches:
         start = time.perf_counter()
-        rows = [cell.row for cell in run_batch(plan, prepared, batch, "cpu")]
+        rows = [cell.row for cell in run_unit(plan, prepared, plan.whole(batch), "cpu")]
         seconds = (time.perf_counter() - start) / len(rows)
         errors = [row["H"] for row in rows if row["foundation"] != NO_MODEL]
         mean = sum(errors) / len(errors)

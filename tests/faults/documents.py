@@ -16,7 +16,7 @@ from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
-from shipid.study.run import run_batch
+from shipid.study.run import run_unit
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.faults.mutations import mutated
@@ -41,7 +41,7 @@ def study(seed: int) -> None:
         searched = max(getattr(way.method, "trials", 1) * getattr(way.method, "units", 1) for way in plan.methods)
         if steps < RUNNABLE and plan.study.prediction.horizon < 100 and searched < 50:
             prepared = prepare(plan, obtain(plan))
-            run_batch(plan, prepared, plan.batches[-1], "cpu")
+            run_unit(plan, prepared, plan.whole(plan.batches[-1]), "cpu")
 
 
 def vessel(seed: int) -> None:

@@ -169,7 +169,7 @@ def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monk
     errors = []
     for clock in ("run", "shared"):
         data = Dataset(frame, {**dataset.metadata, "clock": clock})
-        run.run_batch(plan, prepare(plan, data), plan.batches[0], "cpu")
+        run.run_unit(plan, prepare(plan, data), plan.whole(plan.batches[0]), "cpu")
         left_out, _ = kept[-1]["plain", "force"]
         errors.append(float(np.nanmean(np.hypot(left_out[..., 0], left_out[..., 1]))))
     assert errors[1] == pytest.approx(errors[0], rel=0.1)

@@ -34,7 +34,7 @@ from shipid.study.prepare import (
     runs_by_amount,
     window_memory,
 )
-from shipid.study.run import run_batch
+from shipid.study.run import run_unit
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import draw, resolve
 from tests.study.tiny import logged, tiny_plan
@@ -217,7 +217,7 @@ def test_divergence_on_test_windows_only_is_shown_never_redrawn(
     accuracy = prepared.accuracy("brittle-1")
     assert (accuracy["status"], accuracy["failed_share"]) == ("diverged", 0.5)
     assert np.isnan(accuracy["mean"])
-    rows = {row["foundation"]: row for row, *_ in run_batch(plan, prepared, plan.batches[0], "cpu")}
+    rows = {row["foundation"]: row for row, *_ in run_unit(plan, prepared, plan.whole(plan.batches[0]), "cpu")}
     assert rows["brittle-1"]["status"] == "diverged"
     assert "50.0 %" in rows["brittle-1"]["sentence"]
     assert np.isnan(rows["brittle-1"]["H"])

@@ -17,7 +17,7 @@ from shipid.study import rotate as rotate_module
 from shipid.study.plan import Plan
 from shipid.study.prepare import prepare
 from shipid.study.rotate import rotate, spread, turn_findings, turns
-from shipid.study.run import run_batch, run_unit
+from shipid.study.run import run_unit
 from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
 
@@ -59,7 +59,7 @@ def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Pl
     for test in ("a", "b"):
         single, _ = recorded(weaving(), split={"test": [test]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
         prepared = prepare(single, dataset)
-        rows = [row for row, *_ in run_batch(single, prepared, single.batches[0], "cpu")]
+        rows = [row for row, *_ in run_unit(single, prepared, single.whole(single.batches[0]), "cpu")]
         turn = rows_of_turns[rows_of_turns["test"] == test]
         assert list(turn["foundation"]) == [row["foundation"] for row in rows]
         assert (turn["N_D"] == 5).all()

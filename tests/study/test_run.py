@@ -31,7 +31,7 @@ from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.results import provenance_words, read_results
 from shipid.study.rotate import kept_folder
-from shipid.study.run import run_batch, run_study, run_unit
+from shipid.study.run import run_study, run_unit
 from shipid.version import __version__
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import events_here, mixed_plan, run_here, tiny_plan
@@ -146,7 +146,7 @@ def test_a_unit_has_the_digits_of_its_whole_batch(tmp_path: Path) -> None:
     """Every method, an identified family and refits: units of work against all cells at once, bit by bit."""
     plan = mixed_plan(tmp_path, {"bands": {"refits": 2}})
     prepared = prepare(plan, obtain(plan))
-    whole = {row["cell"]: (row, one) for row, one, _ in run_batch(plan, prepared, plan.batches[0], "cpu")}
+    whole = {row["cell"]: (row, one) for row, one, _ in run_unit(plan, prepared, plan.whole(plan.batches[0]), "cpu")}
     parts = [pair for unit in reversed(plan.units) for pair in run_unit(plan, prepared, unit, "cpu")]
     assert len(parts) == len(whole) == plan.cells
     for row, predictor, _ in parts:
@@ -377,7 +377,7 @@ def test_a_path_that_no_ship_can_follow_is_a_cell_without_a_result(
         return paths
 
     monkeypatch.setattr(Predictor, "predict", wild)
-    rows = [row for row, *_ in run_batch(plan, prepare(plan, obtain(plan)), plan.batches[0], "cpu")]
+    rows = [row for row, *_ in run_unit(plan, prepare(plan, obtain(plan)), plan.whole(plan.batches[0]), "cpu")]
     assert {row["status"] for row in rows} == {"diverged"}
     assert all("the prediction diverges on 50.0" in row["sentence"] for row in rows)
     assert np.isnan([row["H"] for row in rows]).all()
@@ -400,7 +400,7 @@ def test_runs_too_short_to_learn_from_are_a_value(tmp_path: Path) -> None:
 def test_absent_device_is_one_line(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path)
     with pytest.raises(ShipidError, match="no such device") as caught:
-        run_batch(plan, prepare(plan, obtain(plan)), plan.batches[0], "cuda:99")
+        run_unit(plan, prepare(plan, obtain(plan)), plan.whole(plan.batches[0]), "cuda:99")
     assert caught.value.path == "--device cuda:99"
 
 
@@ -571,7 +571,7 @@ def test_methods_are_fitted_with_the_seed_of_their_batch(tmp_path: Path, monkeyp
     monkeypatch.setattr(PathDrawn, "fit", fit)
     prepared = prepare(plan, obtain(plan))
     for batch in plan.batches:
-        run_batch(plan, prepared, batch, "cpu")
+        run_unit(plan, prepared, plan.whole(batch), "cpu")
     assert seen == [batch.seed for batch in plan.batches]
     assert sorted(seen) == [3, 8]
 
