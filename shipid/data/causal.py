@@ -43,10 +43,9 @@ def last_known(t: Array, values: Array) -> NDArray[np.intp]:
     return known
 
 
-def causal_columns(dataset: Dataset, columns: Sequence[str] = ("u", "v"), *, extrapolate: bool = False) -> Dataset:
+def causal_columns(dataset: Dataset, columns: Sequence[str] = ("u", "v")) -> Dataset:
     """Dataset whose `columns` hold in each row the last value that depends on no later fix.
 
-    extrapolate : go on from it along the slope between the last two known values, at most as long as they lie apart.
     Raises DataError for a column that is not there.
     """
     frame = dataset.frame.copy()
@@ -58,13 +57,7 @@ def causal_columns(dataset: Dataset, columns: Sequence[str] = ("u", "v"), *, ext
             t, values = frame["t"].to_numpy()[rows], whole[rows]
             if len(rows) < 3:
                 continue
-            known = last_known(t, values)
-            held = values[known]
-            if extrapolate:
-                earlier = known[np.maximum(known - 1, 0)]
-                apart = np.maximum(t[known] - t[earlier], np.diff(t).min())
-                held = held + (held - values[earlier]) / apart * np.minimum(t - t[known], apart)
-            whole[rows] = held
+            whole[rows] = values[last_known(t, values)]
         frame[name] = whole
     metadata = {**dataset.metadata, "causal": list(columns)}
     return replace(dataset, frame=frame, metadata=metadata)

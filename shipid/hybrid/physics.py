@@ -90,16 +90,15 @@ class Physics:
         result, (north, east) = self._rollout(instants, ("north", "east"), parameters, device)
         return np.stack(_in_frame(instants, north, east), axis=-1), result.diverged
 
-    def states(self, instants: Instants, tau_extra: Array | None = None, *, engine: str = AUTO) -> dict[str, Array]:
+    def states(self, instants: Instants, *, engine: str = AUTO) -> dict[str, Array]:
         """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S), horizontal as in a log.
 
-        tau_extra : (T, S, n_dof) forces [N, N m] added over the horizon; None adds none. With an observer u and v are
-        those through the water.
+        With an observer u and v are those through the water.
         engine : as in `rollout`; `auto` takes C from `WORTH_COMPILING` steps on.
         """
         leaning = tuple(name for name in LEANING if name in dynamics(self.ship).state)
         kept = ("north", "east", *MOTION, *leaning)
-        result, (north, east) = self._rollout(instants, kept, None, "cpu", tau_extra, engine)
+        result, (north, east) = self._rollout(instants, kept, None, "cpu", engine)
         x, y = _in_frame(instants, north[:, 0], east[:, 0])
         motion = {name: result[name][1:, 0] for name in (*MOTION, *leaning)}
         if leaning:
@@ -187,7 +186,6 @@ class Physics:
         keep: Sequence[str],
         parameters: Array | None,
         device: str,
-        tau_extra: Array | None = None,
         engine: str = AUTO,
     ) -> tuple[Trajectories, tuple[Array, Array]]:
         """Trajectories of the vessel, and north and east (T, V, S) [m] over ground after 1..T steps."""
@@ -204,7 +202,7 @@ class Physics:
             method=self.integrator,
             parameters=parameters,
             memory=instants.hidden,
-            tau_extra=slow if tau_extra is None else tau_extra if slow is None else slow + tau_extra,
+            tau_extra=slow,
             keep=keep,
             engine=engine,
             device=device,

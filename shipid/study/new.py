@@ -152,10 +152,10 @@ def _ahead(horizon: float, steps: int, step: float, why: str) -> Choice:
     return Choice("prediction.ahead", value, near + why)
 
 
-def ladder(total: int, least: int = LEAST_RUNS) -> list[int]:
+def ladder(total: int) -> list[int]:
     """Amounts of data from the least to all runs, by equal factors of at least two."""
-    factor = max(2.0, (total / least) ** (1 / (MOST_AMOUNTS - 1)))
-    amounts = [round(least * factor**power) for power in range(MOST_AMOUNTS)]
+    factor = max(2.0, (total / LEAST_RUNS) ** (1 / (MOST_AMOUNTS - 1)))
+    amounts = [round(LEAST_RUNS * factor**power) for power in range(MOST_AMOUNTS)]
     return [amount for amount in amounts if amount < 0.8 * total] + [total]
 
 

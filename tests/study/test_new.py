@@ -89,8 +89,8 @@ def test_amounts_rise_from_the_least_to_all_runs(total: int) -> None:
     assert len(amounts) <= 7
 
 
-def test_amounts_begin_where_a_study_may() -> None:
-    assert ladder(22, least=1) == [1, 2, 4, 8, 16, 22]
+def test_amounts_double_where_that_is_few_enough() -> None:
+    assert ladder(22) == [2, 4, 8, 16, 22]
 
 
 @pytest.mark.parametrize(
