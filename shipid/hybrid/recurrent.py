@@ -14,7 +14,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, pi
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of
 from shipid.hybrid.units import Seen, part_of, taken
+
+if TYPE_CHECKING:
+    import torch
 
 Array = NDArray[np.float64]
 LAYERS = ("W_i", "W_h", "b_i", "b_h", "W_1", "c_1", "W_2", "c_2")
@@ -294,6 +297,8 @@ class Recurrent(Searched):
 
 
 Part = tuple[Sequences, Sequences | None, Array]
+Read = tuple["torch.Tensor", "torch.Tensor"]
+"""The past (P + 1, S, d) and the inputs at the instant (S, e)."""
 
 
 def train(
@@ -320,66 +325,82 @@ def _train(
 
     from shipid.hybrid.training import Adam
 
-    def tensor(values: Array) -> torch.Tensor:
-        return torch.as_tensor(values, dtype=torch.float32)
-
     generator = torch.Generator().manual_seed(seed)
-    begun = data[0][0]
-    shapes = {
-        "W_i": (3 * units, begun.past.shape[2]),
-        "W_h": (3 * units, units),
-        "b_i": (3 * units,),
-        "b_h": (3 * units,),
-        "W_1": (units, units + begun.now.shape[1]),
-        "c_1": (units,),
-        "W_2": (data[0][2].shape[1], units),
-        "c_2": (data[0][2].shape[1],),
-    }
-    bounds = {name: (units if name[2] in "ih" else shape[-1]) ** -0.5 for name, shape in shapes.items()}
-    draws = [(torch.rand(shape, generator=generator) * 2 - 1) * bounds[name] for name, shape in shapes.items()]
-    weights = torch.cat([draw.flatten() for draw in draws])[None]
-    pieces = torch.split(weights[0], [draw.numel() for draw in draws])
-    layers = {  # leaves in the memory of the flat weights
-        name: piece.view(shape).requires_grad_() for (name, shape), piece in zip(shapes.items(), pieces, strict=True)
-    }
-    parts = [
-        ([(tensor(s.past), tensor(s.now)) for s in (seen, image) if s is not None], tensor(outputs))
-        for seen, image, outputs in data
-    ]
-    sign = torch.ones(parts[0][1].shape[1])
-    sign[len(sign) // 2 :] = -1.0
-
-    def forward(seen: list[Any]) -> torch.Tensor:
-        past, now = (torch.cat(arrays, dim=-2) for arrays in zip(*seen, strict=True))
-        flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]
-        _, hidden = torch.gru(past, torch.zeros(1, now.shape[0], units), flat, True, 1, 0.0, False, False, False)
-        full = torch.cat([hidden[0], now], dim=1)
-        outputs: torch.Tensor = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
-        if len(seen) == 1:
-            return outputs
-        plain, image = outputs.chunk(2)
-        both: torch.Tensor = (plain + sign * image) / 2
-        return both
-
+    weights, layers = _begun(data[0], units, generator)
+    (seen, outputs), watched = map(_tensors, data)
     adam = Adam(weights, [method.weight_decay])
-    seen, outputs = parts[0]
     best, kept, since, epoch = float("inf"), {}, 0, 0
     for epoch in range(1, method.epochs + 1):
         rate = torch.tensor([[learning_rate * (1 + cos(pi * (epoch - 1) / method.epochs)) / 2]])
         order = torch.randperm(len(outputs), generator=generator)
         for rows in (order[first : first + method.batch] for first in range(0, len(order), method.batch)):
-            loss = (forward([(past[:, rows], now[rows]) for past, now in seen]) - outputs[rows]).square().mean()
+            loss = _loss(layers, [(past[:, rows], now[rows]) for past, now in seen], outputs[rows])
             gradients = torch.autograd.grad(loss, list(layers.values()))
             with torch.no_grad():
                 adam.step(torch.cat([gradient.flatten() for gradient in gradients])[None], rate)
         with torch.no_grad():
-            value = float((forward(parts[1][0]) - parts[1][1]).square().mean())
+            value = float(_loss(layers, *watched))
         since += 1
         if value < best:
-            best, since = value, 0
-            kept = {name: layer.detach().double().numpy().copy() for name, layer in layers.items()}
+            best, since, kept = value, 0, _numbers(layers)
         if since >= method.patience:
             break
-    if not kept:  # never a number: the start is as good as any
-        kept = {name: layer.detach().double().numpy().copy() for name, layer in layers.items()}
-    return kept, epoch
+    return kept or _numbers(layers), epoch  # where no loss was a number, nor are the weights
+
+
+def _begun(part: Part, units: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+    """Initial weights (1, P) drawn as PyTorch draws them, and the layers by name, which are leaves in their memory."""
+    import torch
+
+    read, _, outputs = part
+    shapes = {
+        "W_i": (3 * units, read.past.shape[2]),
+        "W_h": (3 * units, units),
+        "b_i": (3 * units,),
+        "b_h": (3 * units,),
+        "W_1": (units, units + read.now.shape[1]),
+        "c_1": (units,),
+        "W_2": (outputs.shape[1], units),
+        "c_2": (outputs.shape[1],),
+    }
+    bounds = {name: (units if name[2] in "ih" else shape[-1]) ** -0.5 for name, shape in shapes.items()}
+    draws = [(torch.rand(shape, generator=generator) * 2 - 1) * bounds[name] for name, shape in shapes.items()]
+    weights = torch.cat([draw.flatten() for draw in draws])[None]
+    pieces = torch.split(weights[0], [draw.numel() for draw in draws])
+    return weights, {
+        name: piece.view(shape).requires_grad_() for (name, shape), piece in zip(shapes.items(), pieces, strict=True)
+    }
+
+
+def _tensors(part: Part) -> tuple[list[Read], torch.Tensor]:
+    """What is read, and then its mirror image if there is one, and the outputs (S, 2 r)."""
+    import torch
+
+    def tensor(values: Array) -> torch.Tensor:
+        return torch.as_tensor(values, dtype=torch.float32)
+
+    seen, image, outputs = part
+    return [(tensor(one.past), tensor(one.now)) for one in (seen, image) if one is not None], tensor(outputs)
+
+
+def _loss(layers: Mapping[str, torch.Tensor], seen: list[Read], outputs: torch.Tensor) -> torch.Tensor:
+    """Mean squared error of the network on outputs (S, 2 r); with an image, x is made even and y odd."""
+    import torch
+
+    past, now = (torch.cat(arrays, dim=-2) for arrays in zip(*seen, strict=True))
+    flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]
+    start = torch.zeros(1, len(now), layers["W_h"].shape[1])
+    _, hidden = torch.gru(past, start, flat, True, 1, 0.0, False, False, False)
+    full = torch.cat([hidden[0], now], dim=1)
+    made = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
+    if len(seen) == 2:
+        sign = torch.ones(made.shape[1])
+        sign[len(sign) // 2 :] = -1.0
+        plain, image = made.chunk(2)
+        made = (plain + sign * image) / 2
+    loss: torch.Tensor = (made - outputs).square().mean()
+    return loss
+
+
+def _numbers(layers: Mapping[str, torch.Tensor]) -> dict[str, Array]:
+    return {name: layer.detach().double().numpy().copy() for name, layer in layers.items()}
