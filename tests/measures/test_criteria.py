@@ -92,3 +92,31 @@ def test_what_is_not_judged_says_why() -> None:
     assert "100 m and more" in judged("stop", 50.0)["5.3.4"][3]
     at_rest = judged("zigzag", 200.0, approach_speed=0.0)
     assert [at_rest[one][2:] for one in ("5.3.3.1", "5.3.3.2")] == [(None, AT_REST)] * 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "measure", "most", "paragraph", "changes"),
+    [
+        ("turning", "tactical_diameter", 5.0 * 200.0, "5.3.1", {}),
+        ("zigzag", "initial_turning", 2.5 * 200.0, "5.3.2", {}),
+        ("zigzag", "overshoot_1", 15.0 * DEGREE, "5.3.3.1", {"approach_speed": 10.0}),
+        ("zigzag", "overshoot_2", 32.5 * DEGREE, "5.3.3.2", {"approach_speed": 10.0}),
+        ("zigzag", "overshoot_1", 25.0 * DEGREE, "5.3.3.3", {"helm": 20 * DEGREE, "execute_heading": 20 * DEGREE}),
+        ("stop", "track_reach", 15.0 * 200.0, "5.3.4", {}),
+    ],
+)
+def test_a_measure_up_to_its_limit_is_met(
+    kind: str, measure: str, most: float, paragraph: str, changes: dict[str, float]
+) -> None:
+    """Of a ship of 200 m; the numbers are those of the resolution."""
+    for value, met in ((most * (1 - 1e-9), True), (most * (1 + 1e-9), False)):
+        assert judged(kind, 200.0, **{**changes, measure: value})[paragraph][2] is met
+
+
+def test_the_advance_is_at_most_4_5_lengths() -> None:
+    for value, met in ((899.999, True), (900.001, False)):
+        changed = Measures()
+        for name, one in MEASURES["turning"](every(RECORDS["turning"](), 0.5)).items():
+            changed.add(name, value if name == "advance" else one.value, one.unit, one.why)
+        (advance, _) = criteria("turning", changed, 200.0)
+        assert advance.met is met
