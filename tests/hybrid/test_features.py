@@ -48,6 +48,14 @@ def test_equal_azimuths_leave_the_seven_inputs_of_13(columns):
     assert chosen["port.n"] == ("port.n", "starboard.n")
 
 
+def test_columns_that_differ_by_rounding_are_one_and_vary_by_more(columns):
+    columns["starboard.n"] *= 1 + 1e-15
+    columns["u"] = 4.0 + 1e-12 * columns["u"]
+    chosen = choose_features(feature_table(columns, COMMANDS))
+    assert chosen["port.n"] == ("port.n", "starboard.n")
+    assert "u" not in chosen
+
+
 def test_different_azimuths_leave_the_nine_inputs_of_12(columns):
     columns["starboard.n"][3] += 0.01
     columns["starboard.alpha"][7] -= 0.01
@@ -103,6 +111,12 @@ def test_exact_physics_has_no_past_error(past):
     assert set(errors) == {"x", "y", "u", "v", "r"}
     for values in errors.values():
         np.testing.assert_allclose(values, 0.0, atol=1e-9)
+
+
+def test_a_past_that_is_too_short_is_said_in_seconds(past):
+    held = len(past.past["x"])
+    with pytest.raises(DataError, match=rf"needs 1000 s of the past, there are {2 * held} s"):
+        past_error(Physics(SHIP, 5, 2.0), past.instants(), 1000.0)
 
 
 def test_past_error_of_wrong_physics_grows_and_is_the_rollout_by_hand(past):
