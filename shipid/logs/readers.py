@@ -290,8 +290,6 @@ def _large_text(
     What cannot be read so (blanks as separator, comments, text among the numbers, ragged lines) is left to the slow and
     thorough way, which names the place.
     """
-    import pyarrow.csv as arrow
-
     if form.separator == "whitespace" or form.comment is not None or form.ragged == "drop":
         return None
     with file.open("rb") as stream:
@@ -308,60 +306,76 @@ def _large_text(
     if {names[index] for index in places} != wanted or len(places) != len(wanted):
         return None
     plain = {
-        index: pd.to_numeric(_decimal(first.iloc[:, index], form), errors="coerce").notna().any() for index in places
+        index: bool(pd.to_numeric(_decimal(first.iloc[:, index], form), errors="coerce").notna().any())
+        for index in places
     }
-    skip = form.skip_rows + int(form.header and form.names is None)
-    expected = int(1.02 * size * len(first) / max(1, len(text))) + 1000  # rows: what is not filled takes no memory
-    numbers = {index: np.empty(expected) for index in places if plain[index]}
-    texts: dict[int, list[Any]] = {index: [] for index in places if not plain[index]}
     try:
-        reader = arrow.open_csv(
-            file,
-            arrow.ReadOptions(
-                column_names=[str(i) for i in range(len(names))],
-                skip_rows=skip,
-                encoding=form.encoding,
-                block_size=1_000_000,
-                use_threads=True,
-            ),
-            arrow.ParseOptions(delimiter=form.separator, ignore_empty_lines=True),
-            arrow.ConvertOptions(
-                include_columns=[str(index) for index in places],
-                column_types={str(i): pyarrow.float64() if plain[i] else pyarrow.string() for i in places},
-                null_values=list(form.missing),
-                strings_can_be_null=True,
-                decimal_point=form.decimal,
-            ),
-        )
-        rows = 0
-        for batch in reader:
-            before, rows = rows, rows + batch.num_rows
-            for place, column in zip(places, batch.columns, strict=True):
-                values = column.to_numpy(zero_copy_only=False)
-                if place in texts:
-                    texts[place].append(values)
-                    continue
-                if np.count_nonzero(np.isnan(values)) > column.null_count:  # a word that this mapping does not declare
-                    return None
-                if rows > len(numbers[place]):
-                    more = np.empty(max(rows - len(numbers[place]), len(numbers[place]) // 4))
-                    numbers[place] = np.concatenate([numbers[place], more])
-                numbers[place][before:rows] = values
-            if progress is not None and rows:
-                progress(min(1.0, rows * (len(text) / max(1, len(first))) / size))
+        reader = _blocks(file, form, len(names), plain)
+        about = size * max(1, len(first)) / len(text)  # rows
+        columns = _columns_of_blocks(reader, plain, about, progress)
     except (pyarrow.ArrowException, UnicodeError, ValueError):
         return None
-    joined = {
-        names[place]: numbers[place][:rows]
-        if place in numbers
-        else np.concatenate([np.empty(0, object), *texts[place]])
-        for place in places
-    }
-    table = pd.DataFrame(joined, copy=False)
+    if columns is None:
+        return None
+    table = pd.DataFrame({names[place]: values for place, values in columns.items()}, copy=False)
     blank = np.ones(len(table), dtype=bool)
     for name in table:
         blank &= table[name].isna().to_numpy()
     return None if blank.any() else table  # whether such a line is empty, only all its cells tell
+
+
+def _blocks(file: Path, form: TextFormat, width: int, plain: dict[int, bool]) -> Iterator[pyarrow.RecordBatch]:
+    """The columns of a text log at some places, block by block; `plain` says which of them are numbers."""
+    import pyarrow.csv as arrow
+
+    blocks: Iterator[pyarrow.RecordBatch] = arrow.open_csv(
+        file,
+        arrow.ReadOptions(
+            column_names=[str(i) for i in range(width)],
+            skip_rows=form.skip_rows + int(form.header and form.names is None),
+            encoding=form.encoding,
+            block_size=1_000_000,
+            use_threads=True,
+        ),
+        arrow.ParseOptions(delimiter=form.separator, ignore_empty_lines=True),
+        arrow.ConvertOptions(
+            include_columns=[str(index) for index in plain],
+            column_types={str(i): pyarrow.float64() if plain[i] else pyarrow.string() for i in plain},
+            null_values=list(form.missing),
+            strings_can_be_null=True,
+            decimal_point=form.decimal,
+        ),
+    )
+    return blocks
+
+
+def _columns_of_blocks(
+    blocks: Iterable[pyarrow.RecordBatch], plain: dict[int, bool], about: float, progress: Progress | None
+) -> dict[int, np.ndarray[Any, Any]] | None:
+    """Whole columns by their place, of a log with `about` so many rows; None where a word stands among the numbers."""
+    expected = int(1.02 * about) + 1000  # rows: what is not filled takes no memory
+    numbers = {place: np.empty(expected) for place, of_numbers in plain.items() if of_numbers}
+    texts: dict[int, list[Any]] = {place: [] for place in plain if place not in numbers}
+    rows = 0
+    for batch in blocks:
+        before, rows = rows, rows + batch.num_rows
+        for place, column in zip(plain, batch.columns, strict=True):
+            values = column.to_numpy(zero_copy_only=False)
+            if place in texts:
+                texts[place].append(values)
+                continue
+            if np.count_nonzero(np.isnan(values)) > column.null_count:  # a word that this mapping does not declare
+                return None
+            if rows > len(numbers[place]):
+                more = np.empty(max(rows - len(numbers[place]), len(numbers[place]) // 4))
+                numbers[place] = np.concatenate([numbers[place], more])
+            numbers[place][before:rows] = values
+        if progress is not None and rows:
+            progress(min(1.0, rows / about))
+    return {
+        place: numbers[place][:rows] if of_numbers else np.concatenate([np.empty(0, object), *texts[place]])
+        for place, of_numbers in plain.items()
+    }
 
 
 def _decimal(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
