@@ -264,6 +264,14 @@ def test_held_out_share(share: float, seed: int) -> None:
     assert held
 
 
+@pytest.mark.parametrize("validation", ["runs", "share"])
+def test_of_two_runs_a_whole_one_validates(validation: str) -> None:
+    windows = runs_at((0.0, 60.0), (100.0, 160.0), clock="run")
+    for training, judged in run_folds(windows, validation, 0):
+        assert len(set(windows.run[judged])) == len(set(windows.run[training])) == 1
+        assert len(training) == len(judged) == len(windows) / 2
+
+
 @pytest.mark.parametrize(
     ("validation", "num_folds", "expected"),
     [("runs", 1, [1] * 10), ("share", 1, [2]), ("runs", 3, [3, 3, 4]), ("share", 4, [2, 2, 3, 3])],
