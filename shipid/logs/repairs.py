@@ -148,10 +148,14 @@ def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
 
     Windows are whole and do not reach over a break: the median of half a window is biased for a moving ship. In the
     half window at each end of a stretch a line through the whole window there takes its place, where it fits the rest.
-    Missing values in them are interpolated for the median.
+    Missing values in them are interpolated for the median. Raises DataError for a window of a single row.
     """
     t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
-    width = 2 * round(repair.window / 2 / float(np.median(np.diff(t)))) + 1
+    step = float(np.median(np.diff(t)))
+    width = 2 * round(repair.window / 2 / step) + 1
+    if width == 1:
+        message = f"its window, {repair.window:g} s, holds one row, which is its own median"
+        raise DataError(f"{message}: rows are {step:.3g} s apart, give {2 * step:.3g} s or more", path="repair.despike")
     stretch = np.cumsum((rows["flags"].to_numpy() >> FLAGS.index(BREAK)) & 1)
     healed = {}
     for name in repair.columns:
@@ -285,13 +289,16 @@ def apply_repairs(
 ) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
     """Apply repairs in order and flag what they touch; a record {kind, column, count, note} for each, also if off.
 
-    Raises DataError, with the file, for a repair that leaves no row.
+    Raises DataError, with the file, for a repair that leaves no row or that can mend nothing.
     """
     off, records = set(without), []
     for repair in repairs:
         count, note = 0, "switched off"
         if repair.enabled and repair.kind not in off:
-            outcome = REPAIRS[repair.kind][1](rows, repair)
+            try:
+                outcome = REPAIRS[repair.kind][1](rows, repair)
+            except DataError as error:
+                raise DataError(error.message, file=file, path=error.path) from None
             if outcome.rows.empty:
                 message = f"no row is left ({outcome.note}): change it, or leave it out with --without {repair.kind}"
                 raise DataError(message, file=file, path=f"repair.{repair.kind}")

@@ -225,3 +225,12 @@ def test_a_spike_at_an_end_is_replaced_and_nothing_else_is(seed: int) -> None:
     outcome = despike(rows, repair)
     assert np.flatnonzero(outcome.touched).tolist() == wild.tolist()
     assert np.abs(outcome.rows["north"] - north).max() < 10
+
+
+def test_a_window_of_a_single_row_is_refused(plain_mapping: Callable[..., Path], tmp_path: Path) -> None:
+    """A row is its own median: the repair healed nothing, and the log of the import said that it had been done."""
+    repair = '\n[[repair]]\nkind = "despike"\ncolumns = ["north"]\nwindow = 0.4\nthreshold = 10\nreason = "a test"\n'
+    log = as_log(spiked(MOTION), tmp_path / "log.csv")
+    with pytest.raises(DataError, match=r"holds one row, .* rows are 0\.5 s apart, give 1 s or more") as caught:
+        import_log(read_mapping(plain_mapping(repair)), log)
+    assert (caught.value.file, caught.value.path) == (str(log), "repair.despike")
