@@ -49,6 +49,15 @@ def test_spectrum_without_a_peak_factor_is_that_of_pierson_and_moskowitz() -> No
     np.testing.assert_allclose(jonswap(omega, sea), expected, rtol=1e-3)
 
 
+@pytest.mark.parametrize("gamma", [2.0, 3.3, 7.0])
+def test_the_peak_is_enhanced_over_a_width_of_7_percent_below_and_9_above(gamma: float) -> None:
+    """By gamma at the peak, and by gamma^exp(-1/2) a width beside it (Hasselmann et al. 1973)."""
+    peak = 2 * np.pi / 5.0
+    omega = peak * np.array([1.0, 1 - 0.07, 1 + 0.09])
+    ratio = jonswap(omega, Sea(H_s=1.0, T_p=5.0, gamma=gamma)) / jonswap(omega, Sea(H_s=1.0, T_p=5.0, gamma=1.0))
+    np.testing.assert_allclose(ratio[1:] / ratio[0], gamma ** (np.exp(-0.5) - 1), rtol=1e-12)
+
+
 @pytest.mark.parametrize("components", [1, 20, 60])
 def test_components_hold_the_energy_of_the_range(components: int) -> None:
     sea = Sea(H_s=1.5, T_p=5.0, components=components)
