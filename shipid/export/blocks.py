@@ -32,7 +32,7 @@ _OPERATIONS = {
     **{operation: f"M({name})({{0}}, {{1}})" for operation, name in _TWO.items()},
     ca.OP_SIGN: "(real)(({0} > 0) - ({0} < 0))",
     ca.OP_INV: "(1 / {0})",
-    ca.OP_IF_ELSE_ZERO: "({0} ? {1} : 0)",
+    ca.OP_IF_ELSE_ZERO: "({0} != 0 ? {1} : 0)",
 }
 
 

@@ -618,9 +618,7 @@ double {name}_factor(double miss, double level, int kind)
         values = []
         for key in row:
             low, high = self.model.limits.get(key, (0.0, 0.0))
-            values.append(
-                repr((low + high) / 2 if np.isfinite(low + high) else 0.0) + ("f" if self.precision.single else "")
-            )
+            values.append(self.precision.number((low + high) / 2 if np.isfinite(low + high) else 0.0))
         rows = names.num_past + 1
         predict, around, shown = "predict(&ship, 0, path)", "", ""
         if self.bands is not None:
@@ -649,7 +647,7 @@ int main(void)
     for (i = 0; i < {rows}; ++i) {{
         status = {name}_record(&ship, {self.model.physics.step!r} * i, row);
         if (status) {{ printf("row %d is refused: result %d\\n", i, status); return status; }} /* a path would be that of the row before */
-        row[0] += {self.model.physics.step!r}{"f" if self.precision.single else ""} * row[{row.index("u")}]; /* a straight run to the north */
+        row[0] += {self.precision.number(self.model.physics.step)} * row[{row.index("u")}]; /* a straight run to the north */
     }}
     status = {name}_{predict};
     printf("status %d: %s\\n", status, status & {name}_OUTSIDE ? "outside of what training has seen" : "inside");

@@ -211,9 +211,8 @@ int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_re
         orders = []
         for command in groups["commands"]:
             row = SIGNALS[signal_of(command)]
-            orders.append(
-                repr(float(np.deg2rad(10) if row.turns else row.usual[0] + 0.5 * (row.usual[1] - row.usual[0])))
-            )
+            usual = np.deg2rad(10) if row.turns else row.usual[0] + 0.5 * (row.usual[1] - row.usual[0])
+            orders.append(self.precision.number(usual))
         speed = groups["carry"].index("u")
         return f"""/* A minute of {self.name} with the helm over. cc -std=c99 main.c {name}.c -lm */
 #include <stdio.h>
@@ -230,7 +229,7 @@ int main(void)
     carry[{speed}] = 1; /* {groups["carry"][speed]} */
     {name}_begin(carry, commands);
     for (i = 0; i < 600 && status == 0; ++i)
-        status = {name}_step(carry, commands, environment, loads, {name}_defaults, 0.1{"f" if self.precision.single else ""});
+        status = {name}_step(carry, commands, environment, loads, {name}_defaults, {self.precision.number(0.1)});
     for (i = 0; i < {name}_NUM_CARRY; ++i)
         printf("%s %.6g %s\\n", {name}_carry_names[i], (double)carry[i], {name}_carry_units[i]);
     return status;

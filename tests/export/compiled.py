@@ -14,7 +14,7 @@ from shipid.data.windows import Instants
 from shipid.export.c import Files
 from shipid.export.model import Model
 
-FLAGS = ("-std=c99", "-include", "stdbool.h", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
+FLAGS = ("-std=c99", "-include", "stdbool.h", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import re
+import shutil
 import subprocess
 from dataclasses import replace
 
@@ -31,6 +32,7 @@ from shipid.predictor import Predictor
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import pace, variety
+from tests.drawn_ships import drawn_ship
 from tests.export.compiled import SANITIZERS, compile_, compiler, library, paths, pointer, run_example, write
 from tests.export.strange import KINDS, bands_of, drawn, network_of
 
@@ -410,6 +412,20 @@ def test_fast_math_is_refused_at_compilation(tmp_path):
         )
         assert result.returncode != 0
         assert "compile without -ffast-math" in result.stderr
+
+
+@pytest.mark.parametrize("program", ["gcc", "clang"])
+@pytest.mark.parametrize("single", [False, True])
+def test_no_compiler_warns_of_a_conversion(program, single, tmp_path):
+    """Before, clang saw numbers as truth values, and both saw numbers of the example that single precision rounds."""
+    if shutil.which(program) is None:
+        pytest.skip(f"no {program}")
+    precision = Precision(single)
+    every = [vessel_files(drawn_ship(100, 4), "odd", "rk4", precision)]
+    every += [predictor_files(model(drawn(kind, 100).predictor), "odd", precision) for kind in ("forest", "recurrent")]
+    for files in every:
+        for name in ("odd.c", "main.c"):
+            compile_([program], write(files, tmp_path), "-O0", "-Wsign-conversion", "-c", "-o", "odd.o", name)
 
 
 def test_the_example_ends_with_the_result_of_a_row_that_is_refused(tmp_path):
