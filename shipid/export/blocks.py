@@ -271,7 +271,9 @@ class Nearest(Block):
         """The smallest of all distances."""
         z = MX.sym("z", self.centres.shape[1])
         apart = ca.DM(self.centres.T) - ca.repmat(z, 1, len(self.centres))
-        return ca.Function(self.name, [z], [ca.sqrt(ca.mmin(ca.sum1(apart**2)))], ["z"], ["out"])
+        least = ca.mmin(ca.sum1(apart**2))
+        distance = ca.if_else(least == 0, 0, ca.sqrt(ca.if_else(least == 0, 1, least)))  # 0 has a slope, too
+        return ca.Function(self.name, [z], [distance], ["z"], ["out"])
 
     def numbers(self) -> int:
         """Coordinates of the centres."""

@@ -19,6 +19,7 @@ from shipid.observer import COLUMNS, LOW, bank, moves_start
 from shipid.physics.signals import plain_inputs
 
 SX_of = Mapping[str, SX]
+TRACE = 1e-12  # m/s: of a wind that is exactly 0, so that its direction is defined
 
 
 @dataclass(frozen=True)
@@ -201,7 +202,7 @@ class Known:
         if "V_w" in weather:
             ahead = weather["V_w"] * ca.cos(weather["beta_w"]) - north
             across = weather["V_w"] * ca.sin(weather["beta_w"]) - east
-            weather |= {"V_w": ca.sqrt(ahead**2 + across**2), "beta_w": ca.atan2(across, ahead)}
+            weather |= dict(zip(("V_w", "beta_w"), _polar(ahead, across), strict=True))
         weather |= {name: SX(0) for name in ("V_c", "beta_c") if name in weather}
         environment = self.values["now"][0:0]
         if weather:
@@ -289,6 +290,12 @@ class Known:
         trajectory : steps of the horizon at which the physics is seen (calibrator).
         """
         return Table(self, inputs, tuple(trajectory))
+
+
+def _polar(x: SX, y: SX) -> tuple[SX, SX]:
+    """Length and direction of a vector, with finite derivatives where it has no length: a trace of it is ahead."""
+    x += ca.if_else(x**2 + y**2 == 0, TRACE, 0)
+    return ca.sqrt(x**2 + y**2), ca.atan2(y, x)
 
 
 def past_records(known: Known, first: int, steps: int) -> Value:

@@ -78,6 +78,41 @@ def test_a_path_that_diverged_is_none(step, tmp_path):
     assert np.isfinite(expected[:, 1]).all()
 
 
+def test_an_observer_without_wind_and_current_has_derivatives(tmp_path):
+    """Before, the Hessian by the orders was no number, for the direction of no wind is none; IPOPT gave up."""
+    predictor = Predictor(
+        Physics(load_vessel("gunnerus-28.9"), 5, 1.0, observer=Observer(current=0.0)), "alone", Unchanged({}), {}, {},
+        "known",
+    )  # fmt: skip
+    file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
+    function, names = ca.Function.load(str(file)), model(predictor).layout
+    given = {key: np.zeros(size) for key, size in names.sizes.items()}
+    given |= {"parameters": model(predictor).parameters}
+    given["now"][names.now.index("u")] = given["estimates"][names.estimates.index("observer.u")] = 4.0
+    orders = ca.MX.sym("orders", names.sizes["planned"])
+    path = function(**{**given, "planned": orders})["path"]
+    hessian = ca.Function("hessian", [orders], [ca.hessian(ca.sumsqr(path), orders)[0]])
+    assert np.isfinite(hessian(np.ones(orders.numel())).full()).all()
+
+    def ahead(wind):
+        now = given["now"].copy()
+        now[names.now.index("V_w")] = wind
+        return function(**{**given, "now": now})["path"].full()[0, -1]
+
+    slopes = function.jacobian()(**given, out_path=np.zeros((2, 5)))["jac_path_now"].full()
+    assert slopes[8, names.now.index("V_w")] == pytest.approx((ahead(1e-4) - ahead(-1e-4)) / 2e-4, rel=1e-4)
+    assert np.isfinite(slopes).all()
+
+
+def test_a_point_of_the_training_has_derivatives():
+    """Before, those of `modules` by the state at it, which has no distance to the nearest one, were no numbers."""
+    strange = drawn("modules", 301, count=1)
+    exported = model(strange.predictor)
+    given = {key: values[0] for key, values in exported.inputs(strange.instants).items()}
+    slopes = exported.graph.function.jacobian()(**given, out_out=np.zeros(exported.graph.size))
+    assert np.isfinite(slopes["jac_out_now"].full()).all()
+
+
 def test_a_forest_is_refused_in_one_line(tmp_path):
     strange = drawn("forest", 1)
     with pytest.raises(ShipidError, match="export it to c or fmu"):
