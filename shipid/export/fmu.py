@@ -44,7 +44,10 @@ LARGEST_STEP = 0.1  # s: inside a communication step, of a ship of 30 m and more
 
 @dataclass(frozen=True)
 class Variable:
-    """A real variable of an FMU. start : None where it is calculated."""
+    """A real variable of an FMU.
+
+    start : None where it is calculated. guess : whether it is calculated, too, unless the importer sets a start value.
+    """
 
     name: str
     causality: str
@@ -52,6 +55,13 @@ class Variable:
     unit: str
     description: str
     start: float | None
+    guess: bool = False
+
+    @property
+    def initial(self) -> str:
+        """How it begins, in the words of FMI; nothing for inputs."""
+        known = "calculated" if self.start is None else "approx" if self.guess else "exact"
+        return "" if self.causality == "input" else known
 
 
 @dataclass(frozen=True)
@@ -78,12 +88,12 @@ def vessel_unit(vessel: Vessel, name: str, method: Method) -> Packed:
     parts = VesselParts(vessel, name, method, Precision())
     groups = parts.groups()
     largest = round(LARGEST_STEP * min(1.0, ((vessel.length or 30.0) / 30.0) ** 0.5), 4)
-    variables = [
-        Variable(key, "output", "continuous",
-                 parts.unit("carry", key), described(key) if not key.startswith("actual.")
-                 else f"reached: {described(key.removeprefix('actual.'))}", 0.0)
-        for key in groups["carry"]
-    ]  # fmt: skip
+    variables = []
+    for key in groups["carry"]:
+        order, lags = key.removeprefix("actual."), key.startswith("actual.")
+        text = described(order)
+        text = f"reached: {text}; begins at its order unless a start value is set" if lags else text
+        variables.append(Variable(key, "output", "continuous", parts.unit("carry", key), text, 0.0, lags))
     variables += [
         Variable(key, "input", "continuous", parts.unit("commands", key), f"order: {described(key)}", neutral(key))
         for key in groups["commands"]
@@ -206,30 +216,33 @@ def description(unit: Packed, guid: str) -> str:
     units = sorted({variable.unit for variable in unit.variables} - {"-", ""})
     rows = []
     for reference, variable in enumerate(unit.variables):
-        initial = "" if variable.causality == "input" else "exact" if variable.start is not None else "calculated"
         head = f'    <ScalarVariable name={quoteattr(variable.name)} valueReference="{reference}"'
         head += f' causality="{variable.causality}" variability="{variable.variability}"'
-        head += f' initial="{initial}"' if initial else ""
+        head += f' initial="{variable.initial}"' if variable.initial else ""
         real = "" if variable.unit in ("-", "") else f" unit={quoteattr(variable.unit)}"
         real += "" if variable.start is None else f' start="{float(variable.start)!r}"'
         rows.append(
             f"{head} description={quoteattr(variable.description)}>\n      <Real{real}/>\n    </ScalarVariable>"
         )
+    alarm = unit.step is not None  # a predictor: what is computed from the inputs is so at the start, too
+    known = "calculated" if alarm else "exact"
     rows.append(
-        '    <ScalarVariable name="status" valueReference="0" causality="output" variability="discrete" initial="exact"'
+        f'    <ScalarVariable name="status" valueReference="0" causality="output" variability="discrete" initial="{known}"'
         ' description="0, or a sum of the results that the header in sources lists">\n'
-        '      <Integer start="0"/>\n    </ScalarVariable>'
+        + ("      <Integer/>" if alarm else '      <Integer start="0"/>')
+        + "\n    </ScalarVariable>"
     )
-    alarm = unit.step is not None
     if alarm:
         rows.append(
             '    <ScalarVariable name="alarm" valueReference="0" causality="output" variability="discrete"'
-            ' initial="exact" description="the instant lies outside of what training has seen">\n'
-            '      <Boolean start="false"/>\n    </ScalarVariable>'
+            ' initial="calculated" description="the instant lies outside of what training has seen">\n'
+            "      <Boolean/>\n    </ScalarVariable>"
         )
     outputs = [i + 1 for i, variable in enumerate(unit.variables) if variable.causality == "output"]
-    outputs += [len(unit.variables) + 1 + k for k in range(1 + alarm)]
-    unknown = [i + 1 for i, v in enumerate(unit.variables) if v.causality == "output" and v.start is None]
+    unknown = [i for i in outputs if unit.variables[i - 1].initial != "exact"]
+    others = [len(unit.variables) + 1 + k for k in range(1 + alarm)]
+    outputs += others
+    unknown += others if alarm else []
     structure = "    <Outputs>\n" + "".join(f'      <Unknown index="{i}"/>\n' for i in outputs) + "    </Outputs>\n"
     if unknown:
         listed = "".join(f'      <Unknown index="{i}"/>\n' for i in unknown)
@@ -615,6 +628,7 @@ FMI2_STATUS FMI2(fmi2SetupExperiment)(fmi2Component c, fmi2Boolean known, fmi2Re
     (void)tolerance;
     (void)stops;
     (void)stop;
+    if (self->phase != INSTANTIATED) return refuse(self, fmi2Error, "the start time is set before the initialisation");
     if (!isfinite(start)) return refuse(self, fmi2Error, "the start time is not finite");
     self->time = start;
     return fmi2OK;
@@ -650,7 +664,9 @@ FMI2_STATUS FMI2(fmi2ExitInitializationMode)(fmi2Component c)
 FMI2_STATUS FMI2(fmi2Terminate)(fmi2Component c);
 FMI2_STATUS FMI2(fmi2Terminate)(fmi2Component c)
 {
-    ((Instance *)c)->phase = TERMINATED;
+    Instance *self = (Instance *)c;
+    if (self->phase != STEPPING) return refuse(self, fmi2Error, "there is nothing to end");
+    self->phase = TERMINATED;
     return fmi2OK;
 }
 
@@ -682,6 +698,7 @@ FMI2_STATUS FMI2(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr[], si
 {
     Instance *self = (Instance *)c;
     size_t i;
+    if (self->phase == TERMINATED) return refuse(self, fmi2Error, "the end has come: nothing can be set");
     for (i = 0; i < n; ++i) {
         if (vr[i] >= NUM_REALS) return refuse(self, fmi2Error, "there is no real variable %u", vr[i]);
         if (kinds[vr[i]] == 'o' || (kinds[vr[i]] == 'e' && self->phase == STEPPING))
@@ -754,8 +771,9 @@ FMI2_STATUS FMI2(fmi2SetString)(fmi2Component c, const fmi2ValueReference vr[], 
     return n ? refuse((Instance *)c, fmi2Error, "there are no strings") : fmi2OK;
 }
 
-/* A state is what changes: the model, the phase, the time, and which variables the importer has set. */
+/* A state is what changes: the model, the phase, the time, and which variables the importer has set; and of which FMU. */
 typedef struct {
+    char guid[sizeof guid];
     Model model;
     Phase phase;
     double time;
@@ -769,6 +787,7 @@ FMI2_STATUS FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state)
     Kept *kept = (Kept *)*state;
     if (!kept) kept = (Kept *)get_memory(&self->call, sizeof *kept);
     if (!kept) return refuse(self, fmi2Error, "there is no memory for a state");
+    memcpy(kept->guid, guid, sizeof guid);
     kept->model = self->model;
     kept->phase = self->phase;
     kept->time = self->time;
@@ -821,7 +840,8 @@ FMI2_STATUS FMI2(fmi2DeSerializeFMUstate)(fmi2Component c, const fmi2Byte bytes[
 FMI2_STATUS FMI2(fmi2DeSerializeFMUstate)(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
 {
     Instance *self = (Instance *)c;
-    if (size != sizeof(Kept)) return refuse(self, fmi2Error, "these bytes are no state of this FMU");
+    if (size != sizeof(Kept) || memcmp(bytes, guid, sizeof guid))
+        return refuse(self, fmi2Error, "these bytes are no state of this FMU");
     if (!*state) *state = get_memory(&self->call, sizeof(Kept));
     if (!*state) return refuse(self, fmi2Error, "there is no memory for a state");
     memcpy(*state, bytes, sizeof(Kept));

@@ -71,6 +71,77 @@ def test_the_description_names_every_variable(ship):
     assert root.get("guid") in source
 
 
+def test_what_is_calculated_at_the_start_is_not_said_to_be_known(ship, aboard):
+    """Before, a tool that sets every start value, as FMI allows, began with other actuators than one that does not."""
+    for file, wanted in ((ship, {"actual.port.n": "approx", "u": "exact", "status": "exact"}),
+                         (aboard, {"x[1]": "calculated", "status": "calculated", "alarm": "calculated"})):  # fmt: skip
+        with zipfile.ZipFile(file) as archive:
+            root = ET.fromstring(archive.read("modelDescription.xml"))
+        every = list(root.iter("ScalarVariable"))
+        initial = {entry.get("name"): entry.get("initial") for entry in every}
+        assert {name: initial[name] for name in wanted} == wanted
+        unknown = [every[int(one.get("index")) - 1] for one in root.find("ModelStructure/InitialUnknowns")]
+        outputs = [entry for entry in every if entry.get("causality") == "output"]
+        assert unknown == [entry for entry in outputs if entry.get("initial") != "exact"]
+        for entry in every:
+            assert ("start" in entry[0].attrib) == (entry.get("initial") != "calculated")
+
+
+CALLS_OUT_OF_ORDER = """
+#include "ship.c"
+#define NO(call) if ((call) != fmi2Error) return __LINE__
+#define YES(call) if ((call) != fmi2OK) return __LINE__
+int main(void)
+{
+    const fmi2ValueReference last = NUM_REALS - 1;
+    const double step = 0.2;
+    fmi2CallbackFunctions call = {0, 0, 0, 0, 0};
+    fmi2Component c = fmi2Instantiate("a", fmi2CoSimulation, guid, "", &call, 0, 0);
+    fmi2FMUstate state = 0, other = 0;
+    fmi2Byte bytes[sizeof(Kept)];
+    if (!c) return __LINE__;
+    NO(fmi2DoStep(c, 0, 0.1, 0));
+    NO(fmi2ExitInitializationMode(c));
+    NO(fmi2Terminate(c));
+    YES(fmi2SetupExperiment(c, 0, 0, 3, 0, 0));
+    YES(fmi2EnterInitializationMode(c));
+    NO(fmi2SetupExperiment(c, 0, 0, 4, 0, 0));
+    NO(fmi2EnterInitializationMode(c));
+    NO(fmi2Terminate(c));
+    YES(fmi2ExitInitializationMode(c));
+    NO(fmi2SetupExperiment(c, 0, 0, 4, 0, 0));
+    YES(fmi2SetReal(c, &last, 1, &step));
+    YES(fmi2DoStep(c, 3, 0.1, 0));
+    YES(fmi2GetFMUstate(c, &state));
+    YES(fmi2SerializeFMUstate(c, state, bytes, sizeof bytes));
+    YES(fmi2DeSerializeFMUstate(c, bytes, sizeof bytes, &other));
+    YES(fmi2FreeFMUstate(c, &other));
+    ++bytes[3]; /* as of another FMU */
+    NO(fmi2DeSerializeFMUstate(c, bytes, sizeof bytes, &other));
+    NO(fmi2DeSerializeFMUstate(c, bytes, sizeof bytes - 1, &other));
+    if (other) return __LINE__;
+    YES(fmi2FreeFMUstate(c, &state));
+    YES(fmi2Terminate(c));
+    NO(fmi2SetReal(c, &last, 1, &step));
+    NO(fmi2Terminate(c));
+    YES(fmi2Reset(c));
+    YES(fmi2EnterInitializationMode(c));
+    fmi2FreeInstance(c);
+    return 0;
+}
+"""
+
+
+def test_calls_out_of_order_and_states_of_others_are_refused(ship, tmp_path):
+    """Before, the bytes of another ship's state, of the same size, made this one continue with her numbers."""
+    with zipfile.ZipFile(ship) as archive:
+        archive.extractall(tmp_path)
+    (tmp_path / "sources" / "main.c").write_text(CALLS_OUT_OF_ORDER)
+    compile_([compiler()], tmp_path / "sources", *SANITIZERS, "-o", "main", "main.c")
+    result = subprocess.run([tmp_path / "sources" / "main"], capture_output=True, text=True)
+    assert (result.returncode, result.stderr[:1000]) == (0, "")
+
+
 def test_the_sources_compile_without_a_warning(aboard, tmp_path):
     with zipfile.ZipFile(aboard) as archive:
         archive.extractall(tmp_path)
