@@ -34,6 +34,7 @@ from shipid.vessel.load import Vessel
 
 PARTS_OF_STEP = 8  # of three rows within such a part of a step a recorder keeps the first and the last
 GAP = 3.0  # steps, and shortest intervals of rows: after a longer pause a recorder begins anew
+FORGOTTEN = 1.1  # times: by so much a recorder lets the shortest interval grow with each row
 
 
 def predictor_files(model: Model, name: str, precision: Precision) -> Files:
@@ -195,7 +196,7 @@ enum {{
 /* What is kept of the past. Make one, call {name}_init, and change `parameters` where the ship differs. */
 typedef struct {{
     {name}_real parameters[{max(1, len(names.parameters))}];
-    double t[{self.capacity}], begun, least; /* s; of the first row after a gap; shortest interval of rows */
+    double t[{self.capacity}], begun, least; /* s; of the first row after a gap; shortest interval of late */
     {name}_real rows[{self.capacity}][{len(self.row) + 4}];
     int first, count;
     {name}_real reached[{max(1, len(names.reached))}];
@@ -206,11 +207,11 @@ void {name}_init({name} *self);
 
 /* Keep a row that was measured at t [s], entries as in {name}_row_names. Rows come in order; after a pause of more than
  * {GAP * physics.step:g} s and {
-            GAP:g} times the shortest interval so far the past begins anew. The heading may wrap, and so may angles of
- * thrusters and rudders: 350 deg is -10 deg. Between stops that are less than a turn apart the angle within them is
- * taken, so a jump is real. A unit that turns all round goes on by the shortest way. The first row is taken by the turn
- * that training had. Rows may come as often as they like: of three within {physics.step / PARTS_OF_STEP:g} s the past
- * keeps the first and the last. */
+            GAP:g} times the shortest interval of late the past begins anew; the shortest grows by a tenth with each row, so
+ * that it is forgotten. The heading may wrap, and so may angles of thrusters and rudders: 350 deg is -10 deg. Between
+ * stops that are less than a turn apart the angle within them is taken, so a jump is real. A unit that turns all round
+ * goes on by the shortest way. The first row is taken by the turn that training had. Rows may come as often as they
+ * like: of three within {physics.step / PARTS_OF_STEP:g} s the past keeps the first and the last. */
 int {name}_record({name} *self, double t, const {name}_real *row);
 
 /* Path from the newest row: {name}_HORIZON pairs x, y. planned: {name}_HORIZON rows of commands in force, each the
@@ -461,6 +462,7 @@ double {name}_factor(double miss, double level, int kind)
     if (self->count) {{
         const double apart = t - self->t[newest];
         if (apart > {GAP * step!r} && !(apart <= {GAP!r} * self->least)) self->count = 0;
+        if (self->least > 0) self->least *= {FORGOTTEN!r};
         if (!(self->least > 0 && self->least < apart)) self->least = apart;
     }}
     memcpy(kept, row, {n} * sizeof *kept);

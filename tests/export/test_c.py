@@ -315,6 +315,22 @@ def test_rows_far_apart_for_the_steps_are_no_pauses(pause, kept_on, tmp_path):
     np.testing.assert_allclose(path, expected[:, 0], rtol=0, atol=1e-11)
 
 
+def test_two_rows_that_came_together_once_are_forgotten(tmp_path):
+    """Before, rows four steps apart each began anew from then on, with their actuators at their orders."""
+    vessel = variety()["actuators"]
+    exported = model(Predictor(Physics(vessel, 20, 0.25), "alone", Unchanged({}), {"u": (-9.0, 9.0)}))
+    log = log_of(vessel, 16, np.random.default_rng(5), 1.0).frame.iloc[:14]
+    t = np.array([0.0, 1.0, 2.0, 3.0, *(3.25 + np.arange(10.0))])
+    first = 8  # 3 x 0.25 x 1.1^3 s are less than 1 s, 3 x 0.25 x 1.1^4 s more
+    orders = {name: log[name].to_numpy()[first:] for name in dynamics(vessel).commands}
+    along = memory_along(vessel, orders, t[first:])
+    columns = {name: log[name].to_numpy()[-1:] for name in log if name not in ("run", "flags")}
+    expected = exported.predictor.predict(Instants(columns, hidden={k: values[-1:] for k, values in along.items()}))
+    path = path_after(exported, t, log, tmp_path)
+    np.testing.assert_allclose(path, expected[:, 0], rtol=0, atol=1e-11)
+    assert np.abs(path - exported.predictor.predict(Instants(columns))[:, 0]).max() > 1e-3
+
+
 def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
     """As in Python: the observer is that of the physics, to which the method adds its force afterwards."""
     vessel = variety()["gunnerus-28.9"]
