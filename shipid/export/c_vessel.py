@@ -56,7 +56,7 @@ class VesselParts:
         if group == "loads":
             return "N" if name in "XYZ" else "N m"
         row = row_of(column_of(name))
-        return "-" if row is None else row.unit
+        return _kept_unit(name) if row is None else row.unit
 
     def _tables(self) -> tuple[str, str]:
         declared, defined = [], []
@@ -235,3 +235,9 @@ int main(void)
     return status;
 }}
 """
+
+
+def _kept_unit(name: str) -> str:
+    """Unit of a state that a term keeps: the time of waves, or what the velocity that drives a mode adds up to."""
+    state = signal_of(name)
+    return "s" if state == "t" else SIGNALS[state[0]].unit.removesuffix("/s")

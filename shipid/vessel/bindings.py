@@ -9,6 +9,7 @@ from shipid.document import Document
 from shipid.physics import ACTUATORS, TERMS
 from shipid.physics.grammar import Grammar
 from shipid.physics.inertia import added_mass, rigid_body
+from shipid.physics.signals import SIGNALS
 from shipid.vessel.schema import SHARED, Parameter, actuators, parameters, term_blocks, term_parameters
 
 Binding = dict[str, str | list[str] | dict[str, str] | float]
@@ -57,10 +58,12 @@ def bindings(document: Document) -> dict[str, Binding]:
 def units(document: Document) -> dict[str, str]:
     """Dotted path -> unit of every parameter, in the order of use."""
     known = {"inertia": parameters(rigid_body), "added_mass": parameters(added_mass)}
+    moved: dict[str, str] = {}
     for path, key, block in term_blocks(document):
         known[path] = term_parameters(TERMS[key])
         for command, actuator in actuators(block):
             known[f"{path}.actuator.{command}"] = parameters(ACTUATORS[actuator["kind"]].advance)
+            moved[f"{path}.actuator.{command}"] = SIGNALS[command].unit
     rows: list[tuple[str, str]] = []
     for where, binding in bindings(document).items():
         declared = {parameter.name: parameter for parameter in known[where]}
@@ -70,10 +73,19 @@ def units(document: Document) -> dict[str, str]:
             assert parameter is not None
             unit = parameter.unit
             if isinstance(target, str):
-                rows.append((target, unit.unit(keyword) if isinstance(unit, Grammar) else unit))
+                rows.append((target, unit.unit(keyword) if isinstance(unit, Grammar) else _of(unit, moved.get(where))))
             elif isinstance(target, list):
                 rows += [(path, str(unit)) for path in target]
             elif isinstance(target, dict):
                 assert isinstance(unit, Grammar)
                 rows += [(path, unit.unit(key)) for key, path in target.items()]
     return dict(rows)
+
+
+def _of(unit: str, moved: str | None) -> str:
+    """The unit of a number; of one of an actuator that is `of the command`, with the unit of what is moved."""
+    if moved is None or not unit.endswith("of the command"):
+        return unit
+    if unit == "of the command":
+        return moved
+    return "1/s" if moved == "-" else f"{moved}^2" if moved.endswith("/s") else f"{moved}/s"

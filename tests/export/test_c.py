@@ -20,7 +20,7 @@ from shipid.engine.rollout import rollout
 from shipid.export.blocks import Precision
 from shipid.export.c import Files, c_name, strings
 from shipid.export.c_predictor import predictor_files
-from shipid.export.c_vessel import vessel_files
+from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.casadi import predictor_function
 from shipid.export.equations import Equations
 from shipid.export.model import model
@@ -547,6 +547,16 @@ def test_the_header_in_single_precision_warns_of_coordinates_of_a_map():
             vessel_files(load_vessel("mariner"), "m", "rk4", precision),
         ):
             assert ("from a point nearby" in files.texts["m.h"]) == single
+
+
+def test_states_that_terms_keep_have_units():
+    """Before, the header said that the states of radiation and the time of the waves have none."""
+    parts = VesselParts(load_vessel("gunnerus-28.9-6dof"), "six", "rk4", Precision())
+    units = {name: parts.unit("carry", name) for name in parts.groups()["carry"]}
+    assert "-" not in units.values()
+    kept = ("heave_pitch.w0c", "heave_pitch.q2s", "roll.p1c")
+    assert [units[f"radiation.{name}"] for name in kept] == ["m", "rad", "rad"]
+    assert [units[f"waves.first_order.{name}"] for name in ("t", "east")] == ["s", "m"]
 
 
 def test_names_are_those_of_c():
