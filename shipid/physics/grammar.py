@@ -216,6 +216,7 @@ _MOTIONS, _OF_HULL = monomial_names((HEEL, *MOTIONS)), monomial_names(DEVIATIONS
 _RUDDER_FLOW = rf"(?=(?:[^c]*c){{2}}[^c]*$){monomial_names(('beta', 'delta', 'c'))}"
 DERIVATIVES = Grammar(derivative, derivative_unit, _MOTIONS)
 PRIME_DERIVATIVES = Grammar(derivative, lambda _: "prime", _MOTIONS)
+BIS_DERIVATIVES = Grammar(derivative, lambda _: "bis", _MOTIONS)
 HULL_DEVIATIONS = Grammar(hull_deviation, lambda _: "prime", _OF_HULL)
 RUDDER_DEVIATIONS = Grammar(rudder_deviation, lambda _: "prime", rf"(?=.*delta){monomial_names(DEVIATIONS)}")
 ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit, ACCELERATIONS)

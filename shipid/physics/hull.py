@@ -12,6 +12,7 @@ from casadi import SX
 from shipid.physics.frames import given, vector
 from shipid.physics.grammar import (
     AXES,
+    BIS_DERIVATIVES,
     DERIVATIVES,
     HEEL,
     HULL_DEVIATIONS,
@@ -80,7 +81,7 @@ def bis_derivatives(
     L_pp: Annotated[SX, "m", POSITIVE],
     rho: Annotated[SX, "kg m^-3", POSITIVE],
     g: Annotated[SX, "m s^-2", POSITIVE],
-    **values: Annotated[SX, PRIME_DERIVATIVES],
+    **values: Annotated[SX, BIS_DERIVATIVES],
 ) -> SX:
     """Wrench (6) of derivatives in the bis system: value x rho g nabla x monomial (Norrbin 1970; Fossen 2021, app. D).
 

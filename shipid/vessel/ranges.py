@@ -77,7 +77,7 @@ _BY_UNIT: dict[str, Range] = {
     "deg": _at_most(lambda _: 360.0, "an angle of at most 360 deg"),
     "m s^-1": _at_most(lambda _: 100.0, "a speed of at most 100 m/s"),
     "-": _at_most(lambda _: 100.0, "without unit, at most 100"),
-    "prime": _at_most(lambda _: 100.0, "without unit, at most 100 (is it written in 1e-5?)"),
+    **dict.fromkeys(("prime", "bis"), _at_most(lambda _: 100.0, "without unit, at most 100 (is it written in 1e-5?)")),
 }
 _ADDED: dict[str, Range] = {
     "kg": _at_most(lambda s: 20 * s.m, "at most 20 times the mass"),

@@ -13,7 +13,7 @@ from shipid.errors import DocumentError
 from shipid.vessel.bindings import bindings
 from shipid.vessel.load import Vessel, check_vessel, load_vessel, sources
 
-UNIT = re.compile(r"-|prime|deg|rad(?:/s)?|rev/s(?:\^2)?|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*")
+UNIT = re.compile(r"-|prime|bis|deg|rad(?:/s)?|rev/s(?:\^2)?|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*")
 
 
 def test_every_parameter_has_a_unit_and_a_value(vessel: Vessel) -> None:
@@ -51,6 +51,8 @@ def test_units_follow_from_names() -> None:
     assert units["thruster.port.D_p"] == "m"
     assert units["wind.gamma_deg.3"] == "deg"
     assert units["constants.rho"] == "kg m^-3"
+    supply = load_vessel("supply-vessel")
+    assert supply.units["hull.bis_derivatives.Y_v"] == "bis"  # it was called prime, which is another system
 
 
 def test_a_number_of_the_block_goes_before_the_shared_one() -> None:
