@@ -143,7 +143,10 @@ class PredictorParts:
                     *(
                         []
                         if physics.observer is None
-                        else ["An observer filters the motion and estimates slow forces and current."]
+                        else [
+                            "An observer filters the motion and estimates slow forces and current. It takes the noise of its",
+                            "settings: std_u, std_v, std_r of a log, which widen it in Python, have no entry here.",
+                        ]
                     ),
                     "",
                     "SI units, radians, revolutions per second; directions of wind and current are towards. Path: x ahead and y to",

@@ -549,6 +549,14 @@ def test_the_header_in_single_precision_warns_of_coordinates_of_a_map():
             assert ("from a point nearby" in files.texts["m.h"]) == single
 
 
+@pytest.mark.parametrize("observer", [None, Observer()])
+def test_the_header_says_that_deviations_of_a_log_are_no_entry(observer):
+    """Python widens the noise of the observer by them: the path of a ship of 28.9 m ended 0.4 m elsewhere."""
+    predictor = Predictor(Physics(load_vessel("mariner"), 6, 5.0, observer=observer), "alone", Unchanged({}), {})
+    header = predictor_files(model(predictor), "m", Precision()).texts["m.h"]
+    assert ("std_u, std_v, std_r of a log" in header) == (observer is not None)
+
+
 def test_states_that_terms_keep_have_units():
     """Before, the header said that the states of radiation and the time of the waves have none."""
     parts = VesselParts(load_vessel("gunnerus-28.9-6dof"), "six", "rk4", Precision())
