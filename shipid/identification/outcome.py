@@ -49,6 +49,7 @@ Array = NDArray[np.float64]
 BEFORE, AFTER = "before", "after"
 BETTER = 0.01  # of the limit of a profile: a point this much below the estimate is a better fit
 SIGNALS = ("u", "v", "r", "position")
+WORSE = 0.02  # of the error of free runs before the fit: what is more by less is not worse
 ACCURATE = 0.03  # of a measured thrust or torque: its proposed standard deviation
 EXACT = 1e-3  # of its deviation: what a signal counts with that the vessel repeats exactly
 TRIED: tuple[tuple[str, tuple[float, ...]], ...] = (("zigzag", (10, 10)), ("zigzag", (20, 20)), ("turning", (35,)))
@@ -687,10 +688,16 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
         diverged = [str(model) for model in every.index if not np.isfinite(every["u"][model])]
         if diverged:
             warnings.append(f"free runs of the {name} runs diverge {listed(diverged)} identification")
-        worse = [signal for signal in SIGNALS if float(every[signal][AFTER]) > float(every[signal][BEFORE])]
-        if worse and not diverged:
+        worse = [] if diverged else _worse(every)
+        if worse:
             warnings.append(f"free runs of the {name} runs{without} are worse than before in {listed(worse)}")
     return warnings
+
+
+def _worse(errors: pd.DataFrame) -> list[str]:
+    """Signals with more error after the fit than before, and by how much; errors : by model."""
+    ratios = {name: float(errors[name][AFTER]) / max(float(errors[name][BEFORE]), 1e-12) for name in SIGNALS}
+    return [f"{name} by {digits(100 * (ratio - 1), 2)} %" for name, ratio in ratios.items() if ratio > 1 + WORSE]
 
 
 def _rounded(value: float) -> float:

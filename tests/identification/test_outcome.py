@@ -468,6 +468,19 @@ def test_free_runs_that_are_worse_name_the_nuisances_that_they_leave_out() -> No
     assert said[0].startswith("free runs of the fit runs, which leave out lever_arm, are worse than before in ")
 
 
+@pytest.mark.parametrize(
+    ("v", "position", "worse"),
+    [(1.003, 0.5, []), (1.003, 1.04, ["position by 4 %"]), (1.234, 2.5, ["v by 23 %", "position by 150 %"])],
+)
+def test_free_runs_that_are_worse_say_by_how_much_and_a_little_more_is_not_worse(
+    v: float, position: float, worse: list[str]
+) -> None:
+    """Before, 0.3 % more error was worse, without a number."""
+    before = {"u": 0.2, "v": 0.1, "r": 0.002, "position": 8.0}
+    after = {**before, "v": v * before["v"], "position": position * before["position"]}
+    assert outcome._worse(pd.DataFrame([before, after], index=[BEFORE, AFTER])) == worse
+
+
 @pytest.mark.usefixtures("one_manoeuvre")
 def test_a_profile_of_a_factor_that_ends_at_a_bound_is_left_out_and_the_fit_stays() -> None:
     """Nobody knows before the fit which factor will end at a bound."""
