@@ -23,6 +23,7 @@ from shipid.engine.engines import REPEATED
 from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.files import write_new
 from shipid.identification import design
+from shipid.identification.antenna import antenna_fit
 from shipid.identification.bands import LONG, Measure, bands, check_level, refusal
 from shipid.identification.collinearity import digits, listed
 from shipid.identification.fit import Progress
@@ -291,7 +292,7 @@ def run_identification(
         warnings = (
             *shared,
             *solution.warnings,
-            *filter(None, (late_fit(solution, dataset, judged),)),
+            *filter(None, (antenna_fit(solution, dataset, judged) or late_fit(solution, dataset, judged),)),
             *unmeasured(vessel, dataset, fitted, settings),
             *unrecorded(dataset, fitted, settings),
             *_warnings(solution, judged, pairs, growth_in(dataset, fitted, pair[AFTER])),

@@ -1,0 +1,150 @@
+"""Logs of an antenna away from the origin of the vessel: where it looks to be, and what that does to the estimates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Dataset
+from shipid.document import short_names
+from shipid.identification.collinearity import digits, listed
+from shipid.identification.covariance import inverted
+from shipid.identification.fit import evaluate
+from shipid.identification.late_fit import OUTSIDE
+from shipid.identification.residuals import build
+from shipid.identification.settings import unknowns
+from shipid.identification.solve import Solution, identify
+from shipid.identification.statistics import LinearFit, Statistics, statistics
+from shipid.logs.repairs import LeverArm, move_origin
+from shipid.units import percent
+
+Array = NDArray[np.float64]
+AHEAD, ABEAM = ("antenna.x", "antenna.y")  # unknowns beside the factors, in lengths of the ship
+ARM = 0.1  # of the length: by which the log is moved for the derivatives
+REFITS = 2  # with the log moved from the antenna to the origin
+NEAREST, FARTHEST, WIDEST = 0.1, 0.6, 0.25  # of the length: from the origin; ahead or astern; to a side
+NEGLIGIBLE = 0.02  # of the length: a way that the sentence leaves out
+CERTAIN = 2.5  # half-widths of its 95 % interval: so far from the origin an antenna is not chance
+EXPLAINED = 0.2  # of the squares of the residuals: less has been a vessel that is wrong
+
+
+@dataclass(frozen=True)
+class Antenna:
+    """The point of the ship that the log looks to be of.
+
+    x, y : [m] ahead and to starboard of the origin. certain : the larger of both in half-widths of its 95 % interval.
+    explained : share of the squares of the residuals that it takes away. factors : (n,) estimates with it.
+    """
+
+    x: float
+    y: float
+    certain: float
+    explained: float
+    factors: Array
+
+    @property
+    def shown(self) -> bool:
+        """Whether it is more than chance, and more than a vessel that is a little wrong."""
+        return self.certain >= CERTAIN and self.explained >= EXPLAINED
+
+
+def antenna(solution: Solution, dataset: Dataset) -> Antenna | None:
+    """The point that the log looks to be of; None where it is estimated already, or cannot be computed.
+
+    What one step of Gauss-Newton shows is fitted again with the log moved to the origin: arms are not linear.
+    """
+    length = solution.vessel.length
+    if length is None or "lever_arm" in solution.settings.widths:
+        return None
+    seen, total = stepped(solution, dataset, length), float(solution.residuals @ solution.residuals)
+    for _ in range(REFITS):
+        if seen is None or not seen.shown:
+            return seen
+        moved = _to_origin(dataset, seen.x, seen.y)
+        again = identify(solution.vessel, moved, solution.runs, solution.settings, start=solution)
+        more = stepped(again, moved, length, (seen.x, seen.y)) if again.status == "ok" else None
+        explained = 1 - float(again.residuals @ again.residuals) / total
+        seen = None if more is None else replace(more, explained=explained, factors=again.factors)
+    return seen
+
+
+def stepped(
+    solution: Solution, dataset: Dataset, length: float, at: tuple[float, float] = (0.0, 0.0)
+) -> Antenna | None:
+    """The point after one step of Gauss-Newton with the factors; None where predictions diverge, or rows are too few.
+
+    At a point (x, y) the ship goes u - y r along and v + x r across. The residuals of the log moved a little forward
+    and a little to starboard give the derivatives, and the statistics of a fit the interval.
+
+    at : [m] from where the log has been moved to the origin.
+    """
+    free = ~(solution.held | solution.at_bound)
+    slopes = [_residuals(solution, _to_origin(dataset, *arm)) for arm in ((ARM * length, 0.0), (0.0, ARM * length))]
+    added = np.array([(slope - solution.residuals) / ARM for slope in slopes if slope is not None]).T
+    if added.shape != (len(solution.residuals), 2) or len(added) <= free.sum() + 2:
+        return None
+    J = np.hstack([solution.jacobian[:, free], added])
+    prior = np.append(solution.prior_widths[free], [np.inf, np.inf])
+    inverse = inverted(J.T @ J + np.diag(1 / prior**2))[0]
+    step = -inverse[:, -2:] @ (added.T @ solution.residuals)  # the factors are at their optimum
+    left = solution.residuals + J @ step
+    paths = (*np.array(solution.paths)[free].tolist(), AHEAD, ABEAM)
+    factors = np.append(solution.factors[free], np.array(at) / length) + step
+    clusters, signals = solution.clusters, solution.signals
+    judged = statistics(
+        LinearFit(paths, factors, left, J, clusters, signals, prior, solution.spent, runs=solution.runs)
+    )
+    half = (judged.high - judged.low)[-2:] / 2
+    sizes = np.where(np.isfinite(half), np.abs(factors[-2:]) / np.maximum(half, 1e-12), 0.0)
+    total, every = float(solution.residuals @ solution.residuals), solution.factors.copy()
+    every[free] = factors[:-2]
+    explained = 1 - float(left @ left) / total if total > 0 else 0.0
+    x, y = (length * factors[-2:]).tolist()
+    return Antenna(x, y, float(sizes.max()), explained, every)
+
+
+def _to_origin(dataset: Dataset, x: float, y: float) -> Dataset:
+    """The log of a point (x, y) [m], moved to the origin."""
+    rows = move_origin(dataset.frame, LeverArm(kind="lever_arm", reason="a trial", x=x, y=y)).rows
+    return replace(dataset, frame=rows)
+
+
+def _residuals(solution: Solution, dataset: Dataset) -> Array | None:
+    """Residuals (m,) of the fit with another log; None where they diverge."""
+    problem = build(solution.vessel, dataset, solution.runs, solution.settings)
+    residuals = evaluate(problem, solution.factors, solution.point).at.marginal(solution.settings.linear_from)[0]
+    return residuals if residuals.shape == solution.residuals.shape and np.isfinite(residuals).all() else None
+
+
+def antenna_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
+    """A sentence where the log looks like that of an antenna away from the origin; else none."""
+    seen, length = antenna(solution, dataset), solution.vessel.length
+    if seen is None or length is None or not seen.shown:
+        return ""
+    far = np.hypot(seen.x, seen.y) >= NEAREST * length
+    if not far or abs(seen.x) > FARTHEST * length or abs(seen.y) > WIDEST * length:
+        return ""
+    half, changes = (judged.high - judged.low) / 2, seen.factors - solution.factors
+    share = np.where(np.isfinite(half), np.abs(changes) / np.maximum(half, 1e-12), 0.0)
+    worst = int(np.argmax(share))
+    size, moves = abs(solution.factors[worst]), ""
+    if share[worst] >= OUTSIDE and size > 0:
+        name = short_names(unknowns(solution.vessel, solution.settings).paths)[worst]
+        change, width = 100 * changes[worst] / size, 100 * half[worst] / size
+        moves = f" and moves {name} by {digits(change, 2, '+')} %, its interval is +-{digits(width, 2)} %"
+    ways = ((seen.x, "ahead", "astern"), (seen.y, "to starboard", "to port"))
+    parts = [
+        f"{digits(abs(size), 2)} m {there if size > 0 else back}"
+        for size, there, back in ways
+        if abs(size) >= NEGLIGIBLE * length
+    ]
+    remedy = "if so,"
+    if abs(seen.x) > abs(seen.y):
+        remedy = f"compare with --nuisance lever_arm={digits(abs(seen.x), 2)}, or"
+    return (
+        f"the log looks like that of an antenna about {listed(parts)} of the vessel's origin: that takes "
+        f"{percent(seen.explained)} of the squares of the residuals away{moves}; {remedy} give the place as a "
+        "lever_arm in the mapping, and import again"
+    )
