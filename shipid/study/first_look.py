@@ -455,9 +455,9 @@ def _facts(vessel: Vessel, windows: Windows, share: float | None) -> Iterable[st
     """Sentences on speed against shaft, and turning against helm; share : as of `_turning`."""
     steady = _steady_speeds(vessel, windows)
     if steady is not None:
-        seen, orders = steady
-        held = steady_speed(vessel, orders)
-        if held > OFF * seen or seen > OFF * held:
+        seen, orders, gained, error = steady
+        least, held, most = (steady_speed(vessel, orders, gained + way * error) for way in (1, 0, -1))
+        if least > OFF * seen or seen > OFF * most:
             rpm = max((value for name, value in orders.items() if is_shaft(name)), key=abs) / RPM
             unit = _unit(vessel, seen, orders)
             yield f"at {rpm:.4g} rpm the log runs {seen:.3g} m/s and the vessel {held:.3g} m/s{unit}"
@@ -483,8 +483,11 @@ def _unit(vessel: Vessel, seen: float, orders: Mapping[str, float]) -> str:
     return ""
 
 
-def _steady_speeds(vessel: Vessel, windows: Windows) -> tuple[float, dict[str, float]] | None:
-    """Speed of the log [m/s], and its commands [SI], where it goes straight at its fastest; or None."""
+def _steady_speeds(vessel: Vessel, windows: Windows) -> tuple[float, dict[str, float], float, float] | None:
+    """Speed of the log [m/s], and its commands [SI], where it goes straight at its fastest; or None.
+
+    Also what it still gains there [m/s^2], for a large ship takes many horizons to her speed, and the error of that.
+    """
     commands = dynamics(vessel).commands
     shafts = [name for name in commands if is_shaft(name) and name in windows.planned]
     if not shafts:
@@ -502,14 +505,20 @@ def _steady_speeds(vessel: Vessel, windows: Windows) -> tuple[float, dict[str, f
     if straight.sum() < FEW:
         return None
     held = {name: 0.0 if steers(name) else float(np.median(windows.planned[name][0, straight])) for name in commands}
-    return float(np.median(u[-1, straight])), held
+    t = windows.step * (np.arange(windows.horizon + 1) - windows.horizon / 2)
+    gained = t @ np.vstack([windows.columns["u"], u])[:, straight] / float(t @ t)
+    error = 2 * float(np.std(gained)) / math.sqrt(len(gained))
+    return float(np.median(u[-1, straight])), held, float(np.median(gained)), error
 
 
-def steady_speed(vessel: Vessel, commands: Mapping[str, float]) -> float:
-    """Speed [m/s] that a vessel holds straight ahead in calm water with commands [SI]; 0 where they do not drive it."""
+def steady_speed(vessel: Vessel, commands: Mapping[str, float], gained: float = 0.0) -> float:
+    """Speed [m/s] that a vessel holds straight ahead in calm water with commands [SI]; 0 where they do not drive it.
+
+    gained : [m/s^2] the speed at which it still gains that.
+    """
 
     def surge(speed: float) -> float:
-        return float(acceleration(vessel, speed, commands)[0])
+        return float(acceleration(vessel, speed, commands)[0]) - gained
 
     if surge(1e-3) <= 0:
         return 0.0
