@@ -63,7 +63,7 @@ def lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
     inverse = inverted(J.T @ J + np.diag(1 / solution.prior_widths[free] ** 2))[0]
     moved = -inverse @ (J.T @ change)
     left = change + J @ moved  # what no factor makes up for
-    size, along = float(left @ left), float(solution.residuals @ left)
+    size, along = float(change @ left), float(solution.residuals @ change)  # the factors are at their optimum
     changes = np.zeros(len(free))
     changes[free] = HALF * moved
     if not size > 0:
