@@ -67,7 +67,7 @@ def combinations(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, ..
     greatest weight is then excluded, and the search is repeated.
     """
     lengths = np.sqrt((jacobian**2).sum(axis=0))
-    silent = np.flatnonzero(lengths <= np.sqrt(UNSEEN) * lengths.max(initial=0.0)).tolist()
+    silent = np.flatnonzero(lengths <= UNSEEN * lengths.max(initial=0.0)).tolist()
     names = short_names(paths)
     result = [Combination((paths[j],), (names[j],), (1.0,), float("inf")) for j in silent]
     gram = _gram(jacobian)

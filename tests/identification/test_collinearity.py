@@ -42,6 +42,13 @@ def test_nothing_depends_on_units() -> None:
             assert ratio[1] / ratio[0] == pytest.approx(0.01 / 30.0)
 
 
+def test_a_small_effect_beside_a_great_one_is_an_effect() -> None:
+    """Resistance over long exact runs moves residuals 1e6 times as far as a coefficient that is known to 30 %."""
+    assert combinations(FREE[:, :2] * [3e6, 3.0], "ab") == ()
+    (pair,) = combinations(np.column_stack([correlated(0.9999) * [1.0, 1e-6], FREE[:, 2]]), "abc")
+    assert pair.names == ("a", "b")
+
+
 def test_the_weights_move_the_residuals_as_little_as_the_index_says() -> None:
     jacobian = correlated(0.999) * np.array([1.0, 20.0])
     (pair,) = combinations(jacobian, "ab")
