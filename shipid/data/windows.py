@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -229,6 +230,7 @@ def cut_windows(
 
     An instant of prediction is a row: the last one at or before each multiple of the interval. So what is known at an
     instant, its past included, depends on no later row. Rows farther apart than the interval give a window each.
+    Windows come run by run, by name, so that no fit depends on the order of the runs in the table.
 
     Parameters
     ----------
@@ -251,7 +253,7 @@ def cut_windows(
     one_of("path", path, get_args(PathSource), DataError)
     shared = shares_clock(dataset)
     parts = []
-    for run, rows in pieces(dataset):
+    for run, rows in sorted(pieces(dataset), key=itemgetter(0)):
         t = rows["t"].to_numpy()
         instants = _instants(t, past * step, horizon * step, interval)
         if len(instants):

@@ -1,6 +1,6 @@
 """Windows against motion known in closed form, and splits against the law that no moment is seen twice."""
 
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, permutations
 from typing import Any, Literal
 
 import numpy as np
@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from shipid.data.dataset import Dataset
 from shipid.data.windows import (
     Windows,
     concatenate,
@@ -154,6 +155,23 @@ def test_no_future_leaves_its_run_or_crosses_a_break() -> None:
     starts = [float(t) for t in windows.t[windows.run == "a"]]
     assert starts == [float(t) for t in (*range(15), *range(25, 51))]
     assert windows.t[windows.run == "b"].max() == 10.0
+
+
+def test_the_order_of_the_runs_in_the_table_changes_no_window() -> None:
+    """Whatever is drawn or added up over windows would else depend on it; rows of two runs may alternate, too."""
+    names = ["turn 2", "turn 10", "a"]
+    frames = [turning(np.arange(0.0, 30.0 + 5 * k, 0.5)).assign(u=4.0 + k, flags=0) for k in range(3)]
+    runs = {name: frame.assign(run=name) for name, frame in zip(names, frames, strict=True)}
+    metadata = {"clock": "run", "flags": []}
+    tables = [pd.concat([runs[name] for name in order]) for order in permutations(names)]
+    tables.append(tables[0].sort_values("t", kind="stable"))
+    known, *others = (cut_windows(Dataset(t.reset_index(drop=True), metadata), horizon=10, past=3) for t in tables)
+    assert list(dict.fromkeys(known.run)) == sorted(names)
+    for one in others:
+        assert (one.run == known.run).all()
+        for key, values in (("t", one.t), ("future", one.future), ("u", one.columns["u"]), ("past", one.past["u"])):
+            there = {"t": known.t, "future": known.future, "u": known.columns["u"], "past": known.past["u"]}
+            np.testing.assert_array_equal(values, there[key])
 
 
 def test_select_and_concatenate_are_inverse() -> None:
