@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pydantic import PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
+from shipid.document import LEAST_NUMBER
 from shipid.errors import DataError, ResultError
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
@@ -209,8 +210,9 @@ def limits(vessel: Vessel, speed: float, factor: float) -> dict[str, Array]:
 
 
 def plain(block: Mapping[str, Array]) -> dict[str, Any]:
-    """The block as a vessel document holds it: numbers, and lists of numbers."""
-    return {name: values.tolist() if name in (*HIDDEN, *OUTPUT) else float(values[0]) for name, values in block.items()}
+    """The block as a vessel document holds it: numbers, and lists of numbers; 0 for one too near to 0 for it."""
+    held = {name: np.where(np.abs(values) < LEAST_NUMBER, 0.0, values) for name, values in block.items()}
+    return {name: values.tolist() if name in (*HIDDEN, *OUTPUT) else float(values[0]) for name, values in held.items()}
 
 
 class _Trainer:

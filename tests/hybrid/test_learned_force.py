@@ -10,7 +10,18 @@ import pytest
 
 from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError, ResultError
-from shipid.hybrid.learned_force import BLOCK, HIDDEN, OUTPUT, ForceCorrector, LearnedForce, _Trainer, limits, plain
+from shipid.hybrid.learned_force import (
+    BLOCK,
+    HIDDEN,
+    LIMITS,
+    OUTPUT,
+    SCALES,
+    ForceCorrector,
+    LearnedForce,
+    _Trainer,
+    limits,
+    plain,
+)
 from shipid.hybrid.method import Case, Task
 from shipid.hybrid.physics import Physics
 from shipid.vessel.load import load_vessel
@@ -58,6 +69,15 @@ def test_a_stiff_ridge_leaves_the_physics_as_it_is(windows: Windows) -> None:
     assert fit is not None
     paths = given.cases["wrong"].paths
     np.testing.assert_allclose(fit.predict(WRONG, given.instants("wrong"), paths), paths, atol=1e-4)
+
+
+def test_weights_of_runs_that_do_not_turn_are_0_in_the_vessel() -> None:
+    """A force of 1e-110 N m, which rounding leaves of none, was no number of a vessel: the fit ended in an error."""
+    block = {name: np.full(3, 0.1) for name in (*HIDDEN, *OUTPUT)} | dict.fromkeys(SCALES + LIMITS, np.ones(1))
+    block["c_N"] = np.array([1e-109, -1e-109, 0.2])
+    vessel = ForceCorrector(block, {}).with_force(WRONG).vessel
+    assert vessel is not None
+    assert vessel.document["hull"]["learned"]["c_N"] == [0.0, 0.0, 0.2]
 
 
 def test_the_force_is_bounded_by_what_the_ship_is() -> None:
