@@ -250,6 +250,8 @@ def study_rotate(
         answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
         answer.rows("turns", over, table(heads, rows))
         answer.say(f"naive floor {digits(naive)} m", naive=naive)
+        if saw := plan.saw(wanted):
+            answer.say(f"{', '.join(saw)}: numbers set from runs that test here, so A and H are too good", saw=saw)
         if verdicts:
             answer.say("findings over the turns, in brackets 95 % intervals:")
         shown = table(

@@ -58,7 +58,7 @@ def best_model(results: Results) -> str | None:
     their loss says too little. So are families that a study sets aside.
     """
     table = by_model(results)
-    table = table[~table["family"].isin(results.plan.aside)]
+    table = table[~table["family"].isin(results.aside)]
     top = table[(table["N_D"] == table["N_D"].max()) & (table["family"] != NO_MODEL)]
     fair = top[~top["family"].isin(results.plan.fitted)]
     chosen = top if fair.empty else fair
@@ -145,7 +145,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     methods : sentences that compare the methods; of a study of many methods they come first.
     """
     claims, every_model = results.plan.claims, by_model(results)
-    rows = every_model[~every_model["family"].isin(results.plan.aside)]
+    rows = every_model[~every_model["family"].isin(results.aside)]
     caveats = _caveats(results)
     sentences = [(f"{'; '.join(caveats)}.", "cells")] if caveats else []
     largest = int(rows["N_D"].max()) if len(rows) else 0
@@ -505,7 +505,7 @@ def _nominal(nominal: pd.DataFrame, largest: int, plan: Plan) -> list[str]:
 
 
 def _how_to_read(case: Case) -> list[str]:
-    """What "no physics" is, what identified models and known commands mean, and what brackets hold and do not hold."""
+    """What "no physics" is, what identified models, models set from the runs and known commands mean, and brackets."""
     plan, table, sentences = case.results.plan, case.table, []
     judged = next(way.method for way in plan.methods if way.name == plan.judged)
     mirrored = getattr(judged, "mirror", 0.0) > 0
@@ -527,6 +527,13 @@ def _how_to_read(case: Case) -> list[str]:
             "Models that were identified, or whose observer was chosen, were fitted to their validation runs, too, so "
             "they cannot be called best in validation: "
             f"{lowest['model']} has {case.H(str(lowest['model']), case.largest)} with {runs(case.largest)}."
+        )
+    trained = set(case.results.dataset.runs) - set(case.results.test.spans)
+    saw = [name for name in plan.saw(trained) if name in set(top["family"])]
+    if saw and case.smallest < case.largest:
+        sentences.append(
+            f"The numbers of {named(saw)} were set from runs that train, whatever the amount of data: with few runs "
+            "the errors are lower than these runs alone would give."
         )
     if plan.known and plan.reacting:
         sentences.append(

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.metrics import position_error
+from shipid.study import findings_bands as of_bands
+from shipid.study import findings_simulation as simulated
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable, error_table
 from shipid.study.evidence import contrasts
-from shipid.study.findings_bands import band_findings
-from shipid.study.findings_simulation import simulation_findings
 from shipid.study.results import Results, judged_cells
 from shipid.study.schema import Claims
 from shipid.study.verdict import (
@@ -71,11 +71,17 @@ def findings(results: Results) -> list[Finding]:
     claims = results.plan.claims
     if claims is None or not (results.cells["status"] == "ok").any():
         return []
-    verdicts = _full_scale(results, claims) if claims.accurate is not None else []
-    verdicts += simulation_findings(results) if claims.moderate is not None else []
+    unfair = results.plan.unfair(results.test.spans)
+    verdicts: list[Finding] = []
+    if claims.accurate is not None:
+        verdicts += undecided(CLAIMS, unfair) if unfair else _full_scale(results, claims)
+    if claims.moderate is not None:
+        verdicts += undecided(simulated.CLAIMS, unfair) if unfair else simulated.simulation_findings(results)
     roles = (claims.accurate, claims.inaccurate) if claims.moderate is None else (claims.moderate, claims.high)
     physics = [one.name for role in roles for one in results.plan.foundations if one.family == role]
-    return [*verdicts, *band_findings(results, physics, rivals=claims.moderate is None)] if verdicts else []
+    if unfair:
+        return [*verdicts, *undecided(of_bands.CLAIMS, unfair)]
+    return [*verdicts, *of_bands.band_findings(results, physics, claims.moderate is None)] if verdicts else []
 
 
 def _full_scale(results: Results, claims: Claims) -> list[Finding]:
@@ -171,7 +177,7 @@ def by_step(path: Array, future: Array, run: NDArray[np.str_]) -> Array:
 
 def _steps(results: Results, N_D: int) -> dict[str, Array]:
     """Errors by step of every predictor at an amount of data, mean over seeds, and of physics alone."""
-    aside = {one.name for one in results.plan.foundations if one.family in results.plan.aside}
+    aside = {one.name for one in results.plan.foundations if one.family in results.aside}
     test = results.test
     parts: dict[str, list[Array]] = {}
     cells = judged_cells(results)

@@ -191,7 +191,7 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
         Choice("prediction.step", step, f"s; rows of the log come every {seen.step:.3g} s"),
     ]
     rest = [Choice("prediction.interval", interval, "s between instants of prediction")]
-    families = _families(vessels, looks)
+    families = _families(vessels, looks, _learned(vessels, dataset.runs), others)
     some = [Choice("split.folds", 1), Choice("grid.N_D", [LEAST_RUNS]), *ahead, *rest]
     least = _planned([*fixed, *some, method], families[:1], out, vessels)
     amounts = ladder(len(partition(least, dataset)[0].spans))
@@ -199,7 +199,8 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     tail = [*rest, *_grid(amounts), method]
     failing = [_failing(seen, data)] if seen.faults else []
     failing += over_gaps(dataset, all_windows(least, dataset))
-    warnings = [*failing, *_wrong_velocities(seen), *_wrong_helm(first, dataset), *_knowing(vessels, tests)]
+    warnings = [*failing, *_wrong_velocities(seen), *_wrong_helm(first, dataset)]
+    warnings += _knowing(_learned(vessels, tests))
     warnings += [look.sentence for look in looks.values() if look.wrong]
     try:
         draft = _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
@@ -211,16 +212,20 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     return replace(draft, looks=looks)
 
 
-def _knowing(vessels: Mapping[str, Vessel], tests: Sequence[str]) -> list[str]:
-    """A warning for each vessel whose patch says that it was identified from runs that are to test it."""
-    blocks = []
-    for name, vessel in vessels.items():
-        known = documents.read(vessel.file).get("provenance", {}).get("runs", [])
-        seen = [run for run in tests if run in known]
+def _learned(vessels: Mapping[str, Vessel], runs: Sequence[str]) -> dict[str, list[str]]:
+    """Which of some runs each vessel was identified from, as its patch says; a vessel that is no patch from none."""
+    known = {
+        name: documents.read(vessel.file).get("provenance", {}).get("runs", []) for name, vessel in vessels.items()
+    }
+    return {name: [run for run in runs if run in of_vessel] for name, of_vessel in known.items()}
+
+
+def _knowing(learned: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """A warning for each vessel that was identified from test runs; learned : as of `_learned`, of the test runs."""
+    for name, seen in learned.items():
         if seen:
             words = f"{name} was identified from {', '.join(seen)}, which now {plural(len(seen), 'tests', 'test')} it"
-            blocks.append(f"{words}: choose other test runs, or let the study identify ([family.identify])")
-    return blocks
+            yield f"{words}: choose other test runs, or let the study identify ([family.identify])"
 
 
 def _failing(seen: Survey, data: Path) -> str:
@@ -423,8 +428,13 @@ def _claims(families: Sequence[str]) -> Iterator[Choice]:
         yield Choice("claims.nominal", "nominal")
 
 
-def _families(vessels: Mapping[str, Vessel], looks: Mapping[str, Look]) -> list[Any]:
-    """Every vessel as it is and as its log corrects it; the first made inaccurate as in the paper's experiment 2."""
+def _families(
+    vessels: Mapping[str, Vessel], looks: Mapping[str, Look], learned: Mapping[str, list[str]], others: list[str]
+) -> list[Any]:
+    """Every vessel as it is and as its log corrects it; the first made inaccurate as in the paper's experiment 2.
+
+    learned : the runs that each vessel was identified from. others : the runs that corrected it.
+    """
     taken = {NO_MODEL, "inaccurate"}
     families: list[Any] = []
     for named, vessel in vessels.items():
@@ -433,18 +443,21 @@ def _families(vessels: Mapping[str, Vessel], looks: Mapping[str, Look]) -> list[
         while name in taken:
             name += "-own"
         taken.add(name)
-        families.append({"name": name, "description": f"{vessel.name}, as it is", "base": named})
+        seen = {"seen": learned[named]} if learned[named] else {}
+        families.append({"name": name, "description": f"{vessel.name}, as it is", "base": named, **seen})
         look = looks.get(named)
         if look is not None and look.changes:
             groups = ", ".join(f"{change.group.name} x {change.factor:.3g}" for change in look.changes)
             words = f"{vessel.name} with {groups}: from all runs that do not test, whatever N_D"
             corrected = {"name": f"{name}{CORRECTED}", "description": words, "base": named}
-            families.append({**corrected, "perturb": [{"set": look.values}]})
+            runs = list(dict.fromkeys([*learned[named], *others]))
+            families.append({**corrected, "seen": runs, "perturb": [{"set": look.values}]})
     named, vessel = next(iter(vessels.items()))
     blocks = _inaccurate(vessel)
     words = f"{families[0]['name']} made wrong on purpose: what does it cost to know the ship less well?"
     if blocks:
-        families.append({"name": "inaccurate", "description": words, "base": named, "perturb": blocks})
+        seen = {"seen": learned[named]} if learned[named] else {}
+        families.append({"name": "inaccurate", "description": words, "base": named, **seen, "perturb": blocks})
     return families
 
 

@@ -6,7 +6,7 @@ import json
 import math
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -203,6 +203,16 @@ class Plan:
     def aside(self) -> set[str]:
         """Families that are shown, but that no claim and no sentence of the answer counts."""
         return self.study.claims.not_judged if self.study.claims else set()
+
+    def saw(self, runs: Iterable[str]) -> list[str]:
+        """Families whose numbers were set from any of these runs."""
+        return [family.name for family in self.families if not set(family.seen).isdisjoint(runs)]
+
+    def unfair(self, tests: Iterable[str]) -> str:
+        """Why R1-R4 and S1-S7 are not judged on these test runs; empty where no family of theirs saw any of them."""
+        roles = self.claims.roles.values() if self.claims else ()
+        saw = [name for name in self.saw(tests) if name in roles]
+        return f"the numbers of {', '.join(saw)} were set from runs that test: name another in [claims]" if saw else ""
 
     @property
     def judged(self) -> str:

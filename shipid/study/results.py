@@ -121,6 +121,11 @@ class Results:
         return kinds_of(self.dataset, self.test.spans, test=self.test.spans)
 
     @property
+    def aside(self) -> set[str]:
+        """Families that are shown, but that no claim and no sentence of the answer counts."""
+        return {*self.plan.aside, *self.plan.saw(self.test.spans)}
+
+    @property
     def missing(self) -> str:
         """How many cells are not finished, in words."""
         return f"{self.plan.cells - len(self.cells)} of {self.plan.cells} cells are not finished"

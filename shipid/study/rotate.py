@@ -21,11 +21,11 @@ from shipid.study.claims import Claims
 from shipid.study.code import code_digest
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ErrorTable
-from shipid.study.findings import Rivals, judged
+from shipid.study.findings import CLAIMS, Rivals, judged
 from shipid.study.plan import Batch, Plan
 from shipid.study.prepare import all_windows, partition, prepare
 from shipid.study.run import run_unit
-from shipid.study.verdict import Finding
+from shipid.study.verdict import Finding, undecided
 
 KEYS = [
     *("test", "foundation", "family", "method", "N_D", "seed", "A", "H", "H_90"),
@@ -177,13 +177,18 @@ def spread(frame: pd.DataFrame) -> pd.DataFrame:
 def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
     """Verdicts on R1-R4 over the turns, each a test manoeuvre; R4 by the mean over the horizon.
 
-    Turns share training runs and so are not independent: intervals are too narrow rather than too wide. Nothing without
-    `accurate` and `inaccurate`, or where fewer than two turns have what they need.
+    Turns share training runs and so are not independent: intervals are too narrow rather than too wide. Undecided where
+    the numbers of either model were set from runs that test. Nothing without `accurate` and `inaccurate`, or where
+    fewer than two turns have what they need.
     """
     claims = plan.claims
     if claims is None or claims.accurate is None or claims.inaccurate is None:
         return []
-    mine = frame[(frame["method"] == plan.judged) & ~frame["family"].isin(plan.aside)]
+    tests = set(frame["test"])
+    if unfair := plan.unfair(tests):
+        return undecided(CLAIMS, unfair)
+    aside = {*plan.aside, *plan.saw(tests)}
+    mine = frame[(frame["method"] == plan.judged) & ~frame["family"].isin(aside)]
     good, bad = claims.accurate, claims.inaccurate
     H = mine[mine["status"] == "ok"].pivot_table(index="test", columns=["family", "seed"], values="H")
     if any(name not in H.columns.get_level_values(0) for name in (good, bad, NO_MODEL)):

@@ -192,6 +192,9 @@ class Family(Checked, BaseModel):
     seed: int = 0
     description: str | None = None
     perturb: list[Perturbation] = []
+    seen: list[str] = Field(
+        default=[], description="runs that its numbers were set from: where one of them tests, no claim is about it"
+    )
     observer: dict[str, Any] | None = Field(
         default=None, description="an observer filters the start and adds slow forces: an [observer] block"
     )
@@ -266,7 +269,7 @@ def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[
         if family.name in above:
             raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
         base, perturb, identify, observer = family.base, family.perturb, family.identify, family.observer
-        inherited = 0
+        inherited, seen = 0, family.seen
         if family.extends is not None:
             if family.extends not in by_name:
                 hint = choices(family.extends, by_name)
@@ -275,9 +278,11 @@ def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[
             base, perturb, inherited = base or parent.base, [*parent.perturb, *perturb], len(parent.perturb)
             identify = parent.identify if identify is None else identify
             observer = parent.observer if observer is None else observer
+            seen = [*parent.seen, *seen]
         if base is None:
             raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
-        changes = {"base": base, "perturb": perturb, "identify": identify, "observer": observer, "extends": None}
+        changes: dict[str, Any] = {"base": base, "perturb": perturb, "identify": identify, "observer": observer}
+        changes |= {"seen": seen, "extends": None}
         resolved = family.model_copy(update=changes)
         resolved._inherited = inherited
         return resolved

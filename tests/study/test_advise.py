@@ -297,6 +297,24 @@ def test_identified_models_are_not_best_in_validation(made: Any) -> None:
     assert "so they cannot be called best in validation: fitted has 0.70 m with 30 runs." in advice
 
 
+def test_numbers_that_were_set_from_runs_that_train_are_named(made: Any) -> None:
+    """Such a model knows more runs than its N_D says. One that saw a test run is in no sentence."""
+    H = grid({"good": (1.0, 0.5), "bad": (2.0, 1.0), "none": (4.0, 2.0)})
+
+    def seen(*runs: str) -> Results:
+        bad = {"name": "bad", "base": "gunnerus-28.9"}
+        family = [{"name": "good", "base": "gunnerus-28.9", "seen": list(runs)}, bad]
+        results: Results = made(H, changes={"family": family})
+        every = pd.concat([results.dataset.frame, results.dataset.frame.assign(run="trains")], ignore_index=True)
+        return replace(results, dataset=replace(results.dataset, frame=every))
+
+    assert "The numbers of good were set from runs that train, whatever the amount of data" in text(seen("trains"))
+    assert "were set from" not in text(seen("no run"))
+    assert best_model(seen("trains")) == "good"
+    assert best_model(seen("trains", "a")) == "bad"
+    assert "were set from" not in text(seen("trains", "a"))
+
+
 def test_both_baselines_without_physics_are_named(made: Any) -> None:
     H = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (4.0, 3.0)})
     assert '"No physics" may use that port and starboard are mirror images' in text(made(H))

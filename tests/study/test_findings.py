@@ -87,6 +87,21 @@ def test_one_test_manoeuvre_decides_nothing(made: Any) -> None:
     assert all("shipid study rotate" in finding["evidence"] for finding in findings(results)[:4])
 
 
+def test_numbers_that_were_set_from_a_test_run_are_in_no_claim(made: Any) -> None:
+    """Test runs are named or drawn: here they are called a to h. Another family that saw them is left out of R4."""
+    families = [{"name": name, "base": "gunnerus-28.9"} for name in ("good", "bad")]
+    for name, run, decided in (("good", "h", "undecided"), ("bad", "a", "undecided"), ("good", "z", "confirmed")):
+        seen = [one | {"seen": [run]} if one["name"] == name else one for one in families]
+        results = made(one(1.0, 1.9, 9.0), runs=RUNS, changes={"family": seen})
+        claims = {finding["id"]: finding for finding in findings(results)}
+        assert {claims[key]["verdict"] for key in CLAIMS} == {decided}
+        assert results.aside == ({name} if decided == "undecided" else set())
+        if decided == "undecided":
+            assert {finding["evidence"] for finding in claims.values()} == {
+                f"the numbers of {name} were set from runs that test: name another in [claims]"
+            }
+
+
 def test_data_driven_that_is_worst_at_most_steps(made: Any) -> None:
     curves = {("none", 30, 0): [9.0, 9.0, 9.0, 1.0]}
     results = made(one(1.0, 1.9, 7.0), curves=curves, runs=RUNS)

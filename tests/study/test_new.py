@@ -179,6 +179,10 @@ def test_what_the_log_corrects_is_a_family(tmp_path: Path, monkeypatch: pytest.M
     corrected = next(one for one in draft.plan.foundations if one.family == f"{SHIP}-corrected")
     assert corrected.vessel.parameters[path] == 0.95
     assert document["claims"]["accurate"] == f"{SHIP}-corrected"
+    seen = {run for run in trial().runs if run not in document["split"]["test"]}
+    assert set(document["family"][1]["seen"]) == seen
+    assert draft.plan.saw(document["split"]["test"]) == []
+    assert draft.plan.saw(["no run", min(seen)]) == [f"{SHIP}-corrected"]
     assert any(f"{path} = 0.95 in place of" in warning for warning in draft.warnings)
     patch = tmp_path / "patch.toml"
     patch.write_text(draft.looks[SHIP].patch(SHIP))

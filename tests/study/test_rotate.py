@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -179,6 +180,29 @@ def test_findings_over_turns_by_hand(claimed: Plan, tmp_path: Path) -> None:
     assert by_claim["R1"]["evidence"].endswith("6 test manoeuvres")
     assert by_claim["R4"]["evidence"].startswith("worst over the horizon, physics alone included: bad alone")
     assert turn_findings(by_hand(), tiny_plan(tmp_path)) == []
+
+
+def test_no_finding_is_about_numbers_that_were_set_from_runs_that_test(made: Callable[..., Any]) -> None:
+    """As of `good`: then nothing is decided. A family of no claim is left out, and `none` is the worst at once."""
+    cells = {(model, 2, 0): 1.0 for model in ("good", "bad", "tuned", "none")}
+    claims = {"accurate": "good", "inaccurate": "bad"}
+    plan: Plan = made(cells, claims=claims, alone={"good": 1.0, "bad": 2.0, "tuned": 0.5}).plan
+
+    def seen(**runs: list[str]) -> Plan:
+        families = [one.model_copy(update={"seen": runs.get(one.name, [])}) for one in plan.study.family]
+        return replace(plan, study=plan.study.model_copy(update={"family": families}))
+
+    for name in ("good", "bad"):
+        unfair = turn_findings(many(), seen(**{name: ["another run", "ZZ 1"]}))
+        assert {(one["verdict"], one["evidence"]) for one in unfair} == {
+            ("undecided", f"the numbers of {name} were set from runs that test: name another in [claims]")
+        }
+    shown, left_out = (
+        {one["id"]: one["evidence"] for one in turn_findings(many(), seen(tuned=runs, good=["another run"]))}
+        for runs in (["another run"], ["ZZ 2"])
+    )
+    assert "most often worst: tuned" in shown["R4"] or "included: tuned" in shown["R4"]
+    assert "tuned" not in left_out["R4"]
 
 
 def test_few_turns_decide_nothing(claimed: Plan) -> None:

@@ -262,6 +262,11 @@ def test_extends_puts_the_other_rules_first(base: Vessel) -> None:
     assert draw(written_out, 0, base) == draw(family(HULL, MASS), 0, base)
 
 
+def test_who_extends_a_family_has_seen_what_it_saw() -> None:
+    first = Family(name="a", base="gunnerus-28.9", seen=["run 1"])
+    assert resolve([first, Family(name="b", extends="a", seen=["run 2"])])[1].seen == ["run 1", "run 2"]
+
+
 @pytest.mark.parametrize(
     ("families", "remedy", "path"),
     [
