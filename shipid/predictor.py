@@ -21,7 +21,7 @@ from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrated
-from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, widened
+from shipid.hybrid.method import Case, Corrector, Index, Method, Task, ended, fit_all, place_of, widened
 from shipid.hybrid.methods import METHODS, kind_of, listed
 from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.observer import AGE, Observer
@@ -142,14 +142,20 @@ class Predictor:
             self.check_level(level, kind)
         instants = self._known(instants)
         alone = locked(self._paths(self.physics.paths(instants) if paths is None else paths, instants))
+        home = type(self.corrector)
         try:
             predicted, lost = self.corrector.predict(self.physics, instants, alone), self._lost(instants)
+        except SystemExit as error:
+            raise DataError(f"the method {self.method!r} {ended(error, home)}") from None
         except KeyError as error:
             raise DataError(
-                "the method was trained with this input, and the instants lack it", path=error.args[0]
+                f"the method was trained with this input, and the instants lack it{place_of(error, home)}",
+                path=str(error.args[0]),
             ) from error
         except (ValueError, TypeError, IndexError) as error:
-            raise DataError(f"the method {self.method!r} and the instants do not fit together ({error})") from error
+            raise DataError(
+                f"the method {self.method!r} and the instants do not fit together ({error}){place_of(error, home)}"
+            ) from error
         predicted = self._paths(predicted, instants, f"paths of the method {self.method!r}")
         if np.may_share_memory(predicted, alone) or lost.any():  # the prediction is the caller's to change
             predicted = predicted.copy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -376,6 +377,28 @@ def test_a_method_changes_no_window_that_others_are_fitted_to(monkeypatch: pytes
     monkeypatch.setitem(METHODS, "greedy", Greedy)
     fit(Greedy(), NONE, WINDOWS)
     assert WINDOWS.future.flags.writeable
+
+
+def _parts_that_do_not_fit(paths: Any) -> Any:
+    return paths + np.zeros(3)[: len(paths)]
+
+
+@pytest.mark.parametrize(
+    ("made", "message"),
+    [
+        (_parts_that_do_not_fit, r"the method 'mine' and the instants do not fit together \(.*\)"),
+        (lambda paths: {}["slope"] + paths, "slope: the method was trained with this input, and the instants lack it"),
+        (lambda _: sys.exit(2), r"the method 'mine' calls sys\.exit"),
+    ],
+)
+def test_a_mistake_in_a_method_of_a_user_has_its_place(made: Callable[[Any], Any], message: str) -> None:
+    """One sentence without file and line: the mistake might be anywhere. The last line of the user's file is named."""
+    known = Predictor(NONE, "mine", Mistaken(lambda _, __, paths: made(paths)))
+    with pytest.raises(DataError, match=f"^{message} in {re.escape(__file__)}, line ") as caught:
+        known.predict(WINDOWS.instants())
+    lines = Path(__file__).read_text().splitlines()
+    line = lines[int(re.search(r"line (\d+)", str(caught.value))[1]) - 1]  # type: ignore[index]
+    assert any(part in line for part in ("np.zeros(3)", '{}["slope"]', "sys.exit"))
 
 
 @pytest.mark.parametrize(

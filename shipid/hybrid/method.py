@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,7 +14,7 @@ from pydantic import BaseModel, ConfigDict
 
 from shipid.checked import Checked
 from shipid.data.windows import Instants, Windows, locked
-from shipid.errors import DataError
+from shipid.errors import DataError, ShipidError
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.physics import Physics
 
@@ -198,8 +199,15 @@ TRIAL = ("number", "params", "value", "epochs", "seconds", "state")  # keys of t
 
 
 def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
-    """Fit every foundation of a task; DataError where a method that somebody wrote gives something else."""
-    given, name, shape = method.fit(task), type(method).__name__, task.windows.future.shape
+    """Fit every foundation of a task; DataError where a method that somebody wrote gives something else.
+
+    ShipidError where it ends the process: what runs it would else be taken for killed.
+    """
+    name, shape = type(method).__name__, task.windows.future.shape
+    try:
+        given = method.fit(task)
+    except SystemExit as error:
+        raise ShipidError(f"{name}.fit {ended(error, type(method))}") from None
     if not isinstance(given, Mapping):
         raise DataError(f"{name}.fit must return a table, foundation -> Fitted, not {type(given).__name__}")
     for case in task.cases:
@@ -212,6 +220,24 @@ def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
         if one.left_out is not None and np.shape(one.left_out) != shape:
             raise DataError(f"{name}.fit: left_out must be {shape}, not {np.shape(one.left_out)}")
     return dict(given)
+
+
+def ended(error: SystemExit, kind: type) -> str:
+    """What the code of a class did that calls `sys.exit`, in words."""
+    words = f" ({error.code})" if isinstance(error.code, str) else ""
+    return f"calls sys.exit{words}{place_of(error, kind)}: a method may not end the process, raise DataError instead"
+
+
+def place_of(error: BaseException, kind: type) -> str:
+    """Where in the module of a user's class an error arose, ` in FILE, line N`; empty where it did not arise there."""
+    if kind.__module__.startswith("shipid."):
+        return ""
+    file, trace, line = getattr(sys.modules.get(kind.__module__), "__file__", None), error.__traceback__, 0
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == file:
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return f" in {file}, line {line}" if line else ""
 
 
 def widened(low: float, high: float) -> tuple[float, float]:

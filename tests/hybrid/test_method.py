@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
+import sys
 from typing import Any
 
 import numpy as np
 import pytest
 
 from shipid.data.windows import cut_windows
-from shipid.errors import DataError, DocumentError
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Case, Fitted, Method, Task, fit_all, same_table, shared_tables
 from shipid.hybrid.methods import METHODS
@@ -118,6 +120,19 @@ def test_what_a_method_gives_is_checked(gives: Any, message: str) -> None:
     with pytest.raises(DataError, match=rf"^Mine\.fit:? {message}") as caught:
         fit_all(Mine(), task())
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("words", [[], ["no licence"], [3]])
+def test_a_method_that_ends_the_process_is_named(words: list[Any]) -> None:
+    """Its worker was said to be killed, perhaps for want of memory; without workers the command ended as if well."""
+
+    class Mine(Method):
+        def fit(self, given: Task) -> dict[str, Fitted]:  # noqa: ARG002
+            sys.exit(*words)
+
+    said = r" \(no licence\)" if words == ["no licence"] else ""
+    with pytest.raises(ShipidError, match=rf"^Mine\.fit calls sys\.exit{said} in {re.escape(__file__)}, line \d+: a"):
+        fit_all(Mine(), task())
 
 
 @pytest.mark.parametrize("kind", METHODS)
