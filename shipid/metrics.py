@@ -54,6 +54,18 @@ def position_error(predicted: Array, true: Array) -> Array:
     return lengths(np.subtract(predicted, true, order="C"))
 
 
+def shares_by_run(held: NDArray[Any], run: NDArray[Any]) -> Array:
+    """Share of the windows (S,) of each run that lie in their bands, runs by name."""
+    _, place = np.unique(run, return_inverse=True)
+    shares: Array = np.bincount(place, held) / np.bincount(place)
+    return shares
+
+
+def share_of(held: NDArray[Any], run: NDArray[Any]) -> float:
+    """Coverage: share of windows (S,) in the mean over their runs, so a long run counts as much as a short one."""
+    return float(shares_by_run(held, run).mean())
+
+
 def summary(error: Array) -> Summary:
     """Condense errors (T, S) [m] to A (14) or H (15), H_90 and the root mean square over all points of all windows."""
     if error.size == 0:

@@ -27,10 +27,11 @@ from shipid.hybrid.physics import assumed, check_columns
 from shipid.logs.dates import span_of
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
+from shipid.metrics import share_of
 from shipid.observer import observe
 from shipid.predictor import Predictor
 from shipid.study.apply import Band, along_run
-from shipid.study.bands import share_interval, share_of
+from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
 from shipid.units import length_text, percent, plural
 
@@ -297,7 +298,7 @@ def _held(instants: pd.DataFrame, band: Band, bands: Bands) -> list[str]:
     ]
     if promised.any():
         run = instants["run"].to_numpy()[promised]
-        _, most = share_interval(held[promised], run, by_run=True)
+        _, most = share_interval(held[promised], run)
         if most < band.level:
             share = percent(share_of(held[promised], run))
             same = share == percent(held[promised].mean())

@@ -1,4 +1,7 @@
-"""Bands of a study: what share of test paths they hold, by model, kind of manoeuvre, step, speed and run."""
+"""Bands of a study: what share of test paths they hold, by model, kind of manoeuvre, step, speed and run.
+
+A share, or coverage, is the mean over runs: a long run counts as much as a short one, as the promise does.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ import pandas as pd
 from scipy.special import betaincinv, stdtrit
 
 from shipid.hybrid.bands import Region
+from shipid.metrics import share_of, shares_by_run
 from shipid.predictor import NO_BAND
 from shipid.study.results import Results
 from shipid.study.verdict import metres, named, span
@@ -24,38 +28,24 @@ CONFIDENCE = 0.95
 SPEEDS = 3  # groups of equal size
 
 
-def share_of(held: Array, run: Array) -> float:
-    """Share of windows (S,) in the mean over runs, as a band promises it: a long run counts as much as a short one."""
-    _, place = np.unique(run, return_inverse=True)
-    return float((np.bincount(place, held) / np.bincount(place)).mean())
-
-
-def share_interval(held: Array, run: Array, by_run: bool = False) -> tuple[float, float]:
-    """95 % interval of a share of windows, by Clopper and Pearson for so many windows as those of few runs are worth.
+def share_interval(held: Array, run: Array) -> tuple[float, float]:
+    """95 % interval of `share_of`, by Clopper and Pearson for so many windows as those of few runs are worth.
 
     Windows of one run are alike: the number of windows is reduced until their variance is that between runs, and is
     never below the number of runs. Source: Korn and Graubard (1998), Survey Methodology 24. For one window a run it is
-    the exact interval. A run with most of the windows makes the share, and so lies near it: runs of unequal length
-    count as so many of equal length as would make as certain a mean (Kish 1965), and scatter at least all alike.
+    the exact interval.
 
     Parameters
     ----------
-    held : (S,) whether each window lies in its band. run : its run, (S,). by_run : the interval is of `share_of`.
+    held : (S,) whether each window lies in its band. run : its run, (S,).
     """
-    _, place = np.unique(run, return_inverse=True)
-    sizes = np.bincount(place)
-    runs, windows = len(sizes), len(held)
-    shares = np.bincount(place, held) / sizes
-    weights = np.full(runs, 1 / runs) if by_run else sizes / windows
-    share = float(shares.mean() if by_run else np.mean(held))
-    alike = float(np.square(weights).sum())
-    worth = 1 / alike  # runs
-    count, tail = worth, (1 - CONFIDENCE) / 2
+    shares, windows = shares_by_run(held, run), len(held)
+    runs, share = len(shares), float(shares.mean())
+    count, tail = float(runs), (1 - CONFIDENCE) / 2
     if runs > 1 and 0 < share < 1:
-        variance = runs / (runs - 1) * float(np.square(weights * (shares - share)).sum())
-        variance = max(variance, alike * float(shares.var(ddof=1)))
+        variance = float(shares.var(ddof=1)) / runs
         freedom = (stdtrit(max(windows - 1, 1), tail) / stdtrit(runs - 1, tail)) ** 2
-        count = float(np.clip(freedom * share * (1 - share) / max(variance, 1e-12), worth, windows))
+        count = float(np.clip(freedom * share * (1 - share) / max(variance, 1e-12), runs, windows))
     inside = share * count
     low = 0.0 if inside == 0 else float(betaincinv(inside, count - inside + 1, tail))
     high = 1.0 if inside >= count else float(betaincinv(inside + 1, count - inside, 1 - tail))
@@ -93,7 +83,7 @@ def coverage_frame(results: Results) -> pd.DataFrame:
     Columns: model, family, N_D, level, coverage, low, high (95 % interval, clustered by run), width [m] (mean radius
     over the horizon), end [m] (at its end), lengths (the same end in ship lengths), runs (test runs), seeds.
     """
-    length, rows = ship_length(results), []
+    length, run, rows = ship_length(results), results.test.run, list[dict[str, Any]]()
     levels = sorted({*SHOWN, results.plan.level})
     held: dict[float, dict[tuple[str, str, int], list[Array]]] = {level: {} for level in levels}
     sizes: dict[tuple[float, str, str, int], list[tuple[float, float]]] = {}
@@ -106,10 +96,10 @@ def coverage_frame(results: Results) -> pd.DataFrame:
     for level in levels:
         for (model, family, N_D), parts in held[level].items():
             mean = np.mean(parts, axis=0)  # seeds predict the same windows: they are no further evidence
-            low, high = share_interval(mean, results.test.run)
+            low, high = share_interval(mean, run)
             width, end = np.mean(sizes[level, model, family, N_D], axis=0)
             names = {"model": model, "family": family, "N_D": N_D, "level": level}
-            entry = {**names, "coverage": float(mean.mean()), "low": low, "high": high, "width": width, "end": end}
+            entry = {**names, "coverage": share_of(mean, run), "low": low, "high": high, "width": width, "end": end}
             rows.append({**entry, "lengths": end / length, "runs": len(results.test.spans), "seeds": len(parts)})
     columns = ["model", "family", "N_D", "level", "coverage", "low", "high", "width", "end", "lengths", "runs", "seeds"]
     return pd.DataFrame(rows, columns=columns)
@@ -133,9 +123,10 @@ def groups_frame(results: Results) -> pd.DataFrame:
         bands, held, radius = results.bands[row["cell"]], region.holds(errors), region.radius.mean(axis=0)
 
         def add(by: str, group: str, chosen: Array, inside: Array, wide: float, note: str = "") -> None:
-            low, high = share_interval(inside, test.run[chosen])
-            entry = {"model": row["model"], "by": by, "group": group, "coverage": float(inside.mean())}  # noqa: B023
-            runs = len(np.unique(test.run[chosen]))
+            run = test.run[chosen]
+            low, high = share_interval(inside, run)
+            entry = {"model": row["model"], "by": by, "group": group, "coverage": share_of(inside, run)}  # noqa: B023
+            runs = len(np.unique(run))
             rows.append({**entry, "low": low, "high": high, "width": wide, "runs": runs, "note": note})
 
         for name in np.unique(kind):

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.metrics import rank_correlation
-from shipid.study.bands import regions, share_interval, share_of
+from shipid.metrics import rank_correlation, share_of
+from shipid.study.bands import regions, share_interval
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable, error_table
 from shipid.study.evidence import FEWEST_MODELS, by_chance, doubling
@@ -80,7 +80,7 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     cells = judged_cells(results)
     cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin([*sound, NO_MODEL])]
     held = {name: [bands[cell][1] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
-    shares = [float(np.mean(held[name])) for name in sound]
+    shares = [share_of(np.mean(held[name], axis=0), run) for name in sound]
     first = narrower(Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals))
     first["evidence"] += f"; these bands hold {span(percent(min(shares)), percent(max(shares)))} of whole paths"
     second = kept_promise(np.mean([one for ones in held.values() for one in ones], axis=0), run, level)
@@ -125,7 +125,7 @@ def narrower(widths: Widths) -> Finding:
 
 def kept_promise(held: Array, run: NDArray[np.str_], level: float) -> Finding:
     """Verdict on B2 from held (S,), the share of models whose band holds the path of a window, and its run (S,)."""
-    low, high = share_interval(held, run, by_run=True)
+    low, high = share_interval(held, run)
     share, sizes = share_of(held, run), np.unique(run, return_counts=True)[1]
     count = len(sizes)
     interval = "" if too_few(count) else f" [{percent(low)}, {percent(high)}]"

@@ -32,7 +32,7 @@ from shipid.hybrid.device import use_threads, vectors
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Case, Corrector, Fitted, Task, fit_all
 from shipid.hybrid.physics import Physics
-from shipid.metrics import lengths, position_error, summary
+from shipid.metrics import lengths, position_error, share_of, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
 from shipid.study.claims import WAIT, Claims, Holder, TakenOver, pause
@@ -522,12 +522,12 @@ def _beyond_ships(paths: Array, step: float) -> NDArray[np.bool_]:
 
 
 def _promise(plan: Plan, predictor: Predictor, instants: Instants, paths: Array, test: Windows) -> dict[str, float]:
-    """Share of whole test paths inside the band of the study's level, and its mean radius [m]; NaN without a band."""
+    """Share of whole test paths in the band of the study's level, and its mean radius [m]; NaN without a band."""
     level = plan.level
     if predictor.bands is None or not predictor.bands.promises(level):
         return {"coverage": np.nan, "width": np.nan}
     region = predictor.band(paths, instants, level)
-    return {"coverage": float(region.holds(test.future - paths).mean()), "width": float(region.radius.mean())}
+    return {"coverage": share_of(region.holds(test.future - paths), test.run), "width": float(region.radius.mean())}
 
 
 def machine() -> dict[str, Any]:

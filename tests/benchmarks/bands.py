@@ -30,6 +30,7 @@ from shipid.identification.outcome import COMPARED, _measured
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, statistics
+from shipid.metrics import share_of, shares_by_run
 from shipid.predictor import limits_of
 from shipid.study.bands import share_interval
 from shipid.study.plan import Batch, read_plan
@@ -278,11 +279,10 @@ def recorded_figures(folder: Path) -> dict[str, Any]:
         for model, part in recorded(folder, commands).groupby("model", sort=False):
             for level in (0.8, 0.9):
                 held, wide = part[f"held {level}"].to_numpy(), part[f"end {level}"].mean()
-                low, high = share_interval(held, part["test"].to_numpy())
-                least = part.groupby("test")[f"held {level}"].mean().min()
-                words = (
-                    f"{held.mean():.3f} [{low:.3f}, {high:.3f}], least of a run {least:.2f}, {wide:.2f} m at the end"
-                )
+                run = part["test"].to_numpy()
+                share, (low, high) = share_of(held, run), share_interval(held, run)
+                least = shares_by_run(held, run).min()
+                words = f"{share:.3f} [{low:.3f}, {high:.3f}], least of a run {least:.2f}, {wide:.2f} m at the end"
                 summary[f"real log, {commands}, {model}, {level:.0%}"] = words
     return summary
 

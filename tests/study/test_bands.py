@@ -80,8 +80,8 @@ def test_a_long_run_that_is_mostly_outside_breaks_no_promise(sizes: tuple[int, .
     for _ in range(400):
         chance = rng.beta(0.9, 0.1, len(sizes))  # of each run; 0.9 in the mean
         held = rng.random(len(run)) < chance[run]
-        below += np.array([bands.share_interval(held, run, by_run)[1] < 0.9 for by_run in (False, True)])
-    assert (below <= binom.ppf(0.999, 400, 0.025)).all()
+        below += bands.share_interval(held, run)[1] < 0.9
+    assert below <= binom.ppf(0.999, 400, 0.025)
 
 
 def test_cells_keep_coverage_and_width(results: Results) -> None:
@@ -93,7 +93,9 @@ def test_cells_keep_coverage_and_width(results: Results) -> None:
         else:
             region = kept.region(results.paths[row["cell"]], results.test.columns, results.test.step, LEVEL)
             errors = results.test.future - results.paths[row["cell"]]
-            assert row["coverage"] == pytest.approx(region.holds(errors).mean())
+            held, run = region.holds(errors), results.test.run
+            by_run = [held[run == name].mean() for name in np.unique(run)]
+            assert row["coverage"] == pytest.approx(np.mean(by_run))
             assert row["width"] == pytest.approx(region.radius.mean())
     assert results.cells["width"].notna().any()
 
@@ -113,6 +115,31 @@ def test_frames_agree_with_the_cells(results: Results) -> None:
     assert (groups["low"] <= groups["coverage"] + 1e-9).all()
     assert set(worst["run"]) == set(results.test.spans)
     assert bands.answer(results)[0][0].startswith("Bands of 80 % held ")
+
+
+def test_a_share_counts_runs_and_not_windows(results: Results) -> None:
+    """Of one test run two windows are left, and their paths outside: its share counts as much as that of the others."""
+    run = results.test.run
+    short = run[0]
+    kept = np.sort(np.concatenate([np.flatnonzero(run == short)[:2], np.flatnonzero(run != short)]))
+    cut = replace(
+        results,
+        test=results.test.select(kept),
+        paths={cell: path[:, kept] + 1e4 * (run[kept] == short)[:, None] for cell, path in results.paths.items()},
+    )
+    rows = [row for row in cut.rows if row["cell"] in cut.bands and cut.bands[row["cell"]].promises(LEVEL)]
+    whole = bands.coverage_frame(results)
+    parts = bands.coverage_frame(cut)
+    assert rows
+    for row in rows:
+        region = cut.bands[row["cell"]].region(cut.paths[row["cell"]], cut.test.columns, cut.test.step, LEVEL)
+        held = region.holds(cut.test.future - cut.paths[row["cell"]])
+        names = np.unique(cut.test.run)
+        wanted = sum(held[cut.test.run == name].mean() for name in names if name != short) / len(names)
+        mine = (parts["level"] == LEVEL) & (parts["model"] == row["model"]) & (parts["N_D"] == row["N_D"])
+        assert parts.loc[mine, "coverage"].item() == pytest.approx(wanted)
+        assert held.mean() > wanted + 0.2, "by windows it is another number"
+        assert whole.loc[mine, "low"].notna().all()
 
 
 def test_one_model_has_one_radius(results: Results) -> None:
