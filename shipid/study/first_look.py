@@ -45,6 +45,7 @@ FINER = (0.82, 0.93, 1.07, 1.22)
 SWEEPS = 2  # over all groups taken, once every one is taken
 WORTH = 0.06  # of the error that a further group must save
 SAVING = 0.15  # of the error that all groups together must save, else nothing is reported
+LEAST_ERROR = 1e-3  # m: no log has positions that are so near to the truth; a smaller error is none
 PENALTY = 3.0  # times the error of constant u, v, r: a prediction that diverges
 STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading at every step and of the speed at the end: a steady straight run
 TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from which the turning is judged
@@ -150,7 +151,12 @@ class Look:
     def wrong(self) -> bool:
         """Whether the vessel should not be used as it is."""
         explained = bool(self.changes) or self.current is not None
-        return explained or bool(self.facts) or self.timely >= self.constant
+        return explained or bool(self.facts) or self._worse
+
+    @property
+    def _worse(self) -> bool:
+        """Whether the vessel errs as much as constant u, v, r, or more."""
+        return self.timely >= max(self.constant, LEAST_ERROR)
 
     @property
     def values(self) -> dict[str, float]:
@@ -171,7 +177,7 @@ class Look:
             causes.append((stream, self.current.error))
         causes += [(_shown(self.vessel, one), one.error) for one in self.changes]
         if not causes:
-            if self.alone >= self.constant:
+            if self._worse:
                 return f"{self.vessel.name} is worse than constant u, v, r, and no single number explains it: {seen}"
             if self.facts:
                 return f"{self.vessel.name} and the log differ, and no single number explains it: {seen}"
@@ -242,8 +248,9 @@ def first_look(
     share = _turning(vessel, windows, trial.instants())
     facts = tuple(_facts(vessel, windows, share))
     mistaken = share is not None and share < 0  # a sign, which no factor mends
-    changes = [] if mistaken else _worthwhile(trial, least)
-    current = None if mistaken else _current(trial)
+    done = mistaken or least < LEAST_ERROR
+    changes = [] if done else _worthwhile(trial, least)
+    current = None if done else _current(trial)
     if current is not None and current.error <= min(changes[-1].error if changes else least, (1 - SAVING) * least):
         changes = _worthwhile(_in_current(trial, current.V_c, current.beta_c), current.error)
     else:

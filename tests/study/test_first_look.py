@@ -65,6 +65,17 @@ def test_the_vessel_that_made_the_log_is_left_alone(log: Dataset) -> None:
     assert "the log agree" in look(load_vessel(SHIP), often).sentence
 
 
+def test_a_ship_at_rest_with_stopped_shafts_corrects_no_number(log: Dataset) -> None:
+    """The error of rounding, 3e-8 m, was explained by a screw of a third, and worse than constant motion, 0 m."""
+    still = dict.fromkeys((*log.commands, "u", "v", "r", "north", "east"), 0.0)
+    view = look(load_vessel(SHIP), Dataset(log.frame.assign(psi=0.3, **still), log.metadata))
+    assert view.alone < 1e-6
+    assert not view.changes
+    assert view.current is None
+    assert not view.wrong
+    assert "the log agree" in view.sentence
+
+
 def test_a_screw_too_large_is_reported_and_explained(log: Dataset) -> None:
     """Twice the thrust: the speed tells at once, and a smaller screw explains it."""
     truth = load_vessel(SHIP)
