@@ -11,6 +11,7 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 HELD = ("north", "east", "psi", "u")  # states that no transverse force depends on in calm water, and the speed
+WATER = "waves."  # prefix of states of the water, which no motion changes: time, and where the current carries it
 STEP = 1e-4  # of the speed, for differences
 
 
@@ -25,7 +26,7 @@ def growth(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> float:
     model = dynamics(vessel)
     given = {name: neutral(name) if steers(name) else orders[name] for name in model.commands}
     names = (*model.state, *model.hidden)
-    moving = [place for place, name in enumerate(names) if name not in HELD]
+    moving = [place for place, name in enumerate(names) if name not in HELD and not name.startswith(WATER)]
     straight = np.array([speed if name == "u" else 0.0 for name in names])
     rest = (
         [given[name] for name in model.memory],

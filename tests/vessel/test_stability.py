@@ -44,3 +44,12 @@ def test_every_bundled_ship_has_one(name: str) -> None:
     vessel = load_vessel(name)
     speed = 0.2 * np.sqrt(9.81 * (vessel.length or 30.0))
     assert np.isfinite(growth(vessel, speed, dict.fromkeys(dynamics(vessel).commands, 0.0)))
+
+
+@pytest.mark.parametrize(("name", "slowest"), [("gunnerus-28.9", -0.1), ("gunnerus-33.9", -0.093)])
+def test_the_water_of_a_ship_in_waves_is_no_motion_of_hers(name: str, slowest: float) -> None:
+    """Time goes on by itself: as a motion it had a growth of 0. Of the first ship a memory of heave is the slowest."""
+    plane, waves = load_vessel(name), load_vessel(f"{name}-6dof")
+    n = dict.fromkeys(dynamics(plane).commands, 2.0)
+    assert growth(waves, 5.0, n) == pytest.approx(slowest, rel=0.01)
+    assert growth(plane, 5.0, n) <= growth(waves, 5.0, n) + 1e-3
