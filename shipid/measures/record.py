@@ -26,6 +26,7 @@ FEWEST_LINE = 3  # rows of an angle in motion that show its rate
 FEWEST_ROWS = 16  # in which to look for where an angle leaves its level
 FULL = 0.95  # of the helm angle: the helm is all the way over
 STEADY = 0.05  # relative change over a stretch that counts as none
+CREEP, TO_COME = 0.005, 0.01  # change from quarter to quarter that is looked at, and what may follow after the end
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,10 +194,21 @@ def mean(t: Array, values: Array, start: float, end: float) -> float:
 
 
 def settled(t: Array, values: Array, start: float, end: float, scale: float) -> float:
-    """Mean over the last quarter of the time; NaN if it differs from the quarter before by more than 5 % of `scale`."""
+    """Mean over the last quarter of the time; NaN where the values are still on their way.
+
+    They are where it differs from the quarter before by more than 5 % of `scale`, or where the last three quarters show
+    that more than 1 % of it is still to come: a slow decay changes little from one to the next, and goes on for long.
+    """
     quarter = (end - start) / 4
-    before, last = (mean(t, values, end - (i + 1) * quarter, end - i * quarter) for i in (1, 0))
-    return last if abs(last - before) <= STEADY * abs(scale) else NAN
+    early, before, last = (mean(t, values, end - (i + 1) * quarter, end - i * quarter) for i in (2, 1, 0))
+    change, steady = last - before, STEADY * abs(scale)
+    if not abs(change) <= steady:
+        return NAN
+    slower = before - early - change  # by how much the change falls from quarter to quarter
+    if abs(change) <= CREEP * abs(scale) or change * (before - early) <= 0:
+        return last
+    to_come = change**2 / abs(slower) if slower * change > 0 else np.inf  # of a geometric series
+    return last if to_come <= TO_COME * abs(scale) else NAN
 
 
 def departure(t: Array, order: Array, index: int) -> float:

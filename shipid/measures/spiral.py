@@ -14,6 +14,10 @@ from shipid.units import DEGREE
 LEVEL_HELM, LEVEL_SHARE = 0.5 * DEGREE, 0.02  # closer helm angles are one level, and such a share of the greatest one
 MOST_ROWS, SCATTER = 0.9, 3.0  # of the changes from row to row, and how far such changes scatter about a level
 LEVEL_RATE = 0.05  # of the largest rate: rates closer than this are one level
+LAST, LEFT_OUT = (
+    0.25,
+    0.05,
+)  # of a level of rate: where it is read, but for its end, where the next helm is over already
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +52,14 @@ def _one_level(helm: Array) -> float:
 
 
 def rate_levels(record: Record) -> Levels:
-    """Yaw rate levels of a reverse spiral with the mean helm over the last quarter of each."""
+    """Yaw rate levels of a reverse spiral with the mean helm over the last quarter of each, but for its end.
+
+    At the end of a level the helm is over for the next one, and the rate has hardly changed yet.
+    """
     t, most = record.t, float(np.abs(record.r).max())
     stretches = [(float(t[a]), float(t[b])) for a, b in plateaus(t, record.r, LEVEL_RATE * most)] if most else []
-    means = [[mean(t, values, b - (b - a) / 4, b) for a, b in stretches] for values in (record.helm, record.r)]
+    read = [(b - LAST * (b - a), b - LEFT_OUT * (b - a)) for a, b in stretches]
+    means = [[mean(t, values, *some) for some in read] for values in (record.helm, record.r)]
     return Levels(np.array(means[0]), np.array(means[1]), 0)
 
 
@@ -62,17 +70,19 @@ def spiral(record: Record) -> Measures:
     -------
     Measures : `neutral_helm` [rad], mean of the helm angles at which the rate changes sign on the two branches;
         `loop_width` [rad], their difference; `loop_height` [rad/s], the difference of the rates at helm 0. Width and
-        height are 0 for a stable ship; their resolution is the distance of the levels. `levels` and
-        `levels_not_steady`: counts.
+        height are 0 for a stable ship; their resolution is `levels_apart` [rad], the distance of the steady levels
+        between which the rate changes sign, the larger of both ways. `levels`, `levels_not_steady`: counts.
     """
     measures, points = Measures(), levels(record)
     ways = [(points.helm[way], points.rate[way]) for way in _ways(points.helm)]
     zero = [_at_zero(rate, helm) for helm, rate in ways] if len(ways) == 2 else [NAN, NAN]
     flat = [_at_zero(helm, rate) for helm, rate in ways] if len(ways) == 2 else [NAN, NAN]
+    apart = [_around_zero(rate, helm) for helm, rate in ways] if len(ways) == 2 else [NAN, NAN]
     why = "the rate does not change sign on the way there and on the way back, on levels that are steady"
     measures.add("neutral_helm", (zero[0] + zero[1]) / 2, "rad", why)
     measures.add("loop_width", abs(zero[1] - zero[0]), "rad", why)
     measures.add("loop_height", abs(flat[1] - flat[0]), "rad/s", "the helm does not pass 0 on both ways")
+    measures.add("levels_apart", max(apart) if np.isfinite(apart).all() else NAN, "rad", why)
     measures.add("levels", len(points.helm), "-", "")
     measures.add("levels_not_steady", points.skipped, "-", "")
     return measures
@@ -89,12 +99,26 @@ def _ways(helm: Array) -> list[slice]:
     return [slice(a, b + 1) for a, b in stretches if a < b and abs(helm[a]) >= over and helm[a] * helm[b] <= 0][:2]
 
 
+def _change(x: Array) -> int | None:
+    """First point at which x is 0, or after which it changes sign; None where it does not."""
+    return next((i for i in range(len(x)) if x[i] == 0 or x[i] * x[min(i + 1, len(x) - 1)] < 0), None)
+
+
 def _at_zero(x: Array, y: Array) -> float:
     """Value y where x first changes sign, linear between points; NaN if it does not."""
-    for i in range(len(x) - 1):
-        if x[i] == 0 or x[i] * x[i + 1] < 0:
-            return float(y[i] if x[i] == 0 else y[i] - x[i] * (y[i + 1] - y[i]) / (x[i + 1] - x[i]))
-    return float(y[-1]) if len(x) and x[-1] == 0 else NAN
+    i = _change(x)
+    if i is None:
+        return NAN
+    return float(y[i] if x[i] == 0 else y[i] - x[i] * (y[i + 1] - y[i]) / (x[i + 1] - x[i]))
+
+
+def _around_zero(x: Array, y: Array) -> float:
+    """How far the values y are apart between which x first changes sign, or at the neighbours of x = 0; else NaN."""
+    i = _change(x)
+    if i is None:
+        return NAN
+    others = y[[j for j in (i - (x[i] == 0), i + 1) if 0 <= j < len(y)]]
+    return float(np.abs(others - y[i]).max()) if len(others) else NAN
 
 
 def reverse_spiral(record: Record) -> Measures:

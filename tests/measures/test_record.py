@@ -52,6 +52,23 @@ def test_what_has_settled_does_not_depend_on_its_sign() -> None:
         assert np.isnan(settled(t, sense * rate, 0.0, 40.0, sense / 10))
 
 
+@pytest.mark.parametrize("decay", [0.002, 0.005, 0.02])
+def test_a_decay_that_goes_on_for_long_has_not_settled(decay: float) -> None:
+    """From quarter to quarter it changes by less than 5 % of the rate: it was taken for the rate that remains."""
+    t = np.linspace(0.0, 40.0, 81)
+    for rate in (np.exp(-decay * t), 1 / np.sqrt(1 + 2 * 10 * decay * t)):  # to 0; near neutral dr/dt goes with r^3
+        assert np.isnan(settled(t, rate, 0.0, 40.0, 1.0))
+        assert settled(t, np.full_like(t, rate[-1]), 0.0, 40.0, 1.0) == pytest.approx(rate[-1])
+
+
+def test_waves_do_not_keep_a_rate_from_being_settled() -> None:
+    """Nine of them in a quarter, a tenth of the rate high."""
+    t = np.linspace(0.0, 40.0, 401)
+    for phase in np.linspace(0, 6, 13):
+        rate = 1.0 + 0.1 * np.sin(2 * np.pi * t / 1.1 + phase)
+        assert settled(t, rate, 0.0, 40.0, 1.0) == pytest.approx(1.0, abs=0.02)
+
+
 def test_integrals_begin_and_end_between_samples() -> None:
     assert integral(T, 3.0 + 2 * T, 0.3, 4.1) == pytest.approx(3 * 3.8 + 4.1**2 - 0.3**2)
     assert mean(T, 3.0 + 2 * T, 0.3, 4.1) == pytest.approx(3.0 + 4.4)

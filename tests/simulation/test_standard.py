@@ -15,6 +15,7 @@ from shipid.measures.recognise import record_of
 from shipid.measures.record import Measures
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import ReverseSpiral, Spiral, Zigzag
+from shipid.simulation.measured import measure_standard
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import KINDS, shaft_speed, standard
 from shipid.vessel.load import load_vessel
@@ -102,6 +103,25 @@ def test_spirals_go_to_the_side_and_the_angle_asked_for() -> None:
     reverse = standard(SHIP, "reverse-spiral", (2,)).manoeuvre
     assert isinstance(reverse, ReverseSpiral)
     assert (reverse.rates_deg[0], reverse.rates_deg[-1]) == (2, -2)
+
+
+def test_a_spiral_of_a_nearly_neutral_ship_waits_until_her_turn_is_steady() -> None:
+    """On levels of 40 lengths a ship that is stable had a loop of 0.17 deg, without a word."""
+    guess = first_guess(Particulars(69.0, 11.0, 4.0, 0.76, 4.0), "neutral", "neutral.toml")
+    ship = guess.vessel.with_values({"hull.mmg.N_v": 1.1 * guess.vessel.parameters["hull.mmg.N_v"]})
+    lengths = 4.0 / 69.0
+    chosen = standard(ship, "spiral").manoeuvre
+    assert isinstance(chosen, Spiral)
+    assert 100 < chosen.hold * lengths <= 200
+    steady = {str(row["measure"]): row["value"] for row in measure_standard(ship, "spiral").measures}
+    assert steady["levels not steady"] == 0
+    assert steady["loop width"] == pytest.approx(0.0, abs=0.01)
+    short = standard(ship, "spiral", duration=40 / lengths).manoeuvre
+    assert isinstance(short, Spiral)
+    assert short.hold == 40 / lengths
+    turning = standard(SHIP, "spiral").manoeuvre
+    assert isinstance(turning, Spiral)
+    assert turning.hold == pytest.approx(40 * 28.9 / standard(SHIP, "spiral").speed)
 
 
 @pytest.mark.parametrize(
