@@ -114,6 +114,16 @@ def derivative(name: str) -> Monomial:
     return monomial(name, (HEEL, *MOTIONS))
 
 
+def turns_round(formula: Monomial) -> bool:
+    """Whether the force of a hull that is alike fore and aft has the other sign where it goes astern.
+
+    Mirrored fore and aft, X, M, N and u, q, r change their signs. So Y_v v is the same astern, N_v v is not (Munk's
+    moment goes with u v); what has a factor u turns by itself.
+    """
+    turned = sum(symbol in "uqr" and not absolute for symbol, absolute in formula.factors)
+    return (formula.axis in "XMN") ^ (turned % 2 == 1)
+
+
 def rates(formula: Monomial) -> int:
     """Number of factors that are velocities or angular velocities."""
     return sum(symbol != HEEL for symbol, _ in formula.factors)

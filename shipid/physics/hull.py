@@ -24,6 +24,7 @@ from shipid.physics.grammar import (
     derivative,
     deviation,
     prime_scale,
+    turns_round,
 )
 
 SPEED_FLOOR = 0.01  # m/s: keeps 1/U finite at rest
@@ -110,13 +111,26 @@ def mmg(
     that when she goes astern. U [m/s] is the instantaneous speed through the water, rounded off at 0.01 m/s: the root
     of u^2 + v^2 + 0.01^2. In the primes of the derivatives it is at least |r| L_pp / TIGHTEST: beyond any turn in which
     such polynomials were measured they may drive a ship that turns on the spot.
+
+    Astern the hull counts as alike fore and aft: Y_v |u| v, Y_r u r, N_v u v, N_r |u| r (Yoshimura et al. 2009). What
+    turns round has its full value for drift angles below 45 deg and |r| L_pp / TIGHTEST below |u|, and fades from there
+    to 0 abeam and on the spot.
     """
     U = ca.sqrt(nu_r[0] ** 2 + nu_r[1] ** 2 + SPEED_FLOOR**2)
     ahead = ca.fmin(ca.fmax(nu_r[0] / (ca.fabs(nu_r[1]) + SPEED_FLOOR), -1), 1)
     ahead = _more_astern(ahead, nu_r[0], k_astern)
     turning = nu_r[5] * L_pp / TIGHTEST
     at_least = ca.sqrt(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, turning**2) + SPEED_FLOOR**2)
-    scaled = {name: value * T / L_pp * prime_scale(name, rho, L_pp, at_least) for name, value in values.items()}
+    across = ca.fmax(ca.fabs(nu_r[1]), ca.fabs(turning)) + SPEED_FLOOR
+    sense = ca.fmin(ca.fmax(nu_r[0] / across, -1), 1)
+    scaled = {
+        name: value
+        * T
+        / L_pp
+        * prime_scale(name, rho, L_pp, at_least)
+        * (sense if turns_round(derivative(name)) else 1)
+        for name, value in values.items()
+    }
     return derivatives(nu_r, eta, **scaled) - vector(rho / 2 * L_pp * T * R_0 * U**2 * ahead, 0, 0, 0, 0, 0)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from shipid.physics import hull
+from shipid.physics.grammar import derivative
 
 UPRIGHT = ca.SX(6, 1)
 
@@ -162,8 +163,38 @@ def test_the_mmg_hull_of_a_ship_that_turns_on_the_spot_takes_primes_of_her_turn(
         forces = hull.mmg(
             ca.SX(ca.DM([0.05, v, 0, 0, 0, r])), UPRIGHT, R_0=0.02, N_r=-0.05, N_vrr=0.1, L_pp=L, T=T, rho=1000.0
         )
-        N = 500 * L**2 * T * (-0.05 * r * L * U + 0.1 * v * (r * L) ** 2 / U)
+        fades = 0.05 / (U + 0.01)  # what turns round with the ship
+        N = 500 * L**2 * T * (-0.05 * r * L * U + fades * 0.1 * v * (r * L) ** 2 / U)
         assert numbers(forces)[5] == pytest.approx(N, rel=1e-4)
+
+
+TURNED = {"X_vv": -0.04, "X_rr": 0.01, "X_vvvv": 0.7, "Y_r": 0.08, "Y_|r|r": -0.04, "Y_vvr": 0.4, "N_v": -0.1}
+TURNED |= {"N_|v|v": -0.03, "N_vrr": 0.05, "K_r": 0.02, "M_v": 0.01, "N_vv": 0.01}
+ALIKE = {"X_vr": 0.002, "Y_v": -0.3, "Y_|v|v": -0.7, "Y_vrr": -0.4, "N_r": -0.05, "N_|r|r": -0.03, "N_vvr": -0.3}
+ALIKE |= {"N_uv": -0.1, "X_u": -0.02, "K_v": 0.01, "Y_rr": 0.01, "Y_phi": -0.01}
+
+
+def mmg(name: str, value: float, u: float, v: float, r: float) -> np.ndarray:
+    nu_r, eta = ca.SX(ca.DM([u, v, 0, 0, 0, r])), ca.SX(ca.DM([0, 0, 0, 0.1, 0, 0]))
+    still = hull.mmg(nu_r, eta, R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0)
+    return numbers(hull.mmg(nu_r, eta, R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0, **{name: value})) - numbers(still)
+
+
+@pytest.mark.parametrize(("name", "value"), [*TURNED.items(), *ALIKE.items()])
+def test_astern_the_mmg_hull_is_alike_fore_and_aft(name: str, value: float) -> None:
+    """Seen in a mirror abeam, X, M, N and u, q, r have the other sign: N_v, Munk's moment, had none of u."""
+    mirror = np.array([-1, 1, 1, 1, -1, -1])
+    for u, v, r in ((1.2, 0.4, 0.1), (0.3, -0.5, 0.05), (0.1, 0.02, -0.3)):
+        ahead, astern = mmg(name, value, u, v, r), mmg(name, value, -u, v, -r)
+        np.testing.assert_allclose(astern, mirror * ahead, rtol=1e-12, atol=1e-12)
+    U, axis = np.hypot(1.2, 0.4), "XYZKMN".index(name[0])
+    factors = {"u": 1.2 / U, "v": 0.4 / U, "r": 0.1 * 7 / U, "phi": 0.1}
+    formula = derivative(name)
+    expected = value * np.prod([factors[symbol] for symbol, _ in formula.factors])  # ahead, as it is written
+    lever = 7.0 if axis > 2 else 1.0
+    assert mmg(name, value, 1.2, 0.4, 0.1)[axis] == pytest.approx(500 * 7 * 0.46 * U**2 * lever * expected, rel=1e-4)
+    abeam = mmg(name, value, 0.0, 0.4, 0.0)[axis]
+    assert (abeam == 0) or name in ALIKE
 
 
 def test_the_mmg_resistance_turns_round_with_the_ship() -> None:
