@@ -307,7 +307,8 @@ def hull(given: Particulars) -> Values:
     """Derivatives in the primes of [hull.mmg]: linear by Clarke et al. (1983), the others by Kijima et al. (1990)."""
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
     s, full, slender = -math.pi * T / L, C_b * B / L, (1 - C_b) * T / B
-    m_x, m_y = (-added_mass(given)[name].number / (given.rho / 2 * L**2 * T) for name in ("X_udot", "Y_vdot"))
+    added = {name: -value.number / (given.rho / 2 * L**2 * T) for name, value in added_mass(given).items()}
+    m_x, m_y, centre = added["X_udot"], added["Y_vdot"], (added["Y_rdot"] + added["N_vdot"]) / 2 / L
     clarke, kijima = "Clarke et al. (1983), x L / T", "Kijima et al. (1990)"
     masumoto = "Yoshimura and Masumoto (2012)"
     X_vv = min(1.15 * full - 0.18, 0.0)
@@ -315,7 +316,11 @@ def hull(given: Particulars) -> Values:
         "R_0": _resistance(given),
         "X_vv": Value(X_vv, "prime", f"1.15 C_b B / L - 0.18, at most 0, {masumoto}"),
         "X_vr": Value(1.91 * full - 0.08 - m_y, "prime", f"1.91 C_b B / L - 0.08 - m_y', {masumoto}: v = -U beta"),
-        "X_rr": Value(-0.085 * full + 0.008, "prime", f"-0.085 C_b B / L + 0.008, {masumoto}"),
+        "X_rr": Value(
+            -0.085 * full + 0.008 - centre,
+            "prime",
+            f"-0.085 C_b B / L + 0.008, {masumoto}, + (Y_rdot + N_vdot) / 2 in primes, which turn apart",
+        ),
         "X_vvvv": Value(
             min(max(-6.68 * full + 1.1, 0.0), -X_vv),
             "prime",
