@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -38,12 +39,17 @@ def table(columns: list[str], rows: Iterable[Iterable[Any]]) -> Table:
     return Table([visible(column) for column in columns], [[visible(str(cell)) for cell in row] for row in rows])
 
 
+def _console(*, stderr: bool = False) -> Any:
+    """Return the terminal; with NO_COLOR in the environment without bold and dim text, too (no-color.org)."""
+    from rich.console import Console
+
+    return Console(stderr=stderr, color_system=None if os.environ.get("NO_COLOR") else "auto")
+
+
 def show(table: Table) -> None:
     """Print a table: folded to the width of a terminal; elsewhere a line for each row, however long."""
     if sys.stdout.isatty():
-        from rich.console import Console
-
-        Console().print(_folded(table))
+        _console().print(_folded(table))
     else:
         typer.echo("\n".join(_lines(table)))
 
@@ -188,11 +194,10 @@ def counted(blocks: Iterable[Any], total: int, what: str = "members", interrupte
         if not sys.stderr.isatty():
             yield from _said(blocks, total, what)
             return
-        from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
         columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=Console(stderr=True)) as progress:
+        with Progress(*columns, console=_console(stderr=True)) as progress:
             task = progress.add_task(what, total=total)
             for block in blocks:
                 progress.advance(task, len(block))
@@ -225,9 +230,7 @@ def iterations() -> Iterator[Any]:
 def steps(first: str = "") -> Iterator[Callable[[str], object]]:
     """Give a function that takes the step of a long calculation; shown at once on a terminal, else now and then."""
     if sys.stderr.isatty():
-        from rich.console import Console
-
-        with Console(stderr=True).status(first) as status:
+        with _console(stderr=True).status(first) as status:
             yield lambda step: status.update(visible(step))
         return
     last = [first]
@@ -295,7 +298,6 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
                 if line:
                     quiet.say(line)
         return event
-    from rich.console import Console
     from rich.markup import escape
     from rich.progress import (
         BarColumn,
@@ -315,7 +317,7 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
     )
     best: dict[str, Any] = {}
     worst: dict[str, Any] = {}
-    progress = Progress(*columns, console=Console(), refresh_per_second=2)  # drawing takes time from workers
+    progress = Progress(*columns, console=_console(), refresh_per_second=2)  # drawing takes time from workers
     task, inner = progress.add_task("cells", total=None), progress.add_task("", total=None, visible=False)
 
     def look() -> None:

@@ -32,6 +32,22 @@ def test_a_narrow_table_loses_no_digit(capsys: pytest.CaptureFixture[str], monke
     assert sum(character.isdigit() for character in printed) == 8
 
 
+@pytest.mark.parametrize(("value", "styled"), [("1", False), ("", True)])
+def test_without_colour_a_terminal_is_sent_no_styles(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, value: str, styled: bool
+) -> None:
+    """Rich leaves out colours alone: headings stayed bold, as codes in a terminal that knows none."""
+    from shipid.cli.terminal import show, table
+
+    monkeypatch.setenv("NO_COLOR", value)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    show(table(["criterion", "value"], [["tactical diameter", "5.067"]]))
+    printed = capsys.readouterr().out
+    assert "tactical diameter" in printed
+    assert ("\x1b" in printed) == styled
+
+
 def test_without_a_terminal_a_row_is_one_line_and_columns_stay_in_line(capsys: pytest.CaptureFixture[str]) -> None:
     """A search for a name finds the whole row; a sign of Chinese takes two places."""
     from shipid.cli.terminal import show, table
@@ -99,7 +115,9 @@ def test_long_cells_are_no_silence(capsys: pytest.CaptureFixture[str], monkeypat
     ]
     screen = io.StringIO()
     made = rich.console.Console
-    monkeypatch.setattr(rich.console, "Console", lambda: made(file=screen, force_terminal=True, width=150))
+    monkeypatch.setattr(
+        rich.console, "Console", lambda **given: made(file=screen, force_terminal=True, width=150, **given)
+    )
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     watch = Still()
     terminal.draw(slow(watch), watch)  # type: ignore[arg-type]
