@@ -50,8 +50,15 @@ class AboardContent(PageContent):
 
     @property
     def runs(self) -> list[str]:
-        """Runs to choose from, at even distances if there are many."""
-        return spread([str(run) for run in pd.unique(self.instants["run"])], MOST_RUNS)
+        """Runs to choose from: if there are many some at even distances, and the one with the largest error."""
+        every = [str(run) for run in pd.unique(self.instants["run"])]
+        shown = {*spread(every, MOST_RUNS), self.worst}
+        return [run for run in every if run in shown]
+
+    @property
+    def worst(self) -> str:
+        """The run with the largest error at the end of a path; the first where none can be judged."""
+        return str(self.instants["run"].iloc[int(self.instants["error"].fillna(-1.0).argmax())])
 
     @property
     def banded(self) -> bool:
@@ -79,12 +86,6 @@ def outline(points: pd.DataFrame, corners: int = 16) -> tuple[Floats, Floats]:
     return east.ravel(), north.ravel()
 
 
-def _worst(content: AboardContent) -> int:
-    """Index of the run with the largest error at the end of a path; 0 where none can be judged."""
-    errors = content.instants.groupby("run")["error"].max().reindex(content.runs).fillna(0.0)
-    return int(errors.to_numpy().argmax())
-
-
 def seen(content: AboardContent) -> Figure:
     """The track of a run with the paths, and bands, that were shown at some instants."""
     drawn = [LOGGED, PATH, *([PHYSICS] if content.points["physics_north"].notna().any() else [])]
@@ -93,12 +94,12 @@ def seen(content: AboardContent) -> Figure:
         id="seen",
         title="What was seen",
         takeaway=content.answer[-1].text,
-        how=f"Paths of {MOMENTS} instants of a run, predicted from the rows up to then; the track went on as drawn."
-        + (" Ellipses are the band at a few steps of each path." if content.banded else ""),
+        how=f"Paths of at most {MOMENTS} instants of a run, predicted from the rows up to then; the track went on as "
+        "drawn." + (" Ellipses are the band at a few steps of each path." if content.banded else ""),
         alternative="The measured track, with the paths predicted along it and those of the physics alone.",
         height=520,
         views={str(i): [Panel(_map(content, run))] for i, run in enumerate(content.runs)},
-        controls=[Control("Run", content.runs, _worst(content))],
+        controls=[Control("Run", content.runs, content.runs.index(content.worst))],
         chips=[Chip(name, name, COLOURS[name], DASHES.get(name, "solid")) for name in drawn],
     )
 
@@ -129,9 +130,7 @@ def along(content: AboardContent) -> Figure:
     """Error at the end of each path, size of the band there, and the alarm, over the time of a run."""
     error = content.instants["error"].median()
     takeaway = f"Over all runs, the median error at the end of a path is {metres(error)}"
-    takeaway += (
-        f"; the largest, {metres(float(content.instants['error'].max()))}, is in {content.runs[_worst(content)]}."
-    )
+    takeaway += f"; the largest, {metres(float(content.instants['error'].max()))}, is in {content.worst}."
     return Figure(
         id="along",
         title="Along the run",
@@ -142,7 +141,7 @@ def along(content: AboardContent) -> Figure:
         alternative="Error over time, with instants of alarm marked.",
         height=300,
         views={str(i): [Panel(_history(content, run))] for i, run in enumerate(content.runs)},
-        controls=[Control("Run", content.runs, _worst(content))],
+        controls=[Control("Run", content.runs, content.runs.index(content.worst))],
         chips=[
             Chip(PATH, "error", COLOURS[PATH]),
             *(Chip(name, name, COLOURS[BAND], dash) for name, (_, dash) in AXES.items() if content.banded),
@@ -153,7 +152,7 @@ def along(content: AboardContent) -> Figure:
 
 def _history(content: AboardContent, run: str) -> Plot:
     mine = content.instants[content.instants["run"] == run]
-    t = mine["t"].to_numpy() - float(mine["t"].iloc[0])
+    t = mine["t"].to_numpy() - float(content.track.loc[content.track["run"] == run, "t"].min())
     traces = [line("error", t, mine["error"].to_numpy(), [PATH], line={"color": COLOURS[PATH], "width": 2})]
     if content.banded:
         last = content.points[(content.points["run"] == run)].groupby("t", sort=False).last()

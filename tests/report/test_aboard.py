@@ -62,6 +62,24 @@ def test_it_draws_what_was_played(banded: bool, physics: bool, tmp_path) -> None
     assert "latency: 10 ms" not in text
 
 
+def test_of_many_runs_the_worst_is_among_those_to_choose_from() -> None:
+    """Of 60 runs 24 were shown, and the worst of these was said to have the largest error of all."""
+    here = content()
+    frames = {
+        key: pd.concat([getattr(here, key).assign(run=f"run {i}") for i in range(60)], ignore_index=True)
+        for key in ("instants", "points", "track")
+    }
+    rows = frames["instants"]
+    frames["instants"] = rows.assign(error=rows["error"].where(rows["run"].ne("run 31") | rows["t"].ne(4.0), 55.0))
+    many = replace(here, **frames)
+    figure = along(many)
+    assert "the largest, 55.0 m, is in run 31." in figure.takeaway
+    assert figure.controls[0].options[figure.controls[0].start] == "run 31"
+    drawn_errors = figure.views[str(figure.controls[0].start)][0].plot.traces[0]["y"]
+    assert np.nanmax(drawn_errors) == 55.0
+    assert 24 <= len(many.runs) <= 25
+
+
 def test_it_opens_at_the_worst_run_in_time_of_the_run() -> None:
     """Three runs of another day: the second errs most; its band is that of the last step, along and across."""
     here = content()
@@ -76,6 +94,9 @@ def test_it_opens_at_the_worst_run_in_time_of_the_run() -> None:
     for figure in (seen(three), along(three)):
         assert list(figure.controls[0].options) == ["a", "b", "c"]
         assert figure.controls[0].start == 1
+    late = replace(three, instants=three.instants[three.instants["t"] >= 1e6 + 8], points=three.points)
+    (error, *_) = along(late).views["1"][0].plot.traces
+    assert error["x"][0] == 8, "the run began with its track, before there was a prediction"
     lines = {str(trace["name"]): trace for trace in along(three).views["1"][0].plot.traces}
     np.testing.assert_allclose(lines["error"]["x"], here.instants["t"])
     np.testing.assert_allclose(lines["error"]["y"], 3.0 * here.instants["error"], rtol=1e-6)
