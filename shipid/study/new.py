@@ -6,6 +6,7 @@ import os
 import re
 import textwrap
 import tomllib
+import unicodedata
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -37,6 +38,7 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import order_of
 
+LETTERS = {"ä": "ae", "ö": "oe", "ü": "ue", "ø": "oe", "å": "aa", "æ": "ae", "ß": "ss", "ł": "l", "đ": "d"}
 CORRECTED = "-corrected"  # ends the name of a family whose numbers the log corrects
 LEAST_RUNS = 2  # the smallest amount of data of a new study: one run trains too, if it is long enough to be parted
 MOST_AMOUNTS, MOST_WINDOWS = 6, 20000
@@ -435,21 +437,17 @@ def _families(
 
     learned : the runs that each vessel was identified from. others : the runs that corrected it.
     """
-    taken = {NO_MODEL, "inaccurate"}
     families: list[Any] = []
+    names = family_names(vessels)
     for named, vessel in vessels.items():
-        name = re.sub(r"[^A-Za-z0-9_.+-]", "-", vessel.key)
-        name = name if name[:1].isalpha() else f"ship-{name}"
-        while name in taken:
-            name += "-own"
-        taken.add(name)
+        name, better = names[named]
         seen = {"seen": learned[named]} if learned[named] else {}
         families.append({"name": name, "description": f"{vessel.name}, as it is", "base": named, **seen})
         look = looks.get(named)
         if look is not None and look.changes:
             groups = ", ".join(f"{change.group.name} x {change.factor:.3g}" for change in look.changes)
             words = f"{vessel.name} with {groups}: from all runs that do not test, whatever N_D"
-            corrected = {"name": f"{name}{CORRECTED}", "description": words, "base": named}
+            corrected = {"name": better, "description": words, "base": named}
             runs = list(dict.fromkeys([*learned[named], *others]))
             families.append({**corrected, "seen": runs, "perturb": [{"set": look.values}]})
     named, vessel = next(iter(vessels.items()))
@@ -459,6 +457,33 @@ def _families(
         seen = {"seen": learned[named]} if learned[named] else {}
         families.append({"name": "inaccurate", "description": words, "base": named, **seen, "perturb": blocks})
     return families
+
+
+def family_names(vessels: Mapping[str, Vessel]) -> dict[str, tuple[str, str]]:
+    """Names of the families of each vessel of a study: as it is, and as its log corrects it. No two are one file."""
+    taken = {NO_MODEL, "inaccurate"}
+
+    def free(name: str, more: str, end: str = "") -> str:
+        while f"{name}{end}".lower() in taken:
+            name += more
+        taken.add(f"{name}{end}".lower())
+        return f"{name}{end}"
+
+    own = {named: free(_spelt(vessel.key), "-own") for named, vessel in vessels.items()}
+    return {named: (name, free(name, "-log", CORRECTED)) for named, name in own.items()}
+
+
+def _spelt(key: str) -> str:
+    """The name of a file as the name of a family, which has letters of English alone: `ærø` is `aeroe`."""
+    words = unicodedata.normalize("NFKD", re.sub(r"[^\x00-\x7f]", _letter, key))
+    name = re.sub(r"[^A-Za-z0-9_.+-]+", "-", "".join(sign for sign in words if not unicodedata.combining(sign)))
+    name = name.strip("-") or "ship"
+    return name if name[0].isalpha() else f"ship-{name}"
+
+
+def _letter(match: re.Match[str]) -> str:
+    spelt = LETTERS.get(match[0].lower(), match[0])
+    return spelt.capitalize() if spelt.isascii() and match[0].isupper() else spelt
 
 
 def _inaccurate(vessel: Vessel) -> list[dict[str, Any]]:

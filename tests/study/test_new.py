@@ -28,6 +28,7 @@ from shipid.study.new import (
     _ahead,
     _turning,
     draft_study,
+    family_names,
     horizon_of,
     ladder,
     step_of,
@@ -187,6 +188,38 @@ def test_what_the_log_corrects_is_a_family(tmp_path: Path, monkeypatch: pytest.M
     patch = tmp_path / "patch.toml"
     patch.write_text(draft.looks[SHIP].patch(SHIP))
     assert load_vessel(str(patch)).parameters[path] == 0.95
+
+
+def test_families_have_names_that_a_study_may_use_each_once() -> None:
+    """A correction may be saved under its name and studied beside its ship; two names of one file were refused."""
+    keys = {
+        "a": "\u00e6r\u00f8",
+        "b": "F\u00c4HRE 2",
+        "c": "\u8239",
+        "d": "ada",
+        "e": "ada-corrected",
+        "f": "Ada",
+        "g": "none",
+        "h": "7-seas",
+        "i": "caf\u00e9 (2)",
+    }
+    ship = load_vessel(SHIP)
+    names = family_names({named: replace(ship, file=Path(f"{key}.toml")) for named, key in keys.items()})
+    assert [own for own, _ in names.values()] == [
+        "aeroe",
+        "FAeHRE-2",
+        "ship",
+        "ada",
+        "ada-corrected",
+        "Ada-own",
+        "none-own",
+        "ship-7-seas",
+        "cafe-2",
+    ]
+    assert names["d"][1] == "ada-log-corrected"
+    every = [name.lower() for pair in names.values() for name in pair]
+    assert len(set(every)) == len(every)
+    assert all(re.fullmatch("[A-Za-z][A-Za-z0-9_.+-]*", name) for name in every)
 
 
 def test_what_jitters_is_not_the_true_path(tmp_path: Path) -> None:
