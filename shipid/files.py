@@ -24,6 +24,7 @@ from shipid.errors import DataError, ResultError
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+    from pyarrow import Table
 
 TEMPORARY = ".shipid-"
 """Beginning of the names of temporary folders."""
@@ -221,14 +222,21 @@ def write_table(file: Path, frame: DataFrame) -> None:
                 frame.to_parquet(stream, index=False)
 
 
+def read_arrow(source: Path | BinaryIO) -> Table:
+    """Read a Parquet file in this thread alone: where a user may start no other, PyArrow waits for one without end."""
+    import pyarrow.parquet
+
+    return pyarrow.parquet.ParquetFile(source, pre_buffer=False).read(use_threads=False)
+
+
 def read_table(file: Path) -> DataFrame:
     """Read a Parquet table that `write_table` wrote; OSError if it cannot be opened, ValueError for anything else."""
-    import pandas as pd
     import pyarrow
 
     try:
         with open_file(file) as stream:
-            return pd.read_parquet(stream)
+            table: DataFrame = read_arrow(stream).to_pandas(use_threads=False)
+            return table
     except (pyarrow.ArrowException, LookupError, TypeError, AttributeError, ArithmeticError) as error:
         raise ValueError(f"{file} is not a whole table") from error  # such as a word of pandas' notes that is another
 

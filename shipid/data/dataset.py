@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from shipid.arguments import names_of, of_class, path_of
 from shipid.errors import DataError, choices
-from shipid.files import open_file, whole
+from shipid.files import open_file, read_arrow, whole
 from shipid.physics.signals import SIGNALS, is_command, is_output, named, signal_of, wraps
 
 Array = NDArray[np.float64]
@@ -353,7 +353,7 @@ def read_dataset(file: str | os.PathLike[str]) -> Dataset:
         raise DataError("is a folder: name one dataset; `shipid data join` makes one of several", file=file)
     try:
         with open_file(file) as stream:
-            table = pyarrow.parquet.read_table(stream)
+            table = read_arrow(stream)
     except (pyarrow.ArrowException, ValueError, TypeError):
         hint = "make one from a log with `shipid data import`, or give the log itself if the command has --mapping"
         raise DataError(f"not a Parquet file: {hint}", file=file) from None
@@ -365,7 +365,7 @@ def read_dataset(file: str | os.PathLike[str]) -> Dataset:
     if stored is None:
         raise DataError("a Parquet file, but not a dataset of shipid: no metadata under 'shipid'", file=file)
     try:
-        return Dataset(table.to_pandas(), json.loads(stored))
+        return Dataset(table.to_pandas(use_threads=False), json.loads(stored))
     except DataError as error:
         raise DataError(error.message, file=file, path=error.path) from None
     except (ValueError, RecursionError) as error:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import re
 import stat
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +18,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyarrow
-import pyarrow.parquet
 
 from shipid.errors import DataError
+from shipid.files import read_arrow
 from shipid.logs.foreign import ENOUGH, refuse_foreign
 from shipid.logs.formats import LOOKED_AT, Format, MatFormat, NmeaFormat, ParquetFormat, SheetFormat, TextFormat
 from shipid.logs.mat import is_mat, read_mat
@@ -328,6 +329,8 @@ def _blocks(file: Path, form: TextFormat, width: int, plain: dict[int, bool]) ->
     """The columns of a text log at some places, block by block; `plain` says which of them are numbers."""
     import pyarrow.csv as arrow
 
+    pyarrow.set_io_thread_count(1)
+    _start_threads(2)
     blocks: Iterator[pyarrow.RecordBatch] = arrow.open_csv(
         file,
         arrow.ReadOptions(
@@ -335,7 +338,7 @@ def _blocks(file: Path, form: TextFormat, width: int, plain: dict[int, bool]) ->
             skip_rows=form.skip_rows + int(form.header and form.names is None),
             encoding=form.encoding,
             block_size=1_000_000,
-            use_threads=True,
+            use_threads=False,
         ),
         arrow.ParseOptions(delimiter=form.separator, ignore_empty_lines=True),
         arrow.ConvertOptions(
@@ -378,6 +381,20 @@ def _columns_of_blocks(
     }
 
 
+def _start_threads(count: int) -> None:
+    """Start some threads at once, and end them; raises RuntimeError where this user may not: PyArrow would wait."""
+    end = threading.Event()
+    threads = [threading.Thread(target=end.wait) for _ in range(count)]
+    try:
+        for thread in threads:
+            thread.start()
+    finally:
+        end.set()
+        for thread in threads:
+            if thread.ident is not None:
+                thread.join()
+
+
 def _decimal(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
     return column.str.replace(",", ".") if form.decimal == "," else column
 
@@ -391,9 +408,10 @@ def _sheet(file: Path, form: SheetFormat, _: str) -> pd.DataFrame:
 def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:
     refuse_foreign(file)
     try:
-        stored = pyarrow.parquet.read_table(file)
+        stored = read_arrow(file)
         plain = [place for place, field in enumerate(stored.schema) if not pyarrow.types.is_nested(field.type)]
-        table: pd.DataFrame = stored.select(plain).to_pandas(ignore_metadata=True)  # an index is a column
+        # an index is a column
+        table: pd.DataFrame = stored.select(plain).to_pandas(ignore_metadata=True, use_threads=False)
         return table
     except (pyarrow.ArrowException, ValueError):
         raise DataError("not a Parquet file, or damaged: set [format] kind", file=file, path="format.kind") from None

@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -324,3 +326,15 @@ def test_no_other_run_keeps_a_moment_of_runs_that_are_set_apart() -> None:
     assert by_run == {"a": [list(T[10:20])], "b": [list(T[:10]), list(T[20:])]}
     separate = as_dataset(middle, turning(T), clock="run")
     assert apart_from(separate, ["a"]) is separate
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system does not say the threads of a process")
+def test_a_dataset_is_read_in_one_thread(tmp_path: Path) -> None:
+    """Where a user may start no other, PyArrow would wait for one without end."""
+    file = write_dataset(as_dataset(turning(T)), tmp_path / "a.parquet")
+    code = (
+        "import os, sys; from shipid.data.dataset import read_dataset; before = len(os.listdir('/proc/self/task')); "
+        "read_dataset(sys.argv[1]); print(len(os.listdir('/proc/self/task')) - before)"
+    )
+    run = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "0"

@@ -1,6 +1,7 @@
 """One motion, written in every format a log may have, comes back as the same dataset."""
 
 import os
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -77,6 +78,27 @@ def test_a_large_text_is_read_by_blocks_as_a_small_one(
     assert shares
     assert max(shares) <= 1.0
     assert list(read_table(file, form, "a", ("b",))) == ["a", "b"]
+
+
+def test_a_large_text_is_refused_where_no_threads_can_be_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """PyArrow would wait for the second one without end; the command line makes one line of this error."""
+    start, started = threading.Thread.start, []
+
+    def one(thread: threading.Thread) -> None:
+        if started:
+            raise RuntimeError("can't start new thread")
+        started.append(thread)
+        start(thread)
+
+    file = tmp_path / "log.csv"
+    file.write_text("a,b\n0.5,1\n1.5,2\n", encoding="utf-8")
+    monkeypatch.setattr(readers, "LARGE", 1)
+    monkeypatch.setattr(threading.Thread, "start", one)
+    with pytest.raises(RuntimeError, match="start new thread"):
+        read_table(file, TextFormat(), "a", ("b",))
+    assert not started[0].is_alive()
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,9 @@ from shipid.errors import DocumentError
 from shipid.vessel.bindings import bindings
 from shipid.vessel.load import Vessel, check_vessel, load_vessel, sources
 
-UNIT = re.compile(r"-|prime|bis|deg|rad(?:/s)?|rev/s(?:\^2)?|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*")
+UNIT = re.compile(
+    r"-|prime|bis|deg|rad(?:/s)?|rev/s(?:\^2)?|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*"
+)
 
 
 def test_every_parameter_has_a_unit_and_a_value(vessel: Vessel) -> None:
