@@ -6,6 +6,7 @@ import bisect
 import math
 import re
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from shipid.logs.foreign import refuse_foreign
 from shipid.logs.formats import LOOKED_AT, NmeaFormat
 from shipid.units import KNOT
 
+FIRST_DAY = datetime(1970, 1, 1).toordinal()
 LATE_DATE = 60.0  # s after midnight: so long a receiver may write the date of the day before
 _DOTTED = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})")
 _DATED = re.compile(r"\d{4}([-/]?)\d\d\1\d\d")
@@ -68,10 +70,10 @@ def read_nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
 
 
 class _Clock:
-    """Times of fixes: seconds since the midnight before the first one, over further midnights.
+    """Times of fixes: seconds since 1970, by the dates of RMC and ZDA, or since the midnight before the first fix.
 
-    RMC and ZDA say the date. Another fix is of the day of that one before or behind it whose time of day is nearer.
-    Without any date a time of day that goes back by twelve hours is of the next day.
+    A fix without a date is of the day of that one before or behind it whose time of day is nearer. Without any date
+    a time of day that goes back by twelve hours is of the next day.
     """
 
     def __init__(self) -> None:
@@ -91,7 +93,7 @@ class _Clock:
         if not known:
             return np.asarray(since + DAY * np.cumsum(np.diff(since, prepend=since[:1]) < -HALF_DAY))
         days = [self._day(place, known) for place in range(len(since))]
-        result = since + DAY * (np.array(days) - days[0])
+        result = since + DAY * (np.array(days) - FIRST_DAY)
         for place in np.flatnonzero(since < LATE_DATE):
             if place and 0.0 <= result[place] + DAY - result[place - 1] < NEXT_DAY:  # the date is of the day before
                 result[place] += DAY

@@ -1,5 +1,6 @@
 """NMEA 0183: sentences come back as the motion that they tell, with their times."""
 
+import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -143,7 +144,13 @@ def test_a_fix_is_of_the_day_that_the_sentences_say(fixes: list[str], hours: lis
     (tmp_path / "log").write_text("\n".join(map(sentence, lines)))
     t = read_table(tmp_path / "log", NmeaFormat(kind="nmea"), "time")["time"]
     np.testing.assert_allclose((t - t[0]) / 3600, hours)
-    assert 0 <= t[0] < 86400
+    days = [
+        datetime.strptime(fix.split()[2], "%d%m%y").replace(tzinfo=UTC)
+        for fix in fixes
+        if re.search(r" \d{6} \d{6}$", fix)
+    ]
+    begin = min(days).timestamp() if days else 0.0  # dated, so that it can be joined with other dated logs
+    assert 0 <= t[0] - begin < 86400
 
 
 @pytest.mark.parametrize("speed", ["10.0,N,,M", ",N,5.1444,M", "10.0,N,5.1444,M"])
@@ -165,7 +172,8 @@ def test_nmea(time: str, midnight: float, tmp_path: Path) -> None:
     dataset = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "bridge.nmea")
     frame = dataset.frame
     assert len(frame) == len(T)
-    np.testing.assert_allclose(frame["t"], T + midnight, atol=1e-6)
+    first = datetime(2022, 10, 27, tzinfo=UTC).timestamp() if time == "fix" else 0.0  # RMC says the date
+    np.testing.assert_allclose(frame["t"], first + T + midnight, rtol=0, atol=1e-6)
     for name, tolerance in {"psi": 1e-6, "u": 1e-5, "v": 1e-5, "r": 1e-6}.items():
         np.testing.assert_allclose(frame[name], motion[name], atol=tolerance, err_msg=name)
     extent = np.ptp(motion["north"])
