@@ -56,6 +56,7 @@ from shipid.logs.readers import Progress, in_points, read_table, require_file
 from shipid.logs.repairs import (
     FLAGS,
     REPAIRS,
+    Break,
     Despike,
     Latency,
     Repair,
@@ -243,6 +244,19 @@ def _comes_first(repair: Repair, fixed: bool, read: set[str]) -> bool:
     return repair.of_inputs or turns
 
 
+def _check_breaks(mapping: Mapping, t: Array, off: tuple[str, ...], file: Path) -> None:
+    """Raise DataError for an interval of a break that no time t (N,) [s] of a log reaches: its clock is another one.
+
+    Where each run has a separate clock, or part, the interval may be of another run.
+    """
+    alone = mapping.source.runs is None and mapping.parts is None and BREAK not in off
+    for index, repair in enumerate(mapping.repair if alone else ()):
+        for start, end in repair.intervals if isinstance(repair, Break) and repair.enabled else ():
+            if end < t[0] or start > t[-1]:
+                message = f"{span_of(start, end)} is not in the log, which has {span_of(t[0], t[-1])}"
+                raise DataError(message, file=file, path=f"repair.{index}.intervals")
+
+
 def _texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_]:
     """The column that says the run, as texts (N,); whole numbers without a point."""
     column = _column(log, source, file, "parts.from").ffill().bfill()
@@ -253,6 +267,7 @@ def _texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_]:
 
 def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, ...]) -> Imported:
     rows, first, read, begins = _columns(mapping, file, log)
+    _check_breaks(mapping, rows["t"].to_numpy(), off, file)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
     fixed = "speed" in mapping.columns or ("u" in mapping.columns and mapping.columns["u"].frame == "earth")
     early = [repair for repair in mapping.repair if _comes_first(repair, fixed, {*mapping.columns})]

@@ -128,6 +128,15 @@ def test_break_removes_what_lies_between_and_despike_does_not_reach_over(
     assert [record["count"] for record in dataset.metadata["repairs"]] == [1, 0]
 
 
+def test_a_break_outside_the_log_is_refused(plain_mapping: Callable[..., Path], tmp_path: Path) -> None:
+    """It was written for another clock; left out, it needs no row."""
+    repairs = '\n[[repair]]\nkind = "break"\nintervals = [[99.0, 101.0], [86499.0, 86501.0]]\nreason = "a test"\n'
+    mapping, log = read_mapping(plain_mapping(repairs)), as_log(MOTION, tmp_path / "log.csv")
+    with pytest.raises(DataError, match=r"repair\.0\.intervals: 86499 to 86501 s is not in the log, which has 0 to"):
+        import_log(mapping, log)
+    assert len(import_log(mapping, log, without=["break"]).frame) == len(MOTION)
+
+
 @pytest.mark.parametrize("signal", ["position", "velocity", "heading", "yaw rate"])
 def test_what_came_late_is_taken_earlier(signal: str) -> None:
     """A signal that is 1 s late becomes what it was: a turn with changing rate, over ground."""
