@@ -47,6 +47,7 @@ from shipid.logs.mapping import (
     degrees_of,
     is_dated,
     names_of,
+    rate_of_ais,
     read_mapping,
     size_of,
     to_si,
@@ -345,6 +346,8 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
         numbers = parts[0]
         if column.unit == "ddmm":
             numbers = _of_minutes(numbers, table, other, f"columns.{name}.unit")
+        if column.unit == "ais":
+            numbers = _of_ais(numbers, table, other, f"columns.{name}.unit")
         if column.unit == "quaternion":
             numbers = _of_quaternion(parts, names_of(column.source), table, other, f"columns.{name}.from")
         elif len(parts) > 1:
@@ -386,6 +389,16 @@ def _of_minutes(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, pat
         message = f"{numbers[row]:.10g} in {_row(log, row)} has 60 minutes or more: is the unit deg?"
         raise DataError(message, file=file, path=path)
     return degrees
+
+
+def _of_ais(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: str) -> NDArray[np.float64]:
+    """Rates of turn (N,) as messages of AIS have them, in deg/min."""
+    wrong = ~np.isnan(numbers) & ~((numbers >= -128) & (numbers <= 127))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        message = f"{numbers[row]:.10g} in {_row(log, row)} is none of -128 to 127, as AIS has: is the unit deg/min?"
+        raise DataError(message, file=file, path=path)
+    return rate_of_ais(numbers)
 
 
 def _of_parts(

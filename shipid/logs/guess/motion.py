@@ -14,7 +14,7 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, names_another, unit_in_name
 from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.words import fits, is_order
-from shipid.logs.mapping import UNITS, is_dated, to_si
+from shipid.logs.mapping import UNITS, is_dated, rate_of_ais, to_si
 from shipid.physics.signals import named
 from shipid.units import GRAVITY
 
@@ -27,6 +27,7 @@ FASTEST, HARDEST, SLOWEST = 100.0, 20.0, 0.02  # m/s, m/s^2, m/s: no ship goes o
 FROUDE = 4.0  # U / sqrt(g L): nothing that is steered in trials is faster for its length
 OFF_UNIT = 0.15  # relative distance of a fitted scale from a unit
 PLAIN, OFF_RARE = ("m/s", "kn", "km/h"), 0.03  # units that logs have, and the same distance for a unit that few have
+WHOLE, OFF_AIS = 0.9, 0.2  # share of whole numbers, at least; distance from the unit, of rates that AIS has coded
 ALONG = 0.1  # share of the track that a speed along the heading may leave unexplained
 
 
@@ -405,6 +406,8 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
         _rate_by_name(state)
         return
     called = state.all_called("r")
+    for name in state.called("r"):
+        _take_ais(state, change, name)
     candidates = [
         entry
         for entry in _rates(state, change, state.eligible("r"))
@@ -437,6 +440,32 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
         state.find("unit of r", (name,), confidence, f"{name!r} says {written}, but is in {unit}")
     state.suggest("r", name, unit, confidence, why, **extra)
     state.r = state.columns[name] * to_si(unit, "r") * extra.get("sign", 1)
+
+
+def _take_ais(state: State, change: Complex, name: str) -> None:
+    """Decode, in place, a rate of turn that is in numbers of AIS: so its integral is the heading, and not as it is.
+
+    change : of the heading over the windows [rad], (W,).
+    """
+    coded = state.columns[name]
+    if unit_in_name(name, "rad/s") is not None or np.abs(coded).max() > 128 or np.mean(coded % 1 == 0) < WHOLE:
+        return
+    rates = rate_of_ais(coded)
+    known = np.isfinite(rates)
+    if known.sum() < 2:
+        return
+    rates = np.interp(state.t, state.t[known], rates[known])
+    fits_ = [evidence.fit(change, state.chosen.change(evidence.integral(state.t, one))) for one in (coded, rates)]
+    off = abs(abs(fits_[1].scale) / to_si("ais", "r") - 1)
+    if fits_[1].left > min(NAMED_LEFT, fits_[0].left) or off > OFF_AIS:
+        return
+    state.columns[name] = rates
+    state.units[name] = "ais"
+    sentence = f"{name!r} has the numbers that AIS writes, 4.733 times the root of deg/min"
+    state.find("unit of r", (name,), 0.9, sentence)
+    if not known.all():
+        without = f"{name!r} is 127, -127 or -128 in {int((~known).sum())} rows, with which AIS says no rate"
+        state.find("missing values", (name,), 0.95, without)
 
 
 def _rates(state: State, change: Complex, names: list[str]) -> list[tuple[Fit, str, str, float]]:

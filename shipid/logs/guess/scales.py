@@ -34,6 +34,13 @@ PARTS = {FINE: "1e-7 deg", 1e-6: "1e-6 deg", AIS: "1/10000 min"}
 """Part of a degree [deg] that receivers and AIS (ITU-R M.1371) write as whole numbers -> its name."""
 OF_AIS = re.compile(r"(1/10[., ']?000|1e-?0?4|10\^-4|0[.,]0001) ?(arc)?(min(utes?)?|')")
 SPEEDS, DOUBTED = ("m/s", "kn", "km/h"), 0.4  # of a speed without a unit; share of how far off the next part is
+KNOTS, OFF_KNOT = {0.1: "tenths of a knot", 0.01: "hundredths of a knot"}, 0.15
+"""Part of a knot that AIS (ITU-R M.1371) and receivers write as whole numbers -> its name; how far off a speed is."""
+OF_KNOTS = {
+    0.1: r"(1/10|0[.,]1|d) ?(kn|kts?|knots?)|(kn|kts?|knots?) ?[*x/] ?10",
+    0.01: r"(1/100|0[.,]01|c) ?(kn|kts?|knots?)|(kn|kts?|knots?) ?[*x/] ?100",
+}
+"""Part of a knot -> regular expression of how logs write it as a unit, in lower case."""
 CLOSE = 0.97  # share of a whole turn that a heading sweeps before it jumps: it has been all round
 BEYOND, TWICE = 360.5, 720.0  # deg: a compass shows less; more than two turns in a row are rare
 OFF, BETTER, AGREES = 0.02, 4.0, 0.2  # misfit of a course and a heading, 1 - cos: of 11 deg; times; of a bad one
@@ -48,6 +55,7 @@ def take_scales(state: State) -> None:
             if turn is not None:
                 _scale(state, name, 360.0 / turn, f"a whole turn is {turn:g}: {TURNS[turn]}")
     _take_positions(state)
+    _take_speeds(state)
     _by_track(state)
 
 
@@ -96,8 +104,8 @@ def _fine(state: State, north: str, east: str) -> float:
             continue
         off = {
             fine: min(
-                abs(np.log(max(way[fine], 1e-12) / (length * UNITS["m/s"][unit])))
-                for unit in ([written] if written else SPEEDS)
+                abs(np.log(max(way[fine], 1e-12) / (length * unit)))
+                for unit in ([UNITS["m/s"][written]] if written else _speeds_of(state, name))
             )
             for fine in parts
         }
@@ -110,6 +118,29 @@ def _fine(state: State, north: str, east: str) -> float:
     words = f"are {names} whole numbers of {', '.join(last[:-1])} or of {last[-1]}?"
     state.ask(("latitude", "longitude", "t"), f"{words} {last[0]} is a guess")
     return parts[0]
+
+
+def _speeds_of(state: State, name: str) -> list[float]:
+    """Units [m/s] that a speed without one in its name may have: whole numbers may be parts of a knot."""
+    whole = np.mean(state.columns[name] % 1 == 0) > WHOLE
+    parts = [part * UNITS["m/s"]["kn"] for part in KNOTS] if whole else []
+    return [*(UNITS["m/s"][unit] for unit in SPEEDS), *parts]
+
+
+def _take_speeds(state: State) -> None:
+    """Put into knots a speed in whole parts of a knot, as its name or the track says."""
+    track = _track(state)
+    for name in [*state.called("speed")]:
+        values = state.columns[name]
+        said = [unit.strip().lower() for unit in units_in(name)]
+        part = next((part for part, words in OF_KNOTS.items() if any(re.fullmatch(words, one) for one in said)), None)
+        if part is None and track is not None and unit_in_name(name, "m/s") is None:
+            length = float(np.sum(np.abs(state.chosen.change(np.cumsum(np.abs(values) * np.gradient(state.t))))))
+            found = float(np.sum(np.abs(track))) / max(length, 1e-12) / UNITS["m/s"]["kn"]
+            whole = np.mean(values % 1 == 0) > WHOLE
+            part = next((part for part in KNOTS if whole and abs(found / part - 1.0) < OFF_KNOT), None)
+        if part is not None:
+            _scale(state, name, part, f"whole numbers of {KNOTS[part]}")
 
 
 def _way(state: State, latitude: Array, longitude: Array) -> float:

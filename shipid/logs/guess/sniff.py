@@ -43,8 +43,14 @@ SENTINELS = tuple(
     )
     for sign in (-1, 1)
 )
-NOT_AVAILABLE = {"psi": (511.0, 360.0), "speed": (102.3, 51.0), "latitude": (91.0, 90.0), "longitude": (181.0, 180.0)}
-"""Meaning -> number [deg, kn] that AIS writes for none (ITU-R M.1371), and the largest of the others."""
+NOT_AVAILABLE = {
+    "psi": {511.0: 360.0},
+    "speed": {102.3: 51.0, 1023.0: 600.0},
+    "latitude": {91.0: 90.0, 54_600_000.0: 54e6},
+    "longitude": {181.0: 180.0, 108_600_000.0: 108e6},
+    "r": {-128.0: 127.0},
+}
+"""Meaning -> number that AIS writes for none (ITU-R M.1371), decoded or not -> the largest of the others."""
 VISITS, SELDOM = 3, 0.3  # rows at which a number for no value begins, at least; share of the rows, at most
 BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one that has so few values, an order, more
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
@@ -335,7 +341,7 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
     """
     texts: dict[str, None] = {}
     for name, values in columns.items():
-        never = dict(NOT_AVAILABLE[one] for one in fits(name) if one in NOT_AVAILABLE)
+        never = {value: most for one in fits(name) for value, most in NOT_AVAILABLE.get(one, {}).items()}
         finite = values[np.isfinite(values)]
         ends = {float(finite.max()), float(finite.min())} if len(finite) else set()
         for value in dict.fromkeys([*SENTINELS, *never, *ends]):

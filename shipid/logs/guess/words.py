@@ -88,7 +88,7 @@ PHRASES: dict[str, str] = {
         "velocidad este, velocita est, snelheid oost"
     ),
     "r": (
-        "rotasjons hastighet, rotasjons fart, r, rot, yaw rate, rate of turn, turn rate, rate turn, gyro z, gyro "
+        "rotasjons hastighet, rotasjons fart, r, rot, turn, yaw rate, rate of turn, turn rate, rate turn, gyro z, gyro "
         "rate, w z, omega z, psi dot, nu 6, nu 3, yaw vel, yaw speed, dreh rate, dreh geschwindigkeit, gier "
         "geschwindigkeit, gier rate, giring hastighet, sving rate, gir rate, girrate, ang vel z, angular velocity "
         "z, heading rate, hdg rate, wende geschwindigkeit, d psi, gir hastighet, taux giration, vitesse giration, "

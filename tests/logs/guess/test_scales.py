@@ -133,6 +133,63 @@ def test_positions_of_AIS_are_whole_numbers_of_parts_of_a_minute(
     assert asks or read == pytest.approx([1 / 600_000] * 2)
 
 
+def as_ais(names: tuple[str, ...]) -> pd.DataFrame:
+    """The log every 4 s in the whole numbers of messages of AIS (ITU-R M.1371), under these names."""
+    heading = np.degrees(LOG["psi"]) % 360
+    course = np.degrees(LOG["psi"] + np.arctan2(LOG["v"], LOG["u"])) % 360
+    rate = np.degrees(LOG["r"]) * 60
+    columns = [
+        LOG["t"],
+        600_000 * LAT,
+        600_000 * LON,
+        10 * np.hypot(LOG["u"], LOG["v"]) * 3600 / 1852,
+        (10 * course).round() % 3600,
+        heading.round() % 360,
+        np.sign(rate) * np.minimum(4.733 * np.sqrt(np.abs(rate)), 126),
+    ]
+    whole = {name: one.round().astype(int) for name, one in zip(names, columns, strict=True)}
+    return pd.DataFrame(whole).iloc[::8].reset_index(drop=True)
+
+
+@pytest.mark.parametrize(
+    ("names", "silent"),
+    [
+        (("time", "LATITUDE", "LONGITUDE", "SOG", "COG", "TRUE_HEADING", "ROT"), False),
+        (
+            ("t [s]", "Lat [1/10000 min]", "Lon [1/10000 min]", "SOG [1/10 kn]", "COG [1/10 deg]", "HDG", "ROT_AIS"),
+            True,
+        ),
+        (("timestamp", "lat", "lon", "speed", "course", "heading", "turn"), True),
+    ],
+)
+def test_messages_of_AIS_are_decoded(names: tuple[str, ...], silent: bool, tmp_path: Path) -> None:
+    """Before, a speed in tenths of a knot was one in km/h, and the coded rate of turn was left out."""
+    frame = as_ais(names)
+    if silent:  # a receiver that was away
+        frame.loc[100:104, [names[3], names[6]]] = 1023, -128
+    proposal, dataset = drafted(frame, tmp_path)
+    assert "whole numbers" not in asked(proposal)
+    assert {one.name: one.unit for one in proposal.columns}["r"] == "ais"
+    rows = dataset.frame.loc[~dataset.frame["t"].between(396, 420)]
+    truth = {name: np.interp(rows["t"], LOG["t"], LOG[name]) for name in ("u", "v", "r")}
+    speed = np.hypot(truth["u"], truth["v"])
+    np.testing.assert_allclose(np.hypot(rows["u"], rows["v"]), speed, rtol=0, atol=0.06 * 1852 / 3600)
+    rate = np.degrees(truth["r"]) * 60
+    step = (2 * np.sqrt(np.abs(rate)) * 4.733 + 1) / 4.733**2  # deg/min: the next number, at most
+    assert np.all(np.abs(np.degrees(rows["r"]) * 60 - rate) < step)
+
+
+def test_numbers_that_are_no_rate_of_AIS_are_refused(tmp_path: Path) -> None:
+    frame = as_ais(("t", "lat", "lon", "speed", "course", "heading", "turn"))
+    draft = draft_mapping(guess(as_file(frame, tmp_path)), False).replace("sha256", "# sha256")
+    wrong = as_file(frame.assign(turn=frame["turn"].where(frame.index != 5, 300)), tmp_path)
+    with pytest.raises(DataError, match=r"columns\.r\.unit: 300 in row 6 is none of -128 to 127, as AIS has: is the"):
+        import_log(read_mapping(write_new(draft, tmp_path / "draft.toml")), wrong)
+    for_roll = draft + '\n[columns.p]\nfrom = "turn"\nunit = "ais"\n'
+    with pytest.raises(DocumentError, match="only the yaw rate r is in numbers of AIS"):
+        read_mapping(write_new(for_roll, tmp_path / "other.toml"))
+
+
 @pytest.mark.parametrize(("turn", "asks"), [(400.0, True), (360.0, False)])
 def test_gon_that_a_compass_in_degrees_may_show_are_asked(turn: float, asks: bool, tmp_path: Path) -> None:
     frame = turned_round(200.0).drop(columns="psi")
