@@ -6,6 +6,7 @@ import csv
 import itertools
 import re
 from collections import Counter
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import numpy as np
 from shipid.errors import DataError
 from shipid.logs.dates import DAY_OF, TIME_OF_DAY
 from shipid.logs.foreign import foreign
-from shipid.logs.formats import LOOKED_AT, SheetFormat
+from shipid.logs.formats import LOOKED_AT, SheetFormat, TextFormat
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.words import NO_VALUE, fits, known_words
 from shipid.logs.readers import READERS, grouped_by
@@ -310,3 +311,22 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def table_below(lines: str, form: TextFormat, missing: Iterable[str]) -> tuple[int, str] | None:
+    """Number, from 1, and first text of the line after an empty one that begins another table; None where none does.
+
+    It has words and no number, and lines above it, below the header, have some.
+    """
+    empty, rows = False, 0
+    for number, line in enumerate(lines.splitlines(), 1):
+        row = [cell for cell in cells(line, form.separator) if cell and cell not in missing]
+        if number > form.skip_rows and not row:
+            empty = True
+        elif number > form.skip_rows:
+            share = _number_share(row, form.decimal, form.thousands)
+            words = share == 0.0 and not any(re.match(rf"{TIME_OF_DAY}|{DAY_OF}", cell) for cell in row)
+            if empty and words and rows > 1:
+                return number, row[0]
+            empty, rows = False, rows + (share > 0.0)
+    return None

@@ -14,7 +14,7 @@ import pandas as pd
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.formats import TableFormat, TextFormat
+from shipid.logs.formats import SheetFormat, TableFormat, TextFormat
 from shipid.logs.guess.clock import (
     Rows,
     are_whole,
@@ -25,7 +25,7 @@ from shipid.logs.guess.clock import (
     other_clocks,
     restarts,
 )
-from shipid.logs.guess.layout import format_of, format_of_sheet
+from shipid.logs.guess.layout import format_of, format_of_sheet, table_below
 from shipid.logs.guess.words import NO_VALUE, fits, is_run, parts_of, units_in
 from shipid.logs.importing import OFF_ONE
 from shipid.logs.mapping import SIDES, degrees_in_parts, degrees_in_text, names_of, size_of, yaw_of
@@ -148,7 +148,15 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     in_parts |= {name: (in_text[name][0],) for name in made.keys() & in_text.keys()}
     words = [name for name in words if name not in columns]
     runs, since = restarts(table, columns)
-    clock, t, once = clock_once(table, columns if since is None else columns | since, file)
+    try:
+        clock, t, once = clock_once(table, columns if since is None else columns | since, file)
+    except DataError:
+        below = table_below(lines, model.text(), form.get("missing", ())) if isinstance(model, TableFormat) else None
+        if below is None or sampled:
+            raise
+        place, other = ("row", "sheet") if isinstance(model, SheetFormat) else ("line", "file")
+        message = f"another table begins below the log, with {below[1][:40]!r}: move it to another {other}"
+        raise DataError(message, file=file, path=f"{place} {below[0]}") from None
     columns = {name: values[once] for name, values in (columns | made).items()}
     named = {one for key in ("from", "date") if key in clock for one in names_of(clock[key])}
     named |= {part for parts in in_parts.values() for part in parts}

@@ -189,6 +189,25 @@ def test_a_table_beside_the_first_lines_is_left_out(tmp_path: Path) -> None:
     np.testing.assert_allclose(table["psi"].astype(float), 30.0 + T[2:])
 
 
+@pytest.mark.parametrize(
+    "below", [[["Summary"], ["mean", "4.5"]], [["run", "start", "end"], ["1", "0", "300"], ["2", "300", "600"]]]
+)
+@pytest.mark.parametrize("kind", ["csv", "xlsx"])
+def test_a_table_below_the_log_is_named_with_its_line(below: list[list[str]], kind: str, tmp_path: Path) -> None:
+    """Before, the remedy was to remove a line, with the number of a row that no editor shows."""
+    log = [line.split(",") for line in text().splitlines()]
+    frame = pd.DataFrame([[*row, "", "", ""][:3] for row in [*log, [], [], *below]])
+    file = tmp_path / f"log.{kind}"
+    if kind == "csv":
+        frame.to_csv(file, index=False, header=False)
+    else:
+        frame.to_excel(file, index=False, header=False)
+    place, other = ("line", "file") if kind == "csv" else ("row", "sheet")
+    begins = f"{place} {len(log) + 3}: another table begins below the log, with '{below[0][0]}': .* another {other}"
+    with pytest.raises(DataError, match=begins):
+        sniff(file)
+
+
 def test_words_beside_the_first_lines_are_no_header(tmp_path: Path) -> None:
     """Notes on the weather, on the right, have made the third line one of names, such as 0.5 and 30.5."""
     lines = text().splitlines()
