@@ -32,7 +32,7 @@ from shipid.errors import DataError, choices, is_utf_8
 from shipid.logs.dates import date_texts, dated, hour_twice, moment_of, seconds, span_of, time_texts
 from shipid.logs.formats import Format, SheetFormat, TableFormat, TextFormat
 from shipid.logs.mapping import (
-    SIDES,
+    OF_SHIP,
     Clock,
     Column,
     FileClock,
@@ -45,10 +45,12 @@ from shipid.logs.mapping import (
     degrees_in_parts,
     degrees_in_text,
     degrees_of,
+    degrees_to_sides,
     is_dated,
     names_of,
     rate_of_ais,
     read_mapping,
+    sides_of,
     size_of,
     to_si,
     yaw_of,
@@ -341,7 +343,7 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
     uses = Counter((one.file or "", source) for one in mapping.columns.values() for source in names_of(one.source))
     for name, column in mapping.columns.items():
         table, times, form, other = files[column.file or ""]
-        sides = SIDES.get(name, "") if column.unit == "deg" and isinstance(column.source, str) else ""
+        sides = sides_of(name) if column.unit == "deg" and isinstance(column.source, str) else ""
         parts = [_numbers(table, one, form, other, f"columns.{name}.from", sides) for one in names_of(column.source)]
         numbers = parts[0]
         if column.unit == "ddmm":
@@ -696,7 +698,7 @@ def _numbers(
 ) -> NDArray[np.float64]:
     """Turn a column into numbers, NaN where it is missing; text that is no number raises with its row.
 
-    With the letters of its `sides` it is a position in degrees, which may be written as 59°26'12.3"N.
+    With the letters of its `sides` it is an angle in degrees, which may be written as 59°26'12.3"N, or P12.5.
     """
     column = _column(log, source, file, path)
     if pd.api.types.is_numeric_dtype(column.dtype):
@@ -718,10 +720,14 @@ def _numbers(
     plain = in_points(text, read.decimal, read.thousands).mask(missing)
     numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
     if sides and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
-        numbers = degrees_in_text(in_points(text, read.decimal, None).mask(missing), sides)
+        words = in_points(text, read.decimal, None).mask(missing)
+        angles = degrees_to_sides(words) if sides == OF_SHIP else degrees_in_text(words, sides)
+        if sides != OF_SHIP or np.isfinite(angles).sum() > np.isfinite(numbers).sum():
+            numbers = angles
     bad = np.flatnonzero(~np.isfinite(numbers) & ~missing.to_numpy())
     if len(bad):
-        what = f"no number and no position with {' or '.join(sides)}" if sides else "no number"
+        kind = "angle" if sides == OF_SHIP else "position"
+        what = f"no number and no {kind} with {' or '.join(sides)}" if sides else "no number"
         message = (
             f"{text.iloc[bad[0]]!r} is {what} (column {source!r}; {len(bad)} such rows): "
             "correct it, or list it in [format] missing, or check decimal and thousands"

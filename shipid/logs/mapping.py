@@ -30,7 +30,7 @@ from shipid.logs.repairs import (
     Strict,
     WrapInterpolation,
 )
-from shipid.physics.signals import is_command, is_output, named
+from shipid.physics.signals import is_command, is_output, named, row_of
 from shipid.units import DEGREE, KNOT, MINUTE, RPM
 
 UNITS: dict[str, dict[str, float]] = {
@@ -79,6 +79,13 @@ _ANGLE = re.compile(
 """An angle as text: side or sign, degrees, perhaps minutes and seconds, side."""
 _COMMA = re.compile(r"(?<=\d),(?=\d+\s*(?:['′’´\"″”°º˚]|[NSEW]\b))")
 """A decimal comma of degrees, minutes or seconds, also in a log whose numbers have points."""
+OF_SHIP = "SP"
+"""Letters of the sides of a ship in the text of an angle, as in P12.5, that of positive numbers first."""
+_PORT, _STARBOARD = "P|PORT|PS|BB|L", "S|STBD|STB|SB|R"
+_SIDED = re.compile(
+    rf"(?:({_PORT})|({_STARBOARD}))?[\s.:]*([+-]?\d+(?:\.\d*)?)\s*(?:°|DEG)?\s*(?:({_PORT})|({_STARBOARD}))?"
+)
+"""An angle to one side of a ship as text: side, degrees, side."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
 ESTIMATED = ("u", "v", "r")
 Manoeuvre = Literal[
@@ -398,6 +405,28 @@ def degrees_in_text(texts: pd.Series[Any], sides: str) -> NDArray[np.float64]:
     right &= degrees <= (90.0 if sides == SIDES["latitude"] else 360.0)
     minus = sign.eq("-").to_numpy() | letter.eq(sides[1]).to_numpy()
     return np.asarray(np.where(right, np.where(minus, -degrees, degrees), np.nan), dtype=np.float64)
+
+
+def sides_of(name: str) -> str:
+    """Letters of the sides that an angle may have in a text, by its column of the dataset; empty where it has none."""
+    row = row_of(name)
+    sided = name == "phi" or (row is not None and row.angle and is_command(name))
+    return SIDES.get(name, OF_SHIP if sided else "")
+
+
+def degrees_to_sides(texts: pd.Series[Any]) -> NDArray[np.float64]:
+    """Texts (N,) such as P12.5, 7.0 S or STBD 20 in degrees, those to starboard positive; NaN for any other text.
+
+    Only 0 may stand without a side, and a number with one has no sign.
+    """
+    upper = texts.astype(str).str.strip().str.upper().str.replace(",", ".", regex=False)
+    before, other, number, behind, another = (
+        upper.str.extract(rf"^(?:{_SIDED.pattern})$")[place].fillna("") for place in range(5)
+    )
+    port, starboard = (before + behind).ne(""), (other + another).ne("")
+    value = pd.to_numeric(number, errors="coerce")
+    right = np.where(port | starboard, (port != starboard) & ~number.str.contains(r"[+-]"), value.eq(0.0))
+    return np.asarray(np.where(right, value.where(~port, -value), np.nan), dtype=np.float64)
 
 
 def is_dated(unit: str) -> bool:

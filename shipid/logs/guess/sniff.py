@@ -28,7 +28,7 @@ from shipid.logs.guess.clock import (
 from shipid.logs.guess.layout import format_of, format_of_sheet, table_below
 from shipid.logs.guess.words import NO_VALUE, fits, is_run, parts_of, units_in
 from shipid.logs.importing import OFF_ONE
-from shipid.logs.mapping import SIDES, degrees_in_parts, degrees_in_text, names_of, size_of, yaw_of
+from shipid.logs.mapping import SIDES, degrees_in_parts, degrees_in_text, degrees_to_sides, names_of, size_of, yaw_of
 from shipid.logs.readers import LONGEST_LINE, READERS, in_points, parse_text, read_table, require_file, widest
 from shipid.logs.workbook import NOT_CALCULATED
 
@@ -134,7 +134,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     turned = _quaternions(columns)
     rarely = [name for name, values in columns.items() if np.isnan(values).mean() > 0.5]
     in_text, letters = _in_text(table, [*words, *rarely], form.get("decimal", "."))
-    columns |= dict(in_text.values())
+    columns |= dict(in_text.values()) | _to_sides(table, [*words, *rarely], form.get("decimal", "."))
     notes += (f"{form['thousands']!r} is read as a mark of thousands",) if "thousands" in form else ()
     if isinstance(model, TableFormat):
         missing = [*_words_for_nothing(table, columns, model), *_sentinels(table, columns)]
@@ -309,6 +309,17 @@ def _in_text(
         for one in known:
             letters |= {letter for letter in SIDES[one] if texts.str.contains(letter, case=False).any()}
     return found, frozenset(letters)
+
+
+def _to_sides(table: pd.DataFrame, names: list[str], decimal: str) -> dict[str, Array]:
+    """Name -> degrees (N,) of each column of angles to the sides of the ship, such as P12.5; those to starboard > 0."""
+    found = {}
+    for name in names:
+        if max(fits(name).get(one, 0.0) for one in ("delta", "alpha", "phi")) > 0.5:
+            angles = degrees_to_sides(in_points(column_called(table, name).astype(str).str.strip(), decimal, None))
+            if np.mean(np.isfinite(angles)) > 0.5:
+                found[name] = angles
+    return found
 
 
 def _sides(table: pd.DataFrame, words: list[str]) -> frozenset[str]:

@@ -403,3 +403,31 @@ def test_four_zeros_are_no_quaternion_and_have_no_heading(row: list[float], said
     mapping.write_text(mapping.read_text().replace("quaternion", "rad"))
     with pytest.raises(DocumentError, match="a quaternion is the heading, from four columns"):
         read_mapping(mapping)
+
+
+TEXTS = {
+    "P12.5": lambda x: f"{'P' if x < 0 else 'S'}{abs(x):.1f}",
+    "12.5 P": lambda x: f"{abs(x):.1f} {'P' if x < 0 else 'S'}" if round(x, 1) else "0.0",
+    "PORT 12.5": lambda x: f"{'PORT' if x < 0 else 'STBD'} {abs(x):.1f}",
+    "Bb 12,5": lambda x: f"{'Bb' if x < 0 else 'Stb'} {abs(x):.1f}".replace(".", ","),
+    "L12.5": lambda x: f"{'L' if x < 0 else 'R'}{abs(x):04.1f}",
+}
+
+
+@pytest.mark.parametrize("style", TEXTS)
+def test_a_rudder_with_its_side_in_letters_is_read(style: str, tmp_path: Path) -> None:
+    """Before, it was left out as a column of words."""
+    proposal, dataset = drafted(BRIDGE.assign(rudder=RUDDER.map(TEXTS[style])), tmp_path)
+    column = proposal.column("rudder.delta")
+    assert column is not None
+    assert (column.unit, column.extra) == ("deg", {})
+    np.testing.assert_allclose(np.degrees(dataset.frame["rudder.delta"]), RUDDER, atol=0.051)
+
+
+@pytest.mark.parametrize("text", ["12.5", "P-12.5", "P12.5S", "Q12.5"])
+def test_a_rudder_without_its_side_among_others_is_refused(text: str, tmp_path: Path) -> None:
+    frame = BRIDGE.assign(rudder=RUDDER.map(TEXTS["P12.5"]))
+    draft = draft_mapping(guess(as_file(frame, tmp_path)), False).replace("sha256", "# sha256")
+    wrong = as_file(frame.assign(rudder=frame["rudder"].where(frame.index != 5, text)), tmp_path)
+    with pytest.raises(DataError, match=r"row 6: .* is no number( and no angle with S or P)? \(column 'rudder'"):
+        import_log(read_mapping(write_new(draft, tmp_path / "draft.toml")), wrong)

@@ -36,10 +36,12 @@ def test_only_variables_that_must_be_saved_anew_have_a_note(tmp_path: Path) -> N
     assert sniff(file).notes == ()
 
 
-def test_a_rudder_in_words_has_its_remedy(tmp_path: Path) -> None:
+def test_a_quantity_in_words_has_its_remedy(tmp_path: Path) -> None:
     rows = [f"{k},{'PS'[k % 2]}{k % 9}.5,A{k},{k % 3},{k % 5}" for k in range(80)]
-    notes = sniff(log_of(tmp_path, ["time,Rudder,remark,x,y", *rows])).notes
-    assert "column 'Rudder' holds words, not numbers, such as 'P0.5': write it as a number with a sign" in notes
+    notes = sniff(
+        log_of(tmp_path, ["time,Rudder order,ROT,remark,x,y", *(row.replace(",", ",P1,", 1) for row in rows)])
+    ).notes
+    assert "column 'ROT' holds words, not numbers, such as 'P0.5': write it as a number with a sign" in notes
     assert "column 'remark' holds words, not numbers" in notes
 
 
