@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.logs.guess.evidence import Complex, Windows, effect
-from shipid.logs.guess.words import fits, how_much_says, is_order, parts_of, side_of, units_in
+from shipid.logs.guess.words import fits, how_much_says, is_order, may_be_measured, parts_of, side_of, units_in
 from shipid.logs.mapping import UNITS
 from shipid.logs.repairs import INPUTS
 from shipid.physics.signals import SIGNALS, signal_of
@@ -52,6 +52,7 @@ FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db
 PART = 0.4  # of the windows of the guess: about a quarter of a usual turn
 SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which it is taken to turn the ship
 LIKELY = 0.6  # confidence from which a suggestion is not marked as unsure
+OF_POSE = ("latitude", "longitude", "north", "east", "x", "y", "psi")
 NEARLY, STRONG = 0.1, 0.65  # how much worse than its best meaning a name may fit another; a name that says something
 
 
@@ -245,6 +246,8 @@ class State:
         scores = {name: fits(name).get(meaning, 0.0) for name in names}
         scores = {name: 0.0 if score and unit_of_another(name, meaning) else score for name, score in scores.items()}
         chosen = [name for name in names if scores[name] > 0 and scores[name] >= max(fits(name).values()) - NEARLY]
+        if not chosen and meaning in OF_POSE:
+            return [name for name in names if fits(may_be_measured(name)).get(meaning, 0.0) > STRONG]
         return sorted(chosen, key=lambda name: -scores[name])
 
     def eligible(self, *meanings: str) -> list[str]:

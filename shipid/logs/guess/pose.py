@@ -16,7 +16,7 @@ from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
-from shipid.logs.guess.words import fits, is_magnetic, is_order, parts_of
+from shipid.logs.guess.words import fits, is_magnetic, is_order, may_be_measured, parts_of
 from shipid.logs.mapping import to_si
 
 POOR = 0.2  # misfit of a course and a heading: 1 - agreement
@@ -68,7 +68,7 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
     column can be a position or a heading, or if the ship does not move as in that frame.
     """
     pairs = list(_named_pairs(state))
-    headings = [name for name in state.all_called("psi") if not is_order(name)]
+    headings = [name for name in state.all_called("psi") if not is_order(name) or may_be_measured(name)]
     headings = [name for name in headings if not is_magnetic(name)] or headings  # beside a true one it is a second one
     sure = [name for name in headings if fits(name).get("psi", 0.0) > fits(name).get("course", 0.0)]
     best = _best(state, pairs, sure or headings)
@@ -109,6 +109,13 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
     elif not best.on_globe and best.misfit <= POOR:
         best = _by_course(state, best)
         best = best if best.settled else _by_velocities(state, best)
+    references = [name for name in (best.north, best.east, best.heading) if may_be_measured(name)]
+    if references:
+        said = ", ".join(map(repr, references))
+        state.ask(
+            ("psi", "north", "east", "latitude", "longitude"),
+            f"is {said} measured, or a set point? By the name it may be either",
+        )
     _ask_for_second(state, best, [name for name in sure if not is_magnetic(name)])
     _take(state, best, sure)
 
@@ -228,7 +235,7 @@ def _named_pairs(state: State) -> Iterator[tuple[str, str, bool, float]]:
     for first, second, on_globe in (("latitude", "longitude", True), ("north", "east", False), ("x", "y", False)):
         for north in state.called(first):
             for east in state.called(second):
-                score = (fits(north)[first] + fits(east)[second]) / 2
+                score = (fits(north).get(first, 0.0) + fits(east).get(second, 0.0)) / 2
                 if north != east and (not on_globe or _on_globe(state, north, east)):
                     yield north, east, on_globe, score
 

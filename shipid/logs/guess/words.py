@@ -468,6 +468,19 @@ def is_order(name: str) -> bool:
     return len(parts) > 1 and bool(ORDERS & set(parts[1:] if len(parts[0]) == 1 else parts))
 
 
+def may_be_measured(name: str) -> str:
+    """Return the name without the words ref and reference where only they say that it is a set point, else nothing.
+
+    They may say a reference system of a dynamic positioning, which measures.
+    """
+    parts = parts_of(name)
+    left = [part for part in parts if part not in ("ref", "reference")]
+    if not left or not is_order(name):
+        return ""
+    rest = left[1:] if len(left[0]) == 1 else left
+    return "" if ORDERS & {*rest} else " ".join(left)
+
+
 def is_run(name: str) -> bool:
     """Whether a name says that its column holds the run: `Run`, `test no`, `Versuch`."""
     parts = set(parts_of(name)) - RUN_NUMBERS

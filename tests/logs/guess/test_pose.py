@@ -283,3 +283,19 @@ def test_a_position_of_one_column_has_its_remedy() -> None:
     state.words = {"mode": "AUTO 1", "Position": "63°26.400'N 010°24.000'E"}
     with pytest.raises(DataError, match=r"'Position' holds .*: write latitude and longitude in two columns"):
         choose_pose(state, FILE)
+
+
+@pytest.mark.parametrize(
+    ("north", "east"), [("REF.North", "REF.East"), ("PosRef1 North", "PosRef1 East"), ("Ref N", "Ref E")]
+)
+def test_a_reference_system_that_alone_has_the_position_is_taken_and_asked(north: str, east: str) -> None:
+    """By its name it may be a set point: it is left where another column is measured."""
+    alone = {north: NORTH, east: EAST, "heading": DEG}
+    state = chosen(alone)
+    assert_motion(state)
+    assert any("measured, or a set point?" in question.sentence for question in state.questions)
+    state = chosen(alone | {"North": NORTH + 0.5, "East": EAST})
+    assert {*sources(state).values()} == {"North", "East", "heading"}
+    assert not any("set point" in question.sentence for question in state.questions)
+    with pytest.raises(DataError, match="no column can be the position"):
+        chosen({"setpoint N": NORTH, "setpoint E": EAST, "heading": DEG})
