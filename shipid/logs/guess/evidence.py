@@ -363,8 +363,20 @@ def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:
     result = {}
     for name, values in columns:
         known = np.isfinite(values)
-        result[name] = np.interp(t, t[known], values[known]) if known.any() else values
+        result[name] = _filled(t, values, known) if known.any() and not known.all() else values.copy()
     return result
+
+
+def _filled(t: Array, values: Array, known: NDArray[np.bool_]) -> Array:
+    """Values (N,) interpolated in time where they are not known; an angle that jumps at a whole turn the short way."""
+    held = values[known]
+    spread, jump = float(np.ptp(held)), float(np.abs(np.diff(held)).max(initial=0.0))
+    turn = next((one for one in (2 * np.pi, 360.0) if jump > one / 2 and 0.9 * one < spread <= one), None)
+    if turn is None:
+        return np.interp(t, t[known], held)
+    least = 0.0 if held.min() >= 0.0 else -turn / 2
+    between = np.interp(t, t[known], np.unwrap(held, period=turn))
+    return np.where(known, values, (between - least) % turn + least)
 
 
 def lively(t: Array, psi: Array, chosen: Windows) -> float:

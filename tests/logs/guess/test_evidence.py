@@ -255,3 +255,15 @@ def test_a_heading_that_crosses_north_for_a_row_has_no_spike(seed: int) -> None:
     slow = np.round((middle + 100 + 20 * np.sin(t / 40)) % 360, 1)
     slow[100] = (slow[100] + 120) % 360
     assert np.flatnonzero(evidence.spikes(slow)).tolist() == [100]
+
+
+@pytest.mark.parametrize(("low", "turn"), [(0.0, 360.0), (-180.0, 360.0), (-np.pi, 2 * np.pi)])
+def test_an_angle_that_is_logged_in_every_third_row_is_filled_the_short_way(low: float, turn: float) -> None:
+    """Between 359 and 1 deg lies 0: 180 was a sample that the draft then wanted to repair."""
+    t = np.arange(300.0)
+    angle = (0.013 * turn * t - low) % turn + low
+    filled = evidence.filled(t, [("psi", np.where(t % 3 == 0, angle, np.nan))])["psi"][:298]
+    np.testing.assert_allclose(np.exp(2j * np.pi * filled / turn), np.exp(2j * np.pi * angle[:298] / turn), atol=1e-9)
+    assert filled.min() >= low
+    assert filled.max() < low + turn
+    assert not evidence.heal(filled, turn, t[:298])[1].any()
