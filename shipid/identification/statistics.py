@@ -511,11 +511,20 @@ def _alone(fit: LinearFit, best: Covariance, plain: Covariance, colours: Mapping
     return np.asarray(np.where(unseen, np.inf, np.sqrt((influence**2).sum(axis=0)) * widened * quantile))
 
 
+def _shared(fit: LinearFit, free: Index) -> Array:
+    """How many times wider the interval of each factor (n,) is than if all others were known."""
+    information, times = fit.jacobian[:, free].T @ fit.jacobian[:, free], np.ones(len(fit.paths))
+    if len(free):
+        times[free] = np.sqrt(np.maximum(np.diag(inverted(information)[0]) * np.diag(information), 1.0))
+    return times
+
+
 def _sentences(
     fit: LinearFit, half: Array, alone: Array, identifiable: NDArray[np.bool_], sets: Sequence[Combination]
 ) -> tuple[str, ...]:
     """One sentence for each factor: its interval, or the reason why it has none."""
     free, sentences = _free_places(fit), list[str]()
+    shared = _shared(fit, free)
     for j, (path, name) in enumerate(zip(fit.paths, short_names(fit.paths), strict=True)):
         together = next((combination for combination in sets if path in combination.paths), None)
         known = f"{name} is known to +-{digits(100 * half[j], 2)} % of its base value"
@@ -535,9 +544,8 @@ def _sentences(
         elif together is not None:
             sentences.append(f"{name} is not identified: {together.sentence()}")
         elif np.isfinite(alone[j]):
-            sentences.append(
-                f"{name} is not identified: +-{digits(100 * alone[j], 2)} % of its base value, hardly excited"
-            )
+            why = "hardly excited" if alone[j] > WIDEST * shared[j] else "others do a part of the same"
+            sentences.append(f"{name} is not identified: +-{digits(100 * alone[j], 2)} % of its base value, {why}")
         else:
             sentences.append(f"{name} is not identified: no independent effect on these data")
     return tuple(sentences)

@@ -254,6 +254,18 @@ def test_what_has_no_effect_is_named() -> None:
     assert "p2 has no effect" in estimates.sentences[2]
 
 
+@pytest.mark.parametrize(("size", "why"), [(1.0, "others do a part of the same"), (0.01, "hardly excited")])
+def test_a_wide_interval_has_its_reason(size: float, why: str) -> None:
+    """p1 and p0 at an angle of 8 deg are no set, but each would be known without the other; it was 'hardly excited'."""
+    jacobian = np.linalg.qr(np.random.default_rng(3).normal(size=(3000, 3)))[0] * 10
+    jacobian[:, 1] = size * (np.cos(np.radians(8)) * jacobian[:, 0] + np.sin(np.radians(8)) * jacobian[:, 1])
+    error = np.random.default_rng(0).normal(size=3000)
+    estimates = statistics(fitted(jacobian, error, np.repeat(np.arange(6), 500), ("u",) * 3000))
+    assert not estimates.combinations
+    assert estimates.identifiable[2]
+    assert estimates.sentences[1].endswith(f"% of its base value, {why}")
+
+
 def test_a_prior_narrows_the_interval_but_identifies_nothing() -> None:
     jacobian = JACOBIAN.copy()
     jacobian[:, 2] *= 1e-4
