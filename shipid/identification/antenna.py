@@ -27,7 +27,7 @@ REFITS = 2  # with the log moved from the antenna to the origin
 NEAREST, FARTHEST, WIDEST = 0.1, 0.6, 0.25  # of the length: from the origin; ahead or astern; to a side
 NEGLIGIBLE = 0.02  # of the length: a way that the sentence leaves out
 CERTAIN = 2.5  # half-widths of its 95 % interval: so far from the origin an antenna is not chance
-EXPLAINED = 0.2  # of the squares of the residuals: less has been a vessel that is wrong
+EXPLAINED = 0.3  # of the squares of the residuals: less has been a vessel that is wrong
 
 
 @dataclass(frozen=True)

@@ -56,13 +56,18 @@ def _gyration(value: float, numbers: Mapping[str, float], length: float | None) 
 
 
 _HULL = r"hull\.(?:derivatives|prime_derivatives|mmg)\."
+_SQUARE = r"(?:\|{0}\|{0}|{0}\|{0}\|)"  # both ways to write a signed square
 KINDS = (
     Kind(r"added_mass\.X_udot", "added mass in surge over the mass", 0.01, 0.25, _over("inertia.m")),
     Kind(r"added_mass\.Y_vdot", "added mass in sway over the mass", 0.25, 1.8, _over("inertia.m")),
     Kind(r"added_mass\.N_rdot", "added moment in yaw over I_z", 0.15, 2.0, _over("inertia.I_z")),
     Kind(r"inertia\.I_z", "radius of gyration in yaw over L_pp", 0.18, 0.36, _gyration),
     Kind(
-        rf"{_HULL}(?:Y_u?v|N_u?r|Y_\|v\|v|N_\|r\|r|X_u\|u\||X_u)", "damping, on the force side", -math.inf, 0.0, _itself
+        rf"{_HULL}(?:Y_u?v|N_u?r|Y_{_SQUARE.format('v')}|N_{_SQUARE.format('r')}|X_u|X_{_SQUARE.format('u')})",
+        "damping, on the force side",
+        -math.inf,
+        0.0,
+        _itself,
     ),
     Kind(r"hull\.crossflow\.C_d", "cross-flow drag", 0.1, 2.5, _itself),
     Kind(r"hull\.mmg\.R_0", "resistance", 0.003, 0.1, _itself),

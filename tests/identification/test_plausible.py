@@ -34,6 +34,14 @@ def test_what_no_ship_has_is_reported(path: str, factor: float, message: str) ->
     assert "\n" not in sentence
 
 
+@pytest.mark.parametrize("path", ["hull.derivatives.Y_v|v|", "hull.derivatives.N_r|r|", "hull.derivatives.X_u|u|"])
+def test_a_signed_square_is_damping_however_it_is_written(path: str) -> None:
+    """Before, ranges kept the sign of Y_|v|v and not that of Y_v|v|."""
+    vessel = load_vessel("gunnerus-28.9")
+    assert within(vessel, path)[0] == pytest.approx(0, abs=1e-9)
+    assert "of ships below 0" in verdict(vessel, path, {path: -vessel.parameters[path]})
+
+
 def test_added_mass_is_judged_by_the_mass_that_was_fitted_too() -> None:
     vessel = load_vessel("kvlcc2-l7")
     heavier = {"inertia.m": 5 * vessel.parameters["inertia.m"]}
