@@ -144,8 +144,11 @@ class Controls:
         return {name: n if name in self.drives else neutral(name) for name in self.commands}
 
     def orders(self, n: Array, helm: Array) -> dict[str, Array]:
-        """Every command (T,) from shaft speed [rev/s] and helm angle [rad, > 0 to starboard], each (T,)."""
-        angles = {name: sign * helm for name, sign in self.helm.items()}
+        """Every command (T,) from shaft speed [rev/s] and helm angle [rad, > 0 to starboard], each (T,).
+
+        With the helm amidships no angle need turn the ship: two screws that steer by their difference can stop her.
+        """
+        angles = {name: sign * helm for name, sign in self.helm.items()} if helm.any() else {}
         return {
             name: angles.get(name, n if name in self.drives else np.full(len(n), neutral(name)))
             for name in self.commands

@@ -230,8 +230,8 @@ class Approached(Manoeuvre):
         return controls.orders(self.shaft(t), self.helm(t))
 
     def check(self, controls: Controls) -> None:
-        """Raise DocumentError for a vessel that no command drives ahead or turns."""
-        controls.orders(np.zeros(1), np.zeros(1))
+        """Raise DocumentError for a vessel that no command drives ahead, or none turns where the manoeuvre moves it."""
+        controls.orders(np.zeros(1), np.full(1, self.greatest_helm * DEGREE))
         self.helmsman(controls)
 
 

@@ -112,7 +112,7 @@ def measure_all(
 def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
     """The measures of one log."""
     columns = {str(column): frame[column].to_numpy() for column in frame if column != "run"}
-    record = record_of(columns, Controls(vessel).helm)
+    record = record_of(columns, Controls(vessel).effects[1])
     known = {"execute_heading": chosen.manoeuvre.reversal_deg * DEGREE} if isinstance(chosen.manoeuvre, Zigzag) else {}
     measures, length = MEASURES[chosen.kind](record, **known), vessel.length
     judged = criteria(chosen.kind, measures, length, calm=True)

@@ -112,7 +112,7 @@ def standard(
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
     asked = service_speed(vessel) if speed is None else number("speed", speed)
-    controls = Controls.of(vessel)
+    controls = Controls(vessel)
     n_rpm = (shaft_speed(controls, asked) if n is None else number("n", n)) / RPM
     passing = length / asked  # s for one length
     interval = _round(passing / ROWS) if step is None else step * STEPS

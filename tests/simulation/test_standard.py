@@ -71,6 +71,20 @@ def test_thrust_about_a_service_speed_says_nothing_of_a_stop() -> None:
     assert standard(mariner, "turning").speed == pytest.approx(7.7175)
 
 
+def test_a_ship_that_steers_with_two_screws_can_be_stopped() -> None:
+    """The helm is amidships in a stop; every other standard manoeuvre needs an angle, and says so."""
+    otter = load_vessel("otter")
+    done = measure_standard(otter, "stop")
+    stopped = {str(row["measure"]): row["value"] for row in done.measures}
+    t, u = done.frame["t"].to_numpy(), done.frame["u"].to_numpy()
+    under_way = (t >= stopped["execute"]) & (u > 0)
+    assert stopped["track reach"] == pytest.approx(np.trapezoid(u[under_way], t[under_way]), rel=5e-3)
+    assert (done.frame["port.n"] == done.frame["starboard.n"]).all()
+    for name in sorted({*KINDS} - {"stop"}):
+        with pytest.raises(ShipidError, match="no angle command turns Otter"):
+            standard(otter, name)
+
+
 def test_speed_is_that_of_froude_unless_asked() -> None:
     assert standard(SHIP, "turning").speed == pytest.approx(0.2 * np.sqrt(9.81 * 28.9))
     assert standard(SHIP, "turning", speed=2.0).speed == 2.0
