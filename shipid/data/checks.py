@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -348,6 +348,18 @@ def _repetition(
     yield _row("overlap", double, "1", OVERLAP, f"{100 * double:.3g} % of the rows belong to another run, too{where}")
 
 
+def copies(dataset: Dataset, runs: Iterable[str], others: Collection[str]) -> dict[str, str]:
+    """Runs, and the one of some others with their motion in most rows: recorded twice, or cut from one log twice."""
+    whole = {run: _motion(pd.concat(parts)) for run, parts in pieces_by_run(dataset).items()}
+    every = np.concatenate([whole[other].keys for other in others] or [np.empty(0, np.uint64)])
+    found = {}
+    for run in runs:
+        if np.isin(whole[run].keys, every).mean() >= OVERLAP:  # of few runs: the others need no comparison one by one
+            share, other = max((_alike(whole[run], whole[other]), other) for other in others)
+            found |= {run: other} if share >= OVERLAP else {}
+    return found
+
+
 def _within(mine: _Motion, other: _Motion, shared: bool) -> float:
     """Share of the rows of a run that another run has, too: the same instants of one clock, or the same motion."""
     if shared:
@@ -358,6 +370,11 @@ def _within(mine: _Motion, other: _Motion, shared: bool) -> float:
         share = float(np.mean(near <= slack))
         if share > 0:
             return share
+    return _alike(mine, other)
+
+
+def _alike(mine: _Motion, other: _Motion) -> float:
+    """Share of the rows of a run that have the motion of a row of another run."""
     return float(np.mean(np.isin(mine.keys, other.keys))) if mine.lively else 0.0
 
 

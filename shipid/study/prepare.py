@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.causal import causal_columns
+from shipid.data.checks import copies
 from shipid.data.dataset import Dataset, kept_rows, outside_spans, pieces, read_dataset
 from shipid.data.windows import (
     Instants,
@@ -219,6 +220,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
     notes += [
         f"{way.name} takes no observer: not fitted to {', '.join(way.left_out)}" for way in plan.methods if way.left_out
     ]
+    notes += _copied(dataset, rest, test)
     both = [rest, test]
     longest = max(float(np.ptp(rows["t"])) for _, rows in pieces(dataset))
     for foundation in plan.foundations:
@@ -241,6 +243,17 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         estimates=estimates,
         kinds=kinds_of(dataset, test=test.spans),
     )
+
+
+def _copied(dataset: Dataset, rest: Windows, test: Windows) -> list[str]:
+    """A sentence on test runs whose motion is that of runs that train; none where there are none."""
+    same = copies(dataset, test.spans, rest.spans)
+    if not same:
+        return []
+    pairs = ", ".join(f"{run!r} as {other!r}" for run, other in same.items())
+    return [
+        f"test runs that move as runs that train do ({pairs}): their errors say nothing of new runs: leave out copies"
+    ]
 
 
 def nested(plan: Plan, pool: Windows, batch: Batch) -> tuple[str, ...]:

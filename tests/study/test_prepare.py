@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import tomlkit
 
@@ -37,6 +38,7 @@ from shipid.study.prepare import (
 from shipid.study.run import run_unit
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import draw, resolve
+from tests.study.test_commands import weaving
 from tests.study.tiny import logged, tiny_plan
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -432,6 +434,30 @@ def test_the_sea_trials_test_is_untouched(shared_data: Path, monkeypatch: pytest
             gaps = np.abs(windows.t[train][:, None] - windows.t[validation])
             assert gaps.min() > 15.0
     assert prepared.accuracy("accurate")["mean"] < prepared.accuracy("inaccurate")["mean"]
+
+
+def test_a_test_run_that_is_a_copy_of_one_that_trains_is_named(
+    recorded: Callable[..., tuple[Plan, Dataset]],
+) -> None:
+    """With separate clocks nothing kept them apart: a study of copies had an error of millimetres, without a word."""
+    log = weaving()
+    copy = log.frame[log.frame["run"] == "a"].assign(run="again", t=lambda rows: rows["t"] + 1e4)
+    twice = Dataset(pd.concat([log.frame, copy], ignore_index=True), {**log.metadata, "clock": "run"})
+    for test, other in (("a", "again"), ("again", "a")):
+        plan, dataset = recorded(twice, split={"test": [test, "c"]}, prediction={"ahead": 5.0})
+        (note,) = (words for words in prepare(plan, dataset).notes if "copies" in words)
+        assert note.startswith(f"test runs that move as runs that train do ({test!r} as {other!r}): ")
+    for test in ("b", "f"):
+        plan, dataset = recorded(twice, split={"test": [test]}, prediction={"ahead": 5.0})
+        assert not [words for words in prepare(plan, dataset).notes if "copies" in words]
+
+
+def test_a_ship_at_rest_is_no_copy(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+    log = weaving()
+    still = log.frame["run"].isin(["a", "b"])
+    frame = log.frame.assign(**{name: log.frame[name].mask(still, 0.0) for name in ("u", "v", "r", "psi")})
+    plan, dataset = recorded(Dataset(frame, log.metadata), split={"test": ["a"]}, prediction={"ahead": 5.0})
+    assert not [words for words in prepare(plan, dataset).notes if "copies" in words]
 
 
 def test_a_note_counts_the_windows_over_a_time_without_rows(tiny: tuple[Plan, Dataset, Prepared]) -> None:
