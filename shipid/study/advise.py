@@ -532,8 +532,8 @@ def _how_to_read(case: Case) -> list[str]:
     saw = [name for name in plan.saw(trained) if name in set(top["family"])]
     if saw and case.smallest < case.largest:
         sentences.append(
-            f"The numbers of {named(saw)} were set from runs that train, whatever the amount of data: with few runs "
-            "the errors are lower than these runs alone would give."
+            f"The numbers of {named(saw)} were set from runs that train, whatever the amount of data: the errors with "
+            "few runs rest on the other runs, too."
         )
     if plan.known and plan.reacting:
         sentences.append(
