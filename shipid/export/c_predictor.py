@@ -279,7 +279,8 @@ int {name}_predict_band(const {name} *self, const {name}_real *planned, double l
                         {name}_real *path, {name}_real *band);
 
 /* A band that adapts along a run, for those who judge paths when their time has come. miss: begins at 1 - level. missed:
- * whether a path left the band that was given for it. rate: such as 0.02. Returns miss from then on. */
+ * whether a path left the band that was given for it. rate: such as 0.02, over how many paths begin within a horizon:
+ * else all of them widen the band for one error. Returns miss from then on. */
 double {name}_adapted(double miss, double level, double rate, int missed);
 
 /* How much wider than calibrated such a band is now: times both half axes. A kind that is none gives NAN. */

@@ -303,7 +303,7 @@ class Adaptive(NamedTuple):
     """State of a band that adapts along a run: the share of paths that it now aims to miss, and the one wanted.
 
     miss : may leave 0 to 1: below 0 the band grows until it holds, above 1 it is empty. wanted : 1 - level.
-    rate : how fast it adapts, per instant judged.
+    rate : how fast it adapts, per horizon.
     """
 
     miss: float
@@ -316,15 +316,19 @@ def adaptive(level: float, rate: float = 0.02) -> Adaptive:
     return Adaptive(1 - level, 1 - level, rate)
 
 
-def adapted(state: Adaptive, missed: bool) -> Adaptive:
+def adapted(state: Adaptive, missed: bool, together: int = 1) -> Adaptive:
     """Return the state after one more path could be judged: adaptive conformal inference.
 
     Each miss widens the band, each hit narrows it a little, so that the long-run share of misses goes to that wanted,
-    whatever drifts: |share - wanted| <= const / (rate n) after n paths. Source: Gibbs and Candes (2021), eq. (2).
+    whatever drifts: |share - wanted| <= const / (rate n) after n horizons. Source: Gibbs and Candes (2021), eq. (2).
 
+    Parameters
+    ----------
     missed : whether the path, predicted a horizon ago, left the band that was then given for it.
+    together : how many paths begin within a horizon. Each counts so much less: what the first one shows is not known to
+        the others, and all of them would widen the band for the same error.
     """
-    return state._replace(miss=state.miss + state.rate * (state.wanted - float(missed)))
+    return state._replace(miss=state.miss + state.rate / together * (state.wanted - float(missed)))
 
 
 def factor(state: Adaptive, whole: Array) -> float:

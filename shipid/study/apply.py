@@ -189,10 +189,11 @@ def along_run(reach: Array, known_at: Array, now: Array, band: Band, table: Arra
     """
     state, factors, waiting = adaptive(band.level, band.rate or 0.0), np.ones(len(now)), 0
     slack = clock_slack(now)
+    together = np.maximum(np.searchsorted(now, known_at - slack) - np.arange(len(now)), 1)
     for i, t in enumerate(now):
         while waiting < i and known_at[waiting] <= t + slack:
             if np.isfinite(reach[waiting]):
-                state = adapted(state, bool(reach[waiting] > factors[waiting]))
+                state = adapted(state, bool(reach[waiting] > factors[waiting]), int(together[waiting]))
             waiting += 1
         factors[i] = factor(state, table)
     return factors

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import binom, binomtest
 from typer.testing import CliRunner
 
@@ -234,6 +235,23 @@ def test_an_adaptive_band_judges_by_the_band_that_was_given() -> None:
     factors = along_run(np.full(600, 1.3), now + 5.0, now, Band(0.9, rate=0.02), table)
     assert factors.max() < 10.0
     assert np.mean(factors[100:] < 1.3) == pytest.approx(0.1, abs=0.03)
+
+
+@pytest.mark.parametrize("horizon", [15, 60])
+def test_paths_that_begin_within_a_horizon_do_not_widen_a_band_for_one_error_each(horizon: int) -> None:
+    """Errors three times those of training, alike from row to row: a band that is three times as wide is right.
+
+    Each path counted whole, before: the factor came to 1e3 with 15 and 1e9 with 60 paths within a horizon.
+    """
+    rng, now = np.random.default_rng(3), np.arange(4000.0)
+    table = np.sqrt(-2 * np.log1p(-LEVELS))  # radii of Rayleigh's law
+    plane = lfilter([np.sqrt(1 - 0.95**2)], [1, -0.95], rng.normal(size=(2, len(now))))
+    reach = 3 * np.hypot(*plane) / float(np.interp(0.9, LEVELS, table))
+    factors = along_run(reach, now + horizon, now, Band(0.9, rate=0.02), table)
+    later = now > 2000
+    assert np.mean(reach[later] > factors[later]) == pytest.approx(0.1, abs=0.03)
+    assert np.median(factors[later]) == pytest.approx(3.0, rel=0.2)
+    assert factors.max() < 12.0
 
 
 @pytest.mark.slow
