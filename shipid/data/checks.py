@@ -352,7 +352,7 @@ def copies(dataset: Dataset, runs: Iterable[str], others: Collection[str]) -> di
     """Runs, and the one of some others with their motion in most rows: recorded twice, or cut from one log twice."""
     whole = {run: _motion(pd.concat(parts)) for run, parts in pieces_by_run(dataset).items()}
     every = np.concatenate([whole[other].keys for other in others] or [np.empty(0, np.uint64)])
-    found = {}
+    found: dict[str, str] = {}
     for run in runs:
         if np.isin(whole[run].keys, every).mean() >= OVERLAP:  # of few runs: the others need no comparison one by one
             share, other = max((_alike(whole[run], whole[other]), other) for other in others)
