@@ -191,13 +191,20 @@ def write_fmu(unit: Packed, file: Path, *, binary: bool = True) -> list[str]:
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
     ):
         for name, text in texts.items():
-            archive.writestr(name, text)
+            archive.writestr(_entry(name), text)
         if place is not None:
             for name in (f"{unit.files.name}.c", f"{unit.files.name}.h"):
                 (Path(folder) / name).write_text(texts[f"sources/{name}"], encoding="utf-8")
             built = _compiled(Path(folder), unit.files.name)
-            archive.write(built, f"binaries/{place[0]}/{unit.identifier}{place[1]}")
+            archive.writestr(_entry(f"binaries/{place[0]}/{unit.identifier}{place[1]}", 0o755), built.read_bytes())
     return [] if place is None else [place[0]]
+
+
+def _entry(name: str, mode: int = 0o644) -> zipfile.ZipInfo:
+    """A file of the archive, of 1980 whatever the clock says: one without a battery begins in 1970, which no zip takes."""
+    entry = zipfile.ZipInfo(name)
+    entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, mode << 16
+    return entry
 
 
 def _compiled(folder: Path, name: str) -> Path:

@@ -7,6 +7,7 @@ import platform
 import resource
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ET
 import zipfile
 from dataclasses import replace
@@ -230,6 +231,21 @@ def test_a_compiler_that_fails_is_one_line_and_leaves_no_file(tmp_path, monkeypa
         write_fmu(vessel_unit(variety()["actuators"], "ship", "rk4"), tmp_path / "ship.fmu")
     assert not os.path.exists(noted.read_text())
     assert sorted(place.name for place in tmp_path.iterdir()) == ["gcc", "noted"]
+
+
+def test_an_fmu_is_the_same_whatever_the_clock_says(ship, tmp_path, monkeypatch):
+    """A board without a battery begins in 1970, which no zip can hold: the export was a traceback."""
+    monkeypatch.setattr(time, "time", lambda: 100.0)
+    monkeypatch.setattr(time, "localtime", lambda *_: time.gmtime(100.0))
+    file = tmp_path / "ship.fmu"
+    assert write_fmu(vessel_unit(variety()["actuators"], "ship", "rk4"), file)
+    with zipfile.ZipFile(file) as archive, zipfile.ZipFile(ship) as usual:
+        assert archive.namelist() == usual.namelist()
+        for entry, other in zip(archive.infolist(), usual.infolist(), strict=True):
+            assert entry.date_time == other.date_time == (1980, 1, 1, 0, 0, 0)
+            assert entry.external_attr == other.external_attr
+        texts = [name for name in usual.namelist() if not name.startswith("binaries/")]
+        assert all(archive.read(name) == usual.read(name) for name in texts)
 
 
 def test_an_importer_finds_no_fault(ship, aboard):
