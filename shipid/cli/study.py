@@ -251,7 +251,9 @@ def study_rotate(
         answer.rows("turns", over, table(heads, rows))
         answer.say(f"naive floor {digits(naive)} m", naive=naive)
         if saw := plan.saw(wanted):
-            answer.say(f"{', '.join(saw)}: numbers set from runs that test here, so A and H are too good", saw=saw)
+            answer.say(
+                f"{', '.join(saw)}: numbers set from runs that test here, A and H are not those of new runs", saw=saw
+            )
         if verdicts:
             answer.say("findings over the turns, in brackets 95 % intervals:")
         shown = table(
