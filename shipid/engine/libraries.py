@@ -15,14 +15,17 @@ import signal
 import stat
 import subprocess
 import tempfile
+import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from shipid.errors import ShipidError, is_utf_8, visible
 from shipid.files import temporary_folder
 
+MOST_WORDS = 100_000
 PROBE_LIMIT, LIMIT = 10.0, 120.0  # s that a compiler may take: for a probe of two lines, for a model
 
 log = logging.getLogger(__name__)
@@ -35,7 +38,8 @@ class NoLibrary(ShipidError):
 def run_compiler(arguments: Sequence[str], folder: Path | None = None, limit: float = LIMIT) -> tuple[str | None, str]:
     """Run a compiler: (its complaint in one text, None if it succeeded; what it printed).
 
-    folder : for its temporary files. A compiler that takes longer than `limit` [s] is ended with all its processes.
+    folder : for its temporary files. A compiler that takes longer than `limit` [s] is ended, and so are the processes
+        that it leaves. Of what it prints the first `MOST_WORDS` signs are kept, so that none can fill the memory.
     """
     environment = os.environ | ({"TMPDIR": str(folder)} if folder else {})
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
@@ -45,26 +49,42 @@ def run_compiler(arguments: Sequence[str], folder: Path | None = None, limit: fl
         )
     except OSError as error:
         return f"cannot be started: {error.strerror}", ""
+    kept: list[list[str]] = [[], []]
+    readers = [
+        threading.Thread(target=_read, args=pair, daemon=True)
+        for pair in zip((process.stdout, process.stderr), kept, strict=True)
+    ]
     try:
-        printed, complaint = process.communicate(timeout=limit)
+        for reader in readers:
+            reader.start()
+        process.wait(timeout=limit)
     except subprocess.TimeoutExpired:
         return f"hangs: not done after {limit:g} s", ""
     finally:
-        _end(process)
+        _end(process, readers)
+    printed, complaint = ("".join(parts) for parts in kept)
     return (complaint.strip() or "it gave no reason") if process.returncode else None, printed
 
 
-def _end(process: subprocess.Popen[str]) -> None:
-    """End a process that still runs, and those that it started."""
-    if process.poll() is None:
-        if hasattr(os, "killpg"):
+def _read(pipe: IO[str], kept: list[str]) -> None:
+    """Read a pipe to its end; the first `MOST_WORDS` signs are kept."""
+    with pipe:
+        kept.append(pipe.read(MOST_WORDS))
+        while pipe.read(MOST_WORDS):
+            pass
+
+
+def _end(process: subprocess.Popen[str], readers: Sequence[threading.Thread]) -> None:
+    """End a process that still runs, and those that it started, which hold its pipes."""
+    if hasattr(os, "killpg"):
+        with suppress(OSError):  # all have ended
             os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()
-        process.wait()
-    for pipe in (process.stdout, process.stderr):
-        if pipe is not None:
-            pipe.close()
+    elif process.poll() is None:
+        process.kill()
+    process.wait()
+    for reader in readers:
+        if reader.is_alive():
+            reader.join(PROBE_LIMIT)  # not for ever: a process that left the group may hold the pipe
 
 
 def build(command: Sequence[str], source: str, library: Path, limit: float = LIMIT) -> str | None:

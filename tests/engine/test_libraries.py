@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import stat
+import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 
 from shipid.engine import libraries, native
-from shipid.engine.libraries import NoLibrary, build, load, run_compiler, stranger
+from shipid.engine.libraries import MOST_WORDS, NoLibrary, build, load, run_compiler, stranger
 from shipid.engine.native import Target, compiler
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
@@ -246,6 +247,25 @@ def _alive(number: int) -> bool:
         return Path(f"/proc/{number}/stat").read_text().split()[2] != "Z"
     except OSError:
         return False
+
+
+def test_what_a_compiler_prints_without_an_end_does_not_fill_the_memory() -> None:
+    """It was kept whole: 2 GB in the ten seconds of a probe."""
+    reason, printed = run_compiler(["yes", "error: no such thing"], limit=0.5)
+    assert reason == "hangs: not done after 0.5 s"
+    assert printed == ""
+    reason, printed = run_compiler(["sh", "-c", "yes words | head -c 3000000; yes no | head -c 300000 >&2; exit 1"])
+    assert len(printed) == MOST_WORDS
+    assert reason is not None
+    assert len(reason) <= MOST_WORDS
+    assert reason.startswith("no\nno")
+
+
+def test_what_a_compiler_leaves_running_is_not_waited_for() -> None:
+    """Such as a server that keeps its results: it holds the pipe of what is printed."""
+    start = time.monotonic()
+    assert run_compiler(["sh", "-c", "echo done; sleep 60 &"]) == (None, "done\n")
+    assert time.monotonic() - start < 10.0
 
 
 def test_a_compiler_that_cannot_be_started_is_a_reason(tmp_path: Path) -> None:
