@@ -30,11 +30,14 @@ WORDS = frozenset(
     rewind signal raise time clock gamma j0 j1 jn y0 y1 yn index bool true false complex imaginary linux unix
     and asm bitand bitor catch class compl delete explicit export friend mutable namespace new not operator or private
     protected public template this throw try typeid typename using virtual xor math string
+    alignas alignof concept consteval constexpr constinit decltype noexcept nullptr requires static_assert thread_local
+    typeof typeof_unqual const_cast dynamic_cast reinterpret_cast static_cast co_await co_return co_yield
+    stdin stdout stderr errno assert random select
     begin_filters first_turn follow free_memory get_memory go_filters guid identifier kind_of kinds nearest_turn no
     no_band predict_from radius_of refuse same_turn say self set start_values t va_list
     """.split()
 )
-"""Keywords of C99 and C++, names of C's library and headers and of the sources themselves: a file of such a name would
+"""Keywords of C99, C23 and C++20, names of C's library and headers and of the sources themselves: a file of such a name would
 not compile."""
 
 

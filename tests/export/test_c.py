@@ -573,6 +573,7 @@ def test_names_are_those_of_c():
     assert c_name("double") == "m_double"
     assert c_name("exp") == "m_exp"  # of the library
     assert c_name("class") == "m_class"  # of C++
+    assert c_name("Concept") == "m_concept"  # of C++20
     assert c_name("math") == "m_math"  # math.h would be that of the library
     assert c_name("Ærø") == "r"
     assert c_name("øøø") == "model"
