@@ -283,7 +283,8 @@ int {name}_predict_band(const {name} *self, const {name}_real *planned, double l
  * else all of them widen the band for one error. Returns miss from then on. */
 double {name}_adapted(double miss, double level, double rate, int missed);
 
-/* How much wider than calibrated such a band is now: times both half axes. A kind that is none gives NAN. */
+/* How much wider than calibrated such a band is now: times both half axes. NAN for a kind or level that is none, and for a
+ * miss that is no number. */
 double {name}_factor(double miss, double level, int kind);
 """
 
@@ -346,7 +347,7 @@ double {name}_adapted(double miss, double level, double rate, int missed)
 double {name}_factor(double miss, double level, int kind)
 {{
     double usual, now = 1 - miss;
-    if (kind < 0 || kind > {len(bands.kinds)}) return NAN;
+    if (kind < 0 || kind > {len(bands.kinds)} || !(level > 0 && level < 1) || !isfinite(miss)) return NAN;
     if (now <= 0) return 0;
     usual = radius_of(level, kind);
     if (usual == 0) return 1;

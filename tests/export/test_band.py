@@ -144,7 +144,8 @@ def test_a_band_adapts_as_in_python(tmp_path):
             assert miss == pytest.approx(state.miss, rel=1e-12, abs=1e-14)
             for kind, radius in enumerate((table.whole, *table.by_kind)):
                 assert loaded.odd_factor(miss, level, kind) == pytest.approx(factor(state, radius), rel=1e-9)
-    assert np.isnan(loaded.odd_factor(0.1, 0.9, 9))
+    for wrong in ((0.1, 0.9, 9), (np.nan, 0.9, 0), (np.inf, 0.9, 0), (0.1, np.nan, 0), (0.1, 0.0, 0), (0.1, 1.5, 0)):
+        assert np.isnan(loaded.odd_factor(*wrong))
 
 
 def test_casadi_gives_path_and_band(tmp_path):
