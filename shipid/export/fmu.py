@@ -6,13 +6,14 @@ The standard: Functional Mock-up Interface 2.0.4, fmi-standard.org. Its declarat
 from __future__ import annotations
 
 import platform
+import re
 import tempfile
 import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from xml.sax import saxutils
 
 import numpy as np
 
@@ -74,6 +75,11 @@ class Packed:
     files: Files
     wrapper: str
     step: float | None
+
+
+def quoteattr(text: str) -> str:
+    """A text as an attribute of XML; a character that XML cannot hold becomes the sign for that."""
+    return saxutils.quoteattr(re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "\ufffd", text))
 
 
 def described(name: str) -> str:

@@ -20,13 +20,13 @@ from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.export.c import c_name
-from shipid.export.fmu import predictor_unit, vessel_unit, write_fmu
+from shipid.export.fmu import description, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import MOTIONS, Memory
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
-from shipid.vessel.load import load_vessel
+from shipid.vessel.load import check_vessel, load_vessel
 from tests.conftest import variety
 from tests.export.compiled import FLAGS, SANITIZERS, compile_, compiler
 from tests.export.strange import drawn, network_of
@@ -70,6 +70,14 @@ def test_the_description_names_every_variable(ship):
     assert mass.find("Real").get("unit") == "kg"
     assert all(entry.get("description") for entry in variables.values())
     assert root.get("guid") in source
+
+
+def test_any_name_of_a_ship_is_one_of_xml():
+    """Before, no tool could read an FMU of a ship whose name has a control character."""
+    vessel = load_vessel("mariner")
+    odd = check_vessel({**vessel.document, "name": 'a\x07b\n<"ø🚢&'}, "odd.toml")
+    root = ET.fromstring(description(vessel_unit(odd, "ship", "rk4"), "{1}").encode())
+    assert root.get("modelName") == 'a\ufffdb\n<"ø🚢&'
 
 
 def test_what_is_calculated_at_the_start_is_not_said_to_be_known(ship, aboard):
