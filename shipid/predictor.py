@@ -83,7 +83,7 @@ class Predictor:
 
     @property
     def vessel(self) -> Vessel | None:
-        """The vessel of the physics; None for pure data-driven."""
+        """The vessel of the physics; None for no physics."""
         return self.physics.vessel
 
     @property
@@ -184,7 +184,7 @@ class Predictor:
         return checked_bands(self.bands, self.no_band, level, kind)
 
     def alone(self, instants: Instants) -> Array:
-        """Return the paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for pure data-driven."""
+        """Return the paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for no physics."""
         return self.physics.paths(self._known(instants))
 
     def _lost(self, instants: Instants) -> Array:

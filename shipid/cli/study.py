@@ -415,6 +415,12 @@ def _difference(row: Mapping[Any, Any], banded: bool) -> list[str]:
     ]
 
 
+def _with_ends(mean: float, low: float, high: float) -> str:
+    """A length [m] with an interval, in the decimals of the length."""
+    places = decimals_of(mean)
+    return f"{mean:.{places}f} [{low:.{places}f}, {high:.{places}f}]"
+
+
 def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     """Show findings, errors and bands of one study over several worlds; returns the errors."""
     from shipid.study.compare import compare_bands, compare_errors, compare_findings
@@ -424,8 +430,7 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in findings.itertuples()]
     shown = table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True))
     answer.rows("findings", findings, shown if len(findings) else None)
-    means, lows, highs = (errors[name].map(length_text) for name in ("mean", "low", "high"))
-    texts = [f"{mean} [{low}, {high}]" for mean, low, high in zip(means, lows, highs, strict=True)]
+    texts = [_with_ends(*numbers) for numbers in errors[["mean", "low", "high"]].to_numpy()]
     several = bool(errors.duplicated(["family", "N_D"]).any())
     names = errors["family"] + (" + " + errors["method"]).where((errors["N_D"] > 0) & several, "")
     wide = errors.assign(text=texts, family=names).pivot(index="family", columns="N_D", values="text")
@@ -441,7 +446,7 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
         [
             *(str(row[name]) for name in ("family", "method", "N_D")),
             "{:.2f} [{:.2f}, {:.2f}]".format(*(row[f"coverage{end}"] for end in ("", "_low", "_high"))),
-            "{} [{}, {}]".format(*(length_text(row[f"width{end}"]) for end in ("", "_low", "_high"))),
+            _with_ends(*(row[f"width{end}"] for end in ("", "_low", "_high"))),
             str(row["worlds"]),
         ]
         for row in bands.to_dict("records")

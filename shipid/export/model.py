@@ -71,7 +71,7 @@ class Model:
 
     @property
     def vessel(self) -> Vessel | None:
-        """The vessel with the terms of the method; None for pure data-driven."""
+        """The vessel with the terms of the method; None for no physics."""
         return self.physics.vessel
 
     @cached_property

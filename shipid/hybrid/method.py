@@ -55,7 +55,7 @@ class Corrector(Protocol):
 class Case:
     """One foundation of a task.
 
-    physics : equations with the numbers that the foundation says; without a vessel for pure data-driven.
+    physics : equations with the numbers that the foundation says; without a vessel for no physics.
     paths : (T, S, 2) [m] of the physics alone on the windows of the task; zeros without a vessel.
     """
 

@@ -133,7 +133,7 @@ def width_map(content: ReportContent) -> Figure | None:
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is the mean radius of "
         "its band over the horizon and all test windows, mean over seeds. Cells with too few runs for the level are "
         "left out.",
-        hatched="not narrower than the band of pure data-driven at the same N_D.",
+        hatched="not narrower than the band of no physics at the same N_D.",
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -14,9 +14,17 @@ Indices = np.ndarray[tuple[int, ...], np.dtype[np.signedinteger]]
 PathKey = tuple[str, str, int]
 
 DATA_DRIVEN = "none"  # the family of the model without physics
+NO_PHYSICS = "no physics"
+"""Name of that model for people, in sentences and figures: `none` would say that nobody does."""
 # Columns of a trial; every other column of its frame is a searched hyperparameter.
 TRIAL = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")
 PUBLISHED = "published"  # the set of the envelope that holds the paper's numbers
+
+
+def spoken(model: str) -> str:
+    """Name of a model or family for people, with the method that may follow: `none` is `no physics`."""
+    alone = model == DATA_DRIVEN or model.startswith(f"{DATA_DRIVEN} + ")
+    return model.replace(DATA_DRIVEN, NO_PHYSICS, 1) if alone else model
 
 
 @dataclass(frozen=True)
@@ -104,7 +112,8 @@ class ReportContent:
     """Everything one report shows; a frame without rows leaves its figure out.
 
     `source` is "physics", "cooperative" or "naive". Rows of physics and naive do not depend on the number
-    of manoeuvres and have N_D = 0; the pure data-driven model is the one of family "none", its source "cooperative".
+    of manoeuvres and have N_D = 0; the model without physics is the one of family "none", its source "cooperative". It
+    is called `no physics`, whatever the frames call it.
 
     Parameters
     ----------
@@ -161,3 +170,33 @@ class ReportContent:
     best: str = ""
     alone: Collection[str] = ()
     frames: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Give the model without physics its name for people, wherever a model is named."""
+        for name in ("cells", "models", "factors", "trials", "horizon", "over_time"):
+            object.__setattr__(self, name, _renamed(getattr(self, name)))
+        object.__setattr__(self, "frames", {name: _renamed(frame) for name, frame in self.frames.items()})
+        object.__setattr__(self, "snapshots", [_window(snapshot) for snapshot in self.snapshots])
+        object.__setattr__(self, "alone", {spoken(model) for model in self.alone})
+
+
+def _renamed(frame: pd.DataFrame) -> pd.DataFrame:
+    """A frame whose models have their names for people; itself where they have them."""
+    if "model" not in frame or not frame["model"].isin(names := _without_physics(frame)).any():
+        return frame
+    return frame.assign(model=frame["model"].replace({name: spoken(name) for name in names}))
+
+
+def _without_physics(frame: pd.DataFrame) -> list[str]:
+    return [name for name in pd.unique(frame["model"]) if isinstance(name, str) and spoken(name) != name]
+
+
+def _window(snapshot: Snapshot) -> Snapshot:
+    """A window whose models have their names for people; itself where they have them."""
+    if all(spoken(model) == model for model, _, _ in snapshot.paths):
+        return snapshot
+    paths, bands = (
+        {(spoken(model), source, size): line for (model, source, size), line in lines.items()}
+        for lines in (snapshot.paths, snapshot.bands)
+    )
+    return replace(snapshot, paths=paths, bands=bands)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, Floats, ReportContent
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent
 from shipid.report.contours import FEWEST, contour, length, nice_levels, smoothed
 from shipid.report.figure import (
     Chip,
@@ -60,7 +60,7 @@ Pieces = list[tuple[float, Floats]]  # of lines of equal value: level and points
 
 
 class Spot(NamedTuple):
-    """A model and an N_D: H and its range over seeds [m], whether it beats pure data-driven, and its hover text."""
+    """A model and an N_D: H and its range over seeds [m], whether it beats no physics, and its hover text."""
 
     model: str
     row: int
@@ -209,7 +209,7 @@ def _words(
     if len(good) < len(cells):
         lines.append(f"{len(cells) - len(good)} of {counted(len(cells), 'seed')} gave no result")
     if learned is not None:
-        lines.append(f"no better than pure data-driven, {metres(learned)}")
+        lines.append(f"no better than no physics, {metres(learned)}")
     return "<br>".join([*lines, label(str(best["hyperparameters"]))] if best.get("hyperparameters") else lines)
 
 
@@ -341,9 +341,7 @@ def _ticks(rows: pd.DataFrame) -> dict[str, list[Any]]:
         if tick <= known.A.max() and all(abs(math.sqrt(tick) - math.sqrt(other)) > room for other in values):
             values.append(float(tick))
     strips = rows[rows.A.isna()]
-    only = (strips.family == DATA_DRIVEN).sum() == 1
-    named = ["no model" if only and row.family == DATA_DRIVEN else str(row.model) for row in strips.itertuples()]
-    names = [shortened(name, SHORT) for name in named]
+    names = [shortened(str(model), SHORT) for model in strips.model]
     return {
         "tickvals": [*(math.sqrt(value) for value in values), *strips.y],
         "ticktext": [*(f"{value:g}" for value in values), *map(label, names)],
@@ -455,8 +453,7 @@ def _pure(rows: pd.DataFrame) -> list[str]:
 
 def _rival(rows: pd.DataFrame) -> str:
     """The model without physics that others are compared with: by name where there are several."""
-    pure = _pure(rows)
-    return "pure data-driven" if len(pure) < 2 else f"{pure[0]} (pure data-driven)"
+    return next(iter(_pure(rows)), NO_PHYSICS)
 
 
 def _ends(spots: Sequence[Spot]) -> tuple[str, str]:

@@ -134,7 +134,7 @@ def model_chips(content: ReportContent, sources: set[str]) -> list[Chip]:
         for name in exemplars(content)
     ]
     sources = {drawn_source(content, name, source) for name in exemplars(content) for source in sources}
-    words = {"cooperative": "compensated or data-driven", "physics": "physics alone", "naive": "constant velocity"}
+    words = {"cooperative": "compensated or no physics", "physics": "physics alone", "naive": "constant velocity"}
     return chips + [
         Chip(f"source:{source}", word, NAIVE if source == "naive" else INK, DASHES[source])
         for source, word in words.items()
@@ -301,13 +301,13 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     pure = data_driven(content)
     best = content.best if content.best in together.index else str(together.idxmin())
     of = "" if content.best in together.index or len(together) < 2 else f", the least of {len(together)} models"
-    shown = in_words(content, best)
-    text = (
-        f"{means.ahead.max():g} s ahead and with N_D = {size}, {shown} is {metres(together[best])} off on average{of}"
-    )
+    text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {in_words(content, best)} is "
+    text += f"{metres(together[best])} off on average{of}"
     text += f", its physics alone {metres(alone[best])}" if best in alone.index else ""
     return text + (
-        f"; pure data-driven {metres(together[pure])}." if pure and pure != best and pure in together.index else "."
+        f"; {in_words(content, pure)} {metres(together[pure])}."
+        if pure and pure != best and pure in together.index
+        else "."
     )
 
 

@@ -192,7 +192,7 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
             if name and name in here.index
         ]
         parts.append(
-            f"at N_D = {size}, {', '.join(known) or f'H runs from {metres(here.min())} to {metres(here.max())}'}"
+            f"at N_D = {size}, {' and '.join(known) or f'H runs from {metres(here.min())} to {metres(here.max())}'}"
         )
     best = f" {content.best} is the best in validation." if content.best else ""
     return f"{parts[0][0].upper()}{parts[0][1:]}; {parts[1]}.{best}"
@@ -221,7 +221,7 @@ def _dumbbell(content: ReportContent, means: pd.DataFrame) -> Figure:
         controls=[Control("Position error", [statistic.name for statistic in STATISTICS])],
         chips=[
             Chip("before", "physics alone", INK, "none", symbol="circle-open"),
-            Chip("after", "with compensation (or pure data-driven)", INK, "none", symbol="circle"),
+            Chip("after", "with compensation (or no physics)", INK, "none", symbol="circle"),
             Chip("naive", "constant velocity", NAIVE, "dash"),
         ],
     )
@@ -291,5 +291,5 @@ def _takeaway_dumbbell(content: ReportContent, means: pd.DataFrame) -> str:
     if before.empty:
         text = "No physics model has a result with data"
     if pure and pure in after.index:
-        text += f"; pure data-driven has H = {metres(after[pure])}"
+        text += f"; {in_words(content, pure)} has H = {metres(after[pure])}"
     return f"{text}; the naive floor is {metres(content.naive['mean'])}."

@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 MEANINGS = {
     "H_90": "90th percentile of the position error of the prediction [m]: nine errors in ten are smaller",
     "N_D": "number of recorded runs (manoeuvres) used to train and to validate",
-    "H": "mean position error of the prediction, compensated or pure data-driven, over all tests [m], equation (15)",
+    "H": "mean position error of the prediction, compensated or of no physics, over all tests [m], equation (15)",
     "A": "mean position error of the physics alone over the test manoeuvres [m], equation (14)",
     "(11)": "equation (11): the frame with x ahead and y to starboard at the instant of prediction",
     "(14)": "equation (14): A, the mean distance between true and predicted places, physics alone",

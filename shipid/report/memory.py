@@ -16,7 +16,7 @@ from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.selection import spread
 from shipid.report.tables import Cell, Table, figure, text
-from shipid.report.wording import counted, listed, metres, number
+from shipid.report.wording import counted, difference, listed, metres, number
 
 ROW, GAP, MARGIN = 118, 26, 56  # heights of a row of a stacked figure, between rows, and around them [px]
 FEW = 6  # models that have a line in a figure
@@ -261,8 +261,9 @@ def _differences(frame: pd.DataFrame, models: Sequence[str]) -> Plot:
 
 def _interval(row: dict[Any, Any]) -> str:
     low, high = float(row["low"]), float(row["high"])
-    bracket = f" [{number(low)}, {number(high)}]" if math.isfinite(low) else ", no interval from fewer than five runs"
-    return f"{number(float(row['difference']))} m{bracket}"
+    if not math.isfinite(low):
+        return f"{metres(float(row['difference']))}, no interval from fewer than five runs"
+    return difference(float(row["difference"]), low, high)
 
 
 def _takeaway_gain(frame: pd.DataFrame) -> str:

@@ -10,12 +10,12 @@ from typing import Any
 
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, PageContent, ReportContent, Sentence
+from shipid.report.content import DATA_DRIVEN, PageContent, ReportContent, Sentence, spoken
 from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line, logarithmic
 from shipid.report.palette import INK, OKABE_ITO, SYMBOLS, Style, category
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, figure, text
-from shipid.report.wording import counted, listed, number, shortened
+from shipid.report.wording import counted, difference, ends, listed, number, shortened
 
 EVERY = "with physics"
 STEPS = (  # greatest by least error below which an axis has these ticks in a decade: two at least are within it
@@ -66,15 +66,11 @@ def _verdict(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
     over = " over all cells with physics" if first else ""
     text = f"with N_D = {N_D} {best.method} errs least{over}, {number(best.H)} m"
     if best.method != best.reference and math.isfinite(best.low):
-        text += f" (its difference to {best.reference} is {_bracket(best.difference, best.low, best.high)})"
+        text += f" (its difference to {best.reference} is {difference(best.difference, best.low, best.high)})"
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in mine[mine.failed.gt(0)].itertuples()]
     text += f", without a result: {listed(failed)}" if failed else ""
     partly = [str(row.method) for row in mine[mine.missing.gt(mine.failed)].itertuples()]
     return text + (f", not on every model: {listed(partly)}" if partly else "")
-
-
-def _bracket(value: float, low: float, high: float) -> str:
-    return f"{number(value)} m [{number(low)}, {number(high)}]"
 
 
 def _frame(content: ReportContent | MethodsContent) -> pd.DataFrame:
@@ -128,7 +124,7 @@ def methods(content: ReportContent | MethodsContent) -> Figure | None:
         views=views,
         controls=controls,
         chips=[
-            Chip(f"family:{name}", name, look.colour, "none", symbol=look.symbol)
+            Chip(f"family:{name}", spoken(name), look.colour, "none", symbol=look.symbol)
             for name in families
             for look in [_look(name, families)]
         ],
@@ -170,12 +166,12 @@ def _errors(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -
         look = _look(family, families)
         rows = mine[mine.family.eq(family) & mine.H.notna()].to_dict("records")
         y = [_place({str(key): value for key, value in row.items()}, order, families) for row in rows]
-        trace = line(family, [row["H"] for row in rows], y, [f"family:{family}"], mode="markers",
+        trace = line(spoken(family), [row["H"] for row in rows], y, [f"family:{family}"], mode="markers",
                      marker={"color": look.colour, "symbol": look.symbol, "size": 8})  # fmt: skip
         trace.update(
             customdata=[f"{label(row['method'])}: {number(row['H'])} m, {row['seconds']:.1f} s" for row in rows]
         )
-        trace.update(hovertemplate=f"{label(family)}, %{{customdata}}<extra></extra>")
+        trace.update(hovertemplate=f"{label(spoken(family))}, %{{customdata}}<extra></extra>")
         traces.append(trace)
     errors = mine.H[mine.H > 0]
     span = float(errors.max() / errors.min()) if len(errors) else 1.0
@@ -194,13 +190,13 @@ def _differences(mine: pd.DataFrame, order: Sequence[str], families: Sequence[st
         y = [_place({str(key): value for key, value in row.items()}, order, families) for row in rows]
         middle = [float(row["difference"]) for row in rows]
         reach = {"type": "data", "symmetric": False, "color": look.colour, "thickness": 1.5, "width": 3}
-        ends = [(row["difference"], row["low"], row["high"]) for row in rows]
-        reach |= {"array": [_finite(high - value) for value, _, high in ends]}
-        reach |= {"arrayminus": [_finite(value - low) for value, low, _ in ends]}
+        reaches = [(row["difference"], row["low"], row["high"]) for row in rows]
+        reach |= {"array": [_finite(high - value) for value, _, high in reaches]}
+        reach |= {"arrayminus": [_finite(value - low) for value, low, _ in reaches]}
         marker = {"color": look.colour, "symbol": look.symbol, "size": 6}
-        trace = line(family, middle, y, [f"family:{family}"], mode="markers", marker=marker)
+        trace = line(spoken(family), middle, y, [f"family:{family}"], mode="markers", marker=marker)
         trace.update(error_x=reach, customdata=[f"{label(row['method'])}: {_interval(row)}" for row in rows])
-        trace.update(hovertemplate=f"{label(family)}, %{{customdata}}<extra></extra>")
+        trace.update(hovertemplate=f"{label(spoken(family))}, %{{customdata}}<extra></extra>")
         traces.append(trace)
     zero = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": 0, "x1": 0, "line": {"color": INK, "width": 1}}
     shown = layout(axis("difference of H [m]"), _methods_axis(order), hovermode="closest", shapes=[zero])
@@ -213,7 +209,7 @@ def _finite(value: float) -> float:
 
 def _interval(row: Mapping[Any, Any]) -> str:
     if math.isfinite(float(row["low"])):
-        return _bracket(float(row["difference"]), float(row["low"]), float(row["high"]))
+        return difference(float(row["difference"]), float(row["low"]), float(row["high"]))
     return f"{number(float(row['difference']))} m, no interval from fewer than five runs"
 
 
@@ -225,7 +221,7 @@ def table(content: ReportContent | MethodsContent) -> Table | None:
     several = len(_conditions(frame)) > 1
     rows: list[list[Cell]] = []
     for row in frame.to_dict("records"):
-        names = [text(row[name]) for name in (*(["condition"] if several else []), "family", "method")]
+        names = [text(spoken(row[name])) for name in (*(["condition"] if several else []), "family", "method")]
         failed = Cell(f"{row['failed']} of {row['cells']}", float(row["failed"]), bad=bool(row["failed"]))
         numbers = [figure(row["N_D"], 0), *(figure(row[name], 2) for name in ("H", "H_90", "end"))]
         price = [figure(row["seconds"], 1), figure(row["trials"], 0), failed]
@@ -248,14 +244,14 @@ def _intervals(row: Mapping[Any, Any]) -> list[Cell]:
         return [none, none, none]
     over_runs = none
     if math.isfinite(float(row["low"])):
-        over_runs = Cell(f"{number(row['low'])} to {number(row['high'])}", float(row["low"]))
+        over_runs = Cell(ends(row["low"], row["high"]), float(row["low"]))
     better = Cell(f"{row['better']} of {row['runs']}", float(row["better"]))
     by_world = none
     if row["worlds"] > 1:
-        ends = f"{number(row['least'])} to {number(row['greatest'])} in {row['worlds']}"
+        spread = f"{ends(row['least'], row['greatest'])} in {row['worlds']}"
         if math.isfinite(float(row["world_low"])):
-            ends += f"; 95 % {number(row['world_low'])} to {number(row['world_high'])}"
-        by_world = Cell(ends, float(row["least"]))
+            spread += f"; 95 % {ends(row['world_low'], row['world_high'])}"
+        by_world = Cell(spread, float(row["least"]))
     return [over_runs, better, by_world]
 
 

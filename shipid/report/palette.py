@@ -67,7 +67,7 @@ def accuracy_range(content: ReportContent) -> tuple[float, float] | None:
 
 @lru_cache(maxsize=4)  # every figure asks for it
 def styles(content: ReportContent) -> Mapping[str, Style]:
-    """Style of every model: colour by A for many models, Okabe-Ito for few, thick ink for the pure data-driven."""
+    """Style of every model: colour by A for many models, Okabe-Ito for few, thick ink for no physics."""
     frame, span = families(content), accuracy_range(content)
     kinds = [kind for kind in pd.unique(frame.family) if kind != DATA_DRIVEN]
     same = same_physics(frame).to_numpy()

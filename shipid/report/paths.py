@@ -90,7 +90,7 @@ def browser(content: ReportContent) -> Figure | None:
 def snapshots(content: ReportContent) -> Figure | None:
     """Draw some windows side by side, as in the paper's Fig. 7; None without windows.
 
-    With several N_D, one window: a row per model (data-driven and one of each of the two largest families) and a
+    With several N_D, one window: a row per model (without physics and one of each of the two largest families) and a
     column per N_D; with a single family, all models in one row. At a single N_D, three instants of one run.
     """
     runs, counts = windows_of(content), window_sizes(content)
@@ -138,7 +138,7 @@ def snapshots(content: ReportContent) -> Figure | None:
 
 
 def _compared(content: ReportContent) -> list[str]:
-    """Pure data-driven and one model of each of the two largest families, by A; empty if families are too few."""
+    """The model without physics and one of each of the two largest families, by A; empty if families are too few."""
     recorded = {model for window in content.snapshots for model, source, _ in window.paths if source == "cooperative"}
     middle = {family: name for family, name in middles(content).items() if name in recorded}
     physics = [name for family, name in middle.items() if family != DATA_DRIVEN][:2]
@@ -372,7 +372,7 @@ def _takeaway(content: ReportContent, size: int) -> str:
     together = _mean_end_error(windows, {key for key, source in called.items() if source == "cooperative"})
     alone = _mean_end_error(windows, {key for key, source in called.items() if source == "physics"})
     learned = _mean_end_error(windows, {k for k in keys if k[0] == pure and k[2] == size})
-    parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, "pure data-driven")]
+    parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, in_words(content, pure or ""))]
     errors = [f"{word} by {metres(value)}" for value, word in parts if np.isfinite(value)]
     where = f", N_D = {size}" if size else ""  # where no cell has a result there is physics alone
     return (
@@ -407,7 +407,7 @@ def _takeaway_models(content: ReportContent, window: Snapshot, models: list[str]
     for name in models:
         ends = [_mean_end_error([window], {(name, "cooperative", size)}) for size in counts]
         alone = _mean_end_error([window], {(name, "physics", 0)})
-        text = f"{in_words(content, name)} {', '.join(number(end) for end in ends)} m"
+        text = f"{in_words(content, name)} {listed([number(end) for end in ends])} m"
         parts.append(text + (f" (physics alone {metres(alone)})" if np.isfinite(alone) else ""))
     numbers = listed([str(size) for size in counts])
     return f"Distance from the true place at the end, with N_D = {numbers}: {'; '.join(parts)}."

@@ -24,7 +24,7 @@ def spread(items: Sequence[str], count: int) -> list[str]:
 
 @lru_cache(maxsize=4)  # every figure asks for it
 def families(content: ReportContent) -> pd.DataFrame:
-    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, data-driven last.
+    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, those without last.
 
     The frame is cached and shared: do not change it.
     """
@@ -42,7 +42,7 @@ def same_physics(frame: pd.DataFrame) -> pd.Series[bool]:
 
 
 def data_driven(content: ReportContent) -> str | None:
-    """Name of the pure data-driven model, if the study has one."""
+    """Name of the model without physics, if the study has one; the first of several."""
     frame = families(content)
     names = frame.model[frame.family == DATA_DRIVEN]
     return None if names.empty else str(names.iloc[0])
@@ -59,8 +59,8 @@ def nothing_learns(content: ReportContent) -> bool:
 
 
 def in_words(content: ReportContent, model: str) -> str:
-    """Name of a model in a sentence: of itself `none errs most` would say that nobody does."""
-    return f"{model} (pure data-driven)" if model == data_driven(content) else model
+    """Name of a model in a sentence: without quotes `no physics errs most` would say that no model does."""
+    return f'"{model}"' if model == data_driven(content) else model
 
 
 def middles(content: ReportContent) -> dict[str, str]:

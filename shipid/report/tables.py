@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup, escape
 
-from shipid.report.content import PUBLISHED, Floats, ReportContent
+from shipid.report.content import PUBLISHED, Floats, ReportContent, spoken
 from shipid.report.selection import nothing_learns
 from shipid.report.wording import counted, fixed, listed, number
 
@@ -228,6 +228,7 @@ def _table(
     }
     rows = []
     for record in frame.to_dict("records"):
+        record["family"] = spoken(str(record.get("family")))
         row = [text(record[name]) if count is None else figure(record[name], count) for name, count in places.items()]
         if "status" in places and record["status"] != "ok":
             status = f"{record['status']}: {record['sentence']}" if record.get("sentence") else str(record["status"])

@@ -15,7 +15,11 @@ def number(value: float) -> str:
     """Three digits, two decimals at most, and two digits below 0.1: 0.0083, 0.83, 12.4, 131; NaN is a dash."""
     if not math.isfinite(value):
         return "–"
-    return fixed(value, 0 if abs(value) >= 99.95 else 1 if abs(value) >= 9.995 else decimals_of(value))
+    return fixed(value, _decimals(value))
+
+
+def _decimals(value: float) -> int:
+    return 0 if abs(value) >= 99.95 else 1 if abs(value) >= 9.995 else decimals_of(value)
 
 
 def fixed(value: float, decimals: int) -> str:
@@ -52,6 +56,18 @@ def shortened(name: str, most: int) -> str:
 def metres(value: float) -> str:
     """Write a length with its unit."""
     return f"{number(value)} m"
+
+
+def difference(value: float, low: float, high: float) -> str:
+    """Write a difference [m] and its interval with the decimals of the greatest of them: it may be nearly 0."""
+    places = _decimals(max(map(abs, (value, low, high))))
+    return f"{fixed(value, places)} m [{fixed(low, places)}, {fixed(high, places)}]"
+
+
+def ends(low: float, high: float) -> str:
+    """Write two lengths [m] as `low to high`, with the decimals of the greater."""
+    places = _decimals(max(abs(low), abs(high)))
+    return f"{fixed(low, places)} to {fixed(high, places)}"
 
 
 def distance(value: float) -> str:

@@ -112,13 +112,9 @@ class Case:
     def H(self, model: str, amount: int) -> str:
         """H of a model with its interval, in words."""
         row = self.rows[(self.rows["model"] == model) & (self.rows["N_D"] == amount)].iloc[0]
-        return metres(float(row["H"])) + self.spread(model, amount)
-
-    def spread(self, model: str, amount: int) -> str:
-        """Interval of the H of a model; empty where there is none."""
-        if model not in self.table.H:
-            return ""
-        return interval(*self.table.interval(model, self.place(amount)))
+        error = float(row["H"])
+        known = model in self.table.H
+        return metres(error) + (interval(*self.table.interval(model, self.place(amount)), error) if known else "")
 
     def sides(self, models: Sequence[str], differences: Contrasts) -> Sides:
         """Models that are better (above 0) and worse; by sign alone where there are too few test manoeuvres."""
@@ -213,7 +209,7 @@ def _least(errors: pd.Series[float]) -> str:
     """The least of some errors [m] by name, as the end of a sentence."""
     shown = errors.sort_values(kind="stable")[:SHOWN]
     of = f" (the least of {len(errors)})" if len(errors) > SHOWN else ""
-    return f"{of}: {', '.join(f'{name} {metres(value)}' for name, value in shown.items())}"
+    return f"{of}: {listed([f'{name} {metres(value)}' for name, value in shown.items()], SHOWN)}"
 
 
 def _has_map(table: pd.DataFrame) -> bool:

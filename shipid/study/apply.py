@@ -50,7 +50,7 @@ def predict_log(
     Returns the frame (run, t, ahead [s], physics_north, physics_east, cooperative_north, cooperative_east [m], outside;
     with a level also band_along, band_across [m], band_course [rad], half axes and direction, clockwise from north, of
     the ellipse that holds the true place, and band_factor where it adapts) and the share of instants outside the
-    training's limits. Pure data-driven cells have NaN for physics. `attrs["gaps"]` of the frame says how many times
+    training's limits. Cells without physics have NaN for physics. `attrs["gaps"]` of the frame says how many times
     without rows the log has, and the longest.
     """
     check_table(out)

@@ -17,6 +17,7 @@ from scipy.special import betaincinv, stdtrit
 from shipid.hybrid.bands import Region
 from shipid.metrics import share_of, shares_by_run
 from shipid.predictor import NO_BAND
+from shipid.report.wording import listed
 from shipid.study.results import Results
 from shipid.study.verdict import metres, named, span
 from shipid.units import percent
@@ -162,7 +163,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
     share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
     radius = span(metres(top["width"].min()), metres(top["width"].max()))
     amount = int(top["N_D"].iloc[0])
-    mean = f"mean of {len(top)} models with {amount} runs; 95 % interval of one" if len(top) > 1 else ""
+    mean = f"mean of {len(top)} models with {amount} runs; 95 % interval of a single model" if len(top) > 1 else ""
     spread = f"{mean or f'with {amount} runs; 95 % interval'} {percent(low)} to {percent(high)}"
     sentence = f"Bands of {percent(level)} held {percent(share)} of the whole test paths ({spread}); "
     sentence += f"their mean radius is {radius}."
@@ -170,7 +171,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
     groups = groups_frame(results)
     few = sorted(set(groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]))
     if few:
-        text = f"Too few runs calibrate a band of {percent(level)} for one kind of manoeuvre alone: {', '.join(few)}."
+        text = f"Too few runs calibrate a band of {percent(level)} for one kind of manoeuvre alone: {listed(few)}."
         sentences.append((text, "coverage-groups"))
     return sentences
 

@@ -108,7 +108,7 @@ def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[
             )
     if twice := same_file([foundation.name for foundation in foundations]):
         raise DocumentError(f"two models would be called {twice}: rename a family", file=file, path="family")
-    return (*foundations, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "pure data-driven: no physics"))
+    return (*foundations, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "no physics: data alone"))
 
 
 def same_file(names: Sequence[str]) -> str:

@@ -19,7 +19,7 @@ from shipid.study.results import Results, judged_cells
 Array = NDArray[np.float64]
 Metric = Literal["H", "H_90"]
 PLAIN = "none, plain"
-"""Pure data-driven prediction without the mirror symmetry of the hull, where the study has it."""
+"""Prediction with no physics and without the mirror symmetry of the hull, where the study has it."""
 ALONE = -1  # place of the physics alone in a term
 EXACT = 1e-9  # m: errors below count as this one, which has a logarithm and can be divided by
 Term = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or ALONE

@@ -7,7 +7,7 @@ R1 : both models have H below A.
 R2 : H of the inaccurate model is less than 10 % above A of the accurate one.
 R3 : the models differ less in H than in A: both A gap - H gap and A gap + H gap are above 0, where a gap is the error
     of the model with the larger A less that of the other.
-R4 : at every step ahead pure data-driven has a larger error than every other predictor, physics alone included; refuted
+R4 : at every step ahead no physics has a larger error than every other predictor, physics alone included; refuted
     if one of them is worse over the whole horizon.
 """
 
@@ -46,7 +46,7 @@ CLAIMS = {
     "R1": "compensated physics beats the physics alone, accurate or not",
     "R2": "the inaccurate model, compensated, is about as good as the accurate physics alone",
     "R3": "the gap between accurate and inaccurate physics shrinks after compensation",
-    "R4": "pure data-driven prediction is worst over the whole horizon",
+    "R4": f"{words(NO_MODEL)} is worst over the whole horizon",
 }
 ABOUT = 0.10  # R2: "about as good" means a mean error at most 10 % above
 
@@ -124,7 +124,7 @@ def judged(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs
         f"{measured(about, 1)} less",
         "R3": f"gap {metres(before)} before, {metres(after)} after: {measured(gaps, 0 if narrower else 1)} less",
         "R4": (
-            f"pure data-driven is worst at {percent(share)} of the steps, physics alone included; "
+            f"{words(NO_MODEL)} is worst at {percent(share)} of the steps, physics alone included; "
             f"most often worst: {worst}"
             if len(rivals.steps[NO_MODEL]) > 1
             else f"worst over the horizon, physics alone included: {worst}"

@@ -6,19 +6,19 @@ whose 95 % interval over test manoeuvres is free of 0 (`shipid.study.evidence`).
 differences shown; a claim about some, and a list of names, is corrected for how many could have been (Holm). A finding
 is confirmed if it is shown, refuted if its opposite is shown, else undecided: too few manoeuvres decide nothing.
 
-S1 : every moderate member has a lower H than pure data-driven at the smallest N_D, and more than half of them have it
+S1 : every moderate member has a lower H than no physics at the smallest N_D, and more than half of them have it
     at every N_D.
-S2 : for every model, pure data-driven included, H falls along ln N_D (slope by least squares over all N_D).
+S2 : for every model, no physics included, H falls along ln N_D (slope by least squares over all N_D).
 S3 : at every N_D H rises along ln A over the physics models, and it rises more steeply at the smallest N_D than at the
     largest; and neither the rise nor its fall would come by chance if the models had their A in any other order.
-S4 : at the largest N_D at least one high member is better than pure data-driven and at least one is worse; and over the
+S4 : at the largest N_D at least one high member is better than no physics and at least one is worse; and over the
     seeds, each another nested order of runs, H of those that are worse varies more than that of the moderate members.
     Never decided with fewer than five seeds.
 S5 : the rank correlation of H and H_90 over cells is at least 0.95 and H_90 turns none of S1-S4 round; refuted if it is
     below 0.8 or H_90 confirms what H refutes, or the other way round. Undecided with too few manoeuvres, as all are.
-S6 : a moderate member with a small N_D (at most half of the largest) is better than pure data-driven with the next
+S6 : a moderate member with a small N_D (at most half of the largest) is better than no physics with the next
     larger one, and one is better than physics alone that is more accurate than its physics.
-S7 : at the smallest N_D the roughness of pure data-driven paths is more than 1.5 times that of the true paths, and that
+S7 : at the smallest N_D the roughness of paths without physics is more than 1.5 times that of the true paths, and that
     of the cooperative models, in the mean, is less. Not testable where the compensation is a polynomial of time.
 
 The thresholds are free: the paper gives none. Error rates of every rule: docs/findings.md.
@@ -35,6 +35,7 @@ from scipy.special import stdtr
 
 from shipid.hybrid.method import Method
 from shipid.metrics import rank_correlation, roughness
+from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, PLAIN, ErrorTable, Metric, error_table
 from shipid.study.evidence import FEWEST_MODELS, FEWEST_RUNS, LEVEL, Contrasts, at_least, by_chance, contrasts, doubling
@@ -55,18 +56,19 @@ from shipid.study.verdict import (
     undecided,
     verdict,
     weakest,
+    words,
 )
 from shipid.units import percent, plural
 
 Array = NDArray[np.float64]
 CLAIMS = {
-    "S1": "every moderate cooperative model beats pure data-driven at the smallest N_D, and most keep the lead",
+    "S1": "every moderate cooperative model beats no physics at the smallest N_D, and most keep the lead",
     "S2": "H falls with N_D for every model",
     "S3": "H rises with A at fixed N_D, most steeply at small N_D",
-    "S4": "some high models beat pure data-driven; the worst stay worse even at the largest N_D, and fluctuate",
+    "S4": "some high models beat no physics; the worst stay worse even at the largest N_D, and fluctuate",
     "S5": "H_90 leads to the same findings as H",
-    "S6": "moderate models with small N_D beat pure data-driven with a larger one, and more accurate physics alone",
-    "S7": "paths of pure data-driven at small N_D are rough, those of cooperative models are not",
+    "S6": "moderate models with small N_D beat no physics with a larger one, and more accurate physics alone",
+    "S7": "paths without physics are rough at small N_D, those of cooperative models are not",
 }
 FEWEST_ORDERS = 5  # S4: nested orders of runs that a fluctuation needs
 ALIKE, UNLIKE = 0.95, 0.8  # S5
@@ -125,7 +127,7 @@ def read_grid(results: Results, metric: Metric) -> Grid | str:
         return f"the method {results.plan.judged!r} is not run without physics"
     failed = set(cells["model"][cells["status"] != "ok"])
     if NO_MODEL in failed:
-        return "pure data-driven has no result in every cell"
+        return f"{words(NO_MODEL)} has no result in every cell"
     if cells["N_D"].nunique() < 2:
         return "the findings are about a growing N_D, and the study has one"
     members = {
@@ -173,7 +175,7 @@ def _S1(grid: Grid) -> Finding:
         plain = f" ({over_plain} of {count} beat networks without mirror symmetry, {metres(table.mean(PLAIN, 0))})"
     evidence = (
         f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural(won[0], 'is', 'are')} shown to "
-        f"beat pure data-driven ({grid.value(NO_MODEL, 0)}), whose H less theirs is {_range(leads[0])}{plain}; "
+        f"beat no physics ({grid.value(NO_MODEL, 0)}), whose H less theirs is {_range(leads[0])}{plain}; "
         f"that most keep the lead is {keeps}: "
         f"{', '.join(f'{number} at {N}' for number, N in zip(won[1:], amounts[1:], strict=True))}"
     )
@@ -252,11 +254,11 @@ def _S4(grid: Grid) -> Finding:
     better, worse = shown(lead.above), shown(lead.below)
     worst = [model for model, behind in zip(grid.high, worse, strict=True) if behind]
     orders = table.H[NO_MODEL].shape[1]
-    names = ", ".join(f"{model} {grid.value(model, place)}" for model in worst[:3])
+    names = listed([f"{model} {grid.value(model, place)}" for model in worst]) if worst else ""
     are = plural(len(worst), "is", "are")
     evidence = (
         f"at N_D = {last}, {better.sum()} of {len(better)} high models {plural(better.sum(), 'is', 'are')} shown to "
-        f"beat pure data-driven ({grid.value(NO_MODEL, place)}), {len(worst)} {are} shown to be worse"
+        f"beat no physics ({grid.value(NO_MODEL, place)}), {len(worst)} {are} shown to be worse"
         f"{f' ({names})' if names else ''}"
     )
     numbers = {
@@ -308,7 +310,8 @@ def _S5(H: Grid, H_90: Grid, by_H: list[Finding], by_H_90: list[Finding]) -> Fin
     ]
     opposite = any({"confirmed", "refuted"} <= set(change) for change in changed)
     evidence = f"rank correlation of H and H_90 over {both[0].size} cells {alike:.3f}; by H_90 "
-    evidence += ", ".join(f"{key} is {other} instead of {one}" for key, one, other in changed) or "S1-S4 are the same"
+    said = [f"{key} is {other} instead of {one}" for key, one, other in changed]
+    evidence += listed(said) if said else "S1-S4 are the same"
     decided = verdict(alike >= ALIKE and not opposite, opposite or alike < UNLIKE)
     numbers = {"rank correlation of H and H_90": alike, "verdicts of S1-S4 that differ": float(len(changed))}
     return _finding("S5", decided if H.table.runs >= FEWEST_RUNS else "undecided", evidence, **numbers)
@@ -333,7 +336,7 @@ def _S6(grid: Grid) -> Finding:
     if not small:
         return _finding("S6", "undecided", f"no N_D is at most half of the largest, {grid.amounts[-1]}")
     kinds: list[tuple[str, Callable[[Grid, Sequence[int]], list[Pair]]]] = [
-        ("pure data-driven with more runs", _more_data),
+        ("no physics with more runs", _more_data),
         ("more accurate physics alone", _better_physics),
     ]
     parts, examples, numbers = [], [], {}
@@ -356,7 +359,7 @@ def _S6(grid: Grid) -> Finding:
 
 
 def _more_data(grid: Grid, small: Sequence[int]) -> list[Pair]:
-    """Every moderate model with a small amount against pure data-driven with the next larger one."""
+    """Every moderate model with a small amount against no physics with the next larger one."""
     return [
         Pair(
             ((1.0, NO_MODEL, k + 1), (-1.0, model, k)),
@@ -422,7 +425,7 @@ def _S7(results: Results, grid: Grid) -> Finding:
     together = np.mean([values for model in grid.physics for values in paths[model]], axis=0)
     decided, numbers = rough(true, pure, together, counts.astype(float))
     evidence = (
-        f"at N_D = {first}: pure data-driven {metres(numbers['roughness of pure data-driven [m]'])}, cooperative "
+        f"at N_D = {first}: {words(NO_MODEL)} {metres(numbers['roughness of no physics [m]'])}, cooperative "
         f"{metres(numbers['roughness of cooperative models [m]'])} in the mean, true paths "
         f"{metres(numbers['roughness of true paths [m]'])} ({manoeuvres(len(runs))})"
     )
@@ -430,11 +433,11 @@ def _S7(results: Results, grid: Grid) -> Finding:
 
 
 def rough(true: Array, pure: Array, together: Array, counts: Array) -> tuple[Verdict, dict[str, float]]:
-    """Verdict on S7 from the roughness (R,) [m] of true, pure data-driven and cooperative paths by test manoeuvre."""
+    """Verdict on S7 from the roughness (R,) [m] of true paths, those without physics and cooperative ones, by run."""
     differences = contrasts(np.stack([pure - ROUGH * true, ROUGH * true - together]), counts)
     share = counts / counts.sum()
     numbers = {
-        "roughness of pure data-driven [m]": float(pure @ share),
+        "roughness of no physics [m]": float(pure @ share),
         "roughness of cooperative models [m]": float(together @ share),
         "roughness of true paths [m]": float(true @ share),
     }

@@ -15,7 +15,7 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.evidence import contrasts, mean_errors, over_worlds, training_error
 from shipid.study.results import Results
 
-EVERY = "with physics"  # all families but pure data-driven
+EVERY = "with physics"  # all families but `none`
 LEAST = 3  # worlds from which an interval over worlds is given
 COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),

@@ -8,6 +8,8 @@ from typing import Literal, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.report.content import spoken
+from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
 from shipid.study.evidence import FEWEST_RUNS, LEVEL, Contrasts, holm
 from shipid.units import decimals_of, plural
@@ -67,9 +69,9 @@ def _places(value: float) -> int:
     return 1 if abs(value) >= 9.995 else decimals_of(value)
 
 
-def interval(low: float, high: float) -> str:
-    """Return ` [low, high]`, or nothing where there is no interval."""
-    places = _places(max(abs(low), abs(high)))
+def interval(low: float, high: float, beside: float) -> str:
+    """Return ` [low, high]` with the decimals of the number that it stands beside, or nothing where there is none."""
+    places = _places(beside)
     return f" [{_written(low, places)}, {_written(high, places)}]" if np.isfinite([low, high]).all() else ""
 
 
@@ -79,10 +81,10 @@ def _written(value: float, places: int) -> str:
 
 
 def measured(differences: Contrasts, index: int) -> str:
-    """Return a difference with its 95 % interval."""
-    return metres(float(differences.mean[index])) + interval(
-        float(differences.low[index]), float(differences.high[index])
-    )
+    """Return a difference with its 95 % interval, all with the decimals of the greatest."""
+    mean, low, high = (float(values[index]) for values in (differences.mean, differences.low, differences.high))
+    greatest = float(np.nanmax(np.abs([mean, low, high])))
+    return f"{_written(mean, _places(greatest))} m{interval(low, high, greatest)}"
 
 
 def span(*numbers: str) -> str:
@@ -108,13 +110,11 @@ def runs(count: int) -> str:
 
 
 def words(model: str) -> str:
-    """Name a model inside a sentence, where `none` would say something else."""
-    return "pure data-driven" if model == NO_MODEL else model
+    """Name a model inside a sentence; that without physics in quotes: `no physics is worse` would say that none is."""
+    return f'"{spoken(model)}"' if model == NO_MODEL else model
 
 
 def named(models: Iterable[str]) -> str:
     """Return names as in a sentence, the first few of many."""
     names = [words(model) for model in models]
-    if len(names) <= MOST_NAMES + 1:
-        return ", ".join(names)
-    return f"{', '.join(names[:MOST_NAMES])} and {len(names) - MOST_NAMES} more"
+    return listed(names, MOST_NAMES + 1) if names else ""

@@ -132,7 +132,7 @@ def _crossing(values: Array, limits: tuple[float, float]) -> Array:
 
 
 def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
-    """Runs that pure data needs for the error that a model has with the amount of this place.
+    """Runs that no physics needs for the error that a model has with the amount of this place.
 
     Interpolated between amounts along ln H over ln N_D; where more data made it worse, the best so far counts.
     """

@@ -51,13 +51,13 @@ SIMULATION = [
     Model("moderate-3", "moderate", 4.4, 1.4),
     Model("high-1", "high", 7.5, 2.2),
     Model("high-2", "high", 13.0, 4.6),
-    Model("no model", "none", np.nan, 3.6),
+    Model("no physics", "none", np.nan, 3.6),
 ]
 FULL_SCALE = [
     Model("accurate (Gunnerus, 28.9 m)", "accurate", 2.1, 0.94),
     Model("inaccurate", "inaccurate", 5.2, 2.05),
     Model(f"bare hull {NASTY}", "bare", 6.4, np.nan),
-    Model("no model", "none", np.nan, 4.3),
+    Model("no physics", "none", np.nan, 4.3),
 ]
 
 

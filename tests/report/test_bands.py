@@ -134,7 +134,7 @@ def test_the_map_of_the_width_speaks_of_hatching_where_there_is_some(banded: Rep
         cells = banded.cells.assign(width=banded.cells.width.where(~pure, factor * banded.cells.width.mean()))
         figure = bands.width_map(replace(banded, cells=cells))
         assert figure is not None
-        assert ("Hatched: not narrower than the band of pure data-driven" in figure.how) == told
+        assert ("Hatched: not narrower than the band of no physics" in figure.how) == told
 
 
 def test_the_page_holds_it_and_no_tag(banded: ReportContent) -> None:

@@ -38,8 +38,8 @@ def test_every_cell_lies_at_its_accuracy_and_size(simulation):
             assert f"H {cells.H.mean():.2f} m, H_90 {cells.H_90.mean():.2f} m" in words
             assert f"{cells.H.min():.2f} to {cells.H.max():.2f} m over 2 seeds" in words
             assert "2 layers of 120" in words
-    assert min(low for (name, _), (low, _, _) in where.items() if name == "no model") > np.sqrt(13.0)
-    assert list(flat(simulation).layout.yaxis.ticktext)[-1] == "no model"
+    assert min(low for (name, _), (low, _, _) in where.items() if name == "no physics") > np.sqrt(13.0)
+    assert list(flat(simulation).layout.yaxis.ticktext)[-1] == "no physics"
     assert flat(simulation).layout.yaxis.range[0] == 0
 
 
@@ -51,13 +51,13 @@ def test_rows_do_not_cover_each_other(simulation):
 
 def test_what_is_no_better_than_data_driven_is_hatched(simulation):
     means = simulation.cells.groupby(["model", "N_D"]).H.mean().unstack()
-    worse = (means.drop("no model") >= means.loc["no model"]).sum().sum()
+    worse = (means.drop("no physics") >= means.loc["no physics"]).sum().sum()
     hatched = flat(simulation).data[1]
     assert worse > 0
     assert len(hatched.x) == worse
     assert hatched.marker.pattern.shape == "/"
     assert (
-        f"in {worse} of 18 cells with physics H is not below that of pure data-driven, none of them below A = "
+        f"in {worse} of 18 cells with physics H is not below that of no physics, none of them below A = "
         in error_map(simulation).takeaway
     )
 
@@ -162,7 +162,7 @@ def test_axes_have_ticks_at_any_size_of_error(simulation, factor):
     models = simulation.models.assign(A=factor * simulation.models.A)
     views = error_map(replace(simulation, cells=cells, models=models)).views
     axis = views["0"][0].figure.layout.yaxis
-    words = [word for word in axis.ticktext if word != "no model"]
+    words = [word for word in axis.ticktext if word != "no physics"]
     assert len(words) >= 4
     np.testing.assert_allclose([float(word) ** 0.5 for word in words], axis.tickvals[: len(words)])
     heights = views["1"][0].figure.layout.yaxis.tickvals
@@ -185,15 +185,15 @@ def test_names_of_lines_are_apart(simulation):
 
 
 def test_of_several_models_without_physics_the_rival_has_its_name(simulation):
-    """Another may err less than all models with physics: H is not below that of every pure data-driven model."""
-    better = simulation.cells[simulation.cells.model.eq("no model")].assign(model="none + plain", H=0.01)
+    """Another may err less than all models with physics: H is not below that of every no physics model."""
+    better = simulation.cells[simulation.cells.model.eq("no physics")].assign(model="none + plain", H=0.01)
     figure = error_map(replace(simulation, cells=pd.concat([simulation.cells, better], ignore_index=True)))
-    assert "H is not below that of no model (pure data-driven)" in figure.takeaway
-    assert "Hatched: H is not below that of no model (pure data-driven) at the same N_D." in figure.how
+    assert "H is not below that of no physics" in figure.takeaway
+    assert "Hatched: H is not below that of no physics at the same N_D." in figure.how
 
 
 def test_a_map_of_physics_alone_speaks_of_no_rival_and_no_training(simulation):
-    models, cells = (frame[frame.model.ne("no model")] for frame in (simulation.models, simulation.cells))
+    models, cells = (frame[frame.model.ne("no physics")] for frame in (simulation.models, simulation.cells))
     figure = error_map(replace(simulation, models=models, cells=cells))
     assert "Hatched" not in figure.how
     assert "trained" not in figure.how
@@ -201,7 +201,7 @@ def test_a_map_of_physics_alone_speaks_of_no_rival_and_no_training(simulation):
 
 def test_there_is_no_map_of_one_size_or_one_model(simulation, full_scale):
     assert error_map(full_scale) is None
-    names = ["nominal", "no model"]
+    names = ["nominal", "no physics"]
     one = replace(
         simulation,
         cells=simulation.cells[simulation.cells.model.isin(names)],
@@ -212,7 +212,7 @@ def test_there_is_no_map_of_one_size_or_one_model(simulation, full_scale):
 
 
 def test_without_data_driven_nothing_is_compared(simulation):
-    kept = simulation.cells.model.ne("no model")
+    kept = simulation.cells.model.ne("no physics")
     figure = error_map(
         replace(simulation, cells=simulation.cells[kept], models=simulation.models[simulation.models.family != "none"])
     )
@@ -224,7 +224,7 @@ def test_a_model_without_accuracy_has_a_separate_strip(simulation):
     lost = simulation.models.A.where(simulation.models.model != "high-2")
     cells = simulation.cells.assign(A=simulation.cells.A.where(simulation.cells.model != "high-2"))
     figure = flat(replace(simulation, models=simulation.models.assign(A=lost), cells=cells))
-    assert set(figure.layout.yaxis.ticktext) >= {"no model", "high-2"}
+    assert set(figure.layout.yaxis.ticktext) >= {"no physics", "high-2"}
     assert len(figure.data[0].x) == 21
 
 

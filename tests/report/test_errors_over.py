@@ -22,7 +22,7 @@ def test_horizon_draws_the_rows_of_its_size(simulation, statistic, column, index
     for name, model, source, count in [
         ("moderate-2, compensated", "moderate-2", "cooperative", size),
         ("moderate-2, physics alone", "moderate-2", "physics", 0),
-        ("no model", "no model", "cooperative", size),
+        ("no physics", "no physics", "cooperative", size),
         ("constant velocity", "", "naive", 0),
     ]:
         rows = frame[(frame.model == model) & (frame.source == source) & frame.N_D.eq(count)]
@@ -62,7 +62,7 @@ def test_errors_by_axis_where_they_are_known_and_seeds_as_bands(full_scale):
     assert across == pytest.approx(mean * 0.5 * 1.5 / 2)
     drawn = lines(figure, "0-0")
     bands = {key for key in drawn if key.endswith(", seeds")}
-    assert len(bands) == sum(key.endswith(", compensated") or key == "no model" for key in drawn)
+    assert len(bands) == sum(key.endswith(", compensated") or key == "no physics" for key in drawn)
     assert max(drawn["inaccurate, seeds"].y) == pytest.approx(1.5 * mean)
     assert not [key for key in lines(horizon(replace(full_scale, horizon=known)), "0-0") if key.endswith(", seeds")]
 
@@ -71,7 +71,7 @@ def test_a_close_up_of_many_models_says_which(simulation, full_scale):
     figure = horizon(simulation)
     assert (
         "Of 7 models, the middle one of each family by A, and the best in validation: "
-        "nominal, moderate-2, high-2 and no model." in figure.how
+        "nominal, moderate-2, high-2 and no physics." in figure.how
     )
     assert "high-1, compensated" not in lines(figure, "0-0")
     assert "middle one" not in horizon(full_scale).how

@@ -66,13 +66,13 @@ def test_of_many_models_some_have_a_line(simulation):
     mine = [frame[frame.model.eq("high-1")] for frame in (simulation.models, simulation.cells)]
     names = [f"f{k:02d}" for k in range(41)]
     many = [pd.concat([one.assign(model=n, family=n, A=1.0 + k) for k, n in enumerate(names)]) for one in mine]
-    pure = [frame[frame.model.eq("no model")] for frame in (simulation.models, simulation.cells)]
+    pure = [frame[frame.model.eq("no physics")] for frame in (simulation.models, simulation.cells)]
     models, cells = (pd.concat(pair, ignore_index=True) for pair in zip(many, pure, strict=True))
     figure = gain(replace(simulation, models=models, cells=cells, best="f02"))
     drawn = [name for name in traces(figure, "0-0") if name.startswith("f") and "seed" not in name]
     assert len(drawn) == 13
     assert {"f00", "f02", "f40"} <= set(drawn)
-    assert {chip.key for chip in figure.chips} == {*(f"model:{name}" for name in drawn), "model:no model", "naive"}
+    assert {chip.key for chip in figure.chips} == {*(f"model:{name}" for name in drawn), "model:no physics", "naive"}
     words = (
         "Of 41 models with physics, 13 have a line: some spread over A and the best in validation; the others are in"
     )
@@ -82,7 +82,7 @@ def test_of_many_models_some_have_a_line(simulation):
 
 def test_errors_far_apart_begin_on_a_logarithmic_axis(simulation):
     cells = simulation.cells
-    far = cells.assign(H=cells.H.where(cells.model.ne("no model"), 50.0))
+    far = cells.assign(H=cells.H.where(cells.model.ne("no physics"), 50.0))
     starts = [gain(replace(simulation, cells=one)).controls[1].start for one in (cells, far)]
     assert starts == [0, 1]
 
@@ -91,15 +91,15 @@ def test_takeaway_speaks_of_the_best_in_validation_and_its_rival(simulation):
     cells = simulation.cells
     means = cells[cells.N_D == 10].groupby("model").H.mean()
     text = gain(simulation).takeaway
-    assert f"At N_D = 10, nominal has H = {means['nominal']:.2f} m, no model (pure data-driven) has H = " in text
-    assert f"has H = {means['no model']:.2f} m; at N_D = 100, " in text
+    assert f'At N_D = 10, nominal has H = {means["nominal"]:.2f} m and "no physics" has H = ' in text
+    assert f"has H = {means['no physics']:.2f} m; at N_D = 100, " in text
     assert text.endswith("nominal is the best in validation.")
 
 
 def test_data_driven_is_thick_ink_and_accuracy_is_ordered_colour(simulation):
     drawn = {name: lines[0] for name, lines in traces(gain(simulation), "0-0").items()}
-    assert drawn["no model"].line.color == "var(--ink)"
-    assert drawn["no model"].line.width > drawn["nominal"].line.width
+    assert drawn["no physics"].line.color == "var(--ink)"
+    assert drawn["no physics"].line.width > drawn["nominal"].line.width
     models = ["nominal", "moderate-1", "moderate-2", "moderate-3", "high-1", "high-2"]
     levels = [int(drawn[name].line.color.removeprefix("var(--scale-").rstrip(")")) for name in models]
     assert levels == sorted(levels)
@@ -117,7 +117,7 @@ def test_one_size_is_a_dumbbell(full_scale):
     assert after.marker.symbol == "circle"
     assert figure.takeaway == (
         "accurate (Gunnerus, 28.9 m), best in validation, has H = 0.94 m; compensation improves 2 of 2 physics models; "
-        "pure data-driven has H = 4.30 m; the naive floor is 5.01 m."
+        '"no physics" has H = 4.30 m; the naive floor is 5.01 m.'
     )
 
 
@@ -127,7 +127,7 @@ def test_without_a_result_of_physics_nothing_is_counted(full_scale):
     cells.loc[lost, ["H", "H_90", "rms"]] = np.nan
     cells.loc[lost, "status"] = "failed"
     text = gain(replace(full_scale, cells=cells, best="")).takeaway
-    assert text.startswith("No physics model has a result with data; pure data-driven has H = 4.30 m;")
+    assert text.startswith('No physics model has a result with data; "no physics" has H = 4.30 m;')
 
 
 def test_a_failed_model_keeps_its_physics_and_shows_no_result(full_scale):

@@ -136,7 +136,7 @@ def test_windows_offer_the_largest_and_the_smallest_gain(past: ReportContent) ->
     assert figure is not None
     assert list(figure.controls[0].options) == [
         f"{NASTY}, memory: b against a",
-        "none, memory: b against a",
+        "no physics, memory: b against a",
         "right, observer: physics alone",
     ]
     assert "in 72 % of the windows" in figure.takeaway  # 1 + t / 100 is above 1.3 from t = 31 s on

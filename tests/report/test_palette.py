@@ -59,7 +59,7 @@ def test_errors_of_a_model_ship_have_colours():
 
 
 def test_methods_on_one_model_and_models_without_physics_have_markers_of_their_own(simulation):
-    cells, pure = simulation.cells, simulation.cells.model.eq("no model")
+    cells, pure = simulation.cells, simulation.cells.model.eq("no physics")
     more = [cells[cells.model.eq("high-1")].assign(model="high-1 + alone")]
     more += [cells[pure].assign(model=f"none + {name}") for name in ("plain", "forest", "step")]
     looks = styles(replace(simulation, cells=pd.concat([cells, *more], ignore_index=True)))

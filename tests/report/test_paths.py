@@ -8,7 +8,7 @@ import pytest
 from shipid.report import paths
 from shipid.report.paths import browser, fixed_data, windows_of
 from shipid.report.selection import FEW_RUNS
-from shipid.report.wording import number
+from shipid.report.wording import listed, number
 
 window_data = lru_cache(maxsize=2)(paths.window_data)  # the same content is drawn once
 snapshots = lru_cache(maxsize=2)(paths.snapshots)
@@ -86,7 +86,7 @@ def test_a_diverged_path_becomes_gaps(full_scale):
 
 def test_a_row_per_model_and_a_column_per_size(simulation):
     figure = snapshots(simulation)
-    names = ["no model", "moderate-2", "high-2"]
+    names = ["no physics", "moderate-2", "high-2"]
     assert [(w.model, w.size) for w in figure.windows] == [(name, size) for name in names for size in (0, 1, 2)]
     assert len({(window.run, window.instant) for window in figure.windows}) == 1
     assert figure.windows[4].caption == "moderate-2, N_D = 30"
@@ -98,15 +98,15 @@ def test_the_takeaway_names_each_model_and_its_ends(simulation):
     data = window_data(simulation)
     first = data["runs"][figure.windows[0].run][figure.windows[0].instant]
     shot = next(s for s in simulation.snapshots if s.t == first["t"] and s.run == next(iter(windows_of(simulation))))
-    ends = [np.linalg.norm(shot.paths["no model", "cooperative", c][-1] - shot.truth[-1]) for c in (10, 30, 100)]
-    assert f"no model (pure data-driven) {', '.join(number(end) for end in ends)} m" in figure.takeaway
+    ends = [np.linalg.norm(shot.paths["no physics", "cooperative", c][-1] - shot.truth[-1]) for c in (10, 30, 100)]
+    assert f'"no physics" {listed([number(end) for end in ends])} m' in figure.takeaway
 
 
 def test_panels_share_axes_and_show_one_model(simulation):
     data = window_data(simulation)
     panels = fixed_data(snapshots(simulation).windows, data)
     names = [{data["lines"][i]["name"] for i in panel["lines"]} for panel in panels]
-    assert names[0] == {"no model"}
+    assert names[0] == {"no physics"}
     assert names[3] >= {"moderate-2, compensated", "moderate-2, physics alone"}
     assert not any(name.startswith("high") for name in names[3])
     assert len({json.dumps(panel["spans"]) for panel in panels}) == 1
@@ -153,8 +153,8 @@ def test_one_size_gives_three_instants_of_one_run(full_scale):
 def test_where_nothing_has_physics_the_panels_are_of_what_has_none(full_scale):
     """Paths were drawn below the sentence that none was recorded."""
     first = full_scale.snapshots[0]
-    error = number(float(np.hypot(*(first.paths["no model", "cooperative", 15] - first.truth)[-1])))
-    pure = {key: path for key, path in first.paths.items() if key[0] == "no model" or key[1] != "cooperative"}
+    error = number(float(np.hypot(*(first.paths["no physics", "cooperative", 15] - first.truth)[-1])))
+    pure = {key: path for key, path in first.paths.items() if key[0] == "no physics" or key[1] != "cooperative"}
     figure = snapshots(replace(full_scale, snapshots=[replace(first, paths=pure)]))
     assert figure.takeaway == f"From panel to panel, the paths without physics end {error} m from the true place."
 
@@ -163,7 +163,7 @@ def test_takeaway_is_the_mean_end_error(full_scale):
     ends = {"cooperative": [], "physics": []}
     for snapshot in full_scale.snapshots:
         for (model, source, _), path in snapshot.paths.items():
-            if model != "no model":
+            if model != "no physics":
                 ends[source].append(np.linalg.norm(path[-1] - snapshot.truth[-1]))
     text = browser(full_scale).takeaway
     assert f"compensated paths by {np.mean(ends['cooperative']):.2f} m" in text
@@ -178,7 +178,7 @@ def test_no_windows_no_browser(full_scale):
 
 def test_models_are_compared_where_no_path_without_physics_was_recorded(simulation):
     shots = [
-        replace(shot, paths={key: path for key, path in shot.paths.items() if key[0] != "no model"})
+        replace(shot, paths={key: path for key, path in shot.paths.items() if key[0] != "no physics"})
         for shot in simulation.snapshots
     ]
     figure = paths.snapshots(replace(simulation, snapshots=shots))

@@ -10,8 +10,8 @@ from shipid.report.selection import exemplars, families, middles, sizes, spread,
 
 def test_few_models_are_all_drawn_many_by_their_middle(simulation, full_scale):
     assert exemplars(full_scale) == list(families(full_scale).model)
-    assert exemplars(simulation) == ["nominal", "moderate-2", "high-2", "no model"]
-    assert list(families(simulation).model)[-1] == "no model"
+    assert exemplars(simulation) == ["nominal", "moderate-2", "high-2", "no physics"]
+    assert list(families(simulation).model)[-1] == "no physics"
 
 
 def test_the_largest_families_come_first(simulation):

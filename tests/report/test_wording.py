@@ -3,7 +3,9 @@ import math
 from shipid.report.wording import (
     bound,
     counted,
+    difference,
     distance,
+    ends,
     listed,
     metres,
     number,
@@ -75,3 +77,11 @@ def test_a_sentence_is_set_with_signs_and_spaces() -> None:
     assert bound("1.32 m -> 0.93 m: `shipid study rotate`") == "1.32\u00a0m → 0.93\u00a0m: “shipid study rotate”"
     assert bound("by 1.4e-11 % or 2e+05, not 4b7ce53e-0c") == "by 1.4 × 10⁻¹¹\u00a0% or 2 × 10⁵, not 4b7ce53e-0c"
     assert bound("90% of +-2 m [-0.2, 3-4], N-2") == "90\u00a0% of ±2\u00a0m [−0.2, 3-4], N-2"
+
+
+def test_a_difference_and_its_interval_have_as_many_decimals() -> None:
+    """`0.018 m [0.00, 3.42]` has digits that do not match."""
+    assert difference(0.018, -0.004, 0.042) == "0.018 m [−0.004, 0.042]"
+    assert difference(0.0003, -2.1, 2.14) == "0.00 m [−2.10, 2.14]", "nearly 0 in a wide interval"
+    assert difference(9.8, 8.13, 11.52) == "9.8 m [8.1, 11.5]"
+    assert ends(0.018, 3.42) == "0.02 to 3.42"

@@ -83,7 +83,7 @@ def test_harm_is_reported_with_names(made: Any) -> None:
         in advice
     )
     both = text(made(grid({"good": (1.5, 3.5), "bad": (5.0, 4.0), "none": (4.0, 3.0)})))
-    assert "ith 30 runs none of 2 physics models does better than no physics; good, bad do worse." in both
+    assert "ith 30 runs none of 2 physics models does better than no physics; good and bad do worse." in both
     assert "every physics model" not in both
     unsure = text(made(grid({"good": (1.5, 3.0), "bad": (5.0, 4.0), "none": (4.0, 3.0)})))
     assert "none of 2 physics models is shown to do better than no physics; bad does worse; for good the test" in unsure
@@ -110,7 +110,7 @@ def test_a_tie_is_no_harm(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (7.0, 6.0), "none": (9.0, 8.0)}), naive=6.0))
     assert "harms" not in advice
     assert "It is not shown that compensation helps bad." in advice
-    assert "at 30 runs pure data-driven is worse, and bad is not shown to beat it." in advice
+    assert 'at 30 runs "no physics" is worse, and bad is not shown to beat it.' in advice
 
 
 def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
@@ -135,21 +135,21 @@ def test_methods_without_physics_are_answered_with_their_errors(made: Any) -> No
     assert "no conclusion" not in advice
     assert (
         "No method that learns from data has physics in this study. Mean errors 8 s ahead, with 30 runs and without "
-        "physics: other 2.50 m, drawn 3.00 m; of physics alone: good 2.00 m."
+        "physics: other 2.50 m and drawn 3.00 m; of physics alone: good 2.00 m."
     ) in advice
 
 
 def test_data_that_did_not_help_is_reported(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.6), "bad": (3.0, 2.0), "none": (4.0, 5.0)})))
-    assert "With 30 runs good, pure data-driven are no better than with 10." in advice
+    assert 'With 30 runs good and "no physics" are no better than with 10.' in advice
     assert "no better than with" not in text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (5.0, 4.0)})))
 
 
 def test_constant_motion_that_is_not_beaten(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.5))
-    assert "gives 2.50 m: at 30 runs pure data-driven is worse." in advice
+    assert 'gives 2.50 m: at 30 runs "no physics" is worse.' in advice
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=1.9))
-    assert "bad, pure data-driven are worse." in advice
+    assert 'bad and "no physics" are worse.' in advice
 
 
 def test_test_manoeuvres_become_an_interval_and_seeds_do_not(made: Any) -> None:
@@ -202,7 +202,7 @@ def test_no_limit_of_A_where_better_physics_does_worse(made: Any) -> None:
     H = {name: (10.0 / A, 10.0 / A) for name, A in alone.items()} | {"none": (3.0, 3.0)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
     assert "physics pays" not in advice
-    sides = "3 of 5 physics models do better than no physics; m0, m1 do worse"
+    sides = "3 of 5 physics models do better than no physics; m0 and m1 do worse"
     assert advice.startswith(f"With 10 or 30 runs {sides}.\n")
     assert advice.count(sides) == 1
     H = {name: (10.0 / A, 10.0 / A) for name, A in alone.items()} | {"none": (1.0, 1.0)}

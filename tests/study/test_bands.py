@@ -302,7 +302,7 @@ def test_why_no_band_is_promised_is_the_reason_of_the_cells_with_most_runs(resul
 def test_models_without_a_band_for_different_reasons_are_named(results: Results) -> None:
     reasons = {row["cell"]: f"{NO_BAND}{'noise' if row['model'] == 'none' else 'few runs'}" for row in results.rows}
     ((sentence, _),) = bands.answer(replace(results, bands={}, no_band=reasons))
-    assert sentence == "No band is promised: right, wrong: few runs; pure data-driven: noise."
+    assert sentence == 'No band is promised: right and wrong: few runs; "no physics": noise.'
 
 
 def test_a_method_without_errors_on_runs_left_out_says_which_key_gives_them(tiny_run: Path) -> None:

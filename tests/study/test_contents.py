@@ -28,8 +28,9 @@ def test_content_holds_what_the_results_hold(tiny_run: Path) -> None:
     results = read_results(tiny_run)
     content = report_content(results)
     assert content.title == results.plan.study.question
-    pd.testing.assert_frame_equal(content.cells, results.cells)
-    assert set(content.horizon["model"]) >= {"right", "wrong-1", "wrong-2", "none"}
+    spoken = results.cells["model"].replace({"none": "no physics"})
+    pd.testing.assert_frame_equal(content.cells, results.cells.assign(model=spoken))
+    assert set(content.horizon["model"]) >= {"right", "wrong-1", "wrong-2", "no physics"}
     assert content.naive["mean"] == pytest.approx(results.naive.mean())
     assert content.answer
 
@@ -41,7 +42,7 @@ def test_no_model_is_named_that_no_cell_has(tmp_path: Path) -> None:
         run_here(plan, folder)
     content = report_content(read_results(folder))
     assert set(content.models["model"]) == {"right", "wrong-1", "wrong-2"}
-    assert "none" not in [chip.label for chip in errors_over.horizon(content).chips]
+    assert "no physics" not in [chip.label for chip in errors_over.horizon(content).chips]
 
 
 def test_a_further_frame_is_one_line(tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:

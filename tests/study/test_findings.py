@@ -39,7 +39,7 @@ def test_all_confirmed(made: Any) -> None:
         ((2.5, 1.8, 9.0), {"R1"}),  # compensation worsens `good`
         ((1.0, 2.6, 9.0), {"R2"}),  # 30 % above what accurate physics does alone
         ((0.5, 5.5, 9.0), {"R2", "R3"}),  # gap 4.0 m before, 5.0 m after
-        ((1.0, 1.8, 3.0), {"R4"}),  # `bad` alone is worse than pure data-driven
+        ((1.0, 1.8, 3.0), {"R4"}),  # `bad` alone is worse than no physics
     ],
 )
 def test_refuted(made: Any, H: tuple[float, float, float], refuted: set[str]) -> None:
@@ -107,7 +107,7 @@ def test_data_driven_that_is_worst_at_most_steps(made: Any) -> None:
     results = made(one(1.0, 1.9, 7.0), curves=curves, runs=RUNS)
     assert verdicts(results)["R4"] == "undecided"
     assert "worst at 75 % of the steps" in findings(results)[3]["evidence"]
-    assert "most often worst: pure data-driven" in findings(results)[3]["evidence"], "`none` would mean nobody"
+    assert 'most often worst: "no physics"' in findings(results)[3]["evidence"], "`none` would mean nobody"
     results = made(one(1.0, 1.9, 3.0), runs=RUNS)
     assert "worst at 0 % of the steps" in findings(results)[3]["evidence"]
     assert "most often worst: bad alone" in findings(results)[3]["evidence"]

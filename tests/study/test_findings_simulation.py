@@ -82,7 +82,7 @@ def test_one_seed_cannot_tell_a_fluctuation(judged: Any) -> None:
     by_claim = judged()
     assert verdicts(by_claim) == {**dict.fromkeys(CLAIMS, "confirmed"), "S4": "undecided", "S7": "not testable"}
     assert by_claim["S4"]["evidence"] == (
-        "at N_D = 100, 1 of 2 high models is shown to beat pure data-driven (1.00 m), 1 is shown to be worse "
+        "at N_D = 100, 1 of 2 high models is shown to beat no physics (1.00 m), 1 is shown to be worse "
         "(high-2 1.60 m); fluctuation needs 5 nested orders (grid seeds), the study has 1 seed"
     )
     assert "needs 5 nested orders (grid seeds), the study has 4 seeds" in judged(seeds=4)["S4"]["evidence"]
@@ -91,7 +91,7 @@ def test_one_seed_cannot_tell_a_fluctuation(judged: Any) -> None:
 def test_too_few_test_manoeuvres_decide_nothing(judged: Any) -> None:
     by_claim = judged(runs=4, seeds=5)
     assert set(verdicts(by_claim).values()) == {"undecided", "not testable"}
-    assert "0 of 3 moderate models are shown to beat pure data-driven" in by_claim["S1"]["evidence"], "though all do"
+    assert "0 of 3 moderate models are shown to beat no physics" in by_claim["S1"]["evidence"], "though all do"
     assert all("4 test manoeuvres give no interval, 5 would" in finding["evidence"] for finding in by_claim.values())
 
 
@@ -99,7 +99,7 @@ def test_S1_every_moderate_model_and_most_to_the_end(judged: Any) -> None:
     finding = judged({**H, "moderate-2": (9.5, 1.2, 0.6)})["S1"]
     assert finding["verdict"] == "refuted"
     assert (
-        "at N_D = 10 refuted: 2 of 3 moderate models are shown to beat pure data-driven (8.00 m), whose H less theirs "
+        "at N_D = 10 refuted: 2 of 3 moderate models are shown to beat no physics (8.00 m), whose H less theirs "
         "is -1.50 m [" in finding["evidence"]
     )
     finding = judged({**H, "moderate-2": (2.5, 4.0, 0.6), "moderate-3": (3.5, 4.0, 0.7)})["S1"]
@@ -156,10 +156,7 @@ def test_S4_worst_and_calm(judged: Any) -> None:
     assert "over 5 nested orders H of these varies by 0 %, of moderate models by 6 %" in calm["evidence"]
     all_better = judged({**H, "high-2": (7.0, 3.0, 0.7)}, seeds=5)["S4"]
     assert all_better["verdict"] == "refuted"
-    assert (
-        "2 of 2 high models are shown to beat pure data-driven (1.00 m), 0 are shown to be worse"
-        in all_better["evidence"]
-    )
+    assert "2 of 2 high models are shown to beat no physics (1.00 m), 0 are shown to be worse" in all_better["evidence"]
     none_better = judged({**H, "high-1": (9.0, 5.0, 2.0)}, seeds=5)["S4"]
     assert none_better["verdict"] == "refuted"
 
@@ -181,7 +178,7 @@ def test_S6_names_pairs(judged: Any) -> None:
     finding = judged()["S6"]
     assert finding["verdict"] == "confirmed"
     evidence = finding["evidence"]
-    assert "comparisons show a moderate model better than pure data-driven with more runs: " in evidence
+    assert "comparisons show a moderate model better than no physics with more runs: " in evidence
     assert "moderate-1 with 10 runs 1.50 m against 30 runs without physics, 4.00 m" in evidence
     assert "moderate-2 (4.00 m alone) with 30 runs 1.20 m against moderate-1 alone, 2.00 m" in evidence
     assert "100 runs 0.60 m" not in evidence, "100 runs are not few"
@@ -191,7 +188,7 @@ def test_S6_refuted_and_undecided(judged: Any) -> None:
     worse = {"moderate-1": (8.5, 5.3, 0.5), "moderate-2": (8.6, 5.4, 0.6), "moderate-3": (8.6, 6.6, 0.7)}
     finding = judged({**H, **worse})["S6"]
     assert finding["verdict"] == "refuted"
-    assert finding["evidence"].startswith("0 of 6 comparisons show a moderate model better than pure data-driven")
+    assert finding["evidence"].startswith("0 of 6 comparisons show a moderate model better than no physics")
     same = {"moderate-1": (4.0, 1.0, 0.5), "moderate-2": (4.0, 1.0, 0.6), "moderate-3": (4.0, 1.0, 0.7)}
     assert judged({**H, **same})["S6"]["verdict"] == "undecided"
 
@@ -201,7 +198,7 @@ def test_S7_by_second_differences(judged: Any) -> None:
     curves = {(name, 10, 0): ROUGH if name == "none" else SMOOTH for name in H}
     finding = judged(curves=curves, changes=JAGGED)["S7"]
     assert finding["verdict"] == "undecided", "straight true paths: nothing is smoother"
-    assert "pure data-driven 2.00 m, cooperative 0.00 m in the mean, true paths 0.00 m" in finding["evidence"]
+    assert '"no physics" 2.00 m, cooperative 0.00 m in the mean, true paths 0.00 m' in finding["evidence"]
     alike = {(name, 10, 0): ROUGH for name in H}
     assert judged(curves=alike, changes=JAGGED)["S7"]["verdict"] == "refuted"
     true, counts = np.linspace(0.9, 1.1, 8), np.ones(8)
@@ -225,7 +222,7 @@ def test_a_failed_member_is_left_out_and_named(judged: Any) -> None:
 def test_nothing_is_decided_without_the_whole(judged: Any, made: Any) -> None:
     without = judged({**H, "none": (8.0, None, 1.0)})
     assert set(verdicts(without).values()) == {"undecided"}
-    assert without["S1"]["evidence"] == "pure data-driven has no result in every cell"
+    assert without["S1"]["evidence"] == '"no physics" has no result in every cell'
     one = judged({model: values[:1] for model, values in H.items()})
     assert set(verdicts(one).values()) == {"undecided"}
     some = cells(H)

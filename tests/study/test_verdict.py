@@ -44,8 +44,8 @@ def test_all_need_no_correction_and_some_do() -> None:
 def test_numbers_in_words() -> None:
     assert metres(9.99) == "9.99 m"
     assert metres(9.996) == "10.0 m"
-    assert interval(1.0, 12.0) == " [1.0, 12.0]"
-    assert (metres(-1e-9), interval(-1e-9, 0.5)) == ("0.00 m", " [0.00, 0.50]"), "no minus zero"
+    assert interval(1.0, 12.0, 10.5) == " [1.0, 12.0]"
+    assert (metres(-1e-9), interval(-1e-9, 0.5, 0.2)) == ("0.00 m", " [0.00, 0.50]"), "no minus zero"
     assert [metres(value) for value in (0.42, 0.0423, -0.00423, 0.000423, 1e-6)] == [
         "0.42 m",
         "0.042 m",
@@ -53,8 +53,10 @@ def test_numbers_in_words() -> None:
         "0.0004 m",
         "0.00 m",
     ]
-    assert interval(-0.001, 0.0123) == " [-0.001, 0.012]"
-    assert interval(np.nan, np.nan) == ""
+    assert metres(0.018) + interval(0.0, 3.42, 0.018) == "0.018 m [0.000, 3.420]", "digits that match"
+    assert metres(9.8) + interval(8.13, 11.52, 9.8) == "9.80 m [8.13, 11.52]"
+    assert interval(-0.001, 0.0123, 0.01) == " [-0.001, 0.012]"
+    assert interval(np.nan, np.nan, 1.0) == ""
     assert runs(1) == "1 run"
     assert too_few(1) == "1 test manoeuvre gives no interval, 5 would"
     assert too_few(5) == ""
@@ -74,7 +76,8 @@ def test_undecided_claims_keep_their_words_and_say_why() -> None:
 
 
 def test_many_names_are_cut_and_one_more_than_the_limit_is_not() -> None:
-    assert words(NO_MODEL) == "pure data-driven"
-    assert named([NO_MODEL, "b"]) == "pure data-driven, b"
-    assert named("abcdef") == "a, b, c, d, e, f"
+    assert words(NO_MODEL) == '"no physics"'
+    assert named([]) == ""
+    assert named([NO_MODEL, "b"]) == '"no physics" and b'
+    assert named("abcdef") == "a, b, c, d, e and f"
     assert named("abcdefg") == "a, b, c, d, e and 2 more"
