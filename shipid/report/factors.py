@@ -128,17 +128,20 @@ def _ticks(frame: pd.DataFrame, low: float, high: float, edge: float) -> dict[st
 def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
     """How many numbers, how far from 1, and which model is farthest from its base."""
     positive = frame[frame.factor > 0]
-    text = f"{counted(len(frame), 'number')} in {counted(len(names), 'model')}"
-    if len(positive):
-        text += f", times factors from {number(positive.factor.min())} to {number(positive.factor.max())}"
     removed = int((frame.factor == 0).sum())
+    kept = frame.factor[frame.factor != 0]
+    text = f"{counted(len(kept), 'number')} in {counted(len(names), 'model')}"
+    if len(kept):
+        text += f", times factors from {number(kept.min())} to {number(kept.max())}"
+    else:
+        text = f"{counted(len(names), 'model')} changed"
     text += f"; {counted(removed, 'term')} removed" if removed else ""
     if positive.model.nunique() > 1:
         squared = pd.Series(np.log(positive.factor.to_numpy(dtype=float)) ** 2, index=positive.model)
         away = squared.groupby(level=0).mean()
         far = str(away.idxmax())
         text += f"; {far} is farthest from its base, by a factor of {math.exp(math.sqrt(float(away[far]))):.2f}"
-        text += " (root mean square)"
+        text += f" (root mean square{' of those not removed' if removed else ''})"
     return f"{text}."
 
 

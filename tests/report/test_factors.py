@@ -52,6 +52,19 @@ def test_takeaway_counts_and_finds_the_farthest(simulation):
     assert f"{away.idxmax()} is farthest from its base, by a factor of {away.max():.2f}" in text
 
 
+def test_removed_terms_are_no_numbers_times_a_factor(full_scale):
+    """`10 numbers, times factors from 0.60 to 0.67; 5 terms removed` counted the five twice."""
+    row = full_scale.factors.iloc[0]
+    frame = pd.DataFrame(
+        [{**row, "path": path, "factor": factor} for path, factor in zip("abc", (0.0, 0.6, 0.7), strict=True)]
+    )
+    assert factors(replace(full_scale, factors=frame)).takeaway == (
+        "2 numbers in 1 model, times factors from 0.60 to 0.70; 1 term removed."
+    )
+    gone = frame.assign(factor=0.0)
+    assert factors(replace(full_scale, factors=gone)).takeaway == "1 model changed; 3 terms removed."
+
+
 @pytest.mark.parametrize(("factor", "word"), [(0.0, "0"), (-0.5, "≤ 0")])
 def test_a_removed_term_lies_at_the_left_edge(full_scale, factor, word):
     figure = factors(replace(full_scale, factors=full_scale.factors.assign(factor=[factor, 1.2])))
