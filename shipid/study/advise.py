@@ -547,7 +547,7 @@ def _how_to_read(case: Case) -> list[str]:
         )
         if case.smallest < case.largest and case.results.cells["seed"].nunique() == 1:
             sentences.append(
-                f"One seed drew the training runs. With {case.smallest} others the errors may lie outside the "
-                "brackets: more grid.seeds would show it."
+                f"One seed drew the training runs. With other draws of {runs(case.smallest)} the errors may lie "
+                "outside the brackets: more grid.seeds would show it."
             )
     return sentences

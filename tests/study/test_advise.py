@@ -167,7 +167,7 @@ def test_test_manoeuvres_become_an_interval_and_seeds_do_not(made: Any) -> None:
 def test_one_seed_cannot_see_what_other_runs_would_give(made: Any) -> None:
     """At the largest amount all seeds may have the same runs; there is nothing to say where it is the only one."""
     H = {"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (5.0, 4.0)}
-    words = "One seed drew the training runs. With 10 others the errors may lie outside the brackets"
+    words = "One seed drew the training runs. With other draws of 10 runs the errors may lie outside the brackets"
     assert words in text(made(grid(H), runs=8))
     assert words not in text(made(grid(H)))  # one manoeuvre: no brackets
     assert words not in text(made({(name, 10, 0): values[0] for name, values in H.items()}, runs=8))
