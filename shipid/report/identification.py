@@ -20,7 +20,7 @@ from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
 from shipid.report.structures import group_table
 from shipid.report.tables import Cell, Table, decimals, figure, text
-from shipid.report.wording import bound, counted, listed, number, scientific, short
+from shipid.report.wording import bound, counted, listed, number, scientific
 
 ROW, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
 WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [px]
@@ -89,7 +89,7 @@ def _bought(content: IdentificationContent) -> str:
     rms = rows.set_index("model")[[*SIGNALS, "position"]].astype(float)
     runs = counted(len(content.held_out), "run") + " held out" if content.held_out else "the fitted runs"
     changes = [
-        f"{name} from {short(factor * rms[name][BEFORE])} to {short(factor * rms[name][AFTER])} {unit}"
+        f"{name} from {number(factor * rms[name][BEFORE])} to {number(factor * rms[name][AFTER])} {unit}"
         for name, (_, unit, factor) in {**SIGNALS, "position": ("", "m", 1.0)}.items()
     ]
     return f"On {runs}, the root mean square error of a free run {_length(content)} goes in {listed(changes)}."

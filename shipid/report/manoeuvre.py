@@ -143,7 +143,7 @@ def track(content: ManoeuvreContent) -> Figure:
     return Figure(
         id="track",
         title="The track",
-        takeaway=f"The manoeuvre takes {north} from south to north and {east} from west to east.",
+        takeaway=f"With her outline the ship takes {north} from south to north and {east} from west to east.",
         how="Path of the logged point, north up, equal axes; the outline of the ship is to scale, at even times.",
         alternative="Map of the track.",
         height=460,

@@ -101,7 +101,7 @@ def test_the_answer_counts_compares_and_warns() -> None:
     sentences = [sentence.text for sentence in content().answer]
     assert sentences[0] == "2 of 3 parameters are identified by these runs."
     assert "1 run held out" in sentences[1]
-    assert "u from 1 to 0.1 m/s" in sentences[1]
+    assert "u from 1.00 to 0.10 m/s" in sentences[1]
     assert "r from 0.57 to 0.057 deg/s" in sentences[1]
     assert sentences[2] == "Careful: the horizon is short."
     assert "fitted runs" in content(()).answer[1].text
