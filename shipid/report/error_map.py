@@ -404,7 +404,7 @@ def _oblique(x: float, depth: float, height: float, back: float) -> tuple[float,
 
 def _box(row: int, depth: int, height: float, back: float) -> tuple[Floats, Floats]:
     """Outlines (k, 2) of a bar: front, top and right side, set apart by points that are no numbers; the side alone."""
-    near, far, left, right = depth - WIDE, depth + WIDE, row - WIDE, row + WIDE
+    near, far, left, right = float(depth), depth + 2 * WIDE, row - WIDE, row + WIDE
     front = [(left, near, 0.0), (right, near, 0.0), (right, near, height), (left, near, height)]
     top = [(left, near, height), (right, near, height), (right, far, height), (left, far, height)]
     side = [(right, near, 0.0), (right, far, 0.0), (right, far, height), (right, near, height)]
@@ -424,9 +424,11 @@ def _stage(rows: pd.DataFrame, counts: Sequence[int], span: tuple[float, float],
     """Lay out the bars: the largest N_D in front, since H falls with N_D and short bars hide nothing."""
     last, deep = len(rows) - 1, len(counts) - 1
     shown = np.unique(np.linspace(0, last, min(len(rows), 8)).round().astype(int))
-    words = [number(A) if math.isfinite(A) else "none" for A in rows.A.iloc[shown]]
+    words = [
+        NO_PHYSICS if row.family == DATA_DRIVEN else number(float(str(row.A))) for row in rows.iloc[shown].itertuples()
+    ]
     x = axis("models by A [m]", tickvals=shown.tolist(), ticktext=words, showgrid=False)
-    top = 1.03 * max(span[1] + back * deep, back * (deep + 1))
+    top = 1.03 * (span[1] + back * (deep + 2 * WIDE))
     y = axis("H, front row [m]", range=[0, top], tickvals=_heights(span[1]))
     some = np.unique(np.linspace(0, deep, min(len(counts), 5)).round().astype(int))
     places = [_oblique(last + 0.55, deep - i, 0.0, back) for i in some]

@@ -134,6 +134,22 @@ def test_bars_stand_as_high_as_the_error(failing):
     assert "N_D = 100:" in texts[-1]
 
 
+def test_the_front_row_stands_on_the_axis_and_no_bar_is_cut(simulation):
+    """Its fronts began below 0, where they were cut, and ended below H by 4 % of the greatest."""
+    figure = error_map(simulation).views["1"][0].figure
+    sides = [trace for trace in figure.data if trace.text and "N_D = 100" in trace.text]
+    assert len(sides) == simulation.cells.model.nunique()
+    for side in sides:
+        (H,) = re.findall(r"H ([\d.]+) m", side.text)
+        corners = np.asarray(side.y, dtype=float)
+        np.testing.assert_allclose(corners[[0, 3]], [0, float(H)], atol=0.006)
+    tops = [np.nanmax(np.asarray(trace.y, dtype=float)) for trace in figure.data]
+    low, high = figure.layout.yaxis.range
+    assert low == 0
+    assert max(tops) < high
+    assert figure.layout.xaxis.ticktext[-1] == "no physics"
+
+
 def test_sides_of_the_bars_have_units(simulation):
     layout = error_map(simulation).views["1"][0].figure.layout
     assert (layout.xaxis.title.text, layout.yaxis.title.text) == ("models by A [m]", "H, front row [m]")
