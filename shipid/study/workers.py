@@ -60,24 +60,34 @@ def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int
     try:
         with uninterrupted(), _one_thread():  # half a process would complain
             for task in islice(left, count):
-                connection = _start(work, workers)
-                connection.send(task)
+                with _alive():
+                    connection = _start(work, workers)
+                    connection.send(task)
                 doing[connection] = task
         while doing:
             for ready in cast("list[Connection]", wait(list(doing))):
-                result, done = ready.recv(), doing.pop(ready)
+                with _alive():
+                    result, done = ready.recv(), doing.pop(ready)
                 if isinstance(result, Exception):
                     raise result
                 for task in islice(left, 1):
-                    ready.send(task)
+                    with _alive():
+                        ready.send(task)
                     doing[ready] = task
                 yield done, result
+    finally:
+        workers.close()
+
+
+@contextmanager
+def _alive() -> Iterator[None]:
+    """ShipidError where the process at the other end of a connection is gone."""
+    try:
+        yield
     except (EOFError, ConnectionError):
         raise ShipidError(
             "a worker was killed, perhaps because memory ran out; finished cells are kept: resume with fewer --workers"
         ) from None
-    finally:
-        workers.close()
 
 
 def _method() -> str:

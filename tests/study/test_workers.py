@@ -88,6 +88,13 @@ def test_an_error_arises_here_and_keeps_where_it_arose() -> None:
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.parametrize("kind", ["EOFError", "ConnectionRefusedError"])
+def test_what_work_raises_is_not_taken_for_the_death_of_a_worker(kind: str) -> None:
+    """Such as of a method of a user that reads a file which ends early, or asks a server that is not there."""
+    with pytest.raises((EOFError, ConnectionRefusedError), match="my file"):
+        list(on_workers(exec, [f"raise {kind}('my file')"], 1))
+
+
 def test_a_killed_worker_is_one_line() -> None:
     with pytest.raises(ShipidError, match="a worker was killed") as caught:
         list(on_workers(signal.raise_signal, [signal.SIGKILL, signal.SIGKILL], 2))
