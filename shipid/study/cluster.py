@@ -53,7 +53,7 @@ def on_dask(
     Raises
     ------
     ShipidError : the scheduler does not answer, or dies; a task has killed worker after worker. All other tasks are
-        done before that.
+        done before that. What `work` raises is raised here.
     """
     try:
         import dask
@@ -90,6 +90,7 @@ def _results(
 
     ended: SimpleQueue[Any] = SimpleQueue()
     killed: list[str] = []
+    mistake: Exception | None = None
     keys = f"shipid-{name}-{client.id}"
     try:
         given = client.submit(_given, shared, key=f"{keys}-shared", pure=False)  # made again if its worker dies
@@ -113,10 +114,17 @@ def _results(
             except KilledWorker:
                 killed.append(key)
                 continue
+            except Exception as error:
+                if future.status != "error":
+                    raise
+                mistake = error  # of the task, and not of the cluster
+                break
             yield task, results
             del future, results  # a worker may forget them
     except (OSError, TimeoutError, CancelledError):
         raise gone() from None
+    if mistake is not None:
+        raise mistake
     if killed:
         words = f"workers of the cluster die, perhaps for want of memory, at {', '.join(killed[:3])}"
         more = f" and {len(killed) - 3} more" if len(killed) > 3 else ""

@@ -85,6 +85,12 @@ def test_tasks_and_results_on_a_cluster_in_this_process() -> None:
             done.append(result)
         assert sorted(done) == [(i, 10 + i) for i in range(12)]
 
+        def full(_: int, __: int) -> int:
+            raise OSError(28, "No space left on device")
+
+        with pytest.raises(OSError, match="No space left"):  # before, the scheduler was said to be gone
+            list(on_dask(address, full, 10, [("t", 1)], "full"))
+
         one, other = (on_dask(address, napping(0.0), shared, [("t", 1), ("u", 2)], "z") for shared in (10, 20))
         both = [*islice(one, 1), *other, *one]  # before, the scheduler gave both runs of one plan the results of one
         assert sorted(both) == [(1, 11), (1, 21), (2, 12), (2, 22)]
