@@ -29,6 +29,8 @@ def read_mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
     except NotImplementedError:
         message = "a MATLAB file of version 7.3: save it with save(..., '-v7')"
         raise DataError(message, file=file, path="format.kind") from None
+    except (OSError, MemoryError):  # of the system, whatever is in the file
+        raise
     except Exception as error:  # scipy defines no error class: a damaged file raises any of a dozen
         message = f"not a MATLAB file, or damaged ({type(error).__name__}): set [format] kind"
         raise DataError(message, file=file, path="format.kind") from None

@@ -11,7 +11,7 @@ from scipy.io import savemat
 from shipid.errors import DataError
 from shipid.logs.formats import MatFormat
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.mat import _no_vectors
+from shipid.logs.mat import _no_vectors, read_mat
 from shipid.logs.readers import read_table
 from tests.logs.conftest import NAMES, T, assert_is_the_motion, mapping_with
 
@@ -80,3 +80,18 @@ def test_a_matlab_file_of_version_7_3_has_its_remedy(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"a MATLAB file of version 7\.3: save it with") as caught:
         import_log(read_mapping(mapping_with(tmp_path, 'kind = "mat"')), tmp_path / "log.mat")
     assert caught.value.path == "format.kind"
+
+
+@pytest.mark.parametrize("kind", [MemoryError, OSError])
+def test_what_the_system_lacks_is_no_damage(
+    kind: type[Exception], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A file that is too large for the memory was said to be damaged, or none of MATLAB's."""
+
+    def lacking(*_: object, **__: object) -> None:
+        raise kind("lacking")
+
+    savemat(tmp_path / "log.mat", {"t": T})
+    monkeypatch.setattr("scipy.io.loadmat", lacking)
+    with pytest.raises(kind, match="lacking"):
+        read_mat(tmp_path / "log.mat", MatFormat(kind="mat"), "t")
