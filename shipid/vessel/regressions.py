@@ -108,7 +108,7 @@ def wave_resistance(L: float, B: float, T: float, C_b: float, speed: float) -> f
     """
     C_M = min(max(1.006 - 0.0056 * C_b**-3.56, 0.75), 0.995)
     C_P, C_WP = min(C_b / C_M, 0.9), (1 + 2 * C_b) / 3
-    volume, froude = C_b * L * B * T, speed / math.sqrt(GRAVITY * L)
+    volume = C_b * L * B * T
     run = 1 - C_P  # length of the run over L
     entrance = 1 + 89 * math.exp(
         -((L / B) ** 0.80856)
@@ -117,7 +117,15 @@ def wave_resistance(L: float, B: float, T: float, C_b: float, speed: float) -> f
         * (run * L / B) ** 0.34574
         * (100 * volume / L**3) ** 0.16302
     )
-    ratio = B / L
+    return waves_of(L, B, T, volume, C_P, entrance, speed)
+
+
+def waves_of(L: float, B: float, T: float, volume: float, C_P: float, entrance: float, speed: float) -> float:
+    """R_W over the displaced weight [-] as above, of a hull whose volume [m^3], C_P and angle of entrance are known.
+
+    entrance : half the angle [deg] of the waterline at the bow. Lengths [m], speed [m/s].
+    """
+    ratio, froude = B / L, speed / math.sqrt(GRAVITY * L)
     c_7 = 0.229577 * ratio ** (1 / 3) if ratio < 0.11 else ratio if ratio < 0.25 else 0.5 - 0.0625 / ratio
     c_1 = 2223105 * c_7**3.78613 * (T / B) ** 1.07961 * (90 - entrance) ** -1.37565
     slender = L**3 / volume

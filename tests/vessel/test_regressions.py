@@ -14,6 +14,7 @@ from shipid.vessel.regressions import (
     thrust_coefficient,
     thrust_polynomial,
     wave_resistance,
+    waves_of,
     wetted_surface,
 )
 
@@ -86,6 +87,13 @@ def test_waves_matter_for_a_fast_ship_alone() -> None:
     assert 3e-4 < C_W(KCS, 12.35) < 2e-3
     rising = [wave_resistance(*KCS, speed) for speed in (6.0, 8.0, 10.0, 12.0, 14.0)]
     assert np.all(np.diff(rising) > 0)
+
+
+def test_wave_resistance_of_the_worked_example() -> None:
+    """The example of Holtrop and Mennen (1982): 557.11 kN at 25 knots, with c_2 of a bulb and c_5 of a transom."""
+    weight = 37500 * 1025 * 9.81
+    over = waves_of(205.0, 32.0, 10.0, volume=37500.0, C_P=0.5833, entrance=12.08, speed=25 * 1852 / 3600)
+    assert over * weight * 0.7595 * 0.9592 == pytest.approx(557.11e3, rel=2e-3)
 
 
 @pytest.mark.parametrize("limit", LIMITS)
