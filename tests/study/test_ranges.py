@@ -5,14 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from shipid import capacity
 from shipid import document as documents
+from shipid.data.windows import cut_windows
 from shipid.document import bundled
 from shipid.errors import DocumentError
 from shipid.study.plan import read_plan
-from tests.study.tiny import tiny_plan
+from shipid.study.ranges import Cut
+from tests.study.tiny import logged, tiny_plan
 
 NONSENSE: dict[str, Any] = {
     "truth.manoeuvre.0.alpha_deg": [-50.0, 1e20],
@@ -76,3 +79,22 @@ def test_two_hundred_gibibytes(tmp_path: Path) -> None:
     """The size is reported, and nothing is allocated."""
     with pytest.raises(DocumentError, match=r"1e-09 s: 12 runs of 20 s take [0-9.e+]+ GiB of memory"):
         tiny_plan(tmp_path, {"truth.interval": 1e-9, "truth.step": 1e-9, "unusual": ["*"]})
+
+
+@pytest.mark.parametrize("horizon", [1, 9])
+@pytest.mark.parametrize("past", [0, 7])
+def test_the_numbers_are_those_that_windows_hold(horizon: int, past: int) -> None:
+    """Not fewer, and no more than what comes and goes while they are cut: a column each at every step."""
+    columns = dict.fromkeys(("u", "v", "r", "psi", "north", "east", "propeller.n"), 0.1)
+    log = logged({"a": columns, "b": columns}, np.arange(0.0, 60.5, 0.5))
+    windows = cut_windows(log, horizon=horizon, past=past, step=2.0, interval=3.0)
+    parts = [windows.t, windows.future]
+    for group in (windows.columns, windows.planned, windows.past, windows.states):
+        parts += group.values()
+    held = sum(np.size(part) for part in parts)
+    wide = len(log.frame.columns)
+    numbers = 2 * Cut(horizon, past, 2.0, 3.0, wide, 0).numbers(60.0)
+    assert held <= numbers <= len(windows.t) * ((horizon + 1) * 2 * wide + (past + 1) * wide)
+    more = 2 * Cut(horizon, past, 2.0, 3.0, wide, 2).numbers(60.0)
+    assert more - numbers == len(windows.t) * (horizon + 1) * 4, "north and east of two foundations"
+    assert Cut(horizon, past, 2.0, 3.0, wide, 0).numbers(0.0) > 0
