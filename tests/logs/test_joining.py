@@ -158,6 +158,14 @@ def test_what_must_agree_is_not_guessed(change: Any, message: str) -> None:
         joined(recording(1, vessel="this"), other)
 
 
+def test_parts_of_one_named_vessel_or_of_one_that_only_one_names_are_joined() -> None:
+    later = ("c", "d"), 1000.0
+    for named in ({"vessel": "this"}, {}):
+        whole, notes = joined(recording(1, vessel="this"), recording(2, *later, **named))
+        assert (whole.runs, notes) == (["a", "b", "c", "d"], [])
+        assert whole.metadata["vessel"] == "this"
+
+
 def test_the_command_writes_one_dataset_and_none_over_another(tmp_path: Path) -> None:
     files = [write_dataset(recording(seed), tmp_path / f"{name}.parquet") for seed, name in ((1, "mon"), (2, "tue"))]
     said = output_of("data", "join", *files, "--out", tmp_path / "both.parquet")
