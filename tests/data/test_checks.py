@@ -206,3 +206,18 @@ def test_noise_of_positions_widens_the_limit_of_the_path() -> None:
     log[["north", "east"]] += random.normal(0, 2.0, (len(t), 2))
     row = check_dataset(as_dataset(log)).set_index("check").loc["path"]
     assert row["limit"] == pytest.approx(0.05 * 30.0 * np.hypot(4.0, 0.5) + 2 * (2 * 2 * 2.0**2) ** 0.5, rel=0.1)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.5, 2.0])
+@pytest.mark.parametrize("noisy", ["velocities", "heading"])
+def test_noise_that_is_integrated_widens_the_limit_of_the_path(step: float, noisy: str) -> None:
+    """Its path goes as the root of the time: 1 / sqrt(2) of what it is after 30 s, RMS over them."""
+    t, random = np.arange(0.0, 3000.0, step), np.random.default_rng(3)
+    log = turning(t)
+    if noisy == "velocities":
+        log[["u", "v"]] += random.normal(0, 0.4, (len(t), 2))
+    else:
+        log["psi"] += random.normal(0, 0.1, len(t))
+    row = check_dataset(as_dataset(log)).set_index("check").loc["path"]
+    by_noise = float(re.findall(r"([\d.]+) m by noise", str(row["sentence"]))[0])
+    assert by_noise == pytest.approx(2**0.5 * row["value"], rel=0.35)

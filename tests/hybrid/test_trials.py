@@ -47,7 +47,7 @@ class Counting(Searched):
 
     trials: PositiveInt = 64
     neighbours: Scale = (1.5, 20.0)
-    share: tuple[float, float] = (0.0, 1.0)
+    share: tuple[float, float] = (0.2, 0.7)
     width: Scale = (1.0, 100.0)
 
     def fit(self, task):
@@ -60,8 +60,9 @@ def test_counts_are_whole_and_linear_settings_evenly_spread(tmp_path):
     points = list(points_of(method))
     neighbours = {point["neighbours"] for point in points}
     assert {2.0, 3.0} <= neighbours <= {float(number) for number in range(2, 21)}
-    for name, middle in (("share", 0.5), ("width", 10.0)):
+    for name, middle in (("share", 0.45), ("width", 10.0)):
         assert np.mean([point[name] < middle for point in points]) == pytest.approx(0.5, abs=0.05)
+    assert all(0.2 <= point["share"] <= 0.7 and 1 <= point["width"] <= 100 for point in points)
     rows = [row_of(number, point, 1.0, 0.0) for number, point in enumerate(points)]
     Journal(tmp_path / "trials.log").add({"a": rows}, method.space())
     kept = Journal(tmp_path / "trials.log").rows("a")

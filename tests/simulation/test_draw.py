@@ -124,6 +124,16 @@ def test_shares_are_met_and_no_run_depends_on_their_number() -> None:
     assert many == draw_manoeuvres(truth(*doubled, manoeuvres=400))
 
 
+def test_quantities_of_a_run_are_drawn_apart_and_the_course_is_one_whether_given_or_not() -> None:
+    """400 draws: correlations of shaft speed, angle and course within 5 standard errors of 0."""
+    block = {"kind": "zigzag", "n_rpm": [80.0, 150.0], "angle_deg": [5.0, 30.0]}
+    free = draw_manoeuvres(truth(block, manoeuvres=400))
+    given = draw_manoeuvres(truth({**block, "course_deg": [90.0, 180.0]}, manoeuvres=400))
+    drawn = np.array([(one.n_rpm, one.angle_deg, one.course_deg) for one in free if isinstance(one, Zigzag)])
+    assert np.abs(np.corrcoef(drawn.T) - np.eye(3)).max() < 5 / 20
+    np.testing.assert_allclose([one.course_deg for one in given], 90 + drawn[:, 2] / 4, rtol=1e-12)
+
+
 def test_a_mixture_is_logged_in_one_frame() -> None:
     blocks = [{"kind": kind, **BLOCKS[kind]} for kind in ("turning", "zigzag", "steps")]
     mixed = truth(*blocks, manoeuvres=12, seed=6)
