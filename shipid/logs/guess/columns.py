@@ -37,6 +37,7 @@ from shipid.logs.guess.sources import Source, read_source
 from shipid.logs.guess.stuck import find_stuck
 from shipid.logs.guess.unused import reasons
 from shipid.logs.guess.wind import choose_wind
+from shipid.logs.mapping import to_si
 from shipid.physics.signals import named
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -165,6 +166,13 @@ def _others(state: State) -> None:
     """Choose roll, pitch and other environment columns by their names alone."""
     further = [name for name, row in named("environment").items() if row.names and name not in ("V_w", "beta_w")]
     for meaning in ("phi", "theta", *further):
-        for name in state.called(meaning)[:1]:
+        steep = {name for name in state.called(meaning) if _is_steep(state, name, meaning)}
+        for name in [name for name in state.called(meaning) if name not in steep][:1]:
             unit, sign = likely_unit(state, name, meaning), "by its name; the log does not show its sign"
             state.suggest(meaning, name, unit, 0.5, "by its name" if meaning in further else sign)
+
+
+def _is_steep(state: State, name: str, meaning: str) -> bool:
+    """Whether a column called a roll or pitch is above 90 deg, and so is none: `stamp` is a pitch, and a time."""
+    top = float(np.abs(state.columns[name]).max())
+    return meaning in ("phi", "theta") and top * to_si(likely_unit(state, name, meaning), meaning) > np.pi / 2

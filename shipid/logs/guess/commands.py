@@ -296,6 +296,10 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
         unit = likely_unit(state, name, "n")
         state.ask(("n",), f"in which unit is {name!r}, up to {top:.4g}? {unit} is a guess")
         return unit, 0.4, why, {}
+    angles = next((one.unit for one in state.suggestions if one.name == "psi"), "")
+    if by_motion == "rev/s" and angles == "rad" and _off_advance(state, values, "rad/s") < NEAR:
+        state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: rev/s, or rad/s, as angles are in rad here?")
+        return by_motion, 0.5, f"{why}; the way in a turn of the shaft says rev/s or rad/s", {}
     return by_motion, 0.7, f"{why}; the way in a turn of the shaft says {by_motion}", {}
 
 

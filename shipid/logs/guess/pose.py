@@ -25,6 +25,7 @@ UNSEEN = 0.5  # misfit from which a track says nothing of the heading: she is mo
 MIRROR = 2.0  # times smaller a misfit must be, to decide between a heading and its mirror
 STRAIGHT = 0.01  # 1 - |mean exp(i psi)| of a ship that hardly turns
 COMPASS = frozenset(("heading hdg hdt head compass kompass gyro kreisel kurs course baug psi steuer rumbo cap").split())
+DIRECTIONS = frozenset("north northing nord norte noord east easting ost oest este".split())
 YAW = frozenset(["yaw", "gier", "gir", "theta"])
 TURNED = np.radians(8.0)  # range of a heading that no name says, at least
 NEARLY_ALWAYS = 0.9  # share of the rows with a turning shaft in which it turns astern, of a ship that goes astern
@@ -70,6 +71,8 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
     pairs = list(_named_pairs(state))
     headings = [name for name in state.all_called("psi") if not is_order(name) or may_be_measured(name)]
     headings = [name for name in headings if not is_magnetic(name)] or headings  # beside a true one it is a second one
+    if not headings:  # of a plane x, y, theta
+        headings = [name for name in state.called("theta") if _all_round(state, name)]
     sure = [name for name in headings if fits(name).get("psi", 0.0) > fits(name).get("course", 0.0)]
     best = _best(state, pairs, sure or headings)
     if best is None or best.misfit > POOR:
@@ -118,6 +121,13 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         )
     _ask_for_second(state, best, [name for name in sure if not is_magnetic(name)])
     _take(state, best, sure)
+
+
+def _all_round(state: State, name: str) -> bool:
+    """Whether an angle called theta takes more than a quarter of a turn, as no pitch does."""
+    values = state.columns[name]
+    unit = unit_in_name(name, "rad") or ("deg" if np.abs(values).max() > 2.2 * np.pi else "rad")
+    return bool(np.ptp(values) * to_si(unit, "psi") > np.pi / 2)
 
 
 def _ask_for_second(state: State, best: Pose, headings: list[str]) -> None:
@@ -209,8 +219,9 @@ def _by_velocities(state: State, best: Pose) -> Pose:
 
 
 def _lettered(name: str) -> bool:
-    """Whether a name says x or y, which each hand lays in another direction."""
-    return any(part.rstrip("0123456789") in ("x", "y") for part in parts_of(name))
+    """Whether a name says x or y, which each hand lays in another direction, and no word for north or east."""
+    parts = parts_of(name)
+    return any(part.rstrip("0123456789") in ("x", "y") for part in parts) and not DIRECTIONS & {*parts}
 
 
 def _left(seen: Complex, integrated: Complex) -> float:

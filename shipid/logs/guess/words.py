@@ -23,10 +23,12 @@ PHRASES: dict[str, str] = {
         "longitudine, geogr laenge, lengtegraad, geogr lengde, longitude gps"
     ),
     "north": (
+        "x north, y north, "
         "n, north, northing, pos north, pos n, north pos, x 0, x n, x ned, x earth, eta 1, x e, nord, nordwert, "
         "hochwert, utm n, utm north, utm y, nord pos, norte, xn, ned x, ned n, ned north, delta north, dist north"
     ),
     "east": (
+        "x east, y east, "
         "est, e, east, easting, pos east, pos e, east pos, y 0, y n, y ned, y earth, eta 2, y e, ost, ostwert, "
         "rechtswert, utm e, utm east, utm x, oest, oestlig, este, ye, ned y, ned e, ned east, delta east, dist "
         "east"
@@ -177,6 +179,7 @@ PHRASES: dict[str, str] = {
 }
 """Meaning -> phrases, parts of a name separated by blanks, without accents. The names of `SIGNALS` count, too."""
 OTHERS = (
+    "stamp sec, stamp secs, stamp nsec, stamp nsecs, "
     "battery voltage, sat, ukc, under keel clearance, wave probe, wave gauge, vitesse surface, vitesse eau, "
     "vitesse loch, loch, velocidad corredera, corredera, velocidad superficie, velocita acqua, solcometro, log "
     "snelheid, snelheid door water, vaart door water, fart gennem vand, fart genom vatten, fart gjennom vannet, "

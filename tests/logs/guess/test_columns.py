@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.guess.clues import unit_in_name
+from shipid.logs.guess.clues import LIKELY, unit_in_name
 from shipid.logs.guess.columns import Guess, guess
 from tests.logs.simulated import KNOT, Change, as_bridge, si_log
 
@@ -390,3 +390,27 @@ def test_names_say_which_wind(
     assert proposed["beta_w"].extra.get("relative") is relative
     silent = not any(word in " ".join(taken) for word in ("AW", "Apparent", "rel", "true", "TWS"))
     assert ("does not show" in proposed["V_w"].evidence) is silent
+
+
+def test_a_shaft_without_a_unit_among_radians_may_count_radians(tmp_path: Path) -> None:
+    """As Simulink writes it: before, 17.8 rad/s were 17.8 rev/s without a question."""
+    log = si_log()[["t", "north", "east", "psi", "u", "v", "r"]].assign(n=2 * np.pi * as_bridge(si_log())["rpm"] / 60)
+    proposal = guessed(log, tmp_path)
+    shaft = proposal.column("propeller.n")
+    assert shaft is not None
+    assert shaft.confidence < LIKELY
+    assert any("rev/s, or rad/s" in question.sentence for question in proposal.questions)
+    degrees = guessed(log.assign(psi=np.degrees(log["psi"])), tmp_path)
+    assert not any("rad/s" in question.sentence for question in degrees.questions)
+
+
+@pytest.mark.parametrize("nanoseconds", [0.0, 5e8])
+def test_the_stamps_of_ROS_are_no_pitch(nanoseconds: float, tmp_path: Path) -> None:
+    """`stamp` is a pitch in Norwegian."""
+    log = as_bridge(si_log()).assign(**{"header.stamp.nsecs": nanoseconds * (np.arange(2740) % 2)})
+    assert described(guessed(log, tmp_path)) == CLEAN
+
+
+def test_a_roll_of_more_than_90_deg_is_none(tmp_path: Path) -> None:
+    log = as_bridge(si_log()).assign(Roll=500.0 * np.sin(np.arange(2740.0)))
+    assert described(guessed(log, tmp_path)) == CLEAN

@@ -299,3 +299,18 @@ def test_a_reference_system_that_alone_has_the_position_is_taken_and_asked(north
     assert not any("set point" in question.sentence for question in state.questions)
     with pytest.raises(DataError, match="no column can be the position"):
         chosen({"setpoint N": NORTH, "setpoint E": EAST, "heading": DEG})
+
+
+def test_words_for_east_and_north_beside_letters_say_the_frame() -> None:
+    """x to east, y to north, and an angle theta counted from east to port, which was no heading and then a pitch."""
+    state = chosen({"x_east": EAST, "y_north": NORTH, "theta": (np.pi / 2 - PSI + np.pi) % (2 * np.pi) - np.pi})
+    assert sources(state) == {"north": "y_north", "east": "x_east", "psi": "theta"}
+    heading = next(one for one in state.suggestions if one.name == "psi")
+    assert (heading.extra["sign"], heading.unit) == (-1, "rad")
+    assert not any("north and does" in question.sentence for question in state.questions)
+    assert_motion(state)
+
+
+def test_a_pitch_is_no_heading() -> None:
+    with pytest.raises(DataError, match="no column can be the heading"):
+        chosen({"N": NORTH, "E": EAST, "theta": 0.02 * np.sin(T)})
