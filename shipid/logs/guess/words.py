@@ -179,7 +179,7 @@ PHRASES: dict[str, str] = {
 }
 """Meaning -> phrases, parts of a name separated by blanks, without accents. The names of `SIGNALS` count, too."""
 OTHERS = (
-    "stamp sec, stamp secs, stamp nsec, stamp nsecs, "
+    "stamp secs, stamp nsec, stamp nsecs, stamp nanosec, "
     "battery voltage, sat, ukc, under keel clearance, wave probe, wave gauge, vitesse surface, vitesse eau, "
     "vitesse loch, loch, velocidad corredera, corredera, velocidad superficie, velocita acqua, solcometro, log "
     "snelheid, snelheid door water, vaart door water, fart gennem vand, fart genom vatten, fart gjennom vannet, "
@@ -255,6 +255,8 @@ MAGNETIC = frozenset(
     "mag magnet magnetic magnetisch magnetique magnetico magnetisk compass compas kompass aguja bussola".split()
 )
 """Parts that say that a heading is that of a magnetic compass."""
+NOT_MAGNETIC = frozenset("gyro kreisel sat satellite gps gnss rtk fog".split())
+"""Parts that say that a compass is another one."""
 RUN_WORDS = frozenset(
     (
         "run runs test trial trials versuch lauf messfahrt messlauf essai essais passe prueba ensayo corrida prova "
@@ -491,8 +493,11 @@ def is_run(name: str) -> bool:
 
 
 def is_magnetic(name: str) -> bool:
-    """Whether a name says that a heading is that of a magnetic compass."""
-    return bool(set(parts_of(name)) & MAGNETIC)
+    """Whether a name says that a heading is that of a magnetic compass, in brackets, too: Hdg (mag), Hdg [deg M]."""
+    words = {word for unit in units_in(name) for word in re.split(r"[^a-z]+", unit.lower())} | {*parts_of(name)}
+    if words & NOT_MAGNETIC:
+        return False
+    return bool(words & MAGNETIC or re.search(r"(deg|°) ?\(?M\b", name))
 
 
 def side_of(name: str) -> str | None:

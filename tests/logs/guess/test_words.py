@@ -176,3 +176,23 @@ def test_a_magnetic_heading_is_a_second_one() -> None:
     assert is_magnetic("heading_mag")
     assert is_magnetic("CAP COMPAS")
     assert not is_magnetic("Heading")
+
+
+@pytest.mark.parametrize(
+    ("name", "magnetic"),
+    [
+        ("Hdg (mag)", True),
+        ("Heading [deg M]", True),
+        ("Heading (°M)", True),
+        ("Magnetic heading", True),
+        ("Compass", True),
+        ("Hdg (true)", False),
+        ("Heading [deg]", False),
+        ("HDG_DEG_MEAN", False),
+        ("Gyro compass", False),
+        ("GPS compass heading", False),
+    ],
+)
+def test_a_name_says_a_magnetic_compass(name: str, magnetic: bool) -> None:
+    """In brackets, too: a magnetic heading was taken beside a true one, for a current made it keep to the track."""
+    assert is_magnetic(name) == magnetic
