@@ -31,6 +31,10 @@ TURNED = np.radians(8.0)  # range of a heading that no name says, at least
 NEARLY_ALWAYS = 0.9  # share of the rows with a turning shaft in which it turns astern, of a ship that goes astern
 SEARCHED = 24  # columns at most, where no name helps
 
+RADIUS, OFF_RADIUS = 6.368e6, 2.5e4  # m: from the centre of the Earth to her ellipsoid, with hills and waves
+LENGTHS = re.compile(r"/ ?L(?:_?(?:pp|bp|wl|oa))?\b", re.IGNORECASE)
+"""The end of the name of a position in ship lengths, such as X/Lpp."""
+
 Frame = Literal["ned", "enu", "zup", "ros"]
 """Where x, y point and from where the heading counts; see `in_frame`."""
 
@@ -68,6 +72,7 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
     Names that fit are tried first; where they fit badly or are not there, all columns are. Raises DataError if no
     column can be a position or a heading, or if the ship does not move as in that frame.
     """
+    _refuse_ecef(state, file)
     pairs = list(_named_pairs(state))
     headings = [name for name in state.all_called("psi") if not is_order(name) or may_be_measured(name)]
     headings = [name for name in headings if not is_magnetic(name)] or headings  # beside a true one it is a second one
@@ -113,6 +118,12 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         best = _by_course(state, best)
         best = best if best.settled else _by_velocities(state, best)
     references = [name for name in (best.north, best.east, best.heading) if may_be_measured(name)]
+    lengths = [name for name in (best.north, best.east) if LENGTHS.search(name)]
+    if lengths:
+        said = " and ".join(map(repr, lengths))
+        state.ask(
+            ("north", "east", "u", "v"), f"{said} are in ship lengths by their names: write factor = the length in m"
+        )
     if references:
         said = ", ".join(map(repr, references))
         state.ask(
@@ -121,6 +132,20 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         )
     _ask_for_second(state, best, [name for name in sure if not is_magnetic(name)])
     _take(state, best, sure)
+
+
+def _refuse_ecef(state: State, file: Path) -> None:
+    """Raise DataError where x, y, z count from the centre of the Earth: no plane of two of them is level."""
+    for name in state.columns:
+        place = name.lower().rfind("x")
+        letters = "XYZ" if "X" in name[place : place + 1] else "xyz"
+        three = [f"{name[:place]}{letter}{name[place + 1 :]}" for letter in letters]
+        if place >= 0 and {*three} <= state.columns.keys():
+            far = np.linalg.norm([state.columns[one] for one in three], axis=0)
+            if np.all(np.abs(far - RADIUS) < OFF_RADIUS):
+                words = ", ".join(map(repr, three))
+                remedy = "write latitude and longitude, such as by pymap3d.ecef2geodetic"
+                raise DataError(f"{words} count from the centre of the Earth: {remedy}", file=file)
 
 
 def _all_round(state: State, name: str) -> bool:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pymap3d import ned2geodetic
+from pymap3d import geodetic2ecef, ned2geodetic
 
 from shipid.errors import DataError
 from shipid.logs.guess.clues import State
@@ -314,3 +314,18 @@ def test_words_for_east_and_north_beside_letters_say_the_frame() -> None:
 def test_a_pitch_is_no_heading() -> None:
     with pytest.raises(DataError, match="no column can be the heading"):
         chosen({"N": NORTH, "E": EAST, "theta": 0.02 * np.sin(T)})
+
+
+@pytest.mark.parametrize("names", [("X ECEF", "Y ECEF", "Z ECEF"), ("pos.x", "pos.y", "pos.z")])
+def test_positions_from_the_centre_of_the_Earth_are_refused(names: tuple[str, str, str]) -> None:
+    """Two of them are no level plane: the track was 20 times too far off, and z was called east."""
+    place = ned2geodetic(NORTH, EAST, 0.0, -33.9, 18.4, 0.0)
+    columns = dict(zip(names, geodetic2ecef(*place), strict=True))
+    with pytest.raises(DataError, match=f"'{names[0]}', .* count from the centre of the Earth: write latitude"):
+        chosen(columns | {"heading": DEG})
+    assert_motion(chosen({"pos.x": NORTH, "pos.y": EAST, "pos.z": 0.0 * EAST, "heading": DEG}))
+
+
+def test_positions_in_ship_lengths_are_asked_for_the_length() -> None:
+    state = chosen({"X/Lpp": NORTH / 30.0, "Y/Lpp": EAST / 30.0, "heading": DEG})
+    assert any("write factor = the length in m" in question.sentence for question in state.questions)
