@@ -81,7 +81,7 @@ _COMMA = re.compile(r"(?<=\d),(?=\d+\s*(?:['′’´\"″”°º˚]|[NSEW]\b))")
 """A decimal comma of degrees, minutes or seconds, also in a log whose numbers have points."""
 OF_SHIP = "SP"
 """Letters of the sides of a ship in the text of an angle, as in P12.5, that of positive numbers first."""
-_PORT, _STARBOARD = "P|PORT|PS|BB|L", "S|STBD|STB|SB|R"
+_PORT, _STARBOARD = "P|PORT|PS|BB|BD|BAB|L", "S|STBD|STB|SB|TD|TB|TRI|R"
 _SIDED = re.compile(
     rf"(?:({_PORT})|({_STARBOARD}))?[\s.:]*([+-]?\d+(?:\.\d*)?)\s*(?:°|DEG)?\s*(?:({_PORT})|({_STARBOARD}))?"
 )

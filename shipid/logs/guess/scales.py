@@ -62,7 +62,8 @@ def take_scales(state: State) -> None:
 def _take_positions(state: State) -> None:
     pairs = [(a, b) for a in state.called("latitude") for b in state.called("longitude")]
     for north, east in pairs[:1]:
-        if {unit_in_name(name, "rad") for name in (north, east)} == {"rad"}:
+        written = {unit_in_name(name, "rad") for name in (north, east)}
+        if written == {"rad"} or (written == {None} and _in_radians(state, north, east)):
             for name in (north, east):
                 _scale(state, name, 1.0 / DEGREE, "")
                 state.scaled.pop(name)  # the unit says it
@@ -87,6 +88,19 @@ def _take_positions(state: State) -> None:
                 state.ask(("latitude", "longitude"), f"{words}If they are S or W, write sign = -1")
 
 
+def _in_radians(state: State, north: str, east: str) -> bool:
+    """Whether positions in numbers that small are radians, as a speed shows; asked where there is none."""
+    size = np.abs(state.columns[north]).max(), np.abs(state.columns[east]).max()
+    if size[0] > np.pi / 2 or size[1] > np.pi:
+        return False
+    told = _told_by_speed(state, north, east, [1.0, 1.0 / DEGREE])
+    if told is None:
+        words = f"are {north!r} and {east!r} degrees, off West Africa, or radians?"
+        state.ask(("latitude", "longitude"), f"{words} deg is a guess")
+        return False
+    return told[1] != 1.0 and told[3] < DOUBTED
+
+
 def _fine(state: State, north: str, east: str) -> float:
     """Part of a degree [deg] that whole numbers count, as their names or the speed show; else asked."""
     if all(any(OF_AIS.fullmatch(unit.strip().lower()) for unit in units_in(name)) for name in (north, east)):
@@ -95,8 +109,26 @@ def _fine(state: State, north: str, east: str) -> float:
     parts = [fine for fine in PARTS if _on_globe(both, fine)]
     if len(parts) == 1:
         return parts[0]
-    way = {fine: _way(state, *(fine * state.columns[name] for name in (north, east))) for fine in parts}
     names = f"{north!r} and {east!r}"
+    told = _told_by_speed(state, north, east, parts)
+    if told is not None:
+        name, best, other, off = told
+        if off > DOUBTED:
+            words = f"are {names} whole numbers of {PARTS[best]}, or of {PARTS[other]}?"
+            state.ask(("latitude", "longitude", "t"), f"{words} The speed {name!r} does not say it clearly")
+        return best
+    last = [PARTS[fine] for fine in parts]
+    words = f"are {names} whole numbers of {', '.join(last[:-1])} or of {last[-1]}?"
+    state.ask(("latitude", "longitude", "t"), f"{words} {last[0]} is a guess")
+    return parts[0]
+
+
+def _told_by_speed(state: State, north: str, east: str, parts: list[float]) -> tuple[str, float, float, float] | None:
+    """Of the sizes [deg] that the unit of a position may have, those nearest to a speed; None where there is no speed.
+
+    Returned are the column of the speed, the best and the next one, and how far off the best is, in parts of the next.
+    """
+    way = {fine: _way(state, *(fine * state.columns[name] for name in (north, east))) for fine in parts}
     for name in [*state.called("speed"), *state.called("u")]:
         ran = state.chosen.change(np.cumsum(np.abs(state.columns[name]) * np.gradient(state.t)))
         length, written = float(np.sum(np.abs(ran))), unit_in_name(name, "m/s")
@@ -109,15 +141,9 @@ def _fine(state: State, north: str, east: str) -> float:
             )
             for fine in parts
         }
-        best, *others = sorted(parts, key=off.__getitem__)
-        if off[best] > DOUBTED * off[others[0]]:
-            words = f"are {names} whole numbers of {PARTS[best]}, or of {PARTS[others[0]]}?"
-            state.ask(("latitude", "longitude", "t"), f"{words} The speed {name!r} does not say it clearly")
-        return best
-    last = [PARTS[fine] for fine in parts]
-    words = f"are {names} whole numbers of {', '.join(last[:-1])} or of {last[-1]}?"
-    state.ask(("latitude", "longitude", "t"), f"{words} {last[0]} is a guess")
-    return parts[0]
+        best, other, *_ = sorted(parts, key=off.__getitem__)
+        return name, best, other, off[best] / max(off[other], 1e-12)
+    return None
 
 
 def _speeds_of(state: State, name: str) -> list[float]:

@@ -410,6 +410,7 @@ TEXTS = {
     "12.5 P": lambda x: f"{abs(x):.1f} {'P' if x < 0 else 'S'}" if round(x, 1) else "0.0",
     "PORT 12.5": lambda x: f"{'PORT' if x < 0 else 'STBD'} {abs(x):.1f}",
     "Bb 12,5": lambda x: f"{'Bb' if x < 0 else 'Stb'} {abs(x):.1f}".replace(".", ","),
+    "Bd 12.5": lambda x: f"{'Bd' if x < 0 else 'Td'} {abs(x):.1f}",
     "L12.5": lambda x: f"{'L' if x < 0 else 'R'}{abs(x):04.1f}",
 }
 
@@ -431,3 +432,18 @@ def test_a_rudder_without_its_side_among_others_is_refused(text: str, tmp_path: 
     wrong = as_file(frame.assign(rudder=frame["rudder"].where(frame.index != 5, text)), tmp_path)
     with pytest.raises(DataError, match=r"row 6: .* is no number( and no angle with S or P)? \(column 'rudder'"):
         import_log(read_mapping(write_new(draft, tmp_path / "draft.toml")), wrong)
+
+
+@pytest.mark.parametrize("speed", ["m/s", "kn", ""])
+def test_positions_in_radians_without_a_unit_are_told_by_the_speed(speed: str, tmp_path: Path) -> None:
+    """As degrees they are off West Africa, and the ship is 57 times too slow; without a speed that is asked."""
+    frame = on_globe(np.radians(LAT), np.radians(LON)).drop(columns=["u", "v"])
+    if speed:
+        frame["SOG"] = np.hypot(LOG["u"], LOG["v"]) * (3600 / 1852 if speed == "kn" else 1.0)
+        frame["COG"] = np.degrees(LOG["psi"] + np.arctan2(LOG["v"], LOG["u"])) % 360
+    proposal = guess(as_file(frame, tmp_path))
+    columns = [proposal.column(name) for name in ("latitude", "longitude")]
+    assert [one.unit for one in columns if one is not None] == (["rad"] * 2 if speed else ["deg"] * 2)
+    assert ("or radians?" in asked(proposal)) == (not speed)
+    here = guess(as_file(on_globe(LAT - 63.4, LON - 10.4), tmp_path))
+    assert here.column("latitude").unit == "deg"  # type: ignore[union-attr]
