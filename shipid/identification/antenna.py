@@ -27,7 +27,7 @@ REFITS = 2  # with the log moved from the antenna to the origin
 NEAREST, FARTHEST, WIDEST = 0.1, 0.6, 0.25  # of the length: from the origin; ahead or astern; to a side
 NEGLIGIBLE = 0.02  # of the length: a way that the sentence leaves out
 CERTAIN = 2.5  # half-widths of its 95 % interval: so far from the origin an antenna is not chance
-EXPLAINED = 0.3  # of the squares of the residuals: less has been a vessel that is wrong
+WORTH, EXPLAINED = 0.1, 0.3  # of the squares of the residuals: less is not fitted again; less has been a wrong vessel
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def antenna(solution: Solution, dataset: Dataset) -> Antenna | None:
         return None
     seen, total = stepped(solution, dataset, length), float(solution.residuals @ solution.residuals)
     for _ in range(REFITS):
-        if seen is None or not seen.shown:
+        if seen is None or seen.certain < CERTAIN or seen.explained < WORTH:
             return seen
         moved = _to_origin(dataset, seen.x, seen.y)
         again = identify(solution.vessel, moved, solution.runs, solution.settings, start=solution)
