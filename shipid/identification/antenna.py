@@ -63,7 +63,7 @@ def antenna(solution: Solution, dataset: Dataset) -> Antenna | None:
         if seen is None or seen.certain < CERTAIN or seen.explained < WORTH:
             return seen
         moved = _to_origin(dataset, seen.x, seen.y)
-        again = identify(solution.vessel, moved, solution.runs, solution.settings, start=solution)
+        again = identify(solution.vessel, moved, solution.runs, solution.settings)
         more = stepped(again, moved, length, (seen.x, seen.y)) if again.status == "ok" else None
         explained = 1 - float(again.residuals @ again.residuals) / total
         seen = None if more is None else replace(more, explained=explained, factors=again.factors)
