@@ -35,7 +35,7 @@ APPROACHES = ("steady", "helmsman", "rest")
 ROUND = ("turning", "pull-out", "spiral", "reverse-spiral")
 # in ship lengths at the approach speed: log before the execute, and duration of each kind
 LEAD, ZIGZAG, TURN, LEVEL, STOP = 1.0, 30.0, 60.0, 40.0, 80.0
-DECAYS, LONGEST_LEVEL = 8.0, 200.0  # of a small yaw on a level of a spiral, in time constants; ship lengths
+DECAYS, LONGEST = 8.0, 200.0  # until a turn is steady: time constants of a small yaw, and at most ship lengths
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,8 @@ def standard(
     speed : approach speed [m/s]; default: the document's U_0, else Froude number 0.2.
     side : first turn, `starboard` or `port`.
     duration : [s]; of a spiral, the time of each level. Default: the time for 60 ship lengths at the approach speed, 30
-        for a zigzag, 80 for a stop, 40 for a level of a spiral; of a direct one up to 200, see `_level_lengths`.
+        for a zigzag, 80 for a stop, 40 for a level of a spiral. A level of a direct spiral, and a pull-out after its
+        turn of 30 lengths, take up to 200, see `_settling`.
     step : of the integration [s]; default: about 1/500 of the time for one ship length. A row has ten steps.
     approach : `steady` with the helm amidships, held on course by a `helmsman`, or from `rest`.
     n : shaft speed [rev/s] of the approach; default: that which gives the speed.
@@ -123,10 +124,13 @@ def standard(
         words = f"{step:g} s is too long for this ship, which runs a length in {passing:.3g} s"
         raise ShipidError(f"{words}: give {passing / LEAST_STEPS:.3g} s or less", path="--step")
     if name == "spiral" and duration is None:
-        duration = passing * _level_lengths(controls, asked, n_rpm * RPM, passing)
+        duration = passing * _settling(controls, asked, n_rpm * RPM, passing, LEVEL)
     manoeuvre = build(angles, cast(Side, side), duration, passing, how)
     if isinstance(manoeuvre, PullOut):  # between two rows the log would show the release after it
         manoeuvre = manoeuvre.model_copy(update={"turn": _in_rows(manoeuvre.turn, interval)})
+        if duration is None:
+            amidships = passing * _settling(controls, asked, n_rpm * RPM, passing, TURN / 2)
+            manoeuvre = manoeuvre.model_copy(update={"duration": lead + manoeuvre.turn + amidships})
     manoeuvre.check(controls)
     steps = manoeuvre.length / interval * STEPS
     if steps > MOST_STEPS:
@@ -155,14 +159,14 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     return n
 
 
-def _level_lengths(controls: Controls, speed: float, n: float, passing: float) -> float:
-    """Ship lengths of a level of a direct spiral: the rate of a nearly neutral ship takes long until it is steady.
+def _settling(controls: Controls, speed: float, n: float, passing: float, least: float) -> float:
+    """Ship lengths until a turn is steady, `least` or more: the rate of a nearly neutral ship takes long.
 
     The time is eight time constants of a small yaw about the straight course at a speed [m/s] and shaft speed [rev/s],
-    the slowest of all turns, but at least 40 and at most 200 times that for a ship length, `passing` [s].
+    the slowest of all turns, but at most 200 times that for a ship length, `passing` [s].
     """
     decay = abs(growth(controls.vessel, speed, controls.ahead(n))) * passing  # in a ship length
-    return float(np.clip(DECAYS / decay if decay > 0 else np.inf, LEVEL, LONGEST_LEVEL))
+    return float(np.clip(DECAYS / decay if decay > 0 else np.inf, least, LONGEST))
 
 
 def _title(name: str, manoeuvre: Approached) -> str:

@@ -14,7 +14,7 @@ from shipid.measures import MEASURES
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Measures
 from shipid.simulation.approach import Controls
-from shipid.simulation.manoeuvre import ReverseSpiral, Spiral, Zigzag
+from shipid.simulation.manoeuvre import PullOut, ReverseSpiral, Spiral, Zigzag
 from shipid.simulation.measured import measure_standard
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import KINDS, shaft_speed, standard
@@ -136,6 +136,21 @@ def test_a_spiral_of_a_nearly_neutral_ship_waits_until_her_turn_is_steady() -> N
     turning = standard(SHIP, "spiral").manoeuvre
     assert isinstance(turning, Spiral)
     assert turning.hold == pytest.approx(40 * 28.9 / standard(SHIP, "spiral").speed)
+
+
+@pytest.mark.parametrize(("share", "side", "remains"), [(0.85, "starboard", 0.0), (1.0, "port", 0.130)])
+def test_a_pull_out_of_a_nearly_neutral_ship_waits_until_her_turn_is_steady(
+    share: float, side: str, remains: float
+) -> None:
+    """KVLCC2 with another N_v: r L / U in steady turns with the helm amidships, by solving her equations."""
+    ship = load_vessel("kvlcc2-l7")
+    ship = ship.with_values({"hull.mmg.N_v": share * ship.parameters["hull.mmg.N_v"]})
+    chosen = standard(ship, "pull-out", side=side).manoeuvre
+    assert isinstance(chosen, PullOut)
+    assert (chosen.duration - chosen.execute_at - chosen.turn) * 1.179 / 7 > 60
+    rows = {str(row["measure"]): row["value"] for row in measure_standard(ship, "pull-out", side=side).measures}
+    residual = np.radians(rows["residual rate"]) * 7 / standard(ship, "pull-out").speed
+    assert residual == pytest.approx(remains, abs=0.002)
 
 
 @pytest.mark.parametrize(
