@@ -440,8 +440,7 @@ def test_no_compiler_warns_of_a_conversion(program, single, tmp_path):
     every = [vessel_files(drawn_ship(100, 4), "odd", "rk4", precision)]
     every += [predictor_files(model(drawn(kind, 100).predictor), "odd", precision) for kind in ("forest", "recurrent")]
     for files in every:
-        for name in ("odd.c", "main.c"):
-            compile_([program], write(files, tmp_path), "-O0", "-Wsign-conversion", "-c", "-o", "odd.o", name)
+        compile_([program], write(files, tmp_path), "-O0", "-Wsign-conversion", "-o", "example", "main.c", "odd.c")
 
 
 def test_the_example_ends_with_the_result_of_a_row_that_is_refused(tmp_path):
