@@ -15,6 +15,9 @@ ALIKE = (
 )
 """Meanings of which a log needs one pair: what gives the position, what gives the velocity."""
 
+PARTNERS = {"speed": "course", "course": "speed"}
+"""Meanings that take the place of u and v together alone."""
+
 REMEDIES = {
     "awd": "it may be the direction of the apparent wind from north: write the angle from the bow, less the heading",
     "blowing": "it may be a direction of the wind: map it to beta_w with direction = 'from' or 'towards'",
@@ -52,6 +55,9 @@ def _reason(state: State, name: str, numbers: bool) -> str:
         return f"{what}{_word(meaning)} is read from {' and '.join(map(repr, better))}"
     if np.ptp(state.columns[name]) == 0:
         return f"it may be {_word(meaning)}, but it is the same in every row"
+    partner = PARTNERS.get(meaning)
+    if partner and not any(partner in fits(other) for other in state.free() if other != name):
+        return f"it may be {_word(meaning)}, which says something together with a {partner} alone: there is none"
     return f"it may be {_word(meaning)}, but the motion in the log does not bear that out"
 
 

@@ -46,16 +46,16 @@ PHRASES: dict[str, str] = {
         "gier hoek, stevn"
     ),
     "speed": (
-        "sog, speed, spd, speed over ground, ground speed, ship speed, u, v, fahrt, fahrt ueber grund, fueg, fug, "
-        "geschwindigkeit, fart, fart over grunn, vtg sog, vg, v g, velocity, groundspeed, vitesse, velocidad, "
-        "uog, speed og, hastighet, gps speed, abs speed, total speed, vitesse fond, vitesse navire, vitesse sol, "
-        "velocidad fondo, velocidad sobre fondo, velocidad buque, vel fondo, velocita, velocita fondo, velocita "
-        "nave, snelheid, snelheid over grond, grond snelheid, vaart over grond, vog, fart over grund, fart over "
-        "bunden, fog, schiffs geschwindigkeit, grund geschwindigkeit, skips fart"
+        "sog, speed, spd, speed over ground, ground speed, ship speed, u, v, fahrt, fahrt ueber grund, fahrt ue "
+        "grund, fueg, fug, geschwindigkeit, fart, fart over grunn, vtg sog, vg, v g, velocity, groundspeed, vitesse, "
+        "velocidad, uog, speed og, hastighet, gps speed, abs speed, total speed, vitesse fond, vitesse navire, "
+        "vitesse sol, velocidad fondo, velocidad sobre fondo, velocidad buque, vel fondo, velocita, velocita fondo, "
+        "velocita nave, snelheid, snelheid over grond, grond snelheid, vaart over grond, vog, fart over grund, fart "
+        "over bunden, fog, schiffs geschwindigkeit, grund geschwindigkeit, skips fart"
     ),
     "course": (
-        "cog, course, crs, track, course over ground, track angle, kurs ueber grund, kueg, kug, kurs, kurs over "
-        "grunn, chi, vtg cog, course og, tmg, course made good, track made good, ground course, bahn winkel, "
+        "cog, course, crs, track, course over ground, track angle, kurs ueber grund, kurs ue grund, kueg, kug, kurs, "
+        "kurs over grunn, chi, vtg cog, course og, tmg, course made good, track made good, ground course, bahn winkel, "
         "route fond, route, route vraie, route sur fond, rumbo fondo, rumbo sobre fondo, rumbo efectivo, derrota, "
         "rotta, rotta vera, rotta fondo, grond koers, koers over grond, kog, kurs over grund, kurs over bunden, "
         "beholden kurs, kurs grund"

@@ -35,3 +35,15 @@ def test_a_column_that_is_not_used_says_why(name: str, values: str, message: str
     assert list(proposal.unused) == [name]
     assert message in proposal.unused[name]
     assert f"# column {name!r} is not used: {proposal.unused[name]}" in draft_mapping(proposal, manoeuvres=False)
+
+
+@pytest.mark.parametrize("name", ["SOG [km/h]", "Fahrt \u00fc. Grund [km/h]"])
+def test_a_speed_without_a_course_is_not_said_to_differ_from_the_motion(name: str, tmp_path: Path) -> None:
+    """It was said that the motion did not bear out a speed that agreed with the positions."""
+    log = as_bridge(si_log())
+    speed = 3.6 * np.hypot(log["u"], log["v"])
+    file = tmp_path / "log.csv"
+    log.drop(columns=["u", "v"]).assign(**{name: speed}).to_csv(file, index=False)
+    assert guess(file).unused == {
+        name: "it may be speed, which says something together with a course alone: there is none"
+    }
