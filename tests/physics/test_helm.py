@@ -139,6 +139,18 @@ def test_an_error_is_turned_into_body_axes_and_shared() -> None:
     np.testing.assert_allclose(thrusts(at(north=1.0)), shared, atol=1e-6)
 
 
+@pytest.mark.parametrize("bias", np.linspace(-3.0, 3.0, 7))
+def test_a_unit_may_have_its_bias_in_any_direction(bias: float) -> None:
+    """What is wanted and the bias n^2 in its direction, and the jump of the angle opposite to it."""
+    units = tuple(Unit(unit.name, unit.along, unit.across, (np.cos(bias), np.sin(bias))) for unit in UNITS)
+    still = dict.fromkeys(("north", "east", "heading"), 0.0)
+    ordered = numbers(station_keeping(units, ()).orders(at(north=1.0), {**ORDERS, "n_bias": 1.2}, still))
+    wanted = 50 * 0.1**2 * 2 * np.exp(-0.5j) + 1.2**2 * np.exp(1j * bias)
+    for unit in UNITS:
+        assert ordered[f"{unit.name}.n"] ** 2 * np.exp(1j * ordered[f"{unit.name}.alpha"]) == pytest.approx(wanted)
+        assert abs(ordered[f"{unit.name}.alpha"] - bias) <= np.pi
+
+
 def test_speed_is_damped_and_heading_takes_the_short_way() -> None:
     np.testing.assert_allclose(thrusts(at(u=0.2))[:, 0], [-50 * 2 * 0.1 * 0.2] * 2, atol=1e-6)
     short = thrusts(at(psi=3.0), heading=-3.0)  # 0.28 rad to starboard: the port unit pushes less than its bias astern

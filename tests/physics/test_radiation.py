@@ -54,7 +54,7 @@ def driven(name: str, velocity: np.ndarray, step: float) -> np.ndarray:
     A = np.array(ca.Function("A", [state, nu], [ca.jacobian(rates, state)])(0, 0))
     B = np.array(ca.Function("B", [state, nu], [ca.jacobian(rates, nu)])(0, 0))[:, [2, 3, 4]]
     C = np.array(ca.Function("C", [state], [ca.jacobian(force(state), state)])(0))[[2, 3, 4]]
-    assert np.abs(np.array(f(0, 0))).max() == 0
+    assert np.abs(np.array(f(0, 0))).max() == np.abs(np.array(force(0))).max() == 0
     x, history = np.zeros(count + extra), []
     for i in range(0, len(velocity), 2):
         history.append(C @ x)

@@ -17,10 +17,15 @@ def numbers(expression: Any) -> np.ndarray:
     return np.array(ca.evalf(ca.densify(expression))).ravel()
 
 
+def port() -> dict[str, Any]:
+    """Numbers of the 28.9 m ship's port unit, without their words, and the density of water."""
+    block = load_vessel("gunnerus-28.9").document["thruster"]["port"]
+    return {k: v for k, v in block.items() if k not in ("kind", "source")} | {"rho": 1025.0}
+
+
 def azimuth(**changes: float) -> ca.Function:
     """(nu_r, n, alpha) -> wrench of the 28.9 m ship's port unit."""
-    block = load_vessel("gunnerus-28.9").document["thruster"]["port"]
-    values = {k: v for k, v in block.items() if k not in ("kind", "source")} | {"rho": 1025.0} | changes
+    values = port() | changes
     nu_r, n, alpha = ca.SX.sym("nu_r", 6), ca.SX.sym("n"), ca.SX.sym("alpha")
     return ca.Function("azimuth", [nu_r, n, alpha], [thruster.azimuth(nu_r, n, alpha, **values)])
 
@@ -59,6 +64,18 @@ def test_bollard_pull() -> None:
     for rpm, kN in ((150, 68.5), (200, 121.7)):
         wrench = numbers(azimuth()(np.zeros(6), rpm / 60, 0.0))
         assert wrench[0] == pytest.approx(kN * 1e3, abs=1.4e3)
+
+
+@pytest.mark.parametrize("alpha", [-2.0, 0.4, 1.6])
+@pytest.mark.parametrize("n", [-1.5, 2.5])
+def test_the_thrust_of_a_unit_is_the_force_along_its_axis(n: float, alpha: float) -> None:
+    """At rest that of a unit straight ahead; under way the force that is turned back by its angle."""
+    still = numbers(thruster.azimuth_thrust(ca.DM.zeros(6), ca.DM(n), ca.DM(alpha), **port()))
+    assert still == pytest.approx(numbers(azimuth()(np.zeros(6), n, 0.0))[0])
+    moving = ca.DM([3.0, 0.4, 0, 0, 0, 0])
+    X, Y = numbers(azimuth()(moving, n, alpha))[:2]
+    along = numbers(thruster.azimuth_thrust(moving, ca.DM(n), ca.DM(alpha), **port()))
+    assert along == pytest.approx((np.exp(-1j * alpha) * (X + 1j * Y)).real)
 
 
 def test_positive_angle_turns_to_port() -> None:
