@@ -68,6 +68,20 @@ class Trees:
             np.concatenate([tree.value[:, :, 0] for tree in trees]),
         )
 
+    def fit_together(self, inputs: int) -> bool:
+        """Whether each way down a tree ends: children come after their node, and each that is no leaf asks an input."""
+        nodes = np.arange(self.threshold.size)
+        if any(part.shape != nodes.shape for part in (self.left, self.right, self.feature, self.threshold)):
+            return False
+        inner = self.left != LEAF
+        return bool(
+            self.first.size > 0
+            and np.all((self.first >= 0) & (self.first < len(nodes)))
+            and np.array_equal(inner, self.right != LEAF)
+            and all(np.all((nodes < part)[inner] & (part < len(nodes))[inner]) for part in (self.left, self.right))
+            and np.all((self.feature >= 0)[inner] & (self.feature < inputs)[inner])
+        )
+
     def predict(self, inputs: Array) -> Array:
         """Mean over the trees (S, outputs) for inputs (S, d), which scikit-learn compares in single precision."""
         largest = float(np.finfo(np.float32).max)
@@ -123,15 +137,9 @@ class ForestCorrector:
         first, left, right, feature, threshold, value = (taken(arrays, name) for name in NODES)
         names, basis = tuple(header["names"]), taken(arrays, "basis")
         whole = [part.astype(np.int64) for part in (first, left, right, feature)]
-        count = len(threshold)
-        if (
-            any(part.shape != (count,) for part in (left, right, feature))
-            or value.shape != (count, 2 * basis.shape[1])
-            or max(part.max(initial=0) for part in whole[:3]) >= count
-            or whole[3].max(initial=0) >= len(names)
-        ):
-            raise ResultError("the arrays of the saved trees do not fit together", path="value")
         trees = Trees(whole[0], whole[1], whole[2], whole[3], threshold, value)
+        if not trees.fit_together(len(names)) or value.shape != (len(threshold), 2 * basis.shape[1]):
+            raise ResultError("the arrays of the saved trees do not fit together", path="value")
         return cls(Inputs.from_header(header["inputs"]), names, basis, trees, dict(header["hyperparameters"]))
 
 
