@@ -90,10 +90,16 @@ class Units:
         """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
         names, mirror = tuple(header["names"]), bool(header["mirror"])
         mean, std, weight, offset = (taken(arrays, name) for name in MADE_OF)
+        reflection = taken(arrays, "reflection") if mirror else None
         d = len(names)
-        if mean.shape != (d,) or std.shape != (d,) or weight.shape != (d, len(offset)):
+        if (
+            mean.shape != (d,)
+            or std.shape != (d,)
+            or weight.shape != (d, len(offset))
+            or (reflection is not None and reflection.shape != (d, d))
+        ):
             raise ResultError("the arrays of the saved method do not fit together", path="weight")
-        return cls(Normaliser(names, mean, std), weight, offset, taken(arrays, "reflection") if mirror else None)
+        return cls(Normaliser(names, mean, std), weight, offset, reflection)
 
 
 def taken(arrays: Mapping[str, Array], name: str) -> Array:

@@ -51,8 +51,9 @@ def test_units_are_saved_and_refused_where_a_part_is_missing(table):
     np.testing.assert_array_equal(again.parts(side(table))[1], units.parts(side(table))[1])
     with pytest.raises(ResultError, match="missing"):
         Units.from_arrays(units.header(), {k: v for k, v in units.arrays().items() if k != "offset"})
-    with pytest.raises(ResultError, match="fit together"):
-        Units.from_arrays(units.header(), {**units.arrays(), "mean": np.zeros(2)})
+    for wrong in ({"mean": np.zeros(2)}, {"std": np.ones(2)}, {"weight": np.ones((3, 5))}, {"reflection": np.eye(2)}):
+        with pytest.raises(ResultError, match="fit together"):
+            Units.from_arrays(units.header(), {**units.arrays(), **wrong})
     with pytest.raises(DataError, match="trained with this input"):
         units.parts({name: values for name, values in side(table).items() if name != "v"})
 
