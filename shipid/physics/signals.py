@@ -238,7 +238,8 @@ SIGNALS: dict[str, Signal] = {
         "command",
         "-",
         "pitch ratio P/D",
-        names=r"cpp\w*|pitch_?(ratio|p_?d)\w*|prop(eller)?_?pitch\w*|(port|starboard|stbd)_pitch|pitch_(port|starboard|stbd)|p_?/?_?d",
+        names=r"cpp(?!\w*(rpm|rps|shaft|speed|rev|thrust|torque|power|load|oil|hyd|pump|temp|press))\w*"
+        r"|pitch_?(ratio|p_?d)\w*|prop(eller)?_?pitch\w*|(port|starboard|stbd)_pitch|pitch_(port|starboard|stbd)|p_?/?_?d",
         plausible=2.0,
         reach=(-1.4, 1.4),
         usual=(0.4, 1.0),
