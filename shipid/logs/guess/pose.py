@@ -25,6 +25,8 @@ UNSEEN = 0.5  # misfit from which a track says nothing of the heading: she is mo
 MIRROR = 2.0  # times smaller a misfit must be, to decide between a heading and its mirror
 STRAIGHT = 0.01  # 1 - |mean exp(i psi)| of a ship that hardly turns
 COMPASS = frozenset(("heading hdg hdt head compass kompass gyro kreisel kurs course baug psi steuer rumbo cap").split())
+OTHER_WAY = frozenset("w west ouest oeste vest south sud sur syd zuid".split())
+"""Parts of the name of a longitude or latitude that counts to the west or south."""
 DIRECTIONS = frozenset("north northing nord norte noord east easting ost oest este".split())
 YAW = frozenset(["yaw", "gier", "gir", "theta"])
 TURNED = np.radians(8.0)  # range of a heading that no name says, at least
@@ -546,7 +548,9 @@ def _signed(state: State, best: Pose) -> Pose:
     elif phase > 3 * np.pi / 4:
         psi, _ = evidence.heal(state.columns[best.heading], 2 * np.pi / to_si(best.unit, "psi"), state.t)
         turned = () if _astern(state, best, psi * to_si(best.unit, "psi")) else (best.north, best.east)
-    unsigned = all(state.columns[name].min() >= 0 or name in state.negated for name in turned)
+    unsigned = all(
+        state.columns[name].min() >= 0 or name in state.negated or OTHER_WAY & {*parts_of(name)} for name in turned
+    )
     agreements = sorted((abs(best.same), abs(best.mirrored)))
     if not turned or not unsigned or (mirrored and (1.0 - agreements[1]) * MIRROR > 1.0 - agreements[0]):
         return best

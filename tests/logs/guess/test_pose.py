@@ -329,3 +329,15 @@ def test_positions_from_the_centre_of_the_Earth_are_refused(names: tuple[str, st
 def test_positions_in_ship_lengths_are_asked_for_the_length() -> None:
     state = chosen({"X/Lpp": NORTH / 30.0, "Y/Lpp": EAST / 30.0, "heading": DEG})
     assert any("write factor = the length in m" in question.sentence for question in state.questions)
+
+
+def test_a_longitude_that_by_its_name_counts_to_the_west_does_so() -> None:
+    """Before, the heading, the yaw rate and the rudder of the log were said to count to port."""
+    place = _on_earth()
+    state = chosen({"Lat": place["lat"], "Lon W": -place["lon"], "heading": DEG})
+    assert {one.name: one.extra.get("sign", 1) for one in state.suggestions} == {
+        "latitude": 1,
+        "longitude": -1,
+        "psi": 1,
+    }
+    assert any("does the log count 'Lon W' to west?" in question.sentence for question in state.questions)
