@@ -183,7 +183,8 @@ def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
                 orders[name] = (score, signal)
     groups: dict[tuple[str | int | None, str], list[str]] = {}
     sides = {name: state.side_of(name) for name in orders}
-    for name in sorted(orders, key=lambda one: (is_order(one), -orders[one][0])):
+    still = {name: not np.ptp(state.columns[name]) for name in orders}  # a feedback that is not connected comes last
+    for name in sorted(orders, key=lambda one: (still[one], is_order(one), -orders[one][0])):
         side, number = sides[name], numbered(name)
         both = f"{side} {number}" if side and number and state.commands else side or number
         groups.setdefault((state.command_of(name) or both, orders[name][1]), []).append(name)

@@ -78,6 +78,17 @@ def test_the_measured_angle_is_taken_rather_than_the_order() -> None:
     assert finding.kind == "several columns for one command"
 
 
+def test_an_angle_that_never_moves_comes_after_the_order() -> None:
+    """A feedback that is not connected: before, it was the rudder, and made the shaft turn 60 times too fast."""
+    state = chosen({"rudder order": RUDDER, "rudder feedback": 0.0 * RUDDER, "rpm": RPM})
+    assert described(state) == {"rudder.delta": ("rudder order", "deg", 1), "propeller.n": ("rpm", "rpm", 1)}
+
+
+def test_the_shaft_of_a_controllable_pitch_propeller_is_no_pitch() -> None:
+    state = chosen({"CPP_ShaftRpm": RPM, "CPP_Pitch": 0.8 + 0.01 * np.sin(T), "CPP oil temp": 40.0 + 0.0 * T})
+    assert described(state) == {"propeller.n": ("CPP_ShaftRpm", "rpm", 1), "propeller.pitch": ("CPP_Pitch", "-", 1)}
+
+
 @pytest.mark.parametrize(
     ("name", "values", "unit", "asked", "kinds"),
     [
