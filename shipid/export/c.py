@@ -37,8 +37,9 @@ WORDS = frozenset(
     no_band predict_from radius_of refuse same_turn say self set start_values t va_list
     """.split()
 )
-"""Keywords of C99, C23 and C++20, names of C's library and headers and of the sources themselves: a file of such a name would
-not compile."""
+"""Keywords of C99, C23 and C++20, names of C's library and headers and of the sources themselves.
+
+A file of such a name would not compile."""
 
 
 @dataclass(frozen=True)
