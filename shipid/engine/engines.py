@@ -54,6 +54,7 @@ class Engine:
         the distances are those of the two channels of the job to the goal after every step. None if it cannot.
     gradient : (model, batch of one variant, job, places of the wanted parameters, loss) -> Adjoint. None if it cannot.
     any_device : whether it runs on every PyTorch device, not on the CPU alone.
+    checks : whether the greatest speed is no number wherever an input is none.
     """
 
     run: Callable[[Dynamics, Batch, Job], tuple[Array, Array]]
@@ -62,6 +63,7 @@ class Engine:
     measure: Callable[[Dynamics, Batch, Job, Array], tuple[Array, Array, Array]] | None = None
     gradient: Callable[[Dynamics, Batch, Job, tuple[int, ...], Loss], Adjoint] | None = None
     any_device: bool = False
+    checks: bool = False
 
 
 def _torch(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
@@ -93,8 +95,9 @@ ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
         available=_has_compiler,
         measure=measure_native,
         gradient=gradient_native,
+        checks=True,
     ),
-    "single": Engine(run_single, available=_has_compiler, measure=measure_single),
+    "single": Engine(run_single, available=_has_compiler, measure=measure_single, checks=True),
     "casadi": Engine(run_casadi, preferred=lambda load: load.device == "cpu" and load.width < BATCH_FROM),
     "compiled": Engine(
         _compiled, preferred=lambda load: load.device != "cpu" and load.work > COMPILE_FROM, any_device=True

@@ -70,7 +70,7 @@ _NO_PRE = """#ifndef __clang__ // GCC would keep what one branch has computed in
 #pragma GCC optimize "no-tree-pre"
 #endif
 """
-PARTS = 8  # tasks for each core at least: for an even load
+PARTS = 12  # tasks for each core at least: for an even load
 BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
 
 
@@ -314,9 +314,14 @@ const V dt[1] = {{ K(step) }};
         drawn = " ".join(
             f"components[{i}] = (const U *)drawn[{i}] + g * counts[{i}] * {w};" for i, w in enumerate(widths)
         )
+        check = " ".join(
+            f"for (long c = 0; c < counts[{i}] * {w}; ++c) sum += ((const U *)drawn[{i}])[g * counts[{i}] * {w} + c];"
+            for i, w in enumerate(widths)
+        )
         task = f"""V parameters[{max(1, parameters)}], saved0[{self.total(0)}], known[{block}][{self.total(1)}];
 V states[{block}][{nx}], memories[{block}][{max(1, nm)}], taus[{block}][{n}], greatest[{block}], distance[{block}];
-for (int i = 0; i < {parameters}; ++i) parameters[i] = K(values[number / parts * {parameters} + i]);
+V given = K(0); // its product with 0 is no number where a parameter is none
+for (int i = 0; i < {parameters}; ++i) given += parameters[i] = K(values[number / parts * {parameters} + i]);
 stage0(parameters, saved0);
 const long groups = stride / W, part = number % parts, last = groups * (part + 1) / parts;
 ONE_VARIANT(records, (steps / every + 1) * num_rows * stride)
@@ -326,7 +331,8 @@ if (tally) tally += number * {BINS};
 for (long front = groups * part / parts; front < last; front += {block}) {{
   long end = front + {block} < last ? front + {block} : last;
   EACH_GROUP(end) {{
-    V *x = states[j], *m = memories[j], sum = K(0);
+    V *x = states[j], *m = memories[j], sum = given;
+    {check}
     greatest[j] = distance[j] = K(0);
     for (int i = 0; i < {nx}; ++i) {{ x[i] = *AT(start, i); sum += x[i]; }}
     for (int i = 0; i < {nm}; ++i) {{ m[i] = *AT(memory, i); sum += m[i]; }}
@@ -339,11 +345,11 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
     const U *components[{max(1, len(widths))}];
     {drawn}
     if (k == 0 || k < lengths[2])
-      for (int i = 0; i < {n}; ++i) tau[i] = *AT(extra, k * {n} + i);
+      for (int i = 0; i < {n}; ++i) all += tau[i] = *AT(extra, k * {n} + i);
     if (k == 0 || k < lengths[0] || k < lengths[1]) {{
       V c[{max(1, nc)}], e[{max(1, ne)}];
-      for (int i = 0; i < {nc}; ++i) c[i] = *AT(commands, NOW(0, k) * {nc} + i);
-      for (int i = 0; i < {ne}; ++i) e[i] = *AT(environment, NOW(1, k) * {ne} + i);
+      for (int i = 0; i < {nc}; ++i) all += c[i] = *AT(commands, NOW(0, k) * {nc} + i);
+      for (int i = 0; i < {ne}; ++i) all += e[i] = *AT(environment, NOW(1, k) * {ne} + i);
       stage1(c, e, saved0, saved1);
     }}
     {self.one_step()}

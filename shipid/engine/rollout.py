@@ -110,10 +110,19 @@ def rollout(
     kept = names if keep is None else names_of("keep", keep)
     job = Job(step, num_steps, method, every, places(kept, names, vessel), device)
     with np.errstate(all="ignore"):
-        records, worst = done_by(
-            asked, lambda: chosen(batch, job, engine == REPEATED), lambda way: way.run(model, batch, job)
+        records, diverged = done_by(
+            asked,
+            lambda: chosen(batch, job, engine == REPEATED),
+            lambda way: _judged(way, batch, *way.run(model, batch, job)),
         )
-    return Trajectories(records, kept, ~(worst <= SPEED_LIMIT) | ~finite(batch), step * every)
+    return Trajectories(records, kept, diverged, step * every)
+
+
+def _judged(way: Engine, batch: Batch, *found: Array) -> tuple[Array, ...]:
+    """What an engine has found, with whether each (variant, sample) has diverged in place of its greatest speed."""
+    *kept, worst = found
+    slow = worst <= SPEED_LIMIT
+    return *kept, ~(slow if way.checks else slow & finite(batch))
 
 
 def check_steps(num_steps: int) -> None:
@@ -182,16 +191,14 @@ def distances(
 def _distances(way: Engine, model: Dynamics, batch: Batch, job: Job, goal: Array) -> Distances:
     """Distances by one engine."""
     if way.measure is not None:
-        total, counts, worst = way.measure(model, batch, job, goal.transpose(0, 2, 1))
-        return Distances(total, counts, ~(worst <= SPEED_LIMIT) | ~finite(batch))
+        return Distances(*_judged(way, batch, *way.measure(model, batch, job, goal.transpose(0, 2, 1))))
     few = max(1, PATHS_KEPT // goal.size)
     measured = []
     for first in range(0, len(batch.parameters), few):
         part = replace(batch, parameters=batch.parameters[first : first + few])
         with np.errstate(all="ignore"):
-            records, worst = way.run(model, part, job)
+            records, diverged = _judged(way, part, *way.run(model, part, job))
             apart = [position_error(records[1:, v], goal) for v in range(records.shape[1])]
-        diverged = ~(worst <= SPEED_LIMIT) | ~finite(part)
         measured.append(
             (np.array([errors.sum(axis=0) for errors in apart]), np.array(list(map(tally, apart))), diverged)
         )
@@ -257,8 +264,6 @@ def finite(batch: Batch) -> Array:
     """Whether every input of a (variant, sample) is a number: fmin and fmax may hide a NaN in CasADi."""
     drawn = (part.swapaxes(1, 2) for part in batch.components)
     inputs = (batch.state, batch.memory, batch.commands, batch.environment, batch.tau_extra, *drawn)
-    if all(np.isfinite(array.sum()) for array in (*inputs, batch.parameters)):  # a sum hides nothing, and is fast
-        return np.ones((len(batch.parameters), batch.state.shape[1]), dtype=bool)
     samples = np.all([np.isfinite(array).all(axis=tuple(range(array.ndim - 1))) for array in inputs], axis=0)
     return np.asarray(np.isfinite(batch.parameters).all(axis=1)[:, None] & samples)
 

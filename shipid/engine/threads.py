@@ -57,7 +57,7 @@ def in_parallel(
     work : of one task, in units of a tenth of a microsecond or so.
     """
     held, threads = list(arrays), cores()
-    pointers = [None if array is None else array.ctypes.data for array in held]
+    pointers = [None if array is None else array.__array_interface__["data"][0] for array in held]
     numbers = list(sizes)
     inputs = (ctypes.c_long * len(numbers))(*numbers), (ctypes.c_void_p * len(held))(*pointers)
     few = max(2 * threads, int(AT_ONCE // max(work, 1.0)))

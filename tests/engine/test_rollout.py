@@ -14,6 +14,7 @@ import torch
 
 from shipid.engine.casadi import memory_along
 from shipid.engine.integrate import Method
+from shipid.engine.native import compiler
 from shipid.engine.rollout import distances, rollout
 from shipid.errors import DataError, ShipidError
 from shipid.interrupts import uninterrupted
@@ -250,6 +251,49 @@ def test_distances_begin_where_the_actuators_are(draw_inputs: Draw, engine: Any)
     given["commands"]["port.n"] = np.where(np.arange(3) == 1, np.nan, given["commands"]["port.n"])
     missing = distances(vessel, **given, memory=reached, goal=goal, step=1.0, engine=engine)
     assert missing.diverged.tolist() == [[False, True, False]]
+
+
+@pytest.mark.parametrize("engine", ["native", "single", "casadi", "torch"])
+@pytest.mark.parametrize(
+    "where", ["start", "memory", "commands", "late command", "environment", "tau", "parameters", "drawn"]
+)
+def test_an_input_that_is_no_number_is_reported_though_a_limit_hides_it(
+    draw_inputs: Draw, engine: Any, where: str
+) -> None:
+    """Its samples alone, in paths and in distances; the last sample shares no vector with the first."""
+    if engine in ("native", "single") and compiler() is None:
+        pytest.skip("no C compiler on this machine")
+    limits = {f"thruster.port.actuator.{name}": {**LAG, "low": -3.0, "high": 3.0} for name in ("n", "alpha")}
+    vessel = load_vessel("gunnerus-28.9-6dof" if where == "drawn" else "gunnerus-28.9").with_values(limits)
+    count = 18
+    given: dict[str, Any] = draw_inputs(vessel, count)
+    wrong = np.where(np.isin(np.arange(count), (3, 17)), np.nan, 0.0)
+    further: dict[str, Any] = {"memory": {f"port.{name}": np.full(count, 0.5) for name in ("n", "alpha")}}
+    bad = np.isnan(wrong)[None]
+    if where in ("start", "commands", "environment"):
+        name = {"start": "u", "commands": "port.n", "environment": "V_w"}[where]
+        given[where] = {**given[where], name: given[where][name] + wrong}
+    elif where == "late command":
+        held = np.tile(given["commands"]["port.n"], (4, 1))
+        held[3] += wrong
+        given["commands"] = {**given["commands"], "port.n": held}
+    elif where == "memory":
+        further["memory"]["port.n"] = further["memory"]["port.n"] + wrong
+    elif where == "tau":
+        further["tau_extra"] = np.tile(wrong[:, None], (1, 3))
+    elif where == "parameters":
+        values = np.array([list(vessel.parameters.values())] * 2)
+        values[1, list(vessel.parameters).index("thruster.port.actuator.n.high")] = np.nan
+        further["parameters"], bad = values, np.array([[False], [True]]) & np.ones((2, count), dtype=bool)
+    else:
+        waves = np.zeros((count, 2, sum(dynamics(vessel).drawn[0].widths.values())))
+        waves[:, 1, 3] += wrong
+        further = {"components": {"waves.first_order": waves}}
+    path = rollout(vessel, **given, **further, step=0.5, num_steps=4, engine=engine)
+    np.testing.assert_array_equal(path.diverged, bad)
+    if where not in ("tau", "drawn"):
+        measured = distances(vessel, **given, **further, goal=np.zeros((4, count, 2)), step=0.5, engine=engine)
+        np.testing.assert_array_equal(measured.diverged, bad)
 
 
 def test_memory_along_a_run_is_the_lag_of_its_orders() -> None:
