@@ -25,7 +25,7 @@ from typing import IO, Any
 from shipid.errors import ShipidError, is_utf_8, visible
 from shipid.files import temporary_folder
 
-MOST_WORDS = 100_000
+MOST_WORDS = 100_000  # characters of each output of a compiler
 PROBE_LIMIT, LIMIT = 10.0, 120.0  # s that a compiler may take: for a probe of two lines, for a model
 
 log = logging.getLogger(__name__)
@@ -39,7 +39,7 @@ def run_compiler(arguments: Sequence[str], folder: Path | None = None, limit: fl
     """Run a compiler: (its complaint in one text, None if it succeeded; what it printed).
 
     folder : for its temporary files. A compiler that takes longer than `limit` [s] is ended, and so are the processes
-        that it leaves. Of what it prints the first `MOST_WORDS` signs are kept, so that none can fill the memory.
+        that it leaves. Of what it prints the first `MOST_WORDS` characters are kept, so that none can fill the memory.
     """
     environment = os.environ | ({"TMPDIR": str(folder)} if folder else {})
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
@@ -67,7 +67,7 @@ def run_compiler(arguments: Sequence[str], folder: Path | None = None, limit: fl
 
 
 def _read(pipe: IO[str], kept: list[str]) -> None:
-    """Read a pipe to its end; the first `MOST_WORDS` signs are kept."""
+    """Read a pipe to its end; the first `MOST_WORDS` characters are kept."""
     with pipe:
         kept.append(pipe.read(MOST_WORDS))
         while pipe.read(MOST_WORDS):

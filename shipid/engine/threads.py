@@ -57,6 +57,7 @@ def in_parallel(
     work : of one task, in units of a tenth of a microsecond or so.
     """
     held, threads = list(arrays), cores()
+    # as `array.ctypes.data`, in a quarter of the time
     pointers = [None if array is None else array.__array_interface__["data"][0] for array in held]
     numbers = list(sizes)
     inputs = (ctypes.c_long * len(numbers))(*numbers), (ctypes.c_void_p * len(held))(*pointers)

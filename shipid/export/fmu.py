@@ -78,7 +78,7 @@ class Packed:
 
 
 def quoteattr(text: str) -> str:
-    """A text as an attribute of XML; a character that XML cannot hold becomes the sign for that."""
+    """A text as an attribute of XML; a character that XML cannot hold becomes U+FFFD, the replacement character."""
     return saxutils.quoteattr(re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "\ufffd", text))
 
 
@@ -678,7 +678,7 @@ FMI2_STATUS FMI2(fmi2Terminate)(fmi2Component c);
 FMI2_STATUS FMI2(fmi2Terminate)(fmi2Component c)
 {
     Instance *self = (Instance *)c;
-    if (self->phase != STEPPING) return refuse(self, fmi2Error, "there is nothing to end");
+    if (self->phase != STEPPING) return refuse(self, fmi2Error, "Terminate before a step: nothing runs that could end");
     self->phase = TERMINATED;
     return fmi2OK;
 }
@@ -711,7 +711,7 @@ FMI2_STATUS FMI2(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr[], si
 {
     Instance *self = (Instance *)c;
     size_t i;
-    if (self->phase == TERMINATED) return refuse(self, fmi2Error, "the end has come: nothing can be set");
+    if (self->phase == TERMINATED) return refuse(self, fmi2Error, "the simulation has ended: reset before a value is set");
     for (i = 0; i < n; ++i) {
         if (vr[i] >= NUM_REALS) return refuse(self, fmi2Error, "there is no real variable %u", vr[i]);
         if (kinds[vr[i]] == 'o' || (kinds[vr[i]] == 'e' && self->phase == STEPPING))
@@ -903,7 +903,7 @@ FMI2_STATUS FMI2(fmi2DoStep)(fmi2Component c, fmi2Real time, fmi2Real step, fmi2
     Instance *self = (Instance *)c;
     const char *message;
     (void)keep;
-    if (self->phase != STEPPING) return refuse(self, fmi2Error, "the initialisation is not over, or the end has come");
+    if (self->phase != STEPPING) return refuse(self, fmi2Error, "the initialisation is not over, or the simulation has ended");
     if (!isfinite(time) || !isfinite(step) || step < 0)
         return refuse(self, fmi2Discard, "time %g and step %g must be finite, the step not below 0", time, step);
     if (step == 0) return fmi2OK;

@@ -14,10 +14,8 @@ from shipid.units import DEGREE
 LEVEL_HELM, LEVEL_SHARE = 0.5 * DEGREE, 0.02  # closer helm angles are one level, and such a share of the greatest one
 MOST_ROWS, SCATTER = 0.9, 3.0  # of the changes from row to row, and how far such changes scatter about a level
 LEVEL_RATE = 0.05  # of the largest rate: rates closer than this are one level
-LAST, LEFT_OUT = (
-    0.25,
-    0.05,
-)  # of a level of rate: where it is read, but for its end, where the next helm is over already
+LAST = 0.25  # of a level of rate: it is read in its last quarter
+LEFT_OUT = 0.05  # of a level of rate: at its end the helm is over for the next level already
 
 
 @dataclass(frozen=True, eq=False)

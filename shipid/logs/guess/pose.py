@@ -33,7 +33,7 @@ TURNED = np.radians(8.0)  # range of a heading that no name says, at least
 NEARLY_ALWAYS = 0.9  # share of the rows with a turning shaft in which it turns astern, of a ship that goes astern
 SEARCHED = 24  # columns at most, where no name helps
 
-RADIUS, OFF_RADIUS = 6.368e6, 2.5e4  # m: from the centre of the Earth to her ellipsoid, with hills and waves
+RADIUS, OFF_RADIUS = 6.368e6, 2.5e4  # m: from the centre of the Earth to its ellipsoid, with hills
 LENGTHS = re.compile(r"/ ?L(?:_?(?:pp|bp|wl|oa))?\b", re.IGNORECASE)
 """The end of the name of a position in ship lengths, such as X/Lpp."""
 
