@@ -22,6 +22,7 @@ from shipid.errors import DataError
 INPUTS = {"latitude": "rad", "longitude": "rad", "speed": "m/s", "course": "rad"}
 """Columns of a mapping that become others: position on the Earth north and east, speed and course over ground u, v."""
 Mask = NDArray[np.bool_]
+Records = list[dict[str, Any]]  # kind, column, count and note of what was done to a log
 Interval = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
 FEWEST_AT_END = 3  # rows in half a window, from which spikes at the end of a stretch are looked for
 
@@ -286,7 +287,7 @@ FLAGS = ("interpolated", *REPAIRS)
 
 def apply_repairs(
     rows: pd.DataFrame, repairs: Iterable[Repair], without: Iterable[str] = (), file: Path | None = None
-) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
+) -> tuple[pd.DataFrame, Records]:
     """Apply repairs in order and flag what they touch; a record {kind, column, count, note} for each, also if off.
 
     Raises DataError, with the file, for a repair that leaves no row or that can mend nothing.

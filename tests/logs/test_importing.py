@@ -12,8 +12,8 @@ import pytest
 
 from shipid.data.dataset import Dataset, flag_bit, pieces, read_dataset, write_dataset
 from shipid.errors import DataError, DocumentError
-from shipid.logs import importing, readers
-from shipid.logs.importing import _unwrap, even_clock, evenly, import_log, read_mapping, rounding_of, runs_of
+from shipid.logs import frames, readers
+from shipid.logs.importing import import_log, read_mapping, runs_of
 from shipid.logs.mapping import Source
 from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, stamps, turning
 
@@ -238,21 +238,6 @@ def test_clock_in_minutes(plain_mapping: Write, tmp_path: Path) -> None:
     assert dataset.frame["t"].iloc[[0, -1]].tolist() == [30.0, 60.0]
 
 
-@pytest.mark.parametrize(
-    ("every", "lost"), [(0.1, [(400, 7), (900, 9)]), (0.1, [(300, 12)]), (0.5, [(200, 1), (400, 1)])]
-)
-def test_lost_rows_of_a_rounded_clock_are_found_whatever_it_counts_from(
-    every: float, lost: list[tuple[int, int]]
-) -> None:
-    """In whole seconds since 1970 as in those since the begin of the log."""
-    t = 0.03 + every * np.arange(int(300 / every))
-    seconds = np.floor(np.delete(t, np.concatenate([np.arange(first, first + count) for first, count in lost])))
-    log = pd.DataFrame(index=range(len(seconds)))
-    even, since_1970 = (evenly(seconds + begin, every, log, Path("log.csv")) - begin for begin in (0.0, 1.7e9))
-    np.testing.assert_allclose(since_1970, even, atol=1e-5)
-    assert np.abs(even - seconds).max() < 1.0 + every
-
-
 @pytest.mark.parametrize(("step", "rounded"), [(0.5, 1.0), (0.02, 0.1), (0.1, 1.0)])
 def test_a_rounded_clock_runs_evenly(step: float, rounded: float, plain_mapping: Write, tmp_path: Path) -> None:
     """The rows are `every` apart; without the key, the same log is refused, for its times stand twice."""
@@ -265,41 +250,6 @@ def test_a_rounded_clock_runs_evenly(step: float, rounded: float, plain_mapping:
     times = import_log(read_mapping(mapping), log).frame["t"].to_numpy()
     np.testing.assert_allclose(np.diff(times), step, rtol=1e-9)
     np.testing.assert_allclose(times, t, atol=rounded)
-
-
-def test_a_rounded_clock_starts_anew_after_a_pause() -> None:
-    t = np.concatenate([np.arange(0.0, 20.0, 0.1), np.arange(300.0, 320.0, 0.1)])
-    even, pauses = even_clock(np.floor(t + 1e-9), 0.1)
-    assert pauses == 1
-    np.testing.assert_allclose(even, t, atol=1.0)
-    np.testing.assert_allclose(np.delete(np.diff(even), 199), 0.1)
-
-
-def test_a_clock_of_another_rate_is_refused() -> None:
-    t = np.floor(np.arange(0.0, 60.0, 0.1) + 1e-9)
-    with pytest.raises(DataError, match=r"log\.csv: row \d+, clock\.every: the time is .* from rows every 0\.2 s"):
-        evenly(t, 0.2, pd.DataFrame(index=range(len(t))), Path("log.csv"))
-
-
-def test_the_rounding_of_a_clock_grows_with_its_numbers() -> None:
-    """Of numbers with three digits, 9.99 is known to 0.01, and 99.9 to 0.1."""
-    t = np.arange(1.0, 99.0, 0.05)
-    rounding = rounding_of(np.array([float(f"{value:.3g}") for value in t]))
-    np.testing.assert_allclose(rounding[[0, -1]], [0.05, 0.1], rtol=1e-6)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_angles_are_unwrapped_as_numpy_does(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    turns = np.cumsum(random.normal(0.0, 1.5, 500))
-    for values in (
-        turns % (2 * np.pi),
-        np.angle(np.exp(1j * turns)),
-        np.pi * random.integers(-3, 4, 500).astype(float),
-    ):
-        expected = np.unwrap(values)
-        _unwrap(values)
-        np.testing.assert_allclose(values, expected, atol=1e-9)
 
 
 def test_wind_from_becomes_towards(plain_mapping: Write, tmp_path: Path) -> None:
@@ -468,20 +418,6 @@ def test_rows_of_a_ship_at_rest_are_not_repeated_rows(
     np.testing.assert_allclose(np.diff(dataset.frame["t"]), 0.1, rtol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_a_rounded_clock_keeps_time_where_rows_were_lost(seed: int) -> None:
-    """Times err by less than a rounding against each other; rows are whole steps apart, and none goes back."""
-    random = np.random.default_rng(seed)
-    step = float(random.choice([0.05, 0.1, 0.2]))
-    kept = np.sort(random.choice(2000, 1900, replace=False))
-    t = 5.0 + step * kept
-    even, _ = even_clock(np.floor(t + 1e-9), step)
-    assert np.ptp(even - t) <= 1.0 + 1e-9
-    apart = np.diff(even) / step
-    np.testing.assert_allclose(apart, np.round(apart), atol=1e-6)
-    assert apart.min() > 0.5
-
-
 def test_a_place_beyond_the_poles_is_refused(tmp_path: Path) -> None:
     """999 deg stands for a missing fix; north and east would be thousands of kilometres."""
     log = pd.DataFrame({"t": T, "lat": 63.0 + 1e-5 * T, "lon": 10.0, "psi": 0.1, "u": 1.0, "v": 0.0, "r": 0.0})
@@ -596,7 +532,7 @@ def test_positions_are_projected_block_by_block(tmp_path: Path, monkeypatch: pyt
     (tmp_path / "mapping.toml").write_text(PARTED)
     parted().to_csv(tmp_path / "log.csv", index=False)
     whole = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv").frame
-    monkeypatch.setattr(importing, "BLOCK", 3)
+    monkeypatch.setattr(frames, "BLOCK", 3)
     by_parts = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv").frame
     pd.testing.assert_frame_equal(by_parts, whole, rtol=1e-14)
 

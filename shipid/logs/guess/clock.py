@@ -32,7 +32,7 @@ from shipid.logs.dates import (
     ways_of,
 )
 from shipid.logs.guess.words import NO_VALUE, is_run, parts_of, units_in
-from shipid.logs.importing import even_clock, repeated_rows, rounding_of
+from shipid.logs.instants import even_clock, repeated_rows, rounding_of
 from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, names_of, since_midnight, to_si
 from shipid.logs.workbook import NOT_CALCULATED
 

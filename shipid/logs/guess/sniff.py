@@ -14,6 +14,7 @@ import pandas as pd
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
+from shipid.logs.cells import OFF_ONE
 from shipid.logs.formats import SheetFormat, TableFormat, TextFormat
 from shipid.logs.guess.clock import (
     Rows,
@@ -27,7 +28,6 @@ from shipid.logs.guess.clock import (
 )
 from shipid.logs.guess.layout import format_of, format_of_sheet, table_below
 from shipid.logs.guess.words import NO_VALUE, fits, is_run, parts_of, units_in
-from shipid.logs.importing import OFF_ONE
 from shipid.logs.mapping import SIDES, degrees_in_parts, degrees_in_text, degrees_to_sides, names_of, size_of, yaw_of
 from shipid.logs.readers import LONGEST_LINE, READERS, in_points, parse_text, read_table, require_file, widest
 from shipid.logs.workbook import NOT_CALCULATED

@@ -1,0 +1,692 @@
+"""The C of an FMU: the functions of FMI 2.0 around the step of a vessel, or the path of a predictor.
+
+The standard: Functional Mock-up Interface 2.0.4, fmi-standard.org. Its declarations are written out in `_FMI_HEAD`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipid.export.band import CHOICE, COLUMNS
+from shipid.export.blocks import Precision
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A real variable of an FMU.
+
+    start : None where it is calculated. guess : whether it is calculated, too, unless the importer sets a start value.
+    """
+
+    name: str
+    causality: str
+    variability: str
+    unit: str
+    description: str
+    start: float | None
+    guess: bool = False
+
+    @property
+    def initial(self) -> str:
+        """How it begins, in the words of FMI; nothing for inputs."""
+        known = "calculated" if self.start is None else "approx" if self.guess else "exact"
+        return "" if self.causality == "input" else known
+
+
+def vessel_wrapper(name: str, sizes: Mapping[str, int], num_states: int, variables: Sequence[Variable]) -> str:
+    """Return the C of a vessel; `sizes` are the lengths of the arrays of its step, by their names."""
+    at, place = {}, 0
+    for group in ("carry", "commands", "environment", "loads", "parameters"):
+        at[group] = place
+        place += sizes[group]
+    total = place + 1
+    given = ", ".join(
+        f"self->values + {at[group]}" for group in ("carry", "commands", "environment", "loads", "parameters")
+    )
+    begin = f"""    double carry[{sizes["carry"]}];
+    int i;
+    memcpy(carry, self->values, sizeof carry);
+    {name}_begin(carry, self->values + {at["commands"]});
+    for (i = {num_states}; i < {sizes["carry"]}; ++i) if (!set[i]) self->values[i] = carry[i]; /* actuators: at their orders */
+    (void)t;
+"""
+    begin = begin if sizes["carry"] > num_states else "    (void)self;\n    (void)set;\n    (void)t;\n"
+    return f"""
+#define NUM_REALS {total}
+#define NUM_BOOLEANS 0
+{_FMI_HEAD}
+typedef struct {{
+    double values[NUM_REALS];
+    int status;
+}} Model;
+{_fmi(name, variables)}
+static void Model_init(Model *self)
+{{
+    memset(self, 0, sizeof *self);
+    memcpy(self->values, start_values, sizeof start_values);
+}}
+
+static const char *Model_begin(Model *self, const unsigned char *set, double t)
+{{
+{begin}    return 0;
+}}
+
+static const char *Model_step(Model *self, double t, double h)
+{{
+    const double largest = self->values[{total - 1}];
+    const double count = ceil(h / largest - 1e-9);
+    double before[{max(1, sizes["carry"])}];
+    long k, steps;
+    (void)t;
+    if (!(largest > 0)) return "solver.step must be above 0";
+    if (!(count < 1e9)) return "the communication step needs too many steps of solver.step";
+    steps = count < 1 ? 1 : (long)count;
+    memcpy(before, self->values, sizeof before);
+    for (k = 0; k < steps; ++k) {{
+        self->status = {name}_step({given}, h / (double)steps);
+        if (self->status) {{
+            memcpy(self->values, before, sizeof before);
+            return self->status == {name}_DIVERGED
+                ? "the motion diverges: take a smaller solver.step, or look at inputs and parameters"
+                : "an input is not finite";
+        }}
+    }}
+    return 0;
+}}
+
+static int Model_boolean(const Model *self, unsigned reference)
+{{
+    (void)self;
+    (void)reference;
+    return 0;
+}}
+{_FMI_BODY}"""
+
+
+def predictor_wrapper(
+    name: str,
+    num_row: int,
+    horizon: int,
+    num_planned: int,
+    num_parameters: int,
+    banded: bool,
+    variables: Sequence[Variable],
+) -> str:
+    """Return the C of a predictor of `horizon` steps; `num_row` is the number of values in a row that it records."""
+    planned = num_row
+    path = planned + horizon * num_planned
+    band = path + 2 * horizon
+    instant = band + (len(COLUMNS) * horizon if banded else 0)
+    parameters = instant + 1
+    held = parameters + num_parameters
+    chosen = held + (1 if num_planned else 0)
+    total = chosen + (len(CHOICE) if banded else 0)
+    plan = f"self->values[{held}] != 0 ? 0 : self->values + {planned}" if num_planned else "0"
+    declared, shown = "", ""
+    call = f"{name}_predict(kept, {plan}, path)"
+    if banded:
+        asked = f"self->values[{chosen}], self->values[{chosen + 1}] != 0, kind_of(self->values[{chosen + 2}])"
+        call = f"{name}_predict_band(kept, {plan}, {asked}, path, band)"
+        declared = f"    double band[{len(COLUMNS)} * {horizon}];\n"
+        shown = "\n".join(
+            f"        self->values[{band + place * horizon} + k] = band[{len(COLUMNS)} * k + {place}];"
+            for place in range(len(COLUMNS))
+        )
+    numbered = (
+        """
+/* A whole number, or -1, which is no kind. */
+static int kind_of(double value)
+{
+    return value >= 0 && value < 1e9 && floor(value) == value ? (int)value : -1;
+}
+"""
+        if banded
+        else ""
+    )
+    return f"""
+#define NUM_REALS {total}
+#define NUM_BOOLEANS 1
+{_FMI_HEAD}
+typedef struct {{
+    double values[NUM_REALS];
+    int status;
+    {name} kept, trial; /* the second for the path at the start: too large for the stack of a thread */
+}} Model;
+{_fmi(name, variables)}
+static void Model_init(Model *self)
+{{
+    memset(self, 0, sizeof *self);
+    memcpy(self->values, start_values, sizeof start_values);
+    {name}_init(&self->kept);
+}}
+
+{numbered}
+static const char *predict_from(Model *self, {name} *kept, double t)
+{{
+    double path[2 * {horizon}];
+{declared}    int k;
+    {"memcpy(kept->parameters, self->values + " + str(parameters) + ", " + str(num_parameters) + " * sizeof(double));" if num_parameters else ""}
+    self->status = {name}_record(kept, t, self->values);
+    if (self->status) return self->status == {name}_TIME ? "time does not go on" : "an input is not finite";
+    self->status = {call};
+    for (k = 0; k < {horizon}; ++k) {{
+        self->values[{path} + k] = path[2 * k];
+        self->values[{path + horizon} + k] = path[2 * k + 1];
+{shown}
+    }}
+    self->values[{instant}] = t;
+    return 0;
+}}
+
+/* The path at the start: from a copy, since the first step keeps this row. */
+static const char *Model_begin(Model *self, const unsigned char *set, double t)
+{{
+    (void)set;
+    self->trial = self->kept;
+    return predict_from(self, &self->trial, t);
+}}
+
+static const char *Model_step(Model *self, double t, double h)
+{{
+    (void)h;
+    return predict_from(self, &self->kept, t);
+}}
+
+static int Model_boolean(const Model *self, unsigned reference)
+{{
+    (void)reference;
+    return (self->status & {name}_OUTSIDE) != 0;
+}}
+{_FMI_BODY}"""
+
+
+def _kind(variable: Variable) -> str:
+    exact = variable.causality == "output" and variable.start is not None
+    return f"'{'e' if exact else variable.causality[0]}'"
+
+
+def _fmi(name: str, variables: Sequence[Variable]) -> str:
+    """Start values and kinds of the variables."""
+    values = Precision().table(np.array([0.0 if v.start is None else v.start for v in variables]))
+    return f"""
+static const char guid[] = "@GUID@";
+static const char identifier[] = "{name}";
+static const double start_values[NUM_REALS] = {{{values}}};
+static const char kinds[] = {{{", ".join(_kind(v) for v in variables)}}}; /* input, output, exact at the start, parameter */
+"""
+
+
+_FMI_HEAD = """
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* Types and status of FMI 2.0 for co-simulation. */
+typedef void *fmi2Component;
+typedef void *fmi2ComponentEnvironment;
+typedef void *fmi2FMUstate;
+typedef unsigned int fmi2ValueReference;
+typedef double fmi2Real;
+typedef int fmi2Integer;
+typedef int fmi2Boolean;
+typedef char fmi2Char;
+typedef const fmi2Char *fmi2String;
+typedef char fmi2Byte;
+typedef enum { fmi2OK, fmi2Warning, fmi2Discard, fmi2Error, fmi2Fatal, fmi2Pending } fmi2Status;
+typedef enum { fmi2ModelExchange, fmi2CoSimulation } fmi2Type;
+typedef enum { fmi2DoStepStatus, fmi2PendingStatus, fmi2LastSuccessfulTime, fmi2Terminated } fmi2StatusKind;
+typedef struct {
+    void (*logger)(fmi2ComponentEnvironment, fmi2String, fmi2Status, fmi2String, fmi2String, ...);
+    void *(*allocateMemory)(size_t, size_t);
+    void (*freeMemory)(void *);
+    void (*stepFinished)(fmi2ComponentEnvironment, fmi2Status);
+    fmi2ComponentEnvironment componentEnvironment;
+} fmi2CallbackFunctions;
+
+#ifdef FMI2_FUNCTION_PREFIX
+#define PASTE(a, b) a ## b
+#define PASTED(a, b) PASTE(a, b)
+#define FMI2(name) PASTED(FMI2_FUNCTION_PREFIX, name)
+#else
+#define FMI2(name) name
+#endif
+#if defined _WIN32 || defined __CYGWIN__
+#define FMI2_EXPORT __declspec(dllexport)
+#elif defined __GNUC__
+#define FMI2_EXPORT __attribute__((visibility("default")))
+#else
+#define FMI2_EXPORT
+#endif
+#define FMI2_STATUS FMI2_EXPORT fmi2Status
+"""
+
+
+_FMI_BODY = """
+typedef enum { INSTANTIATED, INITIALIZING, STEPPING, TERMINATED } Phase;
+typedef struct {
+    Model model;
+    Phase phase;
+    double time;
+    unsigned char set[NUM_REALS]; /* by the importer */
+    int logging;
+    char *name;
+    fmi2CallbackFunctions call;
+} Instance;
+
+static void *get_memory(const fmi2CallbackFunctions *call, size_t size)
+{
+    return call->allocateMemory ? call->allocateMemory(1, size) : calloc(1, size);
+}
+
+static void free_memory(const fmi2CallbackFunctions *call, void *memory)
+{
+    if (call->freeMemory) call->freeMemory(memory);
+    else free(memory);
+}
+
+static fmi2Status say(const fmi2CallbackFunctions *call, const char *name, fmi2Status status, const char *text)
+{
+    if (call->logger) call->logger(call->componentEnvironment, name, status, "logStatusError", "%s", text);
+    return status;
+}
+
+static fmi2Status refuse(Instance *self, fmi2Status status, const char *format, ...)
+{
+    char text[256];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    return self ? say(&self->call, self->name, status, text) : status;
+}
+
+FMI2_EXPORT const char *FMI2(fmi2GetTypesPlatform)(void);
+FMI2_EXPORT const char *FMI2(fmi2GetTypesPlatform)(void) { return "default"; }
+FMI2_EXPORT const char *FMI2(fmi2GetVersion)(void);
+FMI2_EXPORT const char *FMI2(fmi2GetVersion)(void) { return "2.0"; }
+
+FMI2_STATUS FMI2(fmi2SetDebugLogging)(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[]);
+FMI2_STATUS FMI2(fmi2SetDebugLogging)(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[])
+{
+    (void)n;
+    (void)categories;
+    ((Instance *)c)->logging = on;
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2String given, fmi2String place,
+    const fmi2CallbackFunctions *call, fmi2Boolean visible, fmi2Boolean logging);
+FMI2_EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2String given, fmi2String place,
+    const fmi2CallbackFunctions *call, fmi2Boolean visible, fmi2Boolean logging)
+{
+    Instance *self;
+    (void)place;
+    (void)visible;
+    if (!call) return 0;
+    if (type != fmi2CoSimulation) {
+        say(call, identifier, fmi2Error, "this FMU is for co-simulation");
+        return 0;
+    }
+    if (!given || strcmp(given, guid)) {
+        say(call, identifier, fmi2Error, "the guid is not that of this FMU");
+        return 0;
+    }
+    if (!name || !*name) {
+        say(call, identifier, fmi2Error, "an instance needs a name");
+        return 0;
+    }
+    self = (Instance *)get_memory(call, sizeof *self);
+    if (!self) return 0;
+    memset(self, 0, sizeof *self);
+    self->call = *call;
+    self->logging = logging;
+    self->name = (char *)get_memory(call, strlen(name) + 1);
+    if (!self->name) {
+        free_memory(call, self);
+        return 0;
+    }
+    strcpy(self->name, name);
+    Model_init(&self->model);
+    return self;
+}
+
+FMI2_EXPORT void FMI2(fmi2FreeInstance)(fmi2Component c);
+FMI2_EXPORT void FMI2(fmi2FreeInstance)(fmi2Component c)
+{
+    Instance *self = (Instance *)c;
+    fmi2CallbackFunctions call;
+    if (!self) return;
+    call = self->call;
+    free_memory(&call, self->name);
+    free_memory(&call, self);
+}
+
+FMI2_STATUS FMI2(fmi2SetupExperiment)(fmi2Component c, fmi2Boolean known, fmi2Real tolerance, fmi2Real start,
+    fmi2Boolean stops, fmi2Real stop);
+FMI2_STATUS FMI2(fmi2SetupExperiment)(fmi2Component c, fmi2Boolean known, fmi2Real tolerance, fmi2Real start,
+    fmi2Boolean stops, fmi2Real stop)
+{
+    Instance *self = (Instance *)c;
+    (void)known;
+    (void)tolerance;
+    (void)stops;
+    (void)stop;
+    if (self->phase != INSTANTIATED) return refuse(self, fmi2Error, "the start time is set before the initialisation");
+    if (!isfinite(start)) return refuse(self, fmi2Error, "the start time is not finite");
+    self->time = start;
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2EnterInitializationMode)(fmi2Component c);
+FMI2_STATUS FMI2(fmi2EnterInitializationMode)(fmi2Component c)
+{
+    Instance *self = (Instance *)c;
+    if (self->phase != INSTANTIATED) return refuse(self, fmi2Error, "the initialisation begins once");
+    self->phase = INITIALIZING;
+    return fmi2OK;
+}
+
+/* In the initialisation outputs follow what has been set until then. */
+static fmi2Status follow(Instance *self)
+{
+    const char *message = self->phase == INITIALIZING ? Model_begin(&self->model, self->set, self->time) : 0;
+    return message ? refuse(self, fmi2Error, "%s", message) : fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2ExitInitializationMode)(fmi2Component c);
+FMI2_STATUS FMI2(fmi2ExitInitializationMode)(fmi2Component c)
+{
+    Instance *self = (Instance *)c;
+    fmi2Status status;
+    if (self->phase != INITIALIZING) return refuse(self, fmi2Error, "there is no initialisation to end");
+    status = follow(self);
+    self->phase = STEPPING;
+    return status;
+}
+
+FMI2_STATUS FMI2(fmi2Terminate)(fmi2Component c);
+FMI2_STATUS FMI2(fmi2Terminate)(fmi2Component c)
+{
+    Instance *self = (Instance *)c;
+    if (self->phase != STEPPING) return refuse(self, fmi2Error, "Terminate before a step: nothing runs that could end");
+    self->phase = TERMINATED;
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2Reset)(fmi2Component c);
+FMI2_STATUS FMI2(fmi2Reset)(fmi2Component c)
+{
+    Instance *self = (Instance *)c;
+    Model_init(&self->model);
+    memset(self->set, 0, sizeof self->set);
+    self->phase = INSTANTIATED;
+    self->time = 0;
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2GetReal)(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]);
+FMI2_STATUS FMI2(fmi2GetReal)(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[])
+{
+    Instance *self = (Instance *)c;
+    size_t i;
+    for (i = 0; i < n; ++i)
+        if (vr[i] >= NUM_REALS) return refuse(self, fmi2Error, "there is no real variable %u", vr[i]);
+    if (follow(self) != fmi2OK) return fmi2Error;
+    for (i = 0; i < n; ++i) value[i] = self->model.values[vr[i]];
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]);
+FMI2_STATUS FMI2(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[])
+{
+    Instance *self = (Instance *)c;
+    size_t i;
+    if (self->phase == TERMINATED) return refuse(self, fmi2Error, "the simulation has ended: reset before a value is set");
+    for (i = 0; i < n; ++i) {
+        if (vr[i] >= NUM_REALS) return refuse(self, fmi2Error, "there is no real variable %u", vr[i]);
+        if (kinds[vr[i]] == 'o' || (kinds[vr[i]] == 'e' && self->phase == STEPPING))
+            return refuse(self, fmi2Error, "variable %u is an output and cannot be set now", vr[i]);
+        if (!isfinite(value[i]))
+            return refuse(self, fmi2Discard, "variable %u: %g is not a finite number", vr[i], value[i]);
+    }
+    for (i = 0; i < n; ++i) {
+        self->model.values[vr[i]] = value[i];
+        self->set[vr[i]] = 1;
+    }
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2GetInteger)(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[]);
+FMI2_STATUS FMI2(fmi2GetInteger)(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[])
+{
+    Instance *self = (Instance *)c;
+    size_t i;
+    if (follow(self) != fmi2OK) return fmi2Error;
+    for (i = 0; i < n; ++i) {
+        if (vr[i]) return refuse(self, fmi2Error, "there is no integer variable %u", vr[i]);
+        value[i] = self->model.status;
+    }
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2GetBoolean)(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[]);
+FMI2_STATUS FMI2(fmi2GetBoolean)(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[])
+{
+    Instance *self = (Instance *)c;
+    size_t i;
+    if (follow(self) != fmi2OK) return fmi2Error;
+    for (i = 0; i < n; ++i) {
+        if (!NUM_BOOLEANS || vr[i]) return refuse(self, fmi2Error, "there is no boolean variable %u", vr[i]);
+        value[i] = Model_boolean(&self->model, vr[i]);
+    }
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2GetString)(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[]);
+FMI2_STATUS FMI2(fmi2GetString)(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[])
+{
+    (void)vr;
+    (void)value;
+    return n ? refuse((Instance *)c, fmi2Error, "there are no strings") : fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2SetInteger)(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[]);
+FMI2_STATUS FMI2(fmi2SetInteger)(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[])
+{
+    (void)vr;
+    (void)value;
+    return n ? refuse((Instance *)c, fmi2Error, "no integer variable can be set") : fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2SetBoolean)(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[]);
+FMI2_STATUS FMI2(fmi2SetBoolean)(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[])
+{
+    (void)vr;
+    (void)value;
+    return n ? refuse((Instance *)c, fmi2Error, "no boolean variable can be set") : fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2SetString)(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String value[]);
+FMI2_STATUS FMI2(fmi2SetString)(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String value[])
+{
+    (void)vr;
+    (void)value;
+    return n ? refuse((Instance *)c, fmi2Error, "there are no strings") : fmi2OK;
+}
+
+/* A state is what changes: the model, the phase, the time, and which variables the importer has set; and of which FMU. */
+typedef struct {
+    char guid[sizeof guid];
+    Model model;
+    Phase phase;
+    double time;
+    unsigned char set[NUM_REALS];
+} Kept;
+
+FMI2_STATUS FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state);
+FMI2_STATUS FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state)
+{
+    Instance *self = (Instance *)c;
+    Kept *kept = (Kept *)*state;
+    if (!kept) kept = (Kept *)get_memory(&self->call, sizeof *kept);
+    if (!kept) return refuse(self, fmi2Error, "there is no memory for a state");
+    memcpy(kept->guid, guid, sizeof guid);
+    kept->model = self->model;
+    kept->phase = self->phase;
+    kept->time = self->time;
+    memcpy(kept->set, self->set, sizeof kept->set);
+    *state = kept;
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2SetFMUstate)(fmi2Component c, fmi2FMUstate state);
+FMI2_STATUS FMI2(fmi2SetFMUstate)(fmi2Component c, fmi2FMUstate state)
+{
+    Instance *self = (Instance *)c;
+    const Kept *kept = (const Kept *)state;
+    if (!kept) return refuse(self, fmi2Error, "there is no state");
+    self->model = kept->model;
+    self->phase = kept->phase;
+    self->time = kept->time;
+    memcpy(self->set, kept->set, sizeof self->set);
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2FreeFMUstate)(fmi2Component c, fmi2FMUstate *state);
+FMI2_STATUS FMI2(fmi2FreeFMUstate)(fmi2Component c, fmi2FMUstate *state)
+{
+    if (state && *state) {
+        free_memory(&((Instance *)c)->call, *state);
+        *state = 0;
+    }
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2SerializedFMUstateSize)(fmi2Component c, fmi2FMUstate state, size_t *size);
+FMI2_STATUS FMI2(fmi2SerializedFMUstateSize)(fmi2Component c, fmi2FMUstate state, size_t *size)
+{
+    (void)c;
+    (void)state;
+    *size = sizeof(Kept);
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2SerializeFMUstate)(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size);
+FMI2_STATUS FMI2(fmi2SerializeFMUstate)(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+{
+    if (!state || size < sizeof(Kept)) return refuse((Instance *)c, fmi2Error, "no state, or too few bytes for it");
+    memcpy(bytes, state, sizeof(Kept));
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2DeSerializeFMUstate)(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state);
+FMI2_STATUS FMI2(fmi2DeSerializeFMUstate)(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+{
+    Instance *self = (Instance *)c;
+    if (size != sizeof(Kept) || memcmp(bytes, guid, sizeof guid))
+        return refuse(self, fmi2Error, "these bytes are no state of this FMU");
+    if (!*state) *state = get_memory(&self->call, sizeof(Kept));
+    if (!*state) return refuse(self, fmi2Error, "there is no memory for a state");
+    memcpy(*state, bytes, sizeof(Kept));
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2GetDirectionalDerivative)(fmi2Component c, const fmi2ValueReference unknown[], size_t n,
+    const fmi2ValueReference known[], size_t m, const fmi2Real seed[], fmi2Real value[]);
+FMI2_STATUS FMI2(fmi2GetDirectionalDerivative)(fmi2Component c, const fmi2ValueReference unknown[], size_t n,
+    const fmi2ValueReference known[], size_t m, const fmi2Real seed[], fmi2Real value[])
+{
+    (void)unknown;
+    (void)n;
+    (void)known;
+    (void)m;
+    (void)seed;
+    (void)value;
+    return refuse((Instance *)c, fmi2Error, "there are no directional derivatives");
+}
+
+FMI2_STATUS FMI2(fmi2SetRealInputDerivatives)(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+    const fmi2Integer order[], const fmi2Real value[]);
+FMI2_STATUS FMI2(fmi2SetRealInputDerivatives)(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+    const fmi2Integer order[], const fmi2Real value[])
+{
+    (void)vr;
+    (void)order;
+    (void)value;
+    return n ? refuse((Instance *)c, fmi2Error, "inputs are held over a step") : fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2GetRealOutputDerivatives)(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+    const fmi2Integer order[], fmi2Real value[]);
+FMI2_STATUS FMI2(fmi2GetRealOutputDerivatives)(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+    const fmi2Integer order[], fmi2Real value[])
+{
+    (void)vr;
+    (void)order;
+    (void)value;
+    return n ? refuse((Instance *)c, fmi2Error, "outputs have no derivatives") : fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2DoStep)(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean keep);
+FMI2_STATUS FMI2(fmi2DoStep)(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean keep)
+{
+    Instance *self = (Instance *)c;
+    const char *message;
+    (void)keep;
+    if (self->phase != STEPPING) return refuse(self, fmi2Error, "the initialisation is not over, or the simulation has ended");
+    if (!isfinite(time) || !isfinite(step) || step < 0)
+        return refuse(self, fmi2Discard, "time %g and step %g must be finite, the step not below 0", time, step);
+    if (step == 0) return fmi2OK;
+    message = Model_step(&self->model, time, step);
+    if (message) return refuse(self, fmi2Discard, "at %g s: %s", time, message);
+    self->time = time + step;
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2CancelStep)(fmi2Component c);
+FMI2_STATUS FMI2(fmi2CancelStep)(fmi2Component c)
+{
+    return refuse((Instance *)c, fmi2Error, "a step is over before it could be cancelled");
+}
+
+FMI2_STATUS FMI2(fmi2GetStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value);
+FMI2_STATUS FMI2(fmi2GetStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
+{
+    (void)value;
+    return refuse((Instance *)c, fmi2Discard, "status %d is not kept", (int)kind);
+}
+
+FMI2_STATUS FMI2(fmi2GetRealStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value);
+FMI2_STATUS FMI2(fmi2GetRealStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
+{
+    if (kind != fmi2LastSuccessfulTime) return refuse((Instance *)c, fmi2Discard, "status %d is not kept", (int)kind);
+    *value = ((Instance *)c)->time;
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2GetIntegerStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value);
+FMI2_STATUS FMI2(fmi2GetIntegerStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
+{
+    (void)value;
+    return refuse((Instance *)c, fmi2Discard, "status %d is not kept", (int)kind);
+}
+
+FMI2_STATUS FMI2(fmi2GetBooleanStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value);
+FMI2_STATUS FMI2(fmi2GetBooleanStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
+{
+    if (kind != fmi2Terminated) return refuse((Instance *)c, fmi2Discard, "status %d is not kept", (int)kind);
+    *value = 0;
+    return fmi2OK;
+}
+
+FMI2_STATUS FMI2(fmi2GetStringStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2String *value);
+FMI2_STATUS FMI2(fmi2GetStringStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
+{
+    (void)value;
+    return refuse((Instance *)c, fmi2Discard, "status %d is not kept", (int)kind);
+}
+"""

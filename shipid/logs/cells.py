@@ -1,0 +1,152 @@
+"""Cells of a table: a column by its name, texts as numbers, and angles in several columns or digits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.errors import DataError, choices
+from shipid.logs.formats import Format, SheetFormat, TableFormat, TextFormat
+from shipid.logs.mapping import (
+    OF_SHIP,
+    degrees_in_parts,
+    degrees_in_text,
+    degrees_of,
+    degrees_to_sides,
+    rate_of_ais,
+    size_of,
+    yaw_of,
+)
+from shipid.logs.readers import in_points
+from shipid.logs.workbook import NOT_CALCULATED
+
+OFF_ONE = 0.05  # of the size of a quaternion from 1: more is no rounding
+
+
+def of_minutes(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: str) -> NDArray[np.float64]:
+    """Degrees and minutes (N,) as degrees."""
+    degrees = degrees_of(numbers)
+    wrong = np.isfinite(numbers) & ~np.isfinite(degrees)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        message = f"{numbers[row]:.10g} in {row_in_words(log, row)} has 60 minutes or more: is the unit deg?"
+        raise DataError(message, file=file, path=path)
+    return degrees
+
+
+def of_ais(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: str) -> NDArray[np.float64]:
+    """Rates of turn (N,) as messages of AIS have them, in deg/min."""
+    wrong = ~np.isnan(numbers) & ~((numbers >= -128) & (numbers <= 127))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        message = (
+            f"{numbers[row]:.10g} in {row_in_words(log, row)} is none of -128 to 127, as AIS has: is the unit deg/min?"
+        )
+        raise DataError(message, file=file, path=path)
+    return rate_of_ais(numbers)
+
+
+def of_parts(
+    parts: list[NDArray[np.float64]], names: tuple[str, ...], log: pd.DataFrame, file: Path, path: str
+) -> NDArray[np.float64]:
+    """Degrees, minutes and seconds (N,), of columns of these names, as degrees."""
+    degrees = degrees_in_parts(parts)
+    for name, part in zip(names[1:], parts[1:], strict=True):
+        wrong = np.abs(part) >= 60.0
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            message = (
+                f"{name!r} is {part[row]:.10g} in {row_in_words(log, row)}, 60 or more: are these minutes or seconds?"
+            )
+            raise DataError(message, file=file, path=path)
+    return degrees
+
+
+def of_quaternion(
+    parts: list[NDArray[np.float64]], names: tuple[str, ...], log: pd.DataFrame, file: Path, path: str
+) -> NDArray[np.float64]:
+    """Quaternions (4, N), of columns of these names, as yaw angles [rad]."""
+    size = size_of(parts)
+    wrong = (size > 0) & (np.abs(size - 1.0) > OFF_ONE)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        said = ", ".join(map(repr, names))
+        place = f"{said} have the size {size[row]:.4g} in {row_in_words(log, row)}"
+        message = f"{place}, and a quaternion has 1: are these x, y, z, w?"
+        raise DataError(message, file=file, path=path)
+    return yaw_of(parts)
+
+
+def row_in_words(log: pd.DataFrame, place: int) -> str:
+    """A row of a log in words, by its number among all rows of the file: of `log` some may have been left out."""
+    return f"row {int(log.index[place]) + 1}"
+
+
+def column_of(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Series[Any]:
+    """Return a column (N,) of a log by its name; raises DataError at `path` where it is missing, or there twice."""
+    names = [str(name) for name in log.columns]
+    if names.count(source) > 1:
+        raise DataError(f"column {source!r} appears twice in the log: rename one of them", file=file, path=path)
+    if source in log.attrs.get("other", {}):
+        raise DataError(f"{source!r} is {log.attrs['other'][source]}", file=file, path=path)
+    if source not in names:
+        alone = f"the header is one column, {names[0]!r}: is the separator right?" if names else "there is none"
+        remedy = alone if len(names) <= 1 else choices(source, names)
+        raise DataError(f"column {source!r} is not in the log: {remedy}", file=file, path=path)
+    return log.iloc[:, names.index(source)]
+
+
+def numbers_of(
+    log: pd.DataFrame, source: str, form: Format, file: Path, path: str, sides: str = ""
+) -> NDArray[np.float64]:
+    """Turn a column into numbers, NaN where it is missing; text that is no number raises with its row.
+
+    With the letters of its `sides` it is an angle in degrees, which may be written as 59°26'12.3"N, or P12.5.
+    """
+    column = column_of(log, source, file, path)
+    if pd.api.types.is_numeric_dtype(column.dtype):
+        numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
+        infinite = np.flatnonzero(np.isinf(numbers))
+        if len(infinite):
+            message = f"{numbers[infinite[0]]} is no number (column {source!r}; {len(infinite)} such rows)"
+            raise DataError(message, file=file, path=row_in_words(log, infinite[0]))
+        return numbers
+    read = form if isinstance(form, TableFormat) else TextFormat()
+    text = column.fillna("").astype(str).str.strip()
+    missing = text.isin(read.missing)
+    if read.decimal == "," and read.thousands is None and (grouped := _grouped(text)) is not None:
+        message = (
+            f"{text.iloc[grouped]!r} has a point, and the decimal is a comma (column {source!r}): is it a mark of "
+            "thousands? Write [format] thousands = '.'. Is it the decimal of this column? Write a comma there"
+        )
+        raise DataError(message, file=file, path=row_in_words(log, grouped))
+    plain = in_points(text, read.decimal, read.thousands).mask(missing)
+    numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
+    if sides and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
+        words = in_points(text, read.decimal, None).mask(missing)
+        angles = degrees_to_sides(words) if sides == OF_SHIP else degrees_in_text(words, sides)
+        if sides != OF_SHIP or np.isfinite(angles).sum() > np.isfinite(numbers).sum():
+            numbers = angles
+    bad = np.flatnonzero(~np.isfinite(numbers) & ~missing.to_numpy())
+    if len(bad):
+        kind = "angle" if sides == OF_SHIP else "position"
+        what = f"no number and no {kind} with {' or '.join(sides)}" if sides else "no number"
+        message = (
+            f"{text.iloc[bad[0]]!r} is {what} (column {source!r}; {len(bad)} such rows): "
+            "correct it, or list it in [format] missing, or check decimal and thousands"
+        )
+        if isinstance(form, SheetFormat) and text.iloc[bad[0]].startswith("="):
+            message = f"{text.iloc[bad[0]]!r} (column {source!r}; {len(bad)} such rows) is {NOT_CALCULATED}"
+        raise DataError(message, file=file, path=row_in_words(log, bad[0]))
+    return numbers
+
+
+def _grouped(text: pd.Series[Any]) -> int | None:
+    """Return the first row whose point may mark thousands, 1.250 for 1250; None where a point of a column may not."""
+    pointed = text.str.contains(".", regex=False)
+    groups = text.str.fullmatch(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?")
+    return int(np.argmax(pointed)) if pointed.any() and groups[pointed].all() else None

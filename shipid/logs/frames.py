@@ -1,0 +1,127 @@
+"""Angles and frames of rows in SI units: angles that wrap, positions on the ellipsoid, velocities, true wind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Array, clock_slack
+from shipid.errors import DataError
+from shipid.logs.dates import moment_of
+from shipid.logs.mapping import Column, Mapping
+from shipid.physics.signals import is_command, row_of, wraps
+
+BLOCK = 200_000  # rows that are projected at once
+NEAR = 3.0  # usual steps: rows further apart are no neighbours
+TURN, ABOUT = 2 * np.pi, np.pi / 4  # rad: a jump of an angle that counts from 0 again, and how far from it one may be
+
+
+def unwrapped(rows: pd.DataFrame, mapping: Mapping, file: Path) -> pd.DataFrame:
+    """Unwrap angles, and turn winds "from" into "towards"; DataError for a jump of one that does not wrap."""
+    turned: dict[str, NDArray[np.float64]] = {}
+    for name, column in mapping.columns.items():
+        check_wraps(rows["t"].to_numpy(), rows[name].to_numpy(), name, column, mapping.clock.max_gap or 0.0, file)
+        if column.direction != "from" and not column.wrap:
+            continue
+        values = rows[name].to_numpy().copy()
+        if column.direction == "from":
+            values += np.pi
+        if column.wrap:
+            known = np.isfinite(values)
+            if known.all():
+                unwrap_in_place(values)
+            else:
+                values[known] = np.unwrap(values[known])
+            if is_command(name) and known.any():  # an azimuth about 360 deg is one about 0
+                values -= 2 * np.pi * np.round(np.median(values[known]) / (2 * np.pi))
+        turned[name] = values
+    return rows.assign(**turned)
+
+
+def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: float, file: Path) -> None:
+    """Raise DataError where an angle jumps by a whole turn: the mean of 359 and 1 deg is 180.
+
+    It does so from row to row, or over a gap of at most `max_gap` [s], which will be interpolated. An order is not
+    interpolated, but a gear that follows it would go the whole turn back.
+    """
+    row = row_of(name)
+    ordered = row is not None and row.angle and is_command(name)
+    if column.wrap or not (wraps(name) or name == "course" or ordered):
+        return
+    if not np.nanmax(values, initial=-np.inf) - np.nanmin(values, initial=np.inf) > TURN - ABOUT:
+        return  # none can: of a large log there is no room for what follows
+    known = np.isfinite(values)
+    times = t[known]
+    steps, jumps = np.diff(times), np.diff(values[known])
+    near = (steps < NEAR * np.median(steps)) | (steps <= max_gap + clock_slack(t)) if len(steps) else steps > 0
+    places = np.flatnonzero(near & is_turn(jumps))
+    if len(places):
+        count = "once" if len(places) == 1 else f"{len(places)} times, first"
+        sentence = f"{column.source!r} jumps by a whole turn, {count} at {moment_of(times[places[0] + 1])}"
+        raise DataError(f"{sentence}: write wrap = true", file=file, path=f"columns.{name}")
+
+
+def is_turn(jumps: Array) -> NDArray[np.bool_]:
+    """Whether differences (N,) [rad] of an angle are those of one that begins again: a turn, or nearly."""
+    return np.asarray(np.abs(np.abs(jumps) - TURN) < ABOUT)
+
+
+def unwrap_in_place(values: NDArray[np.float64]) -> None:
+    """Unwrap an angle (N,) [rad] in place, bit by bit as `numpy.unwrap` does, with a quarter of its memory."""
+    steps = np.diff(values)
+    places = np.flatnonzero(~(np.abs(steps) < np.pi))
+    jumps = steps[places]
+    del steps
+    if len(places):
+        nearest = np.mod(jumps + np.pi, 2 * np.pi) - np.pi
+        nearest[(nearest == -np.pi) & (jumps > 0)] = np.pi
+        corrections = np.zeros(len(values))
+        corrections[places + 1] = nearest - jumps
+        values += np.cumsum(corrections, out=corrections)
+
+
+def projected(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.DataFrame, tuple[float, float]]:
+    """North and east [m] in the plane that touches the ellipsoid (WGS 84) at the origin, instead of positions on it."""
+    from pymap3d import geodetic2ned
+
+    latitude, longitude = np.degrees(rows["latitude"].to_numpy()), np.degrees(rows["longitude"].to_numpy())
+    for name, values, most in (("latitude", latitude, 90.0), ("longitude", longitude, 360.0)):
+        wrong = np.flatnonzero(np.abs(values) > most)
+        if len(wrong):
+            reached = f"{values[wrong[0]]:.6g} deg at {moment_of(rows['t'].iloc[wrong[0]])}, one of {len(wrong)} rows"
+            message = f"{reached}: is the unit right? List what stands for a missing value in [format] missing"
+            raise DataError(message, file=file, path=f"columns.{name}")
+    known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
+    if mapping.origin is not None:
+        origin = mapping.origin.latitude, mapping.origin.longitude
+    else:
+        first = known[0] if len(known) else 0
+        origin = float(latitude[first]), float(longitude[first])
+    for first in range(0, len(rows), BLOCK):  # of a large log there is no room for all steps of the projection
+        part = slice(first, first + BLOCK)
+        latitude[part], longitude[part], _ = geodetic2ned(latitude[part], longitude[part], 0.0, *origin, 0.0)
+    return rows.drop(columns=["latitude", "longitude"]).assign(north=latitude, east=longitude), origin
+
+
+def in_body(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:
+    """Turn speed and course over ground, or earth-fixed velocities, into u and v [m/s] by the heading psi."""
+    if "speed" in columns:
+        drift = rows["course"] - rows["psi"]
+        turned = rows.drop(columns=["speed", "course"])
+        return turned.assign(u=rows["speed"] * np.cos(drift), v=rows["speed"] * np.sin(drift))
+    if "u" not in columns or columns["u"].frame == "body":
+        return rows
+    c, s = np.cos(rows["psi"].to_numpy()), np.sin(rows["psi"].to_numpy())
+    north, east = rows["u"].to_numpy(), rows["v"].to_numpy()
+    return rows.assign(u=c * north + s * east, v=c * east - s * north)
+
+
+def true_wind(rows: pd.DataFrame) -> pd.DataFrame:
+    """Wind relative to the bow and the moving ship as wind over ground: its velocity plus the ship's, turned by psi."""
+    ahead = rows["V_w"] * np.cos(rows["beta_w"]) + rows["u"]
+    abeam = rows["V_w"] * np.sin(rows["beta_w"]) + rows["v"]
+    beta_w = np.unwrap(np.arctan2(abeam, ahead) + rows["psi"])
+    return rows.assign(V_w=np.hypot(ahead, abeam), beta_w=beta_w)

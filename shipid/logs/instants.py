@@ -1,0 +1,182 @@
+"""The clock of a log: its column of time in seconds, checked, and instants in place of rounded ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Array
+from shipid.errors import DataError
+from shipid.logs.cells import column_of, numbers_of, row_in_words
+from shipid.logs.dates import date_texts, dated, hour_twice, moment_of, seconds, time_texts
+from shipid.logs.formats import Format
+from shipid.logs.mapping import Clock, FileClock, Named, clock_seconds, is_dated, names_of
+from shipid.logs.repairs import Records
+
+
+def instants_of(
+    log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str
+) -> NDArray[np.float64]:
+    """Return the time of every row [s]; raises DataError where it is missing or does not rise."""
+    t = times_of(log, clock, form, file, path)
+    twice = hour_twice(t) if np.isfinite(t).all() and (is_dated(clock.unit) or clock.unit == "hhmmss") else None
+    if twice is not None:
+        raise DataError(twice[1], file=file, path=row_in_words(log, twice[0]))
+    if isinstance(clock, Clock) and clock.every is not None and np.isfinite(t).all():
+        return evenly(t, clock.every, log, file)
+    wrong = np.flatnonzero(~(np.diff(t) > 0)) if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
+    if len(wrong):
+        row = int(wrong[0]) + 1
+        if not np.isfinite(t[row]):
+            what = _unread(log, clock, row, file, path)
+        elif t[row] == t[row - 1]:
+            what = (
+                f"the time {moment_of(t[row])} appears twice: remove one of the rows, or set [clock] repeated = 'drop'"
+            )
+        else:
+            what = f"time goes back from {moment_of(t[row - 1])} to {moment_of(t[row])}: sort or split the log"
+        raise DataError(what, file=file, path=row_in_words(log, row))
+    return t
+
+
+def times_of(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
+    """The column of time [s] as it is written, not a number where it is missing."""
+    if clock.unit == "date":
+        times = _as_text(log, clock.source, time_texts, form, file, f"{path}.from")
+        if clock.date is None:
+            return seconds(times)
+        return seconds(dated(_as_text(log, clock.date, date_texts, form, file, f"{path}.date"), times))
+    assert isinstance(clock.source, str)
+    return clock_seconds(numbers_of(log, clock.source, form, file, f"{path}.from"), clock.unit)
+
+
+def _as_text(
+    log: pd.DataFrame,
+    source: Named,
+    write: Callable[[list[Array]], pd.Series[Any]],
+    form: Format,
+    file: Path,
+    path: str,
+) -> pd.Series[Any]:
+    """The column of dates or times, or those of its parts as one."""
+    if isinstance(source, str):
+        return column_of(log, source, file, path)
+    return write([numbers_of(log, name, form, file, path) for name in source]).set_axis(log.index)
+
+
+def _unread(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path, path: str) -> str:
+    """Say what is wrong with the time of a row: nothing is there, or a text that is no date."""
+    times, days = names_of(clock.source), names_of(clock.date) if clock.date is not None else ()
+    places = [*((name, f"{path}.date") for name in days), *((name, f"{path}.from") for name in times)]
+    cells = [column_of(log, name, file, place).iloc[row] for name, place in places]
+    if any(pd.isna(cell) or not str(cell).strip() for cell in cells):
+        return "no time here: remove the row"
+    text = " ".join(str(cell).strip() for cell in cells)
+    if len(times) > 1 or len(days) > 1:
+        said = " and ".join(filter(None, (", ".join(map(repr, days)), ", ".join(map(repr, times)))))
+        return f"{text!r} is no date or time of day, as {said} have to say: correct it, or list them in their order"
+    if clock.unit != "date":
+        return f"{text} is no time of day, hours, minutes and seconds as in 123005.5: correct it, or write another unit"
+    if np.isfinite(seconds(pd.Series([text]))[0]):
+        return f"{text!r} has no time zone, while other rows have one: write it in every row, or in none"
+    return (
+        f"{text!r} is no date or time of day that can be read: write dates as 2024-05-14 08:00:00; "
+        'for a number of seconds write [clock] unit = "s"'
+    )
+
+
+def without_repeats(log: pd.DataFrame, clock: Clock, form: Format, file: Path) -> tuple[pd.DataFrame, Records]:
+    """The log without rows that repeat the time of the row before (with `every`: the whole row), and their number."""
+    if clock.every is None:
+        again = np.diff(times_of(log, clock, form, file, "clock"), prepend=-np.inf) == 0
+    else:
+        again = repeated_rows(log)
+    note = "rows that repeat the row before" if clock.every is not None else "rows with the time of the row before"
+    records: Records = [{"kind": "repeated", "column": "", "count": int(again.sum()), "note": note}]
+    return (log.loc[~again], records) if again.any() else (log, [])
+
+
+def repeated_rows(table: pd.DataFrame) -> NDArray[np.bool_]:
+    """Whether each row (N,) has the values of the row before in all columns."""
+    same = np.ones(len(table), dtype=bool)
+    same[:1] = False
+    for index in range(table.shape[1]):
+        if not same.any():  # most often the first column is a time
+            break
+        column = table.iloc[:, index]
+        same &= (column.eq(column.shift()) | (column.isna() & column.shift().isna())).to_numpy(dtype=bool)
+    return same
+
+
+def evenly(t: NDArray[np.float64], every: float, log: pd.DataFrame, file: Path) -> NDArray[np.float64]:
+    """Return instants `every` [s] apart in place of a rounded column of time t (N,) [s] of a log.
+
+    The rows run on from the first. Where the column pauses, or where rows were lost, whole steps are left out. Raises
+    DataError where the column leaves the instants by more than it is rounded.
+    """
+    even, _ = even_clock(t, every)
+    rounding = rounding_of(t)
+    off = np.abs(even - t)
+    wrong = (off > rounding + every) | (np.diff(even, prepend=-np.inf) <= 0)
+    if np.any(wrong):
+        row = int(np.argmax(wrong))
+        message = f"the time is {off[row]:.3g} s from rows every {every:g} s: the clock has another rate"
+        raise DataError(message, file=file, path=f"{row_in_words(log, row)}, clock.every")
+    return even
+
+
+def even_clock(t: NDArray[np.float64], every: float) -> tuple[NDArray[np.float64], int]:
+    """Return instants `every` [s] apart that follow a rounded column of time, and the number of pauses in it."""
+    rounding = rounding_of(t)
+    pauses = np.flatnonzero(np.diff(t) > 2.0 * rounding[1:] + 3.0 * every) + 1
+    even = np.empty(len(t))
+    for first, last in zip([0, *pauses], [*pauses, len(t)], strict=True):
+        part = slice(first, last)
+        count = every * np.arange(last - first)
+        even[part] = count + np.median(t[part] - count)
+        if np.any(np.abs(even[part] - t[part]) > 0.6 * rounding[part] + 0.5 * every):  # rows were lost
+            even[part] = _with_losses(t[part], every, rounding[part])
+    return even, len(pauses)
+
+
+def _with_losses(t: NDArray[np.float64], every: float, rounding: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Instants a whole number of steps apart, as few as the rounded times t (N,) allow.
+
+    A row at offset + every n fits while one offset in [low, high] lies within half a rounding of all rows so far; where
+    none does, n leaves out as many steps as it must, or the offset starts anew, for a rate that is slightly off.
+    """
+    half = 0.5 * rounding + 1e-9 * (t - t[0]) + 4.0 * np.spacing(np.abs(t).max())  # digits of `every`, and of t
+    steps, low, high = np.zeros(len(t)), t[0] - half[0], t[0] + half[0]
+    offset, number, begin = np.empty(len(t)), 0.0, 0
+    for row in range(1, len(t)):
+        number += 1.0
+        least, most = t[row] - half[row] - every * number, t[row] + half[row] - every * number
+        if least > high:
+            lost = np.ceil((least - high) / every - 1e-9)
+            number, least, most = number + lost, least - every * lost, most - every * lost
+        if most < low:
+            offset[begin:row] = (low + high) / 2
+            begin, low, high = row, least, most
+        low, high = max(low, least), min(high, most)
+        steps[row] = number
+    offset[begin:] = (low + high) / 2
+    return np.asarray(offset + every * steps)
+
+
+def rounding_of(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far a rounded column of time may be from the truth in each row [s]: its step to the next other value.
+
+    Of numbers written with a few digits the step grows with the number; the largest so far is taken.
+    """
+    values = np.unique(t)
+    if len(values) < 3:
+        return np.full(len(t), np.inf)
+    steps = np.diff(values)
+    near = np.append(steps, steps[-1])
+    usual = pd.Series(near).rolling(9, center=True, min_periods=1).median().to_numpy()
+    return np.asarray(np.maximum.accumulate(usual)[np.searchsorted(values, t)])
