@@ -24,6 +24,7 @@ import casadi as ca
 import numpy as np
 
 from shipid.engine import libraries
+from shipid.engine.collect import collect_terms
 from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
 from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_compiler
 from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, Printed, print_function
@@ -243,6 +244,11 @@ def integrated(
     return lines, after, later
 
 
+def _rates(model: Dynamics) -> ca.Function:
+    """The rates of a model as the engine computes them."""
+    return collect_terms(model.rates, frozenset(name for stage in STAGES for name in stage))
+
+
 class _Source(Parts):
     """C source of one model: terms of parameters are computed once, terms of inputs once while they are constant."""
 
@@ -250,7 +256,7 @@ class _Source(Parts):
         self, model: Dynamics, step: float, method: Method, wanted: Target, tables: Mapping[int, Table]
     ) -> None:
         self.model, self.step, self.method, self.wanted = model, step, method, wanted
-        rates = print_function(model.rates, STAGES, replace(C, lookup=wanted.lookup), tables)
+        rates = print_function(_rates(model), STAGES, replace(C, lookup=wanted.lookup), tables)
         self.equations = [rates, print_function(model.advance, STAGES, C)]
         self.sums = [print_function(term.function, _SUM_STAGES, C) for term in model.sums]
         self.all = [*self.equations, *self.sums]
@@ -385,7 +391,7 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
 @lru_cache(maxsize=64)
 def _library(model: Dynamics, step: float, method: Method, precision: Precision, looked_up: Sequence[int]) -> Any:
     """The compiled function `run` of a model, from the cache if possible; some of its tables are looked up."""
-    tables = {k: find_tables(model.rates)[k] for k in looked_up}
+    tables = {k: find_tables(_rates(model))[k] for k in looked_up}
     return compiled_for(lambda: _Source(model, step, method, target(precision), tables).text())
 
 
@@ -515,7 +521,7 @@ def _run(model: Dynamics, batch: Batch, job: Job, precision: Precision, **wanted
     }
     sizes = (parts, wide, batch.state.shape[1], job.num_steps, job.every, len(job.rows))
     work = wide / lanes / parts * job.num_steps * (1 + sum(part.shape[1] for part in drawn))
-    looked_up = tuple(even_tables(model.rates, batch.parameters)) if target(precision).lookup else ()
+    looked_up = tuple(even_tables(_rates(model), batch.parameters)) if target(precision).lookup else ()
     run = _library(model, job.step, job.method, precision, looked_up)
     in_parallel(run, sizes, (arrays.get(name) for name in _ARRAYS), parts * len(batch.parameters), work)
 

@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 import casadi as ca
 
+from shipid.engine.graph import operate
 from shipid.engine.tables import Lookup, Table
 
 ARITHMETIC = {  # the same in every dialect
@@ -169,7 +170,7 @@ class _Printer:
             raise ValueError(f"CasADi operation {operation} of {self.function.name()} has no counterpart")
         stage = max(operand.stage for operand in operands)
         if stage < 0:
-            return _Value(repr(float(ca.evalf(_on_numbers(operation, [float(o.text) for o in operands])))), -1)
+            return _Value(repr(float(ca.evalf(operate(operation, [ca.SX(float(o.text)) for o in operands])))), -1)
         if operation == ca.OP_DIV and 0 <= operands[1].stage < stage:  # divide once, early; then multiply
             operands[1] = self.reciprocal(operands[1])
             template = self.dialect.operations[ca.OP_MUL]
@@ -198,7 +199,3 @@ class _Printer:
         outputs = tuple(self.use(self.outputs[i], self.last) for i in sorted(self.outputs))
         lines = tuple(tuple(stage) for stage in self.lines)
         return Printed(lines, tuple(map(tuple, self.saved)), outputs, tuple(self.names), tuple(self.stage_of))
-
-
-def _on_numbers(operation: int, values: Sequence[float]) -> ca.SX:
-    return ca.SX.unary(operation, values[0]) if len(values) == 1 else ca.SX.binary(operation, *values)

@@ -16,6 +16,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
+from shipid.engine.graph import Graph, operate
 from shipid.engine.integrate import Array
 
 LEAST = 6  # intervals: shorter tables are as fast as ramps
@@ -114,6 +115,20 @@ def find_tables(function: ca.Function) -> Mapping[int, Table]:
     return _Search(function).tables()
 
 
+@lru_cache(maxsize=64)
+def inside_tables(function: ca.Function) -> frozenset[int]:
+    """Instructions that compute the tables of a function from arguments, knots, ordinates and slopes."""
+    operands = Graph(function).operands
+    inside: set[int] = set()
+    for end, table in find_tables(function).items():
+        inside.add(end)
+        given, left = {table.x, table.ordinate, table.slope, *table.knots, *table.bends}, [end]
+        while left:
+            left = [i for k in left for i in operands[k] if i not in given and i not in inside]
+            inside.update(left)
+    return frozenset(inside)
+
+
 def even_tables(function: ca.Function, parameters: Array) -> Mapping[int, Table]:
     """Tables whose knots depend on the input `parameters` alone, and are evenly apart for all rows (V, P) of these."""
     tables = find_tables(function)
@@ -144,21 +159,8 @@ def _knots(function: ca.Function, wanted: tuple[int, ...]) -> tuple[list[int], c
     return _Search(function).of_parameters(wanted)
 
 
-class _Search:
-    """The instructions of a function as a graph: operation and operands of each, by number."""
-
-    def __init__(self, function: ca.Function) -> None:
-        self.function = function
-        self.operation: list[int] = []
-        self.operands: list[tuple[int, ...]] = []
-        slots: dict[int, int] = {}
-        for k in range(function.n_instructions()):
-            operation = function.instruction_id(k)
-            source = () if operation in (ca.OP_CONST, ca.OP_INPUT) else function.instruction_input(k)
-            self.operation.append(operation)
-            self.operands.append(tuple(slots[i] for i in source))
-            if operation != ca.OP_OUTPUT:
-                slots[function.instruction_output(k)[0]] = k
+class _Search(Graph):
+    """Tables among the instructions of a function."""
 
     def tables(self) -> dict[int, Table]:
         """All tables; one that is the beginning of a longer one is left out."""
@@ -217,7 +219,7 @@ class _Search:
                 if given != place:
                     raise LookupError
                 return entries.setdefault(entry, ca.SX.sym(f"p{entry}"))
-            return ca.SX.unary(operation, *source) if len(source) == 1 else ca.SX.binary(operation, *source)
+            return operate(operation, source)
 
         try:
             knots = ca.vertcat(*map(value, wanted))

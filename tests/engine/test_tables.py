@@ -96,7 +96,7 @@ def test_a_lookup_has_the_values_of_the_ramps(size: int, libraries_kept: Path, m
 @pytest.mark.skipif(compiler() is None or target().lookup is None, reason="no instruction that picks from two vectors")
 def test_the_source_of_a_ship_with_tables_looks_them_up() -> None:
     model = dynamics(SHIP)
-    tables = even_tables(model.rates, np.array([list(SHIP.parameters.values())]))
+    tables = even_tables(native._rates(model), np.array([list(SHIP.parameters.values())]))
     source = native._Source(model, 1.0, "euler", target(), tables).text()
     assert len(tables) == 3
     assert source.count("v_found(&") == 6
