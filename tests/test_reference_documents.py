@@ -109,7 +109,8 @@ def test_every_setting_of_a_method_is_listed_with_its_default(kind: str) -> None
     assert set(listed) == wanted_names, remedy
     for name, text in listed.items():
         default = fields[name].default
-        wanted = Memory() if text == "nothing" else tomllib.loads(f"value = {text}")["value"]
+        words = {"nothing": Memory(), "none": None}
+        wanted = words[text] if text in words else tomllib.loads(f"value = {text}")["value"]
         assert (list(default) if isinstance(default, tuple) else default) == wanted, name
     kinds = re.search(r"^\| `kind` \|.*$", section(page("reference-study-document"), "[[method]]"), re.MULTILINE)
     assert kinds, "docs/reference-study-document.md, [[method]], has no row `kind`"

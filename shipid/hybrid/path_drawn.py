@@ -41,7 +41,8 @@ class PathDrawn(Searched):
     ridge : weight of the squared output weights; from low to high, the best of 9 is taken for each trial and model.
     terms : the compensation is a polynomial of time with so many terms: what is faster is waves.
     mirror : share of the trials in which port and starboard are mirror images.
-    averaged : the compensation is the mean of the networks of so many best trials.
+    averaged : the compensation is the mean of the networks of so many best trials; by default 8, and 4 with `choose`,
+        where each memory has a part of the trials only.
     search_windows : about so many windows, evenly taken from each run, judge all trials where there are more; the
         best are then judged, and solved, with all windows.
     memory : what the inputs hold of the past; `history_scale`, `error_scale`, `observer_scale` are their scales.
@@ -70,7 +71,7 @@ class PathDrawn(Searched):
     ridge: Ridge | tuple[Ridge, Ridge] = (1e-5, 10.0)
     terms: PositiveInt = 8
     mirror: Probability = 0.75
-    averaged: PositiveInt = 8
+    averaged: PositiveInt | None = None
     search_windows: PositiveInt = 1000
     memory: Memory = Memory()
     history_scale: Scale = (2.0, 32.0)
@@ -115,7 +116,7 @@ class PathDrawn(Searched):
 
     def num_chosen(self) -> int:
         """Return how many of the best trials make the compensator, at most."""
-        return self.averaged
+        return self.averaged or (4 if self.choose else 8)
 
     def choices(self) -> dict[str, tuple[float, ...]]:
         """Return what is searched among some values: the mirror, and which memory is taken."""

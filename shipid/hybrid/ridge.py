@@ -230,8 +230,8 @@ class _Tuning:
         rows = part_of_runs(task.windows.run[self.windows], method.search_windows)
         whole = len(rows) == len(self.windows) or _lacks_a_part(task.folds, self.windows[rows])
         self.first = self.every if whole else _Judges.of(task, self.windows, rows, sound, self.basis)
-        self.finalists = method.averaged + SPARE
-        self.best = {key: _Best(method.averaged) for key in self.names}
+        self.finalists = method.num_chosen() + SPARE
+        self.best = {key: _Best(method.num_chosen()) for key in self.names}
         self.promising: dict[str, list[tuple[float, int, Index]]] = {key: [] for key in self.names}
         self.points: dict[int, dict[str, float]] = {}
         self.groups: dict[frozenset[str], tuple[list[_Group], list[_Group]]] = {}  # with all windows, and the first
