@@ -272,7 +272,6 @@ typedef struct {
     Phase phase;
     double time;
     unsigned char set[NUM_REALS]; /* by the importer */
-    int logging;
     char *name;
     fmi2CallbackFunctions call;
 } Instance;
@@ -312,10 +311,10 @@ FMI2_EXPORT const char *FMI2(fmi2GetVersion)(void) { return "2.0"; }
 FMI2_STATUS FMI2(fmi2SetDebugLogging)(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[]);
 FMI2_STATUS FMI2(fmi2SetDebugLogging)(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[])
 {
+    (void)on; /* what is refused is always said */
     (void)n;
     (void)categories;
-    ((Instance *)c)->logging = on;
-    return fmi2OK;
+    return c ? fmi2OK : fmi2Error;
 }
 
 FMI2_EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2String given, fmi2String place,
@@ -326,6 +325,7 @@ FMI2_EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, 
     Instance *self;
     (void)place;
     (void)visible;
+    (void)logging;
     if (!call) return 0;
     if (type != fmi2CoSimulation) {
         say(call, identifier, fmi2Error, "this FMU is for co-simulation");
@@ -343,7 +343,6 @@ FMI2_EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, 
     if (!self) return 0;
     memset(self, 0, sizeof *self);
     self->call = *call;
-    self->logging = logging;
     self->name = (char *)get_memory(call, strlen(name) + 1);
     if (!self->name) {
         free_memory(call, self);
@@ -375,6 +374,7 @@ FMI2_STATUS FMI2(fmi2SetupExperiment)(fmi2Component c, fmi2Boolean known, fmi2Re
     (void)tolerance;
     (void)stops;
     (void)stop;
+    if (!self) return fmi2Error;
     if (self->phase != INSTANTIATED) return refuse(self, fmi2Error, "the start time is set before the initialisation");
     if (!isfinite(start)) return refuse(self, fmi2Error, "the start time is not finite");
     self->time = start;
@@ -385,6 +385,7 @@ FMI2_STATUS FMI2(fmi2EnterInitializationMode)(fmi2Component c);
 FMI2_STATUS FMI2(fmi2EnterInitializationMode)(fmi2Component c)
 {
     Instance *self = (Instance *)c;
+    if (!self) return fmi2Error;
     if (self->phase != INSTANTIATED) return refuse(self, fmi2Error, "the initialisation begins once");
     self->phase = INITIALIZING;
     return fmi2OK;
@@ -402,6 +403,7 @@ FMI2_STATUS FMI2(fmi2ExitInitializationMode)(fmi2Component c)
 {
     Instance *self = (Instance *)c;
     fmi2Status status;
+    if (!self) return fmi2Error;
     if (self->phase != INITIALIZING) return refuse(self, fmi2Error, "there is no initialisation to end");
     status = follow(self);
     self->phase = STEPPING;
@@ -412,6 +414,7 @@ FMI2_STATUS FMI2(fmi2Terminate)(fmi2Component c);
 FMI2_STATUS FMI2(fmi2Terminate)(fmi2Component c)
 {
     Instance *self = (Instance *)c;
+    if (!self) return fmi2Error;
     if (self->phase != STEPPING) return refuse(self, fmi2Error, "Terminate before a step: nothing runs that could end");
     self->phase = TERMINATED;
     return fmi2OK;
@@ -421,6 +424,7 @@ FMI2_STATUS FMI2(fmi2Reset)(fmi2Component c);
 FMI2_STATUS FMI2(fmi2Reset)(fmi2Component c)
 {
     Instance *self = (Instance *)c;
+    if (!self) return fmi2Error;
     Model_init(&self->model);
     memset(self->set, 0, sizeof self->set);
     self->phase = INSTANTIATED;
@@ -433,6 +437,7 @@ FMI2_STATUS FMI2(fmi2GetReal)(fmi2Component c, const fmi2ValueReference vr[], si
 {
     Instance *self = (Instance *)c;
     size_t i;
+    if (!self) return fmi2Error;
     for (i = 0; i < n; ++i)
         if (vr[i] >= NUM_REALS) return refuse(self, fmi2Error, "there is no real variable %u", vr[i]);
     if (follow(self) != fmi2OK) return fmi2Error;
@@ -445,6 +450,7 @@ FMI2_STATUS FMI2(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr[], si
 {
     Instance *self = (Instance *)c;
     size_t i;
+    if (!self) return fmi2Error;
     if (self->phase == TERMINATED) return refuse(self, fmi2Error, "the simulation has ended: reset before a value is set");
     for (i = 0; i < n; ++i) {
         if (vr[i] >= NUM_REALS) return refuse(self, fmi2Error, "there is no real variable %u", vr[i]);
@@ -465,6 +471,7 @@ FMI2_STATUS FMI2(fmi2GetInteger)(fmi2Component c, const fmi2ValueReference vr[],
 {
     Instance *self = (Instance *)c;
     size_t i;
+    if (!self) return fmi2Error;
     if (follow(self) != fmi2OK) return fmi2Error;
     for (i = 0; i < n; ++i) {
         if (vr[i]) return refuse(self, fmi2Error, "there is no integer variable %u", vr[i]);
@@ -478,6 +485,7 @@ FMI2_STATUS FMI2(fmi2GetBoolean)(fmi2Component c, const fmi2ValueReference vr[],
 {
     Instance *self = (Instance *)c;
     size_t i;
+    if (!self) return fmi2Error;
     if (follow(self) != fmi2OK) return fmi2Error;
     for (i = 0; i < n; ++i) {
         if (!NUM_BOOLEANS || vr[i]) return refuse(self, fmi2Error, "there is no boolean variable %u", vr[i]);
@@ -525,13 +533,29 @@ typedef struct {
     Phase phase;
     double time;
     unsigned char set[NUM_REALS];
+    unsigned long sum; /* of all bytes before it, where they are serialised */
 } Kept;
+
+static int is_ours(const Kept *kept)
+{
+    return kept && !memcmp(kept->guid, guid, sizeof guid);
+}
+
+/* A number of the bytes of a state, which is another one where they are damaged (FNV-1a of 32 bits). */
+static unsigned long sum_of(const fmi2Byte bytes[])
+{
+    unsigned long sum = 2166136261UL;
+    size_t i;
+    for (i = 0; i < offsetof(Kept, sum); ++i) sum = ((sum ^ (unsigned char)bytes[i]) * 16777619UL) & 0xffffffffUL;
+    return sum;
+}
 
 FMI2_STATUS FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state);
 FMI2_STATUS FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state)
 {
     Instance *self = (Instance *)c;
     Kept *kept = (Kept *)*state;
+    if (!self) return fmi2Error;
     if (!kept) kept = (Kept *)get_memory(&self->call, sizeof *kept);
     if (!kept) return refuse(self, fmi2Error, "there is no memory for a state");
     memcpy(kept->guid, guid, sizeof guid);
@@ -548,7 +572,8 @@ FMI2_STATUS FMI2(fmi2SetFMUstate)(fmi2Component c, fmi2FMUstate state)
 {
     Instance *self = (Instance *)c;
     const Kept *kept = (const Kept *)state;
-    if (!kept) return refuse(self, fmi2Error, "there is no state");
+    if (!self) return fmi2Error;
+    if (!is_ours(kept)) return refuse(self, fmi2Error, "this is no state of this FMU");
     self->model = kept->model;
     self->phase = kept->phase;
     self->time = kept->time;
@@ -559,6 +584,7 @@ FMI2_STATUS FMI2(fmi2SetFMUstate)(fmi2Component c, fmi2FMUstate state)
 FMI2_STATUS FMI2(fmi2FreeFMUstate)(fmi2Component c, fmi2FMUstate *state);
 FMI2_STATUS FMI2(fmi2FreeFMUstate)(fmi2Component c, fmi2FMUstate *state)
 {
+    if (!c) return fmi2Error;
     if (state && *state) {
         free_memory(&((Instance *)c)->call, *state);
         *state = 0;
@@ -578,8 +604,13 @@ FMI2_STATUS FMI2(fmi2SerializedFMUstateSize)(fmi2Component c, fmi2FMUstate state
 FMI2_STATUS FMI2(fmi2SerializeFMUstate)(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size);
 FMI2_STATUS FMI2(fmi2SerializeFMUstate)(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 {
-    if (!state || size < sizeof(Kept)) return refuse((Instance *)c, fmi2Error, "no state, or too few bytes for it");
+    unsigned long sum;
+    if (!c) return fmi2Error;
+    if (!is_ours((const Kept *)state)) return refuse((Instance *)c, fmi2Error, "this is no state of this FMU");
+    if (size < sizeof(Kept)) return refuse((Instance *)c, fmi2Error, "too few bytes for a state");
     memcpy(bytes, state, sizeof(Kept));
+    sum = sum_of(bytes);
+    memcpy(bytes + offsetof(Kept, sum), &sum, sizeof sum);
     return fmi2OK;
 }
 
@@ -587,8 +618,12 @@ FMI2_STATUS FMI2(fmi2DeSerializeFMUstate)(fmi2Component c, const fmi2Byte bytes[
 FMI2_STATUS FMI2(fmi2DeSerializeFMUstate)(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
 {
     Instance *self = (Instance *)c;
+    unsigned long sum;
+    if (!self) return fmi2Error;
     if (size != sizeof(Kept) || memcmp(bytes, guid, sizeof guid))
         return refuse(self, fmi2Error, "these bytes are no state of this FMU");
+    memcpy(&sum, bytes + offsetof(Kept, sum), sizeof sum);
+    if (sum != sum_of(bytes)) return refuse(self, fmi2Error, "the bytes of this state are damaged");
     if (!*state) *state = get_memory(&self->call, sizeof(Kept));
     if (!*state) return refuse(self, fmi2Error, "there is no memory for a state");
     memcpy(*state, bytes, sizeof(Kept));
@@ -637,6 +672,7 @@ FMI2_STATUS FMI2(fmi2DoStep)(fmi2Component c, fmi2Real time, fmi2Real step, fmi2
     Instance *self = (Instance *)c;
     const char *message;
     (void)keep;
+    if (!self) return fmi2Error;
     if (self->phase != STEPPING) return refuse(self, fmi2Error, "the initialisation is not over, or the simulation has ended");
     if (!isfinite(time) || !isfinite(step) || step < 0)
         return refuse(self, fmi2Discard, "time %g and step %g must be finite, the step not below 0", time, step);
@@ -663,6 +699,7 @@ FMI2_STATUS FMI2(fmi2GetStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2
 FMI2_STATUS FMI2(fmi2GetRealStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value);
 FMI2_STATUS FMI2(fmi2GetRealStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
 {
+    if (!c) return fmi2Error;
     if (kind != fmi2LastSuccessfulTime) return refuse((Instance *)c, fmi2Discard, "status %d is not kept", (int)kind);
     *value = ((Instance *)c)->time;
     return fmi2OK;
@@ -678,6 +715,7 @@ FMI2_STATUS FMI2(fmi2GetIntegerStatus)(fmi2Component c, const fmi2StatusKind kin
 FMI2_STATUS FMI2(fmi2GetBooleanStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value);
 FMI2_STATUS FMI2(fmi2GetBooleanStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
 {
+    if (!c) return fmi2Error;
     if (kind != fmi2Terminated) return refuse((Instance *)c, fmi2Discard, "status %d is not kept", (int)kind);
     *value = 0;
     return fmi2OK;

@@ -151,6 +151,90 @@ def test_calls_out_of_order_and_states_of_others_are_refused(ship, tmp_path):
     assert (result.returncode, result.stderr[:1000]) == (0, "")
 
 
+WITHOUT_A_COMPONENT = """
+#include "path.c"
+#define NO(call) if ((call) == fmi2OK) return __LINE__
+#define YES(call) if ((call) != fmi2OK) return __LINE__
+int main(void)
+{
+    const fmi2ValueReference first = 0;
+    const fmi2Integer order = 1;
+    fmi2Real number = 0;
+    fmi2Integer whole = 0;
+    fmi2Boolean truth = 0;
+    fmi2String text = "";
+    fmi2Status status;
+    size_t size = 0, i;
+    fmi2CallbackFunctions call = {0, 0, 0, 0, 0};
+    fmi2Component c = fmi2Instantiate("a", fmi2CoSimulation, guid, "", &call, 0, 0);
+    fmi2FMUstate state = 0, other = 0, foreign = calloc(1, sizeof(Kept));
+    fmi2Byte *bytes = malloc(sizeof(Kept));
+    if (!c || !foreign || !bytes) return __LINE__;
+    YES(fmi2GetFMUstate(c, &state));
+    fmi2FreeInstance(0);
+    NO(fmi2SetDebugLogging(0, 1, 0, 0));
+    NO(fmi2SetupExperiment(0, 0, 0, 0, 0, 0));
+    NO(fmi2EnterInitializationMode(0));
+    NO(fmi2ExitInitializationMode(0));
+    NO(fmi2Terminate(0));
+    NO(fmi2Reset(0));
+    NO(fmi2GetReal(0, &first, 1, &number));
+    NO(fmi2SetReal(0, &first, 1, &number));
+    NO(fmi2GetInteger(0, &first, 1, &whole));
+    NO(fmi2SetInteger(0, &first, 1, &whole));
+    NO(fmi2GetBoolean(0, &first, 1, &truth));
+    NO(fmi2SetBoolean(0, &first, 1, &truth));
+    NO(fmi2GetString(0, &first, 1, &text));
+    NO(fmi2SetString(0, &first, 1, &text));
+    NO(fmi2GetFMUstate(0, &other));
+    NO(fmi2SetFMUstate(0, state));
+    NO(fmi2FreeFMUstate(0, &state));
+    NO(fmi2SerializeFMUstate(0, state, bytes, sizeof(Kept)));
+    NO(fmi2DeSerializeFMUstate(0, bytes, sizeof(Kept), &other));
+    NO(fmi2GetDirectionalDerivative(0, &first, 1, &first, 1, &number, &number));
+    NO(fmi2SetRealInputDerivatives(0, &first, 1, &order, &number));
+    NO(fmi2GetRealOutputDerivatives(0, &first, 1, &order, &number));
+    NO(fmi2DoStep(0, 0, 1, 0));
+    NO(fmi2CancelStep(0));
+    NO(fmi2GetStatus(0, fmi2DoStepStatus, &status));
+    NO(fmi2GetRealStatus(0, fmi2LastSuccessfulTime, &number));
+    NO(fmi2GetIntegerStatus(0, fmi2DoStepStatus, &whole));
+    NO(fmi2GetBooleanStatus(0, fmi2Terminated, &truth));
+    NO(fmi2GetStringStatus(0, fmi2PendingStatus, &text));
+    NO(fmi2SetFMUstate(c, 0)); /* no state, and that of another FMU */
+    NO(fmi2SetFMUstate(c, foreign));
+    NO(fmi2SerializeFMUstate(c, 0, bytes, sizeof(Kept)));
+    NO(fmi2SerializeFMUstate(c, foreign, bytes, sizeof(Kept)));
+    YES(fmi2SerializedFMUstateSize(c, state, &size));
+    if (size != sizeof(Kept)) return __LINE__;
+    YES(fmi2SerializeFMUstate(c, state, bytes, size));
+    for (i = 0; i < size; i += i < size - sizeof(long) ? 7 : 1) { /* one bit in some byte */
+        bytes[i] = (fmi2Byte)(bytes[i] ^ 4);
+        NO(fmi2DeSerializeFMUstate(c, bytes, size, &other));
+        bytes[i] = (fmi2Byte)(bytes[i] ^ 4);
+    }
+    YES(fmi2DeSerializeFMUstate(c, bytes, size, &other));
+    YES(fmi2SetFMUstate(c, other));
+    YES(fmi2FreeFMUstate(c, &state));
+    YES(fmi2FreeFMUstate(c, &other));
+    free(foreign);
+    free(bytes);
+    fmi2FreeInstance(c);
+    return 0;
+}
+"""
+
+
+def test_no_component_and_damaged_states_are_refused(aboard, tmp_path):
+    """Before, both ended the tool: damaged bytes gave the recorder places in the past that it does not have."""
+    with zipfile.ZipFile(aboard) as archive:
+        archive.extractall(tmp_path)
+    (tmp_path / "sources" / "main.c").write_text(WITHOUT_A_COMPONENT)
+    compile_([compiler()], tmp_path / "sources", *SANITIZERS, "-o", "main", "main.c")
+    result = subprocess.run([tmp_path / "sources" / "main"], capture_output=True, text=True)
+    assert (result.returncode, result.stderr[:1000]) == (0, "")
+
+
 def test_the_sources_compile_without_a_warning(aboard, tmp_path):
     with zipfile.ZipFile(aboard) as archive:
         archive.extractall(tmp_path)
