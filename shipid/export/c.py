@@ -33,7 +33,7 @@ WORDS = frozenset(
     alignas alignof concept consteval constexpr constinit decltype noexcept nullptr requires static_assert thread_local
     typeof typeof_unqual const_cast dynamic_cast reinterpret_cast static_cast co_await co_return co_yield
     stdin stdout stderr errno assert random select
-    begin_filters first_turn follow free_memory get_memory go_filters guid identifier is_ours kind_of kinds
+    begin_filters begin_within first_turn follow free_memory get_memory go_filters guid identifier is_ours kind_of kinds
     nearest_turn no no_band predict_from radius_of refuse same_turn say self set start_values sum_of t va_list
     """.split()
 )

@@ -115,7 +115,7 @@ enum {{
 
 {declared}
 
-/* Actuators of a carry take the positions that the commands order. */
+/* Actuators of a carry take the positions that the commands order, within the stops of {name}_defaults. */
 void {name}_begin({name}_real *carry, const {name}_real *commands);
 
 /* d(state)/dt of {
@@ -169,18 +169,23 @@ int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_re
         idle = [key for key in ("commands", "environment", "parameters") if not sizes_[key]]
         voids = "".join(f"    (void){key};\n" for key in idle)
         begin = (
-            f"    {call[id(begun)]}(commands, carry + {equations.num_states});"
+            f"    {call[id(begun)]}({given(begun, f'carry + {equations.num_states}')});"
             if model.memory
-            else "    (void)carry;\n    (void)commands;"
+            else "    (void)carry;\n    (void)commands;\n    (void)parameters;"
         )
         return f"""{comment([f"{self.vessel.name}, written by shipid {__version__}; see {name}.h."])}
 {source_head(name, self.precision)}
 {self._tables()[1]}
 
 {text}
-void {name}_begin({name}_real *carry, const {name}_real *commands)
+static void begin_within(real *carry, const real *commands, const real *parameters)
 {{
 {begin}
+}}
+
+void {name}_begin({name}_real *carry, const {name}_real *commands)
+{{
+    begin_within(carry, commands, {name}_defaults);
 }}
 
 void {name}_rates(const {name}_real *carry, const {name}_real *commands, const {name}_real *environment,

@@ -94,11 +94,13 @@ class Equations:
         return graph.finish(graph.pack(after, memory_after))
 
     def begun(self) -> Formula:
-        """Commands -> memories that have reached their orders."""
+        """(commands, parameters) -> memories that have reached their orders, as far as their stops let them."""
         model = self.model
-        commands = SX.sym("commands", len(model.commands))
-        reached = ca.vertcat(SX(0, 1), *(commands[model.commands.index(name)] for name in model.memory))
-        return Formula(ca.Function("begun", [commands], [reached], ["commands"], ["out"]))
+        commands, parameters = SX.sym("commands", len(model.commands)), SX.sym("parameters", len(model.parameters))
+        ordered = ca.vertcat(SX(0, 1), *(commands[model.commands.index(name)] for name in model.memory))
+        still = SX.zeros(self.num_states), SX.zeros(len(model.environment))
+        reached = ca.densify(SX(model.advance(still[0], ordered, commands, still[1], parameters, 0)))
+        return Formula(ca.Function("begun", [commands, parameters], [reached], ["commands", "parameters"], ["out"]))
 
     @cached_property
     def aboard(self) -> Formula:

@@ -75,7 +75,7 @@ def vessel_unit(vessel: Vessel, name: str, method: Method) -> Packed:
     for key in groups["carry"]:
         order, lags = key.removeprefix("actual."), key.startswith("actual.")
         text = described(order)
-        text = f"reached: {text}; begins at its order unless a start value is set" if lags else text
+        text = f"reached: {text}; begins at its order, within its stops, unless a start value is set" if lags else text
         variables.append(Variable(key, "output", "continuous", parts.unit("carry", key), text, 0.0, lags))
     variables += [
         Variable(key, "input", "continuous", parts.unit("commands", key), f"order: {described(key)}", neutral(key))

@@ -49,7 +49,7 @@ def vessel_wrapper(name: str, sizes: Mapping[str, int], num_states: int, variabl
     begin = f"""    double carry[{sizes["carry"]}];
     int i;
     memcpy(carry, self->values, sizeof carry);
-    {name}_begin(carry, self->values + {at["commands"]});
+    begin_within(carry, self->values + {at["commands"]}, self->values + {at["parameters"]});
     for (i = {num_states}; i < {sizes["carry"]}; ++i) if (!set[i]) self->values[i] = carry[i]; /* actuators: at their orders */
     (void)t;
 """

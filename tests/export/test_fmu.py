@@ -499,6 +499,19 @@ def test_an_actuator_begins_where_the_importer_says_else_at_its_order(ship, fold
     one.fmu.freeInstance()
 
 
+def test_an_actuator_begins_within_its_stops(ship, folder):
+    """Before, the output was an order beyond them until the first step: a rudder at 3 rad that stops at 2."""
+    one = Instance(ship, folder).begin()
+    one.set(**{"port.alpha": 3.0, "starboard.alpha": -9.0, "starboard.n": 2.0})
+    assert one.get("actual.port.alpha", "actual.starboard.alpha", "actual.starboard.n") == [2.0, -2.0, 2.0]
+    one.set(**{"thruster.port.actuator.alpha.high": 2.5})
+    one.fmu.exitInitializationMode()
+    before = one.get("actual.port.alpha", "actual.starboard.alpha")
+    one.fmu.doStep(0.0, 1.0)
+    assert before == one.get("actual.port.alpha", "actual.starboard.alpha") == [2.5, -2.0]
+    one.fmu.freeInstance()
+
+
 @pytest.mark.slow
 def test_outputs_of_the_initialisation_follow_what_has_been_set(ship, aboard, folder):
     """Before, a tool that read them there, as FMI allows, had paths of 0 m without an alarm."""
