@@ -160,6 +160,7 @@ static void Model_init(Model *self)
 {{
     memset(self, 0, sizeof *self);
     memcpy(self->values, start_values, sizeof start_values);
+    self->status = {name}_NO_PAST;
     {name}_init(&self->kept);
 }}
 
@@ -209,8 +210,8 @@ def _kind(variable: Variable) -> str:
 
 
 def _fmi(name: str, variables: Sequence[Variable]) -> str:
-    """Start values and kinds of the variables."""
-    values = Precision().table(np.array([0.0 if v.start is None else v.start for v in variables]))
+    """Start values and kinds of the variables; what is calculated is no number until then."""
+    values = Precision().table(np.array([np.nan if v.start is None else v.start for v in variables]))
     return f"""
 static const char guid[] = "@GUID@";
 static const char identifier[] = "{name}";

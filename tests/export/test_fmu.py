@@ -512,6 +512,22 @@ def test_an_actuator_begins_within_its_stops(ship, folder):
     one.fmu.freeInstance()
 
 
+def test_before_the_initialisation_there_is_no_path(aboard, tmp_path):
+    """Before, a tool that read outputs of a new instance, or of one that was reset, had paths of 0 m with status 0."""
+    with zipfile.ZipFile(aboard) as archive:
+        archive.extractall(tmp_path)
+    one = Instance(aboard, tmp_path)
+    one.fmu.instantiate()
+    for _ in range(2):
+        assert np.isnan(one.get("x[1]", "y[6]", "instant")).all()
+        assert one.fmu.getInteger([0]) == [8]
+        one.fmu.enterInitializationMode()
+        one.fmu.exitInitializationMode()
+        assert np.isfinite(one.get("x[1]", "y[6]", "instant")).all()
+        one.fmu.reset()
+    one.fmu.freeInstance()
+
+
 @pytest.mark.slow
 def test_outputs_of_the_initialisation_follow_what_has_been_set(ship, aboard, folder):
     """Before, a tool that read them there, as FMI allows, had paths of 0 m without an alarm."""
