@@ -355,6 +355,25 @@ def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
     np.testing.assert_allclose(np.stack(predicted, axis=1), expected, rtol=0, atol=1e-10)
 
 
+@pytest.mark.parametrize("flagged", [True, False])
+def test_a_pause_is_a_break_aboard_and_one_in_python_where_it_is_flagged(flagged, tmp_path):
+    """As the page on exports says: else the observer of Python goes on by the physics."""
+    vessel, settings = variety()["gunnerus-28.9"], Observer(waves=(0.0,), change=(1.0,))
+    dataset = log_of(vessel, 16, np.random.default_rng(3), 1.0)
+    frame = dataset.frame
+    frame.loc[frame.index[8] :, "t"] += 20.0
+    if flagged:
+        frame.loc[frame.index[8], "flags"] = 1
+    dataset = Dataset(frame, {"clock": "run", "flags": ["break"]})
+    exported = model(Predictor(Physics(vessel, 5, 1.0, "euler", settings), "alone", Unchanged({}), {"u": (-9.0, 9.0)}))
+    path = path_after(exported, frame["t"], frame, tmp_path)
+    estimates = observe(vessel, dataset, settings).columns
+    columns = {name: frame[name].to_numpy()[-1:] for name in frame if name not in ("run", "flags")}
+    last = Instants(columns, estimates={name: values[-1:] for name, values in estimates.items()})
+    apart = np.abs(path - exported.predictor.predict(last)[:, 0]).max()
+    assert apart < 1e-10 if flagged else apart > 0.1
+
+
 @pytest.mark.parametrize("kind", ["learned-force", "path-drawn"])
 @pytest.mark.parametrize(
     ("low", "high", "angles", "least"),
