@@ -93,6 +93,7 @@ def build(command: Sequence[str], source: str, library: Path, limit: float = LIM
     command : compiler and options, with `{source}` and `{library}` where the names of the files belong.
     """
     try:
+        library.parent.mkdir(0o700, parents=True, exist_ok=True)  # a cache may be cleared at any time
         with temporary_folder(library.parent) as folder:
             text, fresh = folder / "step.c", folder / "step.so"
             text.write_text(source, encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 import stat
 import time
 from collections.abc import Callable, Iterator
@@ -173,6 +174,18 @@ def test_a_cache_that_others_can_write_is_closed(empty_cache: Path, numbers: Cal
     empty_cache.chmod(0o777)
     numbers()
     assert stat.S_IMODE(empty_cache.stat().st_mode) == 0o700
+
+
+def test_a_cache_that_is_cleared_while_a_process_runs_is_filled_again(
+    empty_cache: Path, numbers: Callable[..., np.ndarray]
+) -> None:
+    """Before, the compiler was blamed, and every further ship was computed by a slower engine."""
+    expected = numbers()
+    shutil.rmtree(empty_cache.parent)
+    native._library.cache_clear()
+    np.testing.assert_array_equal(numbers(), expected)
+    (library,) = empty_cache.glob("*.so")
+    assert stranger(library) is None
 
 
 @pytest.mark.parametrize("everywhere", [False, True])
