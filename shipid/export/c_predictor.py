@@ -412,52 +412,37 @@ double {name}_factor(double miss, double level, int kind)
 """
 
     def _recorder(self, advance: str | None) -> str:
-        """init, record and predict."""
-        name, names, model, row = self.name, self.model.layout, self.model, self.row
-        n, cap, step = len(row), self.capacity, model.physics.step
-        angles = [i for i, key in enumerate(row) if "." not in key and key in SIGNALS and SIGNALS[key].angle]
-        orders = [i for i, key in enumerate(row) if "." in key]
-        angled = turned(row, model.vessel, names.parameters)
-        u, v, psi = (row.index(key) for key in ("u", "v", "psi"))
-        reached = [row.index(key) for key in names.reached]
-        velocity = model.physics.path == "velocity"
-        filters = self.filters
-        north, east = (n, n + 1) if velocity else (0, 1)
-        real = f"{name}_real"
-        unwrap = "\n".join(
-            f"        kept[{i}] += (real)(6.283185307179586476925 * floor(0.5 + ((double)last[{i}] - (double)kept[{i}]) / 6.283185307179586476925));"
-            for i in angles
-        )
-        same_turn = "\n".join(self._turn(one) for one in angled)
-        lines = [SAME_TURN] if angled else []
-        lines += [
-            f"""void {name}_init({name} *self)
+        """init, record and predict. advance : C function of the actuators, where some lag behind their orders."""
+        angled = turned(self.row, self.model.vessel, self.model.layout.parameters)
+        turns = [SAME_TURN] if angled else []
+        return "\n".join([*turns, self._init(), self._record(advance, angled), self._predict(angled)])
+
+    def _init(self) -> str:
+        """A recorder without rows."""
+        return f"""void {self.name}_init({self.name} *self)
 {{
     memset(self, 0, sizeof *self);
-    memcpy(self->parameters, {name}_defaults, sizeof self->parameters);
+    memcpy(self->parameters, {self.name}_defaults, sizeof self->parameters);
 }}
 """
-        ]
-        actuators = ""
-        if advance is not None:
-            model_ = Equations(_must(model.vessel)).model
-            orders_ = ", ".join(f"last[{row.index(key)}]" for key in model_.commands)
-            actuators = f"""        {{
-            const real dt = (real)(t - self->t[newest]);
-            const real given[{len(model_.commands)}] = {{{orders_}}};
-            real after[{len(reached)}];
-            {advance}(self->reached, given, self->parameters, &dt, after);
-            memcpy(self->reached, after, sizeof after);
-        }}
-"""
-        first_actuators = "\n".join(f"        self->reached[{k}] = kept[{i}];" for k, i in enumerate(reached))
-        begin_filters = "        begin_filters(self->filters, kept, self->estimates);\n" if filters is not None else ""
-        go_filters = (
-            "        go_filters(self->filters, last, kept, (real)(t - self->t[newest]), self->parameters, self->estimates);\n"
-            if filters is not None
-            else ""
-        )
-        lines.append(f"""int {name}_record({name} *self, double t, const {real} *row)
+
+    def _record(self, advance: str | None, angled: Sequence[Turned]) -> str:
+        """A row to the past, and actuators and observer up to it."""
+        name, row, cap, step = self.name, self.row, self.capacity, self.model.physics.step
+        n, real = len(row), f"{name}_real"
+        u, v, psi = (row.index(key) for key in ("u", "v", "psi"))
+        rates = f"""        kept[{n + 2}] = kept[{u}] * M(cos)(kept[{psi}]) - kept[{v}] * M(sin)(kept[{psi}]);
+        kept[{n + 3}] = kept[{u}] * M(sin)(kept[{psi}]) + kept[{v}] * M(cos)(kept[{psi}]);"""
+        same_turn = "\n".join(self._turn(one) for one in angled)
+        first_actuators = "\n".join(f"        self->reached[{k}] = kept[{i}];" for k, i in enumerate(self._reached))
+        begin_filters, go_filters = "", ""
+        if self.filters is not None:
+            begin_filters = "        begin_filters(self->filters, kept, self->estimates);\n"
+            go_filters = (
+                "        go_filters(self->filters, last, kept, (real)(t - self->t[newest]), "
+                "self->parameters, self->estimates);\n"
+            )
+        return f"""int {name}_record({name} *self, double t, const {real} *row)
 {{
     int i, newest = (self->first + self->count - 1) % {cap};
     real kept[{n + 4}]{", moved" if angled else ""};
@@ -475,19 +460,17 @@ double {name}_factor(double miss, double level, int kind)
         const real *last = self->rows[newest];
         const real half = (real)((t - self->t[newest]) / 2);
         (void)last;
-{unwrap}
-        kept[{n + 2}] = kept[{u}] * M(cos)(kept[{psi}]) - kept[{v}] * M(sin)(kept[{psi}]);
-        kept[{n + 3}] = kept[{u}] * M(sin)(kept[{psi}]) + kept[{v}] * M(cos)(kept[{psi}]);
+{self._unwrapped()}
+{rates}
         kept[{n}] = last[{n}] + half * (last[{n + 2}] + kept[{n + 2}]);
         kept[{n + 1}] = last[{n + 1}] + half * (last[{n + 3}] + kept[{n + 3}]);
-{actuators}{go_filters}        if (self->count > 1 && t - self->t[(newest + {cap - 1}) % {cap}] < {step / PARTS_OF_STEP * (1 - 1e-6)!r})
+{self._advanced(advance)}{go_filters}        if (self->count > 1 && t - self->t[(newest + {cap - 1}) % {cap}] < {step / PARTS_OF_STEP * (1 - 1e-6)!r})
             --self->count; /* the newest row came so soon that this one replaces it */
     }} else {{
         self->first = 0;
         self->begun = t;
         kept[{n}] = kept[{n + 1}] = 0;
-        kept[{n + 2}] = kept[{u}] * M(cos)(kept[{psi}]) - kept[{v}] * M(sin)(kept[{psi}]);
-        kept[{n + 3}] = kept[{u}] * M(sin)(kept[{psi}]) + kept[{v}] * M(cos)(kept[{psi}]);
+{rates}
 {first_actuators}
 {begin_filters}    }}
     if (self->count == {cap}) {{
@@ -499,18 +482,50 @@ double {name}_factor(double miss, double level, int kind)
     memcpy(self->rows[newest], kept, sizeof kept);
     return 0;
 }}
-""")
-        sizes_ = names.sizes
-        past_lines = self._past(orders, north, east, velocity) if names.num_past else ""
-        taken = [row.index(key) for key in names.now]
-        settled = model.predictor.run_up - 1e-3 * step
+"""
+
+    @property
+    def _reached(self) -> list[int]:
+        """Places in a row of the orders of actuators that lag behind them."""
+        return [self.row.index(key) for key in self.model.layout.reached]
+
+    def _unwrapped(self) -> str:
+        """Heading and other angles of a new row by the turn that goes on."""
+        turn = "6.283185307179586476925"
+        angles = [i for i, key in enumerate(self.row) if "." not in key and key in SIGNALS and SIGNALS[key].angle]
+        return "\n".join(
+            f"        kept[{i}] += (real)({turn} * floor(0.5 + ((double)last[{i}] - (double)kept[{i}]) / {turn}));"
+            for i in angles
+        )
+
+    def _advanced(self, advance: str | None) -> str:
+        """Actuators on their way to the orders of the last row."""
+        if advance is None:
+            return ""
+        orders = Equations(_must(self.model.vessel)).model.commands
+        given = ", ".join(f"last[{self.row.index(key)}]" for key in orders)
+        return f"""        {{
+            const real dt = (real)(t - self->t[newest]);
+            const real given[{len(orders)}] = {{{given}}};
+            real after[{len(self._reached)}];
+            {advance}(self->reached, given, self->parameters, &dt, after);
+            memcpy(self->reached, after, sizeof after);
+        }}
+"""
+
+    def _predict(self, angled: Sequence[Turned]) -> str:
+        """The path from the newest row."""
+        name, names, model, row = self.name, self.model.layout, self.model, self.row
+        cap, real, taken = self.capacity, f"{name}_real", [row.index(key) for key in names.now]
+        sizes_, past_lines = names.sizes, self._past() if names.num_past else ""
+        settled = model.predictor.run_up - 1e-3 * model.physics.step
         young = (
             f"    if (self->t[newest] - self->begun < {settled!r}) i |= {name}_OUTSIDE; /* no run-up of the observer */\n"
             if settled > 0
             else ""
         )
         plan = f", plan[{sizes_['planned']}]" if any(one.command in names.planned for one in angled) else ""
-        lines.append(f"""int {name}_predict(const {name} *self, const {real} *planned, {real} *path)
+        return f"""int {name}_predict(const {name} *self, const {real} *planned, {real} *path)
 {{
     const int newest = (self->first + self->count - 1) % {cap};
     static const int taken[{len(taken)}] = {{{_whole(taken)}}};
@@ -523,8 +538,7 @@ double {name}_factor(double miss, double level, int kind)
 {self._plan(angled)}    i = {name}_path(now, self->reached, past, planned, self->estimates, self->parameters, path);
 {young}    return i;
 }}
-""")
-        return "\n".join(lines)
+"""
 
     def _turn(self, one: Turned) -> str:
         """The turn of an angle of a new row; where the past must move to it, what is kept of it does."""
@@ -573,14 +587,14 @@ double {name}_factor(double miss, double level, int kind)
     }}
 """
 
-    def _past(self, orders: Sequence[int], north: int, east: int, velocity: bool) -> str:
+    def _past(self) -> str:
         """Rows of the past by interpolation, commands by the last row before."""
         name, names, row, step = self.name, self.model.layout, self.row, self.model.physics.step
         n, cap = len(row), self.capacity
         places = [row.index(key) for key in names.past if key not in ("x", "y")]
-        held = [int(place in orders) for place in places]
-        psi = row.index("psi")
-        if velocity:  # the trapezoid of linear rates, exact between rows
+        held = [int("." in row[place]) for place in places]
+        psi, north, east = (row.index(key) for key in ("psi", "north", "east"))
+        if self.model.physics.path == "velocity":  # the trapezoid of linear rates, exact between rows
             position = f"""            const real later_n = before[{n + 2}] + (real)share * (after[{n + 2}] - before[{n + 2}]);
             const real later_e = before[{n + 3}] + (real)share * (after[{n + 3}] - before[{n + 3}]);
             const real north = before[{n}] + (real)((at - t0) / 2) * (before[{n + 2}] + later_n) - newest_row[{n}];
