@@ -149,9 +149,7 @@ def predictor_unit(model: Model, name: str) -> Packed:
     what = "no physics" if model.vessel is None else model.vessel.name
     return Packed(
         name, f"{what}, {model.predictor.method}", tuple(variables), predictor_files(model, name, Precision()),
-        predictor_wrapper(
-            name, len(parts.row), names.horizon, len(names.planned), len(names.parameters), bands is not None, variables
-        ),
+        predictor_wrapper(name, names.horizon, len(names.parameters), variables),
         step,
     )  # fmt: skip
 

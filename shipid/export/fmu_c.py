@@ -106,48 +106,11 @@ static int Model_boolean(const Model *self, unsigned reference)
 {_FMI_BODY}"""
 
 
-def predictor_wrapper(
-    name: str,
-    num_row: int,
-    horizon: int,
-    num_planned: int,
-    num_parameters: int,
-    banded: bool,
-    variables: Sequence[Variable],
-) -> str:
-    """Return the C of a predictor of `horizon` steps; `num_row` is the number of values in a row that it records."""
-    planned = num_row
-    path = planned + horizon * num_planned
-    band = path + 2 * horizon
-    instant = band + (len(COLUMNS) * horizon if banded else 0)
-    parameters = instant + 1
-    held = parameters + num_parameters
-    chosen = held + (1 if num_planned else 0)
-    total = chosen + (len(CHOICE) if banded else 0)
-    plan = f"self->values[{held}] != 0 ? 0 : self->values + {planned}" if num_planned else "0"
-    declared, shown = "", ""
-    call = f"{name}_predict(kept, {plan}, path)"
-    if banded:
-        asked = f"self->values[{chosen}], self->values[{chosen + 1}] != 0, kind_of(self->values[{chosen + 2}])"
-        call = f"{name}_predict_band(kept, {plan}, {asked}, path, band)"
-        declared = f"    double band[{len(COLUMNS)} * {horizon}];\n"
-        shown = "\n".join(
-            f"        self->values[{band + place * horizon} + k] = band[{len(COLUMNS)} * k + {place}];"
-            for place in range(len(COLUMNS))
-        )
-    numbered = (
-        """
-/* A whole number, or -1, which is no kind. */
-static int kind_of(double value)
-{
-    return value >= 0 && value < 1e9 && floor(value) == value ? (int)value : -1;
-}
-"""
-        if banded
-        else ""
-    )
+def predictor_wrapper(name: str, horizon: int, num_parameters: int, variables: Sequence[Variable]) -> str:
+    """Return the C of a predictor of `horizon` steps; the row that it records is the first of the variables."""
+    banded = any(variable.name == CHOICE[0] for variable in variables)
     return f"""
-#define NUM_REALS {total}
+#define NUM_REALS {len(variables)}
 #define NUM_BOOLEANS 1
 {_FMI_HEAD}
 typedef struct {{
@@ -164,24 +127,8 @@ static void Model_init(Model *self)
     {name}_init(&self->kept);
 }}
 
-{numbered}
-static const char *predict_from(Model *self, {name} *kept, double t)
-{{
-    double path[2 * {horizon}];
-{declared}    int k;
-    {"memcpy(kept->parameters, self->values + " + str(parameters) + ", " + str(num_parameters) + " * sizeof(double));" if num_parameters else ""}
-    self->status = {name}_record(kept, t, self->values);
-    if (self->status) return self->status == {name}_TIME ? "time does not go on" : "an input is not finite";
-    self->status = {call};
-    for (k = 0; k < {horizon}; ++k) {{
-        self->values[{path} + k] = path[2 * k];
-        self->values[{path + horizon} + k] = path[2 * k + 1];
-{shown}
-    }}
-    self->values[{instant}] = t;
-    return 0;
-}}
-
+{_KIND_OF if banded else ""}
+{_predict_from(name, horizon, num_parameters, {variable.name: place for place, variable in enumerate(variables)})}
 /* The path at the start: from a copy, since the first step keeps this row. */
 static const char *Model_begin(Model *self, const unsigned char *set, double t)
 {{
@@ -202,6 +149,49 @@ static int Model_boolean(const Model *self, unsigned reference)
     return (self->status & {name}_OUTSIDE) != 0;
 }}
 {_FMI_BODY}"""
+
+
+_KIND_OF = """
+/* A whole number, or -1, which is no kind. */
+static int kind_of(double value)
+{
+    return value >= 0 && value < 1e9 && floor(value) == value ? (int)value : -1;
+}
+"""
+
+
+def _predict_from(name: str, horizon: int, num_parameters: int, at: Mapping[str, int]) -> str:
+    """C that records the row of the variables and predicts from it; `at`: place of each variable by name."""
+    first_planned = next((place for key, place in at.items() if key.startswith("planned[")), 0)
+    plan = f"self->values[{at['held']}] != 0 ? 0 : self->values + {first_planned}" if "held" in at else "0"
+    own = f"memcpy(kept->parameters, self->values + {at['instant'] + 1}, {num_parameters} * sizeof(double));"
+    declared, shown = "", ""
+    call = f"{name}_predict(kept, {plan}, path)"
+    if CHOICE[0] in at:
+        level, pointwise, kind = (f"self->values[{at[key]}]" for key in CHOICE)
+        call = f"{name}_predict_band(kept, {plan}, {level}, {pointwise} != 0, kind_of({kind}), path, band)"
+        declared = f"    double band[{len(COLUMNS)} * {horizon}];\n"
+        shown = "\n".join(
+            f"        self->values[{at[f'{key}[1]']} + k] = band[{len(COLUMNS)} * k + {place}];"
+            for place, key in enumerate(COLUMNS)
+        )
+    return f"""static const char *predict_from(Model *self, {name} *kept, double t)
+{{
+    double path[2 * {horizon}];
+{declared}    int k;
+    {own if num_parameters else ""}
+    self->status = {name}_record(kept, t, self->values);
+    if (self->status) return self->status == {name}_TIME ? "time does not go on" : "an input is not finite";
+    self->status = {call};
+    for (k = 0; k < {horizon}; ++k) {{
+        self->values[{at["x[1]"]} + k] = path[2 * k];
+        self->values[{at["y[1]"]} + k] = path[2 * k + 1];
+{shown}
+    }}
+    self->values[{at["instant"]}] = t;
+    return 0;
+}}
+"""
 
 
 def _kind(variable: Variable) -> str:
