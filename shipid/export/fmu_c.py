@@ -121,8 +121,10 @@ typedef struct {{
 {_fmi(name, variables)}
 static void Model_init(Model *self)
 {{
+    int i;
     memset(self, 0, sizeof *self);
     memcpy(self->values, start_values, sizeof start_values);
+    for (i = 0; i < NUM_REALS; ++i) if (kinds[i] == 'o') self->values[i] = NAN; /* NAN is no constant for some compilers */
     self->status = {name}_NO_PAST;
     {name}_init(&self->kept);
 }}
@@ -200,8 +202,8 @@ def _kind(variable: Variable) -> str:
 
 
 def _fmi(name: str, variables: Sequence[Variable]) -> str:
-    """Start values and kinds of the variables; what is calculated is no number until then."""
-    values = Precision().table(np.array([np.nan if v.start is None else v.start for v in variables]))
+    """Start values and kinds of the variables."""
+    values = Precision().table(np.array([0.0 if v.start is None else v.start for v in variables]))
     return f"""
 static const char guid[] = "@GUID@";
 static const char identifier[] = "{name}";
