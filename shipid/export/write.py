@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import platform
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import get_args
 
 from shipid.arguments import of_class, one_of, path_of
 from shipid.engine.integrate import Method
-from shipid.errors import DocumentError, ShipidError, choices
+from shipid.errors import DocumentError, ShipidError, choices, visible
 from shipid.export.blocks import Precision
 from shipid.export.c import Files, c_name
 from shipid.export.c_predictor import predictor_files
@@ -21,6 +23,8 @@ from shipid.export.model import Exportable, Model, model
 from shipid.export.onnx import write_onnx
 from shipid.files import write_together
 from shipid.vessel.load import Vessel
+
+log = logging.getLogger(__name__)
 
 EXAMPLE = "main.c"
 
@@ -113,9 +117,14 @@ def _folder(files: Files, folder: Path) -> list[Path]:
 
 def _fmu(unit: Packed, file: Path) -> list[Path]:
     try:
-        write_fmu(unit, file)
+        platforms = write_fmu(unit, file)
     except ShipidError as error:
         raise ShipidError(error.message, file=file) from None
+    if not platforms:
+        here = f"{platform.system()} {platform.machine()}"
+        log.warning(
+            "%s has no binary for %s: the tool that imports it must compile its sources", visible(str(file)), here
+        )
     return [file]
 
 

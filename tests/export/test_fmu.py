@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import platform
 import re
@@ -23,6 +24,7 @@ from shipid.errors import ShipidError
 from shipid.export.c import c_name
 from shipid.export.fmu import description, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import model
+from shipid.export.write import export_vessel
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import MOTIONS, Memory
 from shipid.hybrid.physics import Physics
@@ -311,6 +313,18 @@ def test_a_binary_has_the_name_that_importers_load(system, file, tmp_path, monke
     with zipfile.ZipFile(tmp_path / "ship.fmu") as archive:
         binaries = [name for name in archive.namelist() if name.startswith("binaries/")]
     assert binaries == ([] if file is None else [f"binaries/{file}"])
+
+
+@pytest.mark.parametrize("system", ["Linux", "Windows"])
+def test_an_fmu_without_a_binary_is_said_to_be_one(system, tmp_path, monkeypatch, caplog):
+    """Before, nobody knew until a tool that does not compile refused it."""
+    compiler()
+    monkeypatch.setattr(platform, "system", lambda: system)
+    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
+    with caplog.at_level(logging.WARNING):
+        export_vessel(load_vessel("otter"), "fmu", tmp_path / "ship.fmu")
+    said = "ship.fmu has no binary for Windows x86_64: the tool that imports it must compile its sources"
+    assert [record.getMessage().rpartition("/")[2] for record in caplog.records] == [said] * (system == "Windows")
 
 
 @pytest.mark.slow
