@@ -16,6 +16,7 @@ MOST_ROWS, SCATTER = 0.9, 3.0  # of the changes from row to row, and how far suc
 LEVEL_RATE = 0.05  # of the largest rate: rates closer than this are one level
 LAST = 0.25  # of a level of rate: it is read in its last quarter
 LEFT_OUT = 0.05  # of a level of rate: at its end the helm is over for the next level already
+ONE_SIDE = "the ship turns to one side at every helm angle"
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +70,8 @@ def spiral(record: Record) -> Measures:
     Measures : `neutral_helm` [rad], mean of the helm angles at which the rate changes sign on the two branches;
         `loop_width` [rad], their difference; `loop_height` [rad/s], the difference of the rates at helm 0. Width and
         height are 0 for a stable ship; their resolution is `levels_apart` [rad], the distance of the steady levels
-        between which the rate changes sign, the larger of both ways. `levels`, `levels_not_steady`: counts.
+        between which the rate changes sign, the larger of both ways. `levels`, `levels_not_steady`: counts. A ship that
+        turns to one side at every helm angle has no height: her loop may be wider than the spiral.
     """
     measures, points = Measures(), levels(record)
     ways = [(points.helm[way], points.rate[way]) for way in _ways(points.helm)]
@@ -79,7 +81,9 @@ def spiral(record: Record) -> Measures:
     why = "the rate does not change sign on the way there and on the way back, on levels that are steady"
     measures.add("neutral_helm", (zero[0] + zero[1]) / 2, "rad", why)
     measures.add("loop_width", abs(zero[1] - zero[0]), "rad", why)
-    measures.add("loop_height", abs(flat[1] - flat[0]), "rad/s", "the helm does not pass 0 on both ways")
+    branch = bool(np.isnan(zero).all() and flat[0] * flat[1] > 0)  # both ways may lie on one branch of a loop
+    unknown = ONE_SIDE if branch else "the helm does not pass 0 on both ways"
+    measures.add("loop_height", NAN if branch else abs(flat[1] - flat[0]), "rad/s", unknown)
     measures.add("levels_apart", max(apart) if np.isfinite(apart).all() else NAN, "rad", why)
     measures.add("levels", len(points.helm), "-", "")
     measures.add("levels_not_steady", points.skipped, "-", "")

@@ -65,6 +65,16 @@ def test_a_straight_course_before_and_after_belongs_to_no_way(straight: float) -
     assert measures["loop_width"].value == pytest.approx(0.4 / GAIN * DEGREE, rel=1e-2)
 
 
+def test_a_ship_that_no_helm_turns_back_has_no_height_of_a_loop() -> None:
+    """Both ways lie on one branch: their rates at helm 0 are equal, which is no sign of a stable ship."""
+    record = every(stable_spiral(), 0.5)
+    one_side = np.where(record.t >= START, 2 * GAIN * np.abs(LEVELS).max() * DEGREE, 0.0)
+    measures = spiral(replace(record, r=record.r + one_side))
+    for name in ("neutral_helm", "loop_width", "loop_height", "levels_apart"):
+        assert np.isnan(measures[name].value)
+        assert measures[name].why
+
+
 def test_reverse_spiral_finds_the_folds() -> None:
     """The helm r^3 - 3 r falls from 2 to -2 deg as the rate rises from -1 to 1 deg/s: 4 deg wide."""
     measures = reverse_spiral(every(reverse(), 0.5))
