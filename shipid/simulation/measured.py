@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from shipid.measures.recognise import record_of
 from shipid.measures.record import Record
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import Levels, levels, rate_levels
+from shipid.physics.signals import steers
 from shipid.report.manoeuvre import ManoeuvreContent
 from shipid.simulation.approach import Controls, NotStraight
 from shipid.simulation.manoeuvre import Zigzag
@@ -23,6 +24,7 @@ from shipid.simulation.perform import perform
 from shipid.simulation.standard import Standard, standard
 from shipid.units import DEGREE, RPM
 from shipid.version import __version__
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.outline import ship_outline
 
@@ -112,13 +114,24 @@ def measure_all(
 def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
     """The measures of one log."""
     columns = {str(column): frame[column].to_numpy() for column in frame if column != "run"}
-    record = record_of(columns, Controls(vessel).effects[1])
+    record = record_of(_within_stops(vessel, columns), Controls(vessel).effects[1])
     known = {"execute_heading": chosen.manoeuvre.reversal_deg * DEGREE} if isinstance(chosen.manoeuvre, Zigzag) else {}
     measures, length = MEASURES[chosen.kind](record, **known), vessel.length
     judged = criteria(chosen.kind, measures, length, calm=True)
     if chosen.manoeuvre.approach == "rest":
         judged = [replace(one, met=None, note=FROM_REST) for one in judged]
     return Measured(vessel, chosen, frame, record, measure_rows(measures, length), criterion_rows(judged))
+
+
+def _within_stops(vessel: Vessel, columns: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns, with every angle kept within the stops of its gear: the helm is what the gear does of an order."""
+    numbers, result = vessel.parameters, dict(columns)
+    for name in filter(steers, dynamics(vessel).commands):
+        component, _, signal = name.rpartition(".")
+        gear = f"thruster.{component}.actuator.{signal}"
+        low, high = numbers.get(f"{gear}.low", -np.inf), numbers.get(f"{gear}.high", np.inf)
+        result[name] = np.clip(result[name], low, high)
+    return result
 
 
 def approached(chosen: Standard) -> str:

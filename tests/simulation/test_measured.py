@@ -88,3 +88,16 @@ def test_a_zigzag_is_measured_at_the_heading_at_which_it_was_ordered(helm: float
     off = (done.record.psi - done.record.psi[0]) / DEGREE
     assert measures["overshoot 1"] == pytest.approx(off[executes[1] : executes[2]].max() - heading, abs=0.02)
     assert not done.criteria  # of 10/10 and 20/20
+
+
+@pytest.mark.parametrize(("side", "stop"), [("starboard", 20.0), ("port", 15.0)])
+def test_the_helm_is_what_the_gear_does_of_an_order(side: str, stop: float) -> None:
+    ship = first_guess(Particulars(100.0, 16.0, 6.0, 0.7, 7.0), "b", "b.toml").vessel
+    gear = "thruster.rudder.actuator.delta"
+    ship = ship.with_values({f"{gear}.low": -15.0 * DEGREE, f"{gear}.high": 20.0 * DEGREE})
+    beyond, within = (measure_standard(ship, "turning", helm, side=side) for helm in (35.0, stop))
+    ordered, done = ({row["measure"]: row["value"] for row in one.measures} for one in (beyond, within))
+    assert ordered["helm"] == pytest.approx(stop)
+    assert ordered["tactical diameter"] == pytest.approx(done["tactical diameter"])
+    assert [row["verdict"] for row in beyond.criteria] == ["not judged"] * 2
+    assert f"helm is {stop:.1f} deg, not 35" in beyond.criteria[0]["note"]
