@@ -37,6 +37,7 @@ from shipid.units import GRAVITY, RPM, percent, plural
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import order_of
+from shipid.vessel.schema import SHARED
 
 LETTERS = {"ä": "ae", "ö": "oe", "ü": "ue", "ø": "oe", "å": "aa", "æ": "ae", "ß": "ss", "ł": "l", "đ": "d"}
 CORRECTED = "-corrected"  # ends the name of a family whose numbers the log corrects
@@ -59,6 +60,7 @@ PAST, LAGS, LEAST_PAST = 11.6, (0.1, 0.2, 0.4, 0.5, 1.0), 8  # sqrt(L / g): 20 s
 HELM_DEG, STEPS_A_LENGTH = 35.0, 150
 STEERING = ("N_ur", "Y_ur", "N_uv", "N_r", "Y_r", "N_v")  # linear in v, r at a speed: products with u or scaled by U
 HIGHER = "hull.*[order >= 3]"
+DRAG = ("C_d", *(f"R_{power}" for power in range(5)))  # coefficients of the hull whose names are no formula
 INERTIA = ("inertia.m", "inertia.I_z", "added_mass.X_udot", "added_mass.Y_vdot", "added_mass.N_rdot")
 
 
@@ -636,7 +638,8 @@ def _turning(controls: Controls, service: float, rpm: float) -> Choice:
 def _degraded(named: str, vessel: Vessel) -> list[Any]:
     """Nominal, moderate and high: the families of experiment 1 (method, section 4), as far as the vessel has them."""
     hull = [path for path in vessel.parameters if path.startswith("hull.")]
-    damping = ["hull.*[order >= 1]"] if any(order_of(path) for path in hull) else _shapeless(hull)
+    drag = [path for path in hull if path.rpartition(".")[2] in DRAG]
+    damping = ["hull.*[order >= 1]", *drag] if any(order_of(path) for path in hull) else _shapeless(hull)
     heavy = [path for path in INERTIA if path in vessel.parameters]
     if not damping:
         raise ShipidError("has no [hull] numbers to degrade: declare families by hand", file=vessel.file)
@@ -667,8 +670,8 @@ def _degraded(named: str, vessel: Vessel) -> list[Any]:
 
 
 def _shapeless(paths: Sequence[str]) -> list[str]:
-    """Paths of coefficients, without those of geometry."""
-    return [path for path in paths if path.rpartition(".")[2] not in ("x_aft", "x_fwd", "T")]
+    """Paths of coefficients, without those of geometry and of the water."""
+    return [path for path in paths if path.rpartition(".")[2] not in ("x_aft", "x_fwd", *SHARED)]
 
 
 def _text(choices: Sequence[Choice], families: Sequence[Mapping[str, Any]], warnings: Sequence[str] = ()) -> str:

@@ -26,6 +26,7 @@ from shipid.study.new import (
     LEAST_RUNS,
     SHARE_OF_RUN,
     _ahead,
+    _degraded,
     _turning,
     draft_study,
     family_names,
@@ -38,6 +39,7 @@ from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.survey import helm_sense, separation, survey, typical_runs
 from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.perturb import Family, members, resolve
 from shipid.vessel.template import Particulars, first_guess
 from tests.study.tiny import logged
 
@@ -360,6 +362,16 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
     assert truth is not None
     assert truth.duration >= plan.study.prediction.horizon * plan.study.prediction.step
     assert max(plan.study.grid.N_D) == truth.manoeuvres - plan.study.split.test  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("name", ["otter", "kvlcc2-l7", "gunnerus-33.9"])
+def test_every_coefficient_of_the_hull_is_degraded(name: str) -> None:
+    """Also the drag of a cross-flow and the resistance: with linear damping alone a model is nearly the ship."""
+    vessel = load_vessel(name)
+    family = resolve([Family(**one) for one in _degraded(name, vessel)])[1]
+    changed = members(family, vessel)[0].values
+    geometry = ("x_aft", "x_fwd", "T", "rho")
+    assert set(changed) == {p for p in vessel.parameters if p.startswith("hull.") and not p.endswith(geometry)}
 
 
 @pytest.mark.parametrize(
