@@ -617,20 +617,30 @@ def wind_for(length: float) -> Choice:
 
 
 def _turning(controls: Controls, service: float, rpm: float) -> Choice:
-    """Turns with constant orders; shafts that steer by their difference are ordered apart."""
+    """Turns with constant orders; each shaft, or angle, has its own where they steer by their difference.
+
+    A shaft that does not drive her ahead, such as that of a tunnel thruster, rests.
+    """
     low, high = float(f"{rpm / 2:.3g}"), float(f"{rpm:.3g}")
-    orders = {}
+    drives, helm = controls.effects
+    apart = len({*helm.values()}) > 1  # units at both ends: the same angle would drive her aside
+    orders: dict[str, Any] = {}
+    resting = [name for name in controls.commands if is_shaft(name) and name not in drives]
     for name in controls.commands:
         row = SIGNALS[signal_of(name)]
         usual = [value / row.factor for value in row.usual]
         limits = [low, high] if is_shaft(name) else [-HELM_DEG, HELM_DEG] if steers(name) else usual
         single, common = order_keys(name)
-        if controls.differential and name in controls.drives:
+        if name in resting:
+            orders[single] = 0.0
+        elif controls.differential and name in drives:
             orders[single] = [0.0, high]
         else:
-            orders[common] = limits
+            orders[single if apart and steers(name) else common] = limits
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
     turned = "each shaft apart: their difference turns her" if controls.differential else "and hard over either way"
+    turned += ", each angle apart: units at both ends turn her by their difference" if apart else ""
+    turned += f"; what does not drive her ahead rests: {', '.join(resting)}" if resting else ""
     why = f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water, {turned}"
     return Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
 

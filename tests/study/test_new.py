@@ -392,6 +392,26 @@ def test_a_ship_without_helm_gets_an_order_for_each_screw() -> None:
         assert all(high in (300.0, 35.0) for _, high in (order[key] for key in keys))
 
 
+def test_what_does_not_drive_a_ship_ahead_rests() -> None:
+    """A tunnel thruster at the speed of the main shaft drove her to starboard in every run."""
+    ship = first_guess(Particulars(100.0, 16.0, 6.0, 0.7, 7.0, tunnel_thruster=True), "b", "b.toml").vessel
+    choice = _turning(Controls(ship), 7.0, 130.0)
+    assert choice.value[0]["bow.n_rpm"] == 0
+    assert choice.value[0]["n_rpm"] == [65, 130]
+    assert "rests: bow.n" in choice.why
+    assert _turning(Controls(load_vessel("supply-vessel")), 1.0, 100.0).value[0]["bow_aft.n_rpm"] == 0
+
+
+def test_units_at_both_ends_are_ordered_apart() -> None:
+    """With one angle for both a double-ended ferry goes aside and does not turn."""
+    aft = load_vessel("gunnerus-28.9")
+    x, y = ("thruster.starboard.x", "thruster.starboard.y")
+    both = aft.with_values({x: -aft.parameters[x], y: 0.0, "thruster.port.y": 0.0})
+    order = _turning(Controls(both), 5.0, 140.0).value[0]
+    assert order["port.alpha_deg"] == order["starboard.alpha_deg"] == [-35, 35]
+    assert "alpha_deg" in _turning(Controls(aft), 5.0, 140.0).value[0]
+
+
 @pytest.mark.parametrize(
     ("vessels", "runs", "message"),
     [
