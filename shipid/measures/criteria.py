@@ -65,7 +65,7 @@ def _turning(measures: Measures, length: float | None, *, calm: bool) -> Iterato
     current, steady = measures["current_speed"].value, measures["steady_speed"].value
     why = "" if calm else measures["current_speed"].why
     remark = f"how far current or wind carried the ship is not known: {why}" if why else ""
-    if current > CARRIED * steady:
+    if not calm and current > CARRIED * steady:  # in calm water a turn that is not quite steady has some, too
         carried = f"current or wind carried the ship at {current:.2g} m/s: correct the track for it (MSC/Circ.1053)"
         note = "; ".join(filter(None, [note, carried]))
     for name, limit in (("advance", 4.5), ("tactical_diameter", 5.0)):
