@@ -15,7 +15,9 @@ Array = NDArray[np.float64]
 OTHER = {"port": "starboard", "starboard": "port"}
 SIDES = {word: side for side in OTHER for word in words_of_side(side)}  # words in names of components: p, stbd, left
 ENDS = frozenset().union(*map(words_of_side, ("bow", "stern", "fore", "aft")))  # units there stand on the middle line
-ACROSS = {"bow", "tunnel"}  # units whose shaft may drive sideways
+ACROSS = re.compile(
+    "bow|tunnel|lateral|transvers|strahl|(stern|aft|fore).*thruster|thruster.*(stern|aft|fore)"
+)  # in names of units whose shaft may drive sideways, such as `bowthruster`
 
 
 def reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...]]) -> Array | None:
@@ -34,7 +36,7 @@ def reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...
     for column, values in table.items():
         component, _, signal = column.rpartition(".")
         turns = any(steers(other) for other in table if other.startswith(f"{component}."))
-        if orders_thrust(column) and ACROSS & set(words[column]) and not turns:
+        if orders_thrust(column) and ACROSS.search(component.lower()) and not turns:
             return None
         sides = [SIDES.get(word, word) for word in words[column]]
         partner = called.get(_name(column, [OTHER.get(side, side) for side in sides]), "")

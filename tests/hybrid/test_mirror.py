@@ -72,6 +72,9 @@ def test_one_input_may_stand_for_several_columns() -> None:
         ("u", "port.alpha"),  # the other unit is not measured
         ("u", "bow.n"),  # a tunnel drives sideways by its shaft
         ("u", "port-tunnel.n", "starboard-tunnel.n"),
+        ("u", "port.n", "starboard.n", "bowthruster.n"),
+        ("u", "port.n", "starboard.n", "SternThruster1.n"),
+        ("u", "port.n", "starboard.n", "thruster_aft.n"),
         ("u", "m1.n", "m2.n"),  # which of them is to port, no name says
         ("u", "port.n", "left.n", "starboard.n", "right.n"),
     ],
