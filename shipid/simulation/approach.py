@@ -158,6 +158,8 @@ class Controls:
 def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Array:
     """Surge, sway and yaw acceleration (3,) [m/s^2, rad/s^2] of the ship straight ahead at u [m/s] in calm water.
 
+    Surge is that of a ship that keeps her trim, as on a steady course: a deep screw would trim her first.
+
     commands : command -> value [SI], reached by the actuators; other commands are neutral.
     """
     model = dynamics(vessel)
@@ -165,7 +167,12 @@ def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Arr
     memory, orders = ([commands.get(name, neutral(name)) for name in names] for names in (model.memory, model.commands))
     calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
     rates = np.array(model.rates(state, memory, orders, calm, values, np.zeros(model.num_dof))).ravel()
-    return rates[[model.state.index(name) for name in ("u", "v", "r")]]
+    motions, mass = model.state[model.num_dof :], vessel.mass
+    result = rates[[model.state.index(name) for name in ("u", "v", "r")]]
+    trim = [motions.index(name) for name in motions if name in "wq"]
+    surge = motions.index("u")
+    result[0] += mass[surge, trim] @ rates[model.num_dof :][: model.num_dof][trim] / mass[surge, surge]
+    return result
 
 
 def helm_effect(controls: Controls, n: float, u: float) -> float:

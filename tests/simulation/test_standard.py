@@ -42,6 +42,14 @@ def test_shaft_speed_gives_the_speed(speed: float) -> None:
     assert path["u"].iloc[0] == pytest.approx(speed, abs=0.02)  # an approach ends where it changes by 1 mm/s in 30 s
 
 
+@pytest.mark.parametrize("name", ["gunnerus-28.9-6dof", "gunnerus-33.9-6dof"])
+def test_a_ship_that_the_thrust_trims_reaches_the_speed(name: str) -> None:
+    """Her shafts had the speed at which she, with no trim yet, did not gain speed: 1 % too little."""
+    ship = load_vessel(name)
+    run = Zigzag(n_rpm=60 * shaft_speed(Controls.of(ship), 4.0), duration=1.0)
+    assert perform(ship, [run], step=0.05)["u"].iloc[0] == pytest.approx(4.0, rel=2e-3)
+
+
 @pytest.mark.parametrize("speed", [3.5, 3.7, 5.0])
 def test_a_pull_out_begins_at_the_rate_of_the_steady_turn(speed: float) -> None:
     """The helm was let go between two rows, so that the rate was that of the next row, up to 8 % less."""
