@@ -32,7 +32,8 @@ ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
 LEAST_STEPS, MOST_STEPS = 10, 1e7  # steps for a ship length, and of a manoeuvre
 MOST_HELM, MOST_HEADING = 90.0, 180.0  # deg; the first angle of a reverse spiral is a rate in deg/s
 APPROACHES = ("steady", "helmsman", "rest")
-ROUND = ("turning", "pull-out", "spiral", "reverse-spiral")
+SPIRALS = ("spiral", "reverse-spiral")
+ROUND = ("turning", "pull-out", *SPIRALS)
 # in ship lengths at the approach speed: log before the execute, and duration of each kind
 LEAD, ZIGZAG, TURN, LEVEL, STOP = 1.0, 30.0, 60.0, 40.0, 80.0
 DECAYS, LONGEST = 8.0, 200.0  # until a turn is steady: time constants of a small yaw, and at most ship lengths
@@ -118,6 +119,9 @@ def standard(
     passing = length / asked  # s for one length
     interval = _round(passing / ROWS) if step is None else step * STEPS
     lead = _in_rows(LEAD * passing, interval)
+    if duration is not None and name not in SPIRALS and duration <= lead:
+        words = f"{duration:g} s is over before the first order, at {lead:g} s of the log"
+        raise ShipidError(f"{words}: give more", path="--duration")
     course = 0.0 if name in ROUND else 90.0  # straight tracks are drawn from left to right
     how = {"n_rpm": n_rpm, "execute_at": lead, "course_deg": course, "approach": approach}
     if step is not None and step > passing / LEAST_STEPS:

@@ -175,6 +175,8 @@ def test_a_pull_out_of_a_nearly_neutral_ship_waits_until_her_turn_is_steady(
         ("turning", (), {"speed": 1e160}, "--speed: 1e+160 m/s: the speed of the approach must be above 0"),
         ("turning", (), {"duration": 0.0}, "--duration: 0 s must be positive"),
         ("turning", (), {"duration": 1e12}, "--duration: "),
+        ("turning", (), {"duration": 3.0}, "--duration: 3 s is over before the first order, at 8.6 s of the log"),
+        ("pull-out", (), {"duration": 8.0}, "--duration: 8 s is over before the first order, at 8.6 s of the log"),
         ("turning", (), {"step": float("nan")}, "--step: nan s must be positive"),
         ("turning", (), {"step": 1e-9}, "--step: "),
         ("turning", (), {"step": 50.0}, "--step: 50 s is too long for this ship"),
