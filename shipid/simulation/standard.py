@@ -149,12 +149,13 @@ def shaft_speed(controls: Controls, speed: float) -> float:
 
     Raises
     ------
+    DocumentError : no command drives the ship.
     ShipidError : the speed is not positive, or no shaft speed up to 60,000 rpm gives it.
     """
     if not 0 < speed <= SPEED_LIMIT:
         words = f"the speed of the approach must be above 0 and at most {SPEED_LIMIT:g} m/s"
         raise ShipidError(f"{speed:g} m/s: {words}", path="--speed")
-
+    _ = controls.drives  # DocumentError where nothing drives her, at any speed
     n = balanced_shaft(controls, speed)
     if n is None:
         raise ShipidError(

@@ -523,7 +523,11 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     controls = Controls(vessel)
     if not controls.differential:
         _ = controls.helm  # DocumentError where nothing turns the ship
-    rpm = shaft_speed(controls, service) / RPM
+    try:
+        rpm = shaft_speed(controls, service) / RPM
+    except ShipidError as error:
+        place = "particulars.U_0" if error.path == "--speed" else error.path  # here no option gives the speed
+        raise DocumentError(error.message, file=vessel.file, path=place) from None
     speed = 0.75 * service
     horizon, why = horizon_of(length, speed, [np.inf])
     step = step_of(horizon, 0.0)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.errors import ShipidError
+from shipid.errors import DocumentError, ShipidError
 from shipid.measures import MEASURES
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Measures
@@ -67,6 +67,13 @@ def test_a_small_model_may_have_a_fast_shaft(rpm: float, diameter: float) -> Non
 def test_a_speed_that_no_shaft_speed_gives_is_refused() -> None:
     with pytest.raises(ShipidError, match=r"--speed: no shaft speed drives .* at 100 m/s: give a lower speed"):
         standard(SHIP.with_values({"hull.derivatives.X_uu": -1e9}), "turning", speed=100.0)
+
+
+def test_a_ship_that_nothing_drives_is_told_so() -> None:
+    """A lower speed is no help to a barge."""
+    barge = SHIP.with_values({"thruster.port.off": True, "thruster.starboard.off": True})
+    with pytest.raises(DocumentError, match=r"thruster: no command drives .* ahead: a manoeuvre needs a shaft speed"):
+        standard(barge, "stop")
 
 
 def test_thrust_about_a_service_speed_says_nothing_of_a_stop() -> None:

@@ -402,6 +402,15 @@ def test_what_does_not_drive_a_ship_ahead_rests() -> None:
     assert _turning(Controls(load_vessel("supply-vessel")), 1.0, 100.0).value[0]["bow_aft.n_rpm"] == 0
 
 
+def test_a_service_speed_that_no_shaft_gives_is_a_fault_of_the_vessel(tmp_path: Path) -> None:
+    """The command has no option for a speed."""
+    lame = tmp_path / "lame.toml"
+    stops = 'actuator.n.kind = "rate_limit"\nactuator.n.rate = 1.0\nactuator.n.high = 0.5\n'
+    lame.write_text(f'extends = "gunnerus-28.9"\nname = "lame"\n[thruster.port]\n{stops}[thruster.starboard]\n{stops}')
+    with pytest.raises(DocumentError, match=r"lame.toml: particulars.U_0: no shaft speed drives"):
+        draft_study([str(lame)], None, tmp_path / "study.toml")
+
+
 def test_units_at_both_ends_are_ordered_apart() -> None:
     """With one angle for both a double-ended ferry goes aside and does not turn."""
     aft = load_vessel("gunnerus-28.9")
