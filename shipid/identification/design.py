@@ -83,6 +83,12 @@ class Informed:
     information: Array
 
 
+def recorded(vessel: Vessel, rows: pd.DataFrame) -> Limits:
+    """Limits by the greatest recorded speed of the shafts that drive the ship ahead: a tunnel thruster is faster."""
+    shafts = Controls(vessel).effects[0]
+    return Limits(n_rpm=max(float(rows[name].abs().max()) for name in shafts) / RPM) if shafts else Limits()
+
+
 def candidates(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | None = None) -> list[Candidate]:
     """Candidate manoeuvres at each approach speed [m/s] that respect the limits.
 

@@ -38,7 +38,6 @@ from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, Statistics, autocorrelation, decided_alone, statistics
 from shipid.identification.unstable import grows, growth_in
 from shipid.interrupts import uninterrupted
-from shipid.physics.signals import is_shaft
 from shipid.simulation.measured import measure_standard
 from shipid.units import percent, plural
 from shipid.version import __version__
@@ -555,13 +554,11 @@ def _programme(
     """
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     speed = float(np.median(np.hypot(rows["u"], rows["v"])))
-    shafts = [name for name in dynamics(vessel).commands if is_shaft(name)]
-    most = 60 * max(float(rows[name].abs().max()) for name in shafts) if shafts else float("inf")
     unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
     motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
     spread = {name: width * (residual_level(judged, name) or EXACT) for name, width in motions.items()}
     try:
-        choice = design.candidates(vessel, (speed / 2, speed), design.Limits(n_rpm=most))
+        choice = design.candidates(vessel, (speed / 2, speed), design.recorded(vessel, rows))
         contributions = design.informed_of_possible(
             vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
             interval=settings.step,

@@ -24,7 +24,7 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
 from shipid.files import write_new
 from shipid.identification.bands import Measure, bands, check_level, refusal
-from shipid.identification.design import Candidate, Limits, candidates, performed, steps_between
+from shipid.identification.design import Candidate, candidates, performed, recorded, steps_between
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
 from shipid.identification.outcome import (
     SIGNALS,
@@ -42,14 +42,12 @@ from shipid.identification.sides import by_group, uneven
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, Statistics, statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange
-from shipid.physics.signals import is_shaft
 from shipid.report.structures import StructuresContent
 from shipid.simulation.measured import Measured, measure_all
 from shipid.study.evidence import FEWEST_RUNS, contrasts
 from shipid.study.new import proposed_horizon
 from shipid.study.verdict import shown
 from shipid.version import __version__
-from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
 Array = NDArray[np.float64]
@@ -483,14 +481,12 @@ def _programme(
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     speed = float(np.median(np.hypot(rows["u"], rows["v"])))
     ship = with_gear(fits[chosen].vessel)
-    shafts = [name for name in dynamics(ship).commands if is_shaft(name)]
-    limits = Limits(n_rpm=60 * max(float(rows[name].abs().max()) for name in shafts) if shafts else float("inf"))
     settings, judged = fits[chosen].solution.settings, fits[chosen].statistics
     deviations = {
         name: settings.weights[name] * residual_level(judged, name) for name in "uvr" if name in settings.weights
     }
     try:
-        choice = candidates(ship, (speed / 2, speed), limits)
+        choice = candidates(ship, (speed / 2, speed), recorded(ship, rows))
         interval = settings.step
         step = interval / steps_between(ship, interval)
         logs = {name: _logs(with_gear(fits[name].vessel), choice, step, interval) for name in good}

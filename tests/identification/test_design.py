@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.engine.rollout import rollout
@@ -19,6 +20,7 @@ from shipid.identification.design import (
     informed,
     informed_of_possible,
     rank,
+    recorded,
 )
 from shipid.simulation.manoeuvre import (
     Approached,
@@ -34,6 +36,7 @@ from shipid.simulation.manoeuvre import (
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import standard
 from shipid.vessel.load import load_vessel
+from shipid.vessel.template import Particulars, first_guess
 from tests.conftest import variety
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -203,3 +206,10 @@ def test_a_zigzag_is_replayed_as_logged() -> None:
     zigzag = Candidate("zigzag", Zigzag(n_rpm=120, angle_deg=20, execute_heading_deg=20, duration=90))
     fine, coarse = (informed(SHIP, [zigzag], GROUPS, weights=WEIGHTS, step=step)[0].information for step in (0.1, 0.2))
     np.testing.assert_allclose(np.diag(fine), np.diag(coarse), rtol=0.05)
+
+
+def test_recorded_limits_are_those_of_the_shafts_that_drive_the_ship() -> None:
+    """A tunnel thruster at 600 rpm allowed 600 rpm to the main shaft."""
+    ship = first_guess(Particulars(100.0, 16.0, 6.0, 0.7, 7.0, tunnel_thruster=True), "b", "b.toml").vessel
+    rows = pd.DataFrame({"propeller.n": [1.0, 2.0], "bow.n": [0.0, -10.0]})
+    assert recorded(ship, rows).n_rpm == pytest.approx(120.0)
