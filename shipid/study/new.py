@@ -627,7 +627,8 @@ def _turning(controls: Controls, service: float, rpm: float) -> Choice:
     """
     low, high = float(f"{rpm / 2:.3g}"), float(f"{rpm:.3g}")
     drives, helm = controls.effects
-    apart = len({*helm.values()}) > 1  # units at both ends: the same angle would drive her aside
+    signs = {(signal_of(name), sign) for name, sign in helm.items()}
+    apart = {signal for signal, sign in signs if (signal, -sign) in signs}  # at both ends: one angle drives her aside
     orders: dict[str, Any] = {}
     resting = [name for name in controls.commands if is_shaft(name) and name not in drives]
     for name in controls.commands:
@@ -640,7 +641,7 @@ def _turning(controls: Controls, service: float, rpm: float) -> Choice:
         elif controls.differential and name in drives:
             orders[single] = [0.0, high]
         else:
-            orders[single if apart and steers(name) else common] = limits
+            orders[single if signal_of(name) in apart else common] = limits
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
     turned = "each shaft apart: their difference turns her" if controls.differential else "and hard over either way"
     turned += ", each angle apart: units at both ends turn her by their difference" if apart else ""

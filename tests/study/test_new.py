@@ -419,6 +419,10 @@ def test_units_at_both_ends_are_ordered_apart() -> None:
     order = _turning(Controls(both), 5.0, 140.0).value[0]
     assert order["port.alpha_deg"] == order["starboard.alpha_deg"] == [-35, 35]
     assert "alpha_deg" in _turning(Controls(aft), 5.0, 140.0).value[0]
+    rudder = {"kind": "rudder_derivatives", "N_delta": 0.002, "L_pp": 28.9, "U_0": 5.0}
+    order = _turning(Controls(aft.with_values({"thruster.rudder": rudder})), 5.0, 140.0)
+    assert {"alpha_deg", "delta_deg"} <= order.value[0].keys()  # of other signs, but each by itself
+    assert "both ends" not in order.why
 
 
 @pytest.mark.parametrize(
