@@ -36,7 +36,7 @@ def reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...
     for column, values in table.items():
         component, _, signal = column.rpartition(".")
         turns = any(steers(other) for other in table if other.startswith(f"{component}."))
-        if orders_thrust(column) and ACROSS.search(component.lower()) and not turns:
+        if orders_thrust(column) and values.any() and ACROSS.search(component.lower()) and not turns:
             return None
         sides = [SIDES.get(word, word) for word in words[column]]
         partner = called.get(_name(column, [OTHER.get(side, side) for side in sides]), "")

@@ -96,3 +96,9 @@ def test_a_column_left_out_must_be_its_image() -> None:
     for other, mirrored in ((2.0, True), (1.0, False)):  # names without a side
         unsided = {"u": here["u"], "m1.n": np.full(20, 2.0), "m2.n": np.full(20, other)}
         assert (reflection(unsided, features("u")) is not None) == mirrored
+
+
+def test_a_tunnel_that_rests_takes_no_mirror_away() -> None:
+    here = table("u", "v", "propeller.n", "rudder.delta") | {"bow.n": np.zeros(20)}
+    matrix = reflection(here, features("u", "v", "propeller.n", "rudder.delta"))
+    np.testing.assert_array_equal(matrix, np.diag([1.0, -1.0, 1.0, -1.0]))
