@@ -21,6 +21,7 @@ ELSEWHERE = {
         f"export/{part}.py": "export/test_c.py"
         for part in ("blocks", "c_predictor", "c_vessel", "correctors", "equations", "known", "model")
     },
+    "export/fmu_c.py": "export/test_fmu.py",
     "report/replay.py": "cli/test_replay.py",
     "report/motion.py": "cli/test_replay.py",
 }

@@ -1,0 +1,51 @@
+"""Cells of a table as numbers and angles, and what is said of one that is none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.errors import DataError
+from shipid.logs.cells import column_of, numbers_of, of_minutes, of_quaternion
+from shipid.logs.formats import TextFormat
+
+FILE = Path("log.csv")
+
+
+def test_texts_become_numbers_as_the_format_says() -> None:
+    log = pd.DataFrame({"n": ["1.250,5", " -3,25", "n/a", ""]})
+    form = TextFormat(decimal=",", thousands=".", missing=("", "n/a"))
+    np.testing.assert_equal(numbers_of(log, "n", form, FILE, "columns.n.from"), [1250.5, -3.25, np.nan, np.nan])
+
+
+def test_a_text_that_is_no_number_is_named_with_its_row_in_the_file() -> None:
+    log = pd.DataFrame({"n": ["1", "2", "off"]}, index=[0, 1, 7])
+    with pytest.raises(DataError, match=r"log\.csv: row 8: 'off' is no number \(column 'n'; 1 such rows\)"):
+        numbers_of(log, "n", TextFormat(), FILE, "columns.n.from")
+
+
+def test_a_column_that_is_there_twice_or_not_at_all_is_refused() -> None:
+    log = pd.DataFrame([[1.0, 2.0, 3.0]], columns=["n", "n", "speed"])
+    with pytest.raises(DataError, match="'n' appears twice"):
+        column_of(log, "n", FILE, "columns.n.from")
+    with pytest.raises(DataError, match=r"columns\.u\.from: column 'sped' is not in the log: .*speed"):
+        column_of(log, "sped", FILE, "columns.u.from")
+
+
+def test_degrees_and_minutes() -> None:
+    log = pd.DataFrame(index=range(2))
+    np.testing.assert_allclose(of_minutes(np.array([5930.0, -1045.0]), log, FILE, "p"), [59.5, -10.75])
+    with pytest.raises(DataError, match="60 minutes or more"):
+        of_minutes(np.array([5930.0, 5975.0]), log, FILE, "p")
+
+
+def test_a_quaternion_that_is_none_is_named() -> None:
+    """A turn by 90 deg about the vertical axis, and one of twice its size."""
+    log, half = pd.DataFrame(index=range(2)), np.sqrt(0.5)
+    parts = [np.zeros(2), np.zeros(2), np.array([half, half]), np.array([half, half])]
+    np.testing.assert_allclose(of_quaternion(parts, ("x", "y", "z", "w"), log, FILE, "p"), np.pi / 2)
+    with pytest.raises(DataError, match="size 2 in row 1"):
+        of_quaternion([2 * part for part in parts], ("x", "y", "z", "w"), log, FILE, "p")
