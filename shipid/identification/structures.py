@@ -10,7 +10,8 @@ Sobolev (1964).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,6 +35,7 @@ OF_VALUE, SHARE = 0.3, 0.03  # standard deviation of a prior: of the value at th
 TINY = 1e-6  # of the hull's force: a coefficient whose force is smaller begins at 0
 SAMPLES, BEYOND, SEED = 1500, 1.2, 0  # states of the data, and as many drawn from the ranges, so much wider
 DRAWN = 0.05  # weight of a drawn state: along a run forces nearly cancel, and small errors count
+NOTHING = 1e-6  # in place of 0 where a coefficient must be positive
 LEAST = 1e-3  # of the usual size: where a coefficient that must be positive begins at least
 AXES = ("X", "Y", "N")
 
@@ -81,8 +83,11 @@ STRUCTURES: dict[str, Structure] = {
     ),
 }
 """Name -> structure. Each also has a side force and a moment of straight running, which a single screw makes."""
-REPLACED = ("mmg", "derivatives", "prime_derivatives", "abkowitz", "crossflow")
-"""Blocks of `hull` that a structure replaces; of `resistance` it takes over R_0."""
+REPLACED = ("mmg", "derivatives", "prime_derivatives", "bis_derivatives", "abkowitz", "crossflow")
+"""Blocks of `hull` that a structure replaces, but for what they do with heave, roll, pitch and heel; of `resistance` it
+takes over R_0."""
+COEFFICIENTS = tuple(f"{axis}_" for axis in "XYZKMN")
+PLANAR = re.compile(r"[XYN]_[uvr|]+")  # a coefficient that a structure may have, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +157,9 @@ def _bare(
 ) -> Vessel:
     """The vessel with the blocks of the structure, every coefficient about nothing."""
     document = dict(vessel.document)
+    blocks = {path.split(".")[1] for path in structure.hull}
     hull = {key: block for key, block in document.get("hull", {}).items() if key not in REPLACED}
+    hull |= {key: _left(block) for key, block in document.get("hull", {}).items() if _stays(key, block, blocks)}
     if "resistance" in hull:
         hull["resistance"] = {**hull["resistance"], "R_0": 0.0}
     document["hull"] = hull
@@ -167,9 +174,22 @@ def _bare(
         raise DocumentError("missing: a structure of the hull needs it", file=vessel.file, path=path)
     if structure.rudder and "U_0" not in sizes:
         document["particulars"] = {**sizes, "U_0": speed}
-    small = {path: 1e-6 if path.endswith("hull.mmg.R_0") else 0.0 for path in paths}
+    small = {path: NOTHING if path == "hull.mmg.R_0" else 0.0 for path in paths}
     document["name"] = f"{vessel.name}, hull of {structure.words}"
     return check_vessel(documents.replace(document, small), vessel.file)
+
+
+def _stays(key: str, block: Mapping[str, Any], blocks: Collection[str]) -> bool:
+    """Whether a block that a structure replaces has a number that stays; blocks : those of the structure."""
+    heeling = any(name[:2] in COEFFICIENTS and not PLANAR.fullmatch(name) for name in block)
+    replaced = key in REPLACED and key != "crossflow" and not block.get("off", False)
+    return replaced and (key in blocks or heeling)
+
+
+def _left(block: Mapping[str, Any]) -> dict[str, Any]:
+    """A block without the coefficients that a structure replaces: those of heave, roll, pitch and heel, constants."""
+    kept = {name: value for name, value in block.items() if not isinstance(value, str) and not PLANAR.fullmatch(name)}
+    return {**kept, "R_0": NOTHING} if "R_0" in kept else kept
 
 
 def _states(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dict[str, Array]:
@@ -251,8 +271,8 @@ def _settings(
         return [
             path
             for path in chosen
-            if not path.startswith(gone) and path not in paths and path != "hull.resistance.R_0"
-            and path in result.parameters
+            if (".actuator." in path or not path.startswith(gone)) and path not in paths
+            and path != "hull.resistance.R_0" and path in result.parameters
         ]  # fmt: skip
 
     fixed = set(kept(settings.fixed))

@@ -90,6 +90,67 @@ def test_numbers_outside_of_the_hull_stay_as_the_settings_say() -> None:
     assert rudder["actuator"] == before["actuator"]
 
 
+def test_numbers_of_the_gear_of_a_replaced_rudder_stay_free() -> None:
+    """Only `abkowitz` replaces the rudder: its fit had the lag fixed, that of all others had it free."""
+    gear = "thruster.rudder.actuator.delta.rate"
+    asked = Identify(parameters=["hull.*", gear], prior={gear: 0.2})
+    for name in STRUCTURES:
+        exchanged = exchange(KVLCC2, name, log_of(KVLCC2), log_of(KVLCC2).runs, asked)
+        assert gear in exchanged.settings.parameters, name
+        assert exchanged.settings.prior[gear] == 0.2
+        assert gear in unknowns(exchanged.vessel, exchanged.settings).paths
+
+
+@pytest.mark.parametrize("name", list(STRUCTURES))
+def test_a_hull_in_the_bis_system_is_replaced(name: str) -> None:
+    """It stayed beside the new one, whose coefficients all began at 0: its numbers were fixed in every structure."""
+    tanker = load_vessel("esso-190k")
+    data = log_of(tanker)
+    exchanged = exchange(tanker, name, data, data.runs, Identify(parameters=["hull.*"]))
+    assert "bis_derivatives" not in exchanged.vessel.document["hull"]
+    assert max(exchanged.misfit.values()) < 0.02
+    values = exchanged.vessel.parameters
+    assert any(values[path] for path in STRUCTURES[name].hull if path.rpartition(".")[2].startswith("N_"))
+
+
+HEELING = {
+    "derivatives": (load_vessel("naval-51"), "K_p|p|"),
+    "prime_derivatives": (load_vessel("container-175"), "N_vphiphi"),
+}
+
+
+@pytest.mark.parametrize("name", list(STRUCTURES))
+@pytest.mark.parametrize("block", list(HEELING))
+def test_roll_and_heel_are_as_they_were(block: str, name: str) -> None:
+    """A ship that rolls had no damping of it, and no moment of heel: a roll of 0.1 rad grew in still water."""
+    ship, coefficient = HEELING[block]
+    data = log_of(ship)
+    vessel = exchange(ship, name, data, data.runs, Identify(parameters=["hull.*"])).vessel
+    assert vessel.document["hull"][block][coefficient] == ship.document["hull"][block][coefficient]
+    model = dynamics(ship)
+    numbers = [data.frame[command].median() for command in model.commands]
+    speed = float(data.frame["u"].median())
+    rolls = []
+    for one in (ship, vessel):
+        moments = []
+        for heel, rate in ((0.0, 0.0), (0.15, 0.0), (0.0, 0.1)):
+            state = [0, 0, 0, heel, speed, 0, rate, 0]
+            given = (dynamics(one).memory, np.zeros(len(model.environment)), list(one.parameters.values()))
+            memory = [numbers[model.commands.index(command)] for command in given[0]]
+            rates = dynamics(one).rates(state, memory, numbers, given[1], given[2], np.zeros(model.num_dof))
+            moments.append(np.array(rates).ravel()[model.num_dof :])
+        rolls.append(np.array(moments)[1:] - moments[0])
+    np.testing.assert_allclose(rolls[1], rolls[0], rtol=1e-9, atol=1e-12)
+
+
+def test_constants_of_a_hull_stay_with_its_kind() -> None:
+    """A ship whose resistance is another astern kept none of it, in a structure of the same kind."""
+    ship = KVLCC2.with_values({"hull.mmg.k_astern": 1.4})
+    for name, kept in {"modulus": True, "cubic": False}.items():
+        hull = exchange(ship, name, log_of(KVLCC2), log_of(KVLCC2).runs, Identify(parameters=["hull.*"])).vessel
+        assert (hull.parameters.get("hull.mmg.k_astern") == 1.4) == kept
+
+
 @pytest.mark.parametrize("name", list(STRUCTURES))
 def test_a_rudder_that_is_off_stays_off(name: str) -> None:
     """No coefficient of it is free, it takes no order, and its block is as before."""
