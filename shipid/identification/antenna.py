@@ -58,14 +58,14 @@ def antenna(solution: Solution, dataset: Dataset) -> Antenna | None:
     length = solution.vessel.length
     if length is None or "lever_arm" in solution.settings.widths:
         return None
-    seen, total = stepped(solution, dataset, length), float(solution.residuals @ solution.residuals)
+    seen, total = stepped(solution, dataset, length), _squares(solution)
     for _ in range(REFITS):
         if seen is None or seen.certain < CERTAIN or seen.explained < WORTH:
             return seen
         moved = _to_origin(dataset, seen.x, seen.y)
         again = identify(solution.vessel, moved, solution.runs, solution.settings)
         more = stepped(again, moved, length, (seen.x, seen.y)) if again.status == "ok" else None
-        explained = 1 - float(again.residuals @ again.residuals) / total
+        explained = 1 - _squares(again) / total
         seen = None if more is None else replace(more, explained=explained, factors=again.factors)
     return seen
 
@@ -105,6 +105,12 @@ def stepped(
     return Antenna(x, y, float(sizes.max()), explained, every)
 
 
+def _squares(solution: Solution) -> float:
+    """Sum of the squares of the residuals; with huber of what each counts as, whatever share is within."""
+    shares = np.array([solution.within[name] for name in solution.signals])
+    return float((shares * solution.residuals) @ solution.residuals)
+
+
 def _to_origin(dataset: Dataset, x: float, y: float) -> Dataset:
     """The log of a point (x, y) [m], moved to the origin."""
     rows = move_origin(dataset.frame, LeverArm(kind="lever_arm", reason="a trial", x=x, y=y)).rows
@@ -114,7 +120,8 @@ def _to_origin(dataset: Dataset, x: float, y: float) -> Dataset:
 def _residuals(solution: Solution, dataset: Dataset) -> Array | None:
     """Residuals (m,) of the fit with another log; None where they diverge."""
     problem = build(solution.vessel, dataset, solution.runs, solution.settings)
-    residuals = evaluate(problem, solution.factors, solution.point).at.marginal(solution.settings.linear_from)[0]
+    at = evaluate(problem, solution.factors, solution.point).at
+    residuals = at.marginal(solution.settings.linear_from, solution.within)[0]
     return residuals if residuals.shape == solution.residuals.shape and np.isfinite(residuals).all() else None
 
 

@@ -55,7 +55,7 @@ def lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
         return None
     problem = build(solution.vessel, _earlier(dataset), solution.runs, settings)
     at = evaluate(problem, solution.factors, solution.point).at
-    shifted = at.marginal(settings.linear_from)[0]
+    shifted = at.marginal(settings.linear_from, solution.within)[0]
     if shifted.shape != solution.residuals.shape or not np.isfinite(shifted).all():
         return None
     free = ~(solution.held | solution.at_bound)

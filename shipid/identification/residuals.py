@@ -326,17 +326,33 @@ class Prediction:
     time: Array
     signals: NDArray[np.str_]
 
-    def marginal(self, threshold: float = np.inf) -> tuple[Array, Array, Array]:
+    def within(self, threshold: float) -> dict[str, float]:
+        """Signal -> share of its residuals up to the threshold of the Huber loss; at least that of one residual."""
+        small = np.abs(self.r) <= threshold
+        selected = {name: self.signals == name for name in self.problem.layout.signals}
+        return {name: max(float(small[at].mean()), 1 / at.sum()) for name, at in selected.items() if at.any()}
+
+    def marginal(
+        self, threshold: float = np.inf, shares: Mapping[str, float] | None = None
+    ) -> tuple[Array, Array, Array]:
         """Marginal residuals (m,), their Jacobian (m, n), and the leverage (m,) of the nuisances.
 
         With A the derivatives to the nuisances xi ~ N(0, 1), e = (I + A A^T)^(-1/2) (r - A xi). At the optimum of xi
         its sum of squares is that of r and xi, and its Jacobian gives the Fisher information of the factors.
-        threshold : of the Huber loss, in standard deviations; the weights are applied to residuals and Jacobian.
+
+        With the Huber loss a residual counts as psi = r up to the threshold and no more beyond it, and d psi / d r is 1
+        or 0, on average the share p of its signal that is within. So r is psi / sqrt(p) here, and the derivatives are
+        times sqrt(p): squares, scores and information are then those of Huber's covariance,
+        (J^T J)^-1 E[psi^2] / p^2 (Huber, Robust Statistics (1981), sec. 7.6).
+
+        threshold : of the Huber loss, in standard deviations. shares : signal -> p; default: `within`.
         """
-        root = np.ones(len(self.r))
+        e, root = self.r, np.ones(len(self.r))
         if np.isfinite(threshold):
-            root = np.sqrt(threshold / np.maximum(np.abs(self.r), threshold))
-        e, J, spent = root * self.r, root[:, None] * self.by_factor, np.zeros(len(self.r))
+            shares = self.within(threshold) if shares is None else shares
+            root = np.sqrt(np.array([shares[name] for name in self.signals.tolist()]))
+            e = np.clip(self.r, -threshold, threshold) / root
+        e, J, spent = np.array(e), root[:, None] * self.by_factor, np.zeros(len(self.r))
         if not (self.nuisances.size or self.away.size) or not np.isfinite(e).all():
             return e, J, spent
         for run in range(len(self.problem.runs)):

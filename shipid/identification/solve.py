@@ -41,7 +41,7 @@ class Solution:
     nuisances : run -> name -> estimate [SI] of the unknowns of that run.
     residuals : (m,) predicted less measured over the declared standard deviation, nuisances projected out; by run, then
         time. Their sum of squares is the objective without the priors of the factors, those of the nuisances included.
-        With huber each is scaled by the square root of its weight, and their squares sum to less than that.
+        With huber they are those of `Prediction.marginal`, and their squares sum to something else.
     jacobian : (m, n) d residual / d factor with the nuisances projected out: J^T J is the Fisher information.
     prior_widths : (n,) standard deviations of the factors' priors; inf: none. centre : (n,) their means.
     clusters, signals, times : (m,) index of the run, column and time [s] of each residual.
@@ -52,6 +52,7 @@ class Solution:
     at_bound : (n,) whether the estimate is at a bound. held : (n,) factors that are not free: dropped, or given
         bounds that are equal. dropped : paths of the former.
     effective : signal -> independent residuals that its residuals were counted as, where `discount` is on.
+    within : signal -> share of its residuals up to the threshold of huber; 1 with the squared loss.
     warnings : what the fit cannot see, one sentence each: a step that is longer than the interval of the log.
     """
 
@@ -81,6 +82,7 @@ class Solution:
     point: Point = field(repr=False)
     dropped: tuple[str, ...] = ()
     effective: Mapping[str, float] = field(default_factory=dict)
+    within: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     @property
@@ -299,6 +301,7 @@ def _solution(problem: Problem, result: Result, objective_start: float, seconds:
         at_bound=at_bound,
         held=unknown.low == unknown.high,
         point=_point(result),
+        within=end.within(settings.linear_from),
     )
 
 

@@ -329,6 +329,34 @@ def test_huber_withstands_outliers() -> None:
     assert off[1] < 0.2 * off[0]
 
 
+@pytest.mark.parametrize(("sharper", "bad"), [(1.0, 0.0), (4.0, 0.0), (1.0, 0.1), (4.0, 0.1)])
+def test_standard_errors_of_huber_are_those_of_its_theory(sharper: float, bad: float) -> None:
+    """The variance is E[psi^2] / P(within)^2 times that of known errors of 1 (Huber, Robust Statistics (1981), ch. 3).
+
+    With declared deviations 4 times too small the errors were 0.66 of these: 95 % intervals held the truth in 81 %.
+    With outliers they were up to 1.4 times as large.
+    """
+    dataset, rng = trials(SHIP, runs=5, steps=60), np.random.default_rng(3)
+    count = len(dataset.frame)
+    true = {"u": 0.02, "v": 0.02, "r": 2e-3}
+    begins = dataset.frame["t"].to_numpy() == 0
+    noise = {
+        name: np.where(begins, 0.0, width * rng.normal(0, 1, count) * np.where(rng.random(count) < bad, 10, 1))
+        for name, width in true.items()
+    }
+    log = changed(dataset, **{name: dataset.frame[name] + one for name, one in noise.items()})
+    declared = {name: width / sharper for name, width in true.items()}
+    solution = identify(SHIP, log, log.runs, settings(weights=declared, loss="huber", horizon=0, start="base"))
+    known = identify(SHIP, log, log.runs, settings(weights=true, horizon=0, start="base"))
+    x, k = np.linspace(-80, 80, 400001), 2.0 / sharper
+    density = (1 - bad) * np.exp(-(x**2) / 2) + bad / 10 * np.exp(-(x**2) / 200)
+    density /= density.sum()
+    variance = (density @ np.clip(x, -k, k) ** 2) / density[np.abs(x) <= k].sum() ** 2
+    plain = np.sqrt(np.diag(np.linalg.inv(known.jacobian.T @ known.jacobian)))
+    errors = statistics(LinearFit.of(solution)).covariances["fisher"].errors
+    np.testing.assert_allclose(errors / plain, np.sqrt(variance), rtol=0.15)
+
+
 def test_what_the_data_do_not_support_is_dropped() -> None:
     dataset, rng = trials(SHIP, runs=4, steps=40), np.random.default_rng(4)
     noisy = changed(dataset, **{k: dataset.frame[k] + rng.normal(0, s, len(dataset.frame)) for k, s in SHARP.items()})
