@@ -295,6 +295,7 @@ def _show_nuisances(outcome: Identified, answer: Answer) -> None:
 
 def _show_identified(outcome: Identified, answer: Answer) -> None:
     """Print estimates, what is not identified, free runs, manoeuvres, manoeuvres to run next, and warnings."""
+    from shipid.identification.collinearity import listed
     from shipid.identification.sides import HEADS, shown
 
     solution = outcome.solution
@@ -320,8 +321,10 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     columns = ["parameter", "unit", "base", "estimate", "factor", "std error", "95 % interval", "identified"]
     answer.rows("estimates", outcome.estimates, table(columns, rows))
     words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}
+    none = outcome.estimates.loc[outcome.estimates["base"] == 0, "name"].tolist()
     answer.say(
         f"Factors are relative to the base, and so are errors and intervals, by {words[outcome.statistics.chosen]}."
+        + (f" The base has 0 for {listed(none)}: there they are relative to the scale." if none else "")
     )
     answer.say("\n".join(f"  {sentence}" for sentence in outcome.unseen), unseen=outcome.unseen)
     _show_nuisances(outcome, answer)

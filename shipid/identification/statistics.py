@@ -76,6 +76,7 @@ class LinearFit:
     spent : (m,) share of each residual that the nuisances have taken (its leverage); 0 without nuisances.
     at_bound : (n,) estimates at a bound. held : (n,) factors that were not free. Neither has an interval.
     dropped : paths of the held factors that the drop test has removed. runs : name of each run number, or empty.
+    centre : (n,) factor of the base vessel: 0 where its number is 0, and factors are on the setting `scale`.
     """
 
     paths: tuple[str, ...]
@@ -90,6 +91,7 @@ class LinearFit:
     held: NDArray[np.bool_] | None = None
     dropped: tuple[str, ...] = ()
     runs: tuple[str, ...] = ()
+    centre: Array | None = None
 
     @classmethod
     def of(cls, solution: Solution) -> LinearFit:
@@ -527,7 +529,8 @@ def _sentences(
     shared = _shared(fit, free)
     for j, (path, name) in enumerate(zip(fit.paths, short_names(fit.paths), strict=True)):
         together = next((combination for combination in sets if path in combination.paths), None)
-        known = f"{name} is known to +-{digits(100 * half[j], 2)} % of its base value"
+        of_what = "its base value" if fit.centre is None or fit.centre[j] else "its scale"
+        known = f"{name} is known to +-{digits(100 * half[j], 2)} % of {of_what}"
         if path in fit.dropped:
             sentences.append(f"{name} was dropped, to {fit.factors[j]:.4g}: the data do not support a change")
         elif fit.held is not None and fit.held[j]:
@@ -545,7 +548,7 @@ def _sentences(
             sentences.append(f"{name} is not identified: {together.sentence()}")
         elif np.isfinite(alone[j]):
             why = "hardly excited" if alone[j] > WIDEST * shared[j] else "others do a part of the same"
-            sentences.append(f"{name} is not identified: +-{digits(100 * alone[j], 2)} % of its base value, {why}")
+            sentences.append(f"{name} is not identified: +-{digits(100 * alone[j], 2)} % of {of_what}, {why}")
         else:
             sentences.append(f"{name} is not identified: no independent effect on these data")
     return tuple(sentences)

@@ -132,12 +132,14 @@ def estimates(content: IdentificationContent) -> Figure:
     plot = layout(x_axis, y_axis, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44})
     cut = bool(((frame["factor_low"] < low) | (frame["factor_high"] > high)).any())
     vague = frame.loc[~frame["identified"].astype(bool), "name"].tolist()
+    none = frame.loc[frame["base"] == 0, "name"].tolist()
     return Figure(
         id="estimates",
         title="The estimates",
         takeaway=f"Not identified: {listed(vague, 8)}." if vague else "Every parameter is identified.",
         how="Dot: estimate; bar: 95 % interval; dotted: the base value. Hollow: the runs alone, without priors, leave "
         "an interval wider than ±100 % of the base value, or the estimate is at a bound or was dropped."
+        + (f" The base has 0 for {listed(none, 8)}: there factors are on the scale, which is dotted." if none else "")
         + (" Bars that reach an edge go on." if cut else ""),
         alternative="Estimates with intervals; the table below has the numbers.",
         height=ROW * len(frame) + HEAD,

@@ -18,6 +18,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.identification import outcome
+from shipid.identification.contents import identification_content
 from shipid.identification.design import Candidate, Informed
 from shipid.identification.free_run import ALL, CHANNELS, MEASURED, free_runs
 from shipid.identification.outcome import (
@@ -34,6 +35,7 @@ from shipid.identification.residuals import build, predict
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, statistics
+from shipid.report.identification import estimates
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials
 
@@ -518,3 +520,17 @@ def test_whole_runs_are_advised_to_stable_ships_alone(
     warnings = "; ".join(run_identification(off(), shaken, settings(horizon=horizon)).warnings)
     assert there in warnings
     assert absent not in warnings
+
+
+@pytest.mark.usefixtures("one_manoeuvre")
+def test_factors_on_a_scale_are_not_said_to_be_on_the_base_value() -> None:
+    """A number that is 0 in the base has no share of it; the reason, the command and the page said so."""
+    path = "hull.derivatives.N_ur"
+    zero, log = SHIP.with_values({path: 0.0}), trials(SHIP, runs=3, steps=40)
+    settings = Identify(parameters=[path, "hull.derivatives.N_uv"], scale={path: 1e6}, start="base")
+    found = run_identification(zero, log, settings)
+    reasons = dict(zip(found.estimates["name"], found.estimates["reason"], strict=True))
+    assert reasons["N_ur"].endswith("% of its scale")
+    assert reasons["N_uv"].endswith("% of its base value")
+    figure = estimates(identification_content(found, "log.parquet"))
+    assert "The base has 0 for N_ur: there factors are on the scale" in figure.how
