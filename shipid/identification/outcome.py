@@ -35,7 +35,14 @@ from shipid.identification.reach import beyond, of_log, reach_of
 from shipid.identification.settings import BLOCK, Identify, overrides, overrides_of, unknowns
 from shipid.identification.sides import by_group, uneven
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, Statistics, autocorrelation, decided_alone, statistics
+from shipid.identification.statistics import (
+    LinearFit,
+    Statistics,
+    against_priors,
+    autocorrelation,
+    decided_alone,
+    statistics,
+)
 from shipid.identification.unstable import grows, growth_in
 from shipid.interrupts import uninterrupted
 from shipid.simulation.measured import measure_standard
@@ -673,6 +680,17 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
             f"excite {path} in another run, too"
             for path, run in decided_alone(judged.fit).items()
         ]
+    contrary = against_priors(judged.fit)
+    if contrary:
+        of_path = dict(zip(solution.paths, short_names(solution.paths), strict=True))
+        said = [
+            f"{of_path[path]} would be {digits(factor)} +- {digits(half, 2)} (prior {width:g})"
+            for path, (width, factor, half) in contrary.items()
+        ]
+        warnings.append(
+            f"the runs contradict the priors: by the runs alone the factor of {listed(said)}; base, log or priors are "
+            "wrong, and the intervals take the priors for true"
+        )
     bound = [path for path, there in zip(solution.paths, solution.at_bound, strict=True) if there]
     if bound:
         others = "the intervals of the others hold if the bound is the true value"

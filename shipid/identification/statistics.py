@@ -29,7 +29,7 @@ Tipton, Psychological Methods 20 (2015) 375 (4 degrees of freedom); Carlstein, A
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -59,6 +59,7 @@ LITTLE = 1.1  # integrated correlation time, in samples, that makes no differenc
 MOST_LAGS, LEAST_ROWS = 10, 5  # lags that whiteness looks at; fewest rows of a run for that
 ALONE = 0.95  # of the variance of a factor under independent errors: one run decides it
 BLOCK = 10.0  # length of a block in integrated correlation times
+CONTRARY = 3.0  # standard deviations between a prior and the data that are no chance
 KEPT = 1e-4  # of I - H: directions that a cluster alone decides have no residual left
 
 
@@ -402,6 +403,25 @@ def declared_error(fit: LinearFit, path: str) -> float:
     inverse = _Basis.of(inner).inverse
     j = inner.paths.index(path)
     return float(np.sqrt(inverse[j, j]))
+
+
+def against_priors(fit: LinearFit) -> dict[str, tuple[float, float, float]]:
+    """Factors whose prior the data contradict: path -> width of the prior, and factor with half-width of data alone.
+
+    The fit without priors is one step of Gauss-Newton away. There a factor is farther from the centre of its prior than
+    `CONTRARY` standard deviations of prior and data together.
+    """
+    inner = _free(fit, _free_places(fit))
+    centre = np.ones(len(fit.paths)) if fit.centre is None else fit.centre
+    widths, centre = _widths(inner), centre[_free_places(fit)]
+    if not np.isfinite(widths).any():
+        return {}
+    step = -inverted(inner.jacobian.T @ inner.jacobian)[0] @ (inner.jacobian.T @ inner.residuals)
+    factors, left = inner.factors + step, inner.residuals + inner.jacobian @ step
+    seen = statistics(replace(inner, factors=factors, residuals=left, prior_widths=None))
+    half, errors = (seen.high - seen.low) / 2, (seen.high - seen.low) / 2 / stdtrit(np.inf, 0.5 + LEVEL / 2)
+    far = np.abs(factors - centre) > CONTRARY * np.hypot(widths, errors)
+    return {inner.paths[j]: (float(widths[j]), float(factors[j]), float(half[j])) for j in np.flatnonzero(far)}
 
 
 def decided_alone(fit: LinearFit) -> dict[str, str]:

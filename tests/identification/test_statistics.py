@@ -12,6 +12,7 @@ from scipy import stats
 from shipid.errors import ShipidError
 from shipid.identification.statistics import (
     LinearFit,
+    against_priors,
     autocorrelation,
     blocks,
     decided_alone,
@@ -353,3 +354,24 @@ def test_fits_without_a_meaning_are_refused() -> None:
         replace(fit, residuals=fit.residuals[:5], jacobian=fit.jacobian[:5], clusters=CLUSTERS[:5], signals=NAMES[:5])
     with pytest.raises(ShipidError, match="finite"):
         replace(fit, residuals=fit.residuals * np.nan)
+
+
+@pytest.mark.parametrize(("width", "true", "contrary"), [(0.01, 1.6, True), (0.1, 1.6, True), (1.0, 1.6, False)])
+def test_a_prior_that_the_data_contradict_is_told(width: float, true: float, contrary: bool) -> None:
+    """However tight it is: 0.01 holds the estimate near 1, with an interval that is far from the truth."""
+    rng = np.random.default_rng(5)
+    J = rng.normal(0, 0.5, (400, 2))
+    measured = J @ np.array([true, 1.0]) + rng.normal(0, 1.0, 400)
+    prior = np.array([width, np.inf])
+    precision = np.diag(1 / prior**2)
+    factors = np.linalg.solve(J.T @ J + precision, J.T @ measured + precision @ np.ones(2))
+    fit = LinearFit(
+        ("hull.p1", "hull.p2"), factors, J @ factors - measured, J, np.repeat(np.arange(8), 50), ("u",) * 400, prior
+    )
+    alone = np.linalg.lstsq(J, measured, rcond=None)[0]
+    error = np.sqrt(np.linalg.inv(J.T @ J)[0, 0])
+    assert (abs(alone[0] - 1) > 3 * np.hypot(width, error)) == contrary
+    told = against_priors(fit)
+    assert list(told) == (["hull.p1"] if contrary else [])
+    if contrary:
+        assert told["hull.p1"][:2] == pytest.approx((width, alone[0]))
