@@ -17,12 +17,13 @@ from shipid.identification.residuals import build
 from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, Statistics, statistics
-from shipid.logs.repairs import LeverArm, move_origin
+from shipid.logs.repairs import HeadingOffset, LeverArm, move_origin, turn_heading
 from shipid.units import percent
 
 Array = NDArray[np.float64]
 AHEAD, ABEAM = ("antenna.x", "antenna.y")  # unknowns beside the factors, in lengths of the ship
 ARM = 0.1  # of the length: by which the log is moved for the derivatives
+OFF = 0.02  # [rad] by which the heading is turned for the derivatives
 REFITS = 2  # with the log moved from the antenna to the origin
 NEAREST, FARTHEST, WIDEST = 0.1, 0.6, 0.25  # of the length: from the origin; ahead or astern; to a side
 NEGLIGIBLE = 0.02  # of the length: a way that the sentence leaves out
@@ -105,6 +106,26 @@ def stepped(
     return Antenna(x, y, float(sizes.max()), explained, every)
 
 
+def turned(solution: Solution, dataset: Dataset) -> float:
+    """Share of the squares of the residuals that a heading which is off takes away, by one step of Gauss-Newton."""
+    free = ~(solution.held | solution.at_bound)
+    slope = _residuals(solution, _turned(dataset, OFF))
+    total = float(solution.residuals @ solution.residuals)
+    if slope is None or not total > 0:
+        return 0.0
+    added = (slope - solution.residuals) / OFF
+    J = np.column_stack([solution.jacobian[:, free], added])
+    inverse = inverted(J.T @ J + np.diag(np.append(solution.prior_widths[free], np.inf) ** -2.0))[0]
+    left = solution.residuals - J @ (inverse[:, -1] * float(added @ solution.residuals))
+    return 1 - float(left @ left) / total
+
+
+def _turned(dataset: Dataset, angle: float) -> Dataset:
+    """The log with the heading turned by an angle [rad]; the velocity over ground is unchanged."""
+    repair = HeadingOffset(kind="heading_offset", reason="a trial", offset=angle)
+    return replace(dataset, frame=turn_heading(dataset.frame, repair).rows)
+
+
 def _squares(solution: Solution) -> float:
     """Sum of the squares of the residuals; with huber of what each counts as, whatever share is within."""
     shares = np.array([solution.within[name] for name in solution.signals])
@@ -132,6 +153,8 @@ def antenna_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str
         return ""
     far = np.hypot(seen.x, seen.y) >= NEAREST * length
     if not far or abs(seen.x) > FARTHEST * length or abs(seen.y) > WIDEST * length:
+        return ""
+    if turned(solution, dataset) >= seen.explained:  # a heading that is off explains as much
         return ""
     half, changes = (judged.high - judged.low) / 2, seen.factors - solution.factors
     share = np.where(np.isfinite(half), np.abs(changes) / np.maximum(half, 1e-12), 0.0)

@@ -9,11 +9,12 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.identification.antenna import antenna, antenna_fit
+from shipid.identification.antenna import turned as turned_share
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.vessel.load import Vessel, load_vessel
-from tests.identification.trials import changed, trials
+from tests.identification.trials import RANGES, changed, trials
 
 SHIP = load_vessel("gunnerus-28.9")
 LENGTH = float(SHIP.document["particulars"]["L_pp"])
@@ -100,3 +101,27 @@ def test_priors_that_pull_the_estimates_do_not_hide_or_make_an_antenna() -> None
         assert seen is not None
         assert (seen.x / LENGTH, seen.y / LENGTH) == pytest.approx((x, 0), abs=0.05)
         assert bool(sentence(solution, log)) == bool(x)
+
+
+@pytest.mark.parametrize(("off", "ahead", "named"), [(4.5, 0.0, False), (-4.5, 0.0, False), (0.0, 0.25, True)])
+def test_a_heading_that_is_off_is_not_taken_for_an_antenna(
+    monkeypatch: pytest.MonkeyPatch, off: float, ahead: float, named: bool
+) -> None:
+    """Where the ship turns to one side only, both give her drift a part of one sign; the heading explains more."""
+    for name, limits in {"n": (1.5, 3.3), "delta": (0.05, 0.5)}.items():
+        monkeypatch.setitem(RANGES, name, limits)
+    ship, rng, b = load_vessel("container-175"), np.random.default_rng(2), np.radians(off)
+    sound = trials(ship, runs=5, steps=50, step=3.0)
+    rows, size, length = sound.frame, len(sound.frame), ship.document["particulars"]["L_pp"]
+    v = rows["v"] + ahead * length * rows["r"]
+    noise = {"u": 0.07, "v": 0.07, "r": 1e-3}
+    turned = {"u": np.cos(b) * rows["u"] + np.sin(b) * v, "v": np.cos(b) * v - np.sin(b) * rows["u"], "r": rows["r"]}
+    measured = {name: (one + rng.normal(0, noise[name], size)).to_numpy() for name, one in turned.items()}
+    log = changed(sound, psi=(rows["psi"] + b).to_numpy(), **measured)
+    free = [f"hull.prime_derivatives.{name}" for name in ("N_r", "N_v", "Y_v")]
+    solution = fitted(log, ship, parameters=free, weights=noise, horizon=75, step=3.0)
+    seen = antenna(solution, log)
+    assert seen is not None
+    assert seen.shown
+    assert bool(sentence(solution, log)) == named
+    assert (turned_share(solution, log) < seen.explained) == named
