@@ -30,6 +30,7 @@ ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no fi
 NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
 STEPS_ABOUT = 5  # steps before and after a row, at least, whose median is usual there
 FARTHER = 2.0  # times the way from row to row that a ship would go in a hole of the clock, at least
+OFF_RATE, RATE_LEFT = 0.03, 0.02  # factor of a yaw rate, at least; share of the heading that it then leaves, at most
 STREAM = 0.5  # of the misfit of positions and velocities: less is no current
 NOTHING, OFTEN = 0.3, 20.0  # share of the rows that are 0 for no value, at most; s of a speed that count as a spike
 HALF, AWAY = 0.5, 18.0  # share of the usual speed, and parts of a turn, by which the rows around are away from 0
@@ -127,6 +128,7 @@ def defects_of_motion(state: State) -> None:
             )  # or the tests below would report the same delay again
             if state.body is not None and not _is_earth_fixed(state):
                 state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
+        _factor_of_rate(state)
     if state.position is not None and state.velocity is None:
         _jumps(state, _own_path(state), spikes=False)
     if state.velocity is None or state.position is None or state.body is None:
@@ -135,6 +137,23 @@ def defects_of_motion(state: State) -> None:
     path = evidence.integral(state.t, state.velocity)
     _jumps(state, _arm_or_delay(state, path))
     _heading_offset(state)
+
+
+def _factor_of_rate(state: State) -> None:
+    """Report a yaw rate whose integral is the heading times another number, as of gon/s or of a gyro that is off."""
+    assert state.psi is not None
+    assert state.r is not None
+    source = next(one.source for one in state.suggestions if one.name == "r")
+    seen, ran = state.chosen.change(state.psi), state.chosen.change(evidence.integral(state.t, state.r))
+    keep = evidence.robust(seen, ran)
+    fit = evidence.fit(seen[keep], ran[keep])
+    off = abs(fit.scale - 1.0)
+    clipped = any(one.kind == "clipped" and source in one.columns for one in state.findings)
+    if clipped or fit.left > RATE_LEFT or not off > max(OFF_RATE, 5 * fit.error):
+        return
+    sentence = f"the heading is {fit.scale:.4f} +- {fit.error:.4f} times the integral of {source!r}"
+    repair = {"kind": "scale", "columns": ["r"], "factor": round(fit.scale, 4)}
+    state.find("factor", (source,), 0.9, sentence, repair)
 
 
 def _own_path(state: State) -> Complex:

@@ -29,6 +29,8 @@ OFF_UNIT = 0.15  # relative distance of a fitted scale from a unit
 PLAIN, OFF_RARE = ("m/s", "kn", "km/h"), 0.03  # units that logs have, and the same distance for a unit that few have
 WHOLE, OFF_AIS = 0.9, 0.2  # share of whole numbers, at least; distance from the unit, of rates that AIS has coded
 ALONG = 0.1  # share of the track that a speed along the heading may leave unexplained
+TURNED, ONE_WAY = np.radians(0.5), 0.9  # of a track against a course, at least; mean of its directions, at most
+EXCHANGED, INWARD = 0.2, 0.5  # ratio of unexplained shares, at most; correlation of a drift into the turn, at least
 
 
 @dataclass(frozen=True)
@@ -203,9 +205,12 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
     state.suggest("v", second, unit, confidence, why, **extra, **extra_v)
     velocity = in_unit[0] + 1j * in_unit[1] * (-1 if frame == "mirrored" else 1)
     turn = np.exp(1j * state.psi)
-    state.velocity = np.asarray(velocity if frame == "earth" else velocity * turn)
     state.body = np.asarray(velocity / turn if frame == "earth" else velocity)
-    _factor(state, rest, Fit(fit.scale / factor, fit.error / factor, fit.left), (first, second), unit)
+    fit = Fit(fit.scale / factor, fit.error / factor, fit.left)
+    if frame == "earth":
+        fit, velocity = _as_track(state, fit, velocity, (first, second))
+    state.velocity = np.asarray(velocity if frame == "earth" else velocity * turn)
+    _factor(state, rest, fit, (first, second), unit)
 
 
 def _speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: bool = False) -> tuple[str, bool]:
@@ -340,8 +345,65 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
     state.suggest("course", course, turn, 0.9, why, wrap=True)
     state.velocity = np.asarray(to_si(unit, "u") * state.columns[speed] * way)
     state.body = np.asarray(state.velocity * np.exp(-1j * state.psi))
-    _factor(state, rest, Fit(fit.scale / factor, fit.error / factor, fit.left), (speed,), unit, ("speed",))
+    fit = Fit(fit.scale / factor, fit.error / factor, fit.left)
+    if not _ask_if_exchanged(state, seen, speed, course, fit):
+        fit, state.velocity = _as_track(state, fit, state.velocity, (course,), turn)
+    _factor(state, rest, fit, (speed,), unit, ("speed",))
     return True
+
+
+def _ask_if_exchanged(state: State, seen: Complex, speed: str, course: str, fit: Fit) -> bool:
+    """Ask whether heading and course are exchanged: the speed runs along the heading, not along the course.
+
+    fit : of the track (W,) `seen` with the course. A ship drifts out of her turn, and so a course that is late does not
+    look so.
+    """
+    assert state.psi is not None
+    assert state.body is not None
+    change = state.chosen.change(evidence.integral(state.t, state.columns[speed] * np.exp(1j * state.psi)))
+    keep = evidence.robust(seen, change)
+    if evidence.fit(seen[keep], change[keep]).left > EXCHANGED * fit.left:
+        return False
+    r = np.gradient(state.psi, state.t)
+    inward = np.corrcoef(_calmed(state, state.body.imag), _calmed(state, r))[0, 1]
+    if not inward > INWARD:
+        return False
+    heading = next((one.source for one in state.suggestions if one.name == "psi"), "psi")
+    words = f"are {heading!r} and {course!r} exchanged? The ship moves along {heading!r}, and drifts into her turns"
+    state.ask(("psi", "course", "v"), f"{words}: no ship does. Then exchange them here")
+    return True
+
+
+def _as_track(
+    state: State, fit: Fit, velocity: Complex, sources: tuple[str, ...], unit: str = "deg"
+) -> tuple[Fit, Complex]:
+    """Ask where the track is turned against velocities over ground (N,) [m/s]; return both as turned with it.
+
+    The north of a map, or of a compass, is another one. Where the ship turns, a position that is late, or of another
+    point, is turned, too, by as much as she turns. On a straight way a current may turn the track.
+    """
+    assert state.position is not None
+    assert state.psi is not None
+    seen, ran = (state.chosen.change(one) for one in (state.position, evidence.integral(state.t, velocity)))
+    keep = evidence.robust(seen, ran) & (np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90))
+    if keep.sum() < 20 or abs(complex(np.mean(ran[keep] / np.abs(ran[keep])))) > ONE_WAY:
+        return fit, velocity
+    angles = np.angle(seen[keep] * np.conj(ran[keep]))
+    rates = state.chosen.change(state.psi).real[keep]
+    design = np.stack([np.ones_like(rates), rates], axis=1)
+    (angle, slope), *_ = np.linalg.lstsq(design, angles, rcond=None)
+    parts = [float(np.mean(part)) for part in np.array_split(angles - slope * rates, 10)]
+    error = 1.25 * float(np.std(parts)) / np.sqrt(len(parts))
+    if not max(TURNED, 5 * error) < abs(angle) < np.pi / 4:
+        return fit, velocity
+    names = " and ".join(map(repr, sources))
+    words = f"the track is turned by {np.degrees(angle):+.1f} +- {np.degrees(error):.1f} deg against {names}: is their "
+    words += "north another than that of the positions, as that of a map or of a compass?"
+    remedy = f"offset = {angle / to_si(unit, 'psi'):.4g} ({unit}) for course, and for psi, too, if it counts so"
+    remedy = f"Then write {remedy}" if len(sources) == 1 else "Then turn the positions, or these"
+    state.ask(("psi", "course", "u", "v"), f"{words} {remedy}")
+    turn = np.exp(1j * angle)
+    return evidence.fit(seen[keep], ran[keep] * turn), np.asarray(velocity * turn)
 
 
 def pace(state: State) -> tuple[float, float]:

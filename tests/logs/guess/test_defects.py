@@ -92,6 +92,20 @@ def test_a_defect_is_reported_with_its_size(kind: str, tmp_path: Path) -> None:
     assert re.search(sentence, findings[kind].sentence), findings[kind].sentence
 
 
+@pytest.mark.parametrize("factor", [0.9, 1.0, 10 / 9])
+@pytest.mark.parametrize("delay", [0.0, 2.0])
+def test_a_yaw_rate_times_a_factor_is_scaled(factor: float, delay: float, tmp_path: Path) -> None:
+    """As in gon/s, or of a gyro that is off; a heading that is late has no other factor."""
+    unwrapped = CLEAN.assign(psi=np.unwrap(CLEAN["psi"], period=360.0))
+    frame = late(unwrapped, ["psi"], delay).assign(r=factor * CLEAN["r"])
+    found = [one for one in guessed(tmp_path, frame.assign(psi=frame["psi"] % 360.0)).findings if one.kind == "factor"]
+    assert len(found) == (factor != 1.0)
+    for one in found:
+        assert one.repair is not None
+        assert one.repair["columns"] == ["r"]
+        assert one.repair["factor"] == pytest.approx(1 / factor, rel=0.01)
+
+
 def test_a_repair_is_what_would_undo_the_defect(tmp_path: Path) -> None:
     (arm,) = (f for f in guessed(tmp_path, moved(CLEAN, 9.0, -3.0)).findings if f.kind == "lever arm")
     assert arm.repair is not None

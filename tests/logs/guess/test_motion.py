@@ -231,3 +231,56 @@ def test_a_ship_that_hardly_turns_has_a_yaw_rate_by_its_name_alone() -> None:
     (column,) = state.suggestions
     assert (column.source, column.unit) == ("rot", "deg/s")
     assert column.confidence < 0.5
+
+
+def over_ground(turn: float = 0.0) -> dict[str, np.ndarray]:
+    """Speed, and a course turned by an angle [rad]."""
+    return {"sog": np.abs(GROUND), "cog": np.degrees(np.angle(GROUND) + turn) % 360.0}
+
+
+@pytest.mark.parametrize("degrees", [-8.0, -1.0, 0.0, 0.2, 1.0, 8.0])
+@pytest.mark.parametrize("earth", [True, False], ids=["north and east", "speed and course"])
+def test_a_track_turned_against_velocities_over_ground_is_asked(degrees: float, earth: bool) -> None:
+    """As by the north of a map or a compass; it is no factor of the speed, which its cosine looked like."""
+    turn = np.radians(degrees)
+    there = GROUND * np.exp(1j * turn)
+    state = state_with_pose({"v north": there.real, "v east": there.imag} if earth else over_ground(turn))
+    choose_velocities(state)
+    assert not state.findings
+    assert len(state.questions) == (abs(degrees) >= 1.0)
+    for question in state.questions:
+        assert question.sentence.startswith(f"the track is turned by {-degrees:+.1f} +- 0.")
+        said = float(question.sentence.partition("offset = ")[2].partition(" ")[0] or np.nan)
+        assert np.isnan(said) if earth else said == pytest.approx(-degrees, abs=0.02)
+
+
+@pytest.mark.parametrize("late", [-2.0, 2.0])
+@pytest.mark.parametrize("x", [-15.0, 15.0])
+def test_a_late_position_of_another_point_is_no_turned_track(late: float, x: float) -> None:
+    """A ship that turns to one side alone is turned, too."""
+    state = state_with_pose(over_ground())
+    place = LOG["north"] + 1j * LOG["east"] + x * np.exp(1j * PSI)
+    state.position = np.interp(T - late, T, np.real(place)) + 1j * np.interp(T - late, T, np.imag(place))
+    choose_velocities(state)
+    assert not state.questions
+
+
+@pytest.mark.parametrize("exchanged", [True, False])
+def test_heading_and_course_that_are_exchanged_are_asked(exchanged: bool) -> None:
+    columns, state = over_ground(), state_with_pose({})
+    if exchanged:
+        columns["cog"], state.psi = np.degrees(PSI) % 360.0, np.unwrap(np.angle(GROUND))
+    state.columns |= columns
+    choose_velocities(state)
+    assert [question.sentence.partition("?")[0] for question in state.questions] == (
+        ["are 'psi' and 'cog' exchanged"] if exchanged else []
+    )
+
+
+@pytest.mark.parametrize("lag", [1.0, 3.0])
+def test_a_course_that_is_late_is_not_exchanged(lag: float) -> None:
+    columns = over_ground()
+    late = np.interp(T - lag, T, np.unwrap(np.angle(GROUND)))
+    state = state_with_pose(columns | {"cog": np.degrees(late) % 360.0})
+    choose_velocities(state)
+    assert not any("exchanged" in question.sentence for question in state.questions)
