@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Array
+from shipid.data.dataset import DATED, Array
 from shipid.errors import DataError
 from shipid.logs.dates import (
     DAY,
     DAY_OF,
     HALF_DAY,
     HOUR,
+    LAST_DATE,
     NEXT_DAY,
     TIME_OF_DAY,
     date_of,
@@ -78,6 +80,10 @@ DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in {**EPOCHS, "
 modified Julian dates to 2008 are the same numbers."""
 TICKS = {11_644_473_600: "1601, as Windows does", 62_135_596_800: "the year 1, as .NET does"}
 """Seconds from the begin of a clock of ticks of 100 ns to 1970 -> who counts so."""
+GPS, OF_GPS = 315_964_800, frozenset("gps gnss gpst".split())
+"""Seconds from 1970 to 6 January 1980, from which GPS counts, and words of a clock that may."""
+LEAP, LEAPS = 1_483_228_800, 18  # s since 1970 (UTC): from 2017 on GPS is so many seconds ahead of UTC
+OF_1904 = 2_082_844_800  # s from 1904, from which LabVIEW counts, to 1970
 COUNTERS, LONG_STEP = (2**16, 2**32), 10.0  # numbers of a counter; usual steps that lie over its end, at most
 SHORT_YEAR = 2e-6  # years, a minute: no clock of a ship has steps of as many seconds, or hours, without a unit
 SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
@@ -207,8 +213,11 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         if day:
             of_date = column_called(table, day) if isinstance(day, str) else date_texts([columns[one] for one in day])
             with_date = seconds(dated(of_date, column))
-            if np.isfinite(with_date).all() and np.all(np.diff(with_date) > 0):
-                return {"from": name, "unit": "date", "date": day}, with_date
+            if np.isfinite(with_date).all():
+                if np.all(np.diff(with_date) > 0):
+                    return {"from": name, "unit": "date", "date": day}, with_date
+                if (rate := _rate(with_date)) is not None:
+                    return {"from": name, "unit": "date", "date": day, "every": rate[0]}, rate[1]
         since = seconds(column) if is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
         times[name] = since
         if not np.isfinite(since).all():
@@ -267,6 +276,7 @@ def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[
     if clock["unit"] == "excel" and DATES["mjd"][0] < t[0] / DAY + EPOCHS["excel"]:
         excel, other = (date_of(t[0] + days * DAY)[:10] for days in (0.0, EPOCHS["excel"] - EPOCHS["mjd"]))
         yield f"{clock['from']!r} is read as a day of Excel, {excel}: or is it a modified Julian date (mjd), {other}?"
+    yield from _other_begin(clock, float(t[0]))
     if clock["unit"] not in ("date", "hhmmss") or {type(clock["from"]), type(clock.get("date", ""))} != {str}:
         return
     texts = column_called(table, clock["from"])
@@ -295,6 +305,23 @@ def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[
             words = f"after {before} comes {after}: is it local time as daylight saving begins, and no pause?"
             yield f"{words} Then write UTC, or in every row the zone that holds there"
             return
+
+
+def _other_begin(clock: dict[str, Any], first: float) -> Iterator[str]:
+    """Yield a question where a clock of seconds that is read as since 1970, first [s], may count from another date.
+
+    GPS counts from 1980, which a name may say; a log of the future counts from 1904. No log is of the future.
+    """
+    now = datetime.now(UTC).timestamp()
+    if clock["unit"] not in ("s", "ms", "us", "ns") or not DATED < first < LAST_DATE:
+        return
+    begins = f"{clock['from']!r} is read as seconds since 1970, {date_of(first)}: or does it count from"
+    of_gps, of_1904 = first + GPS - (LEAPS if first + GPS > LEAP else 0), first - OF_1904
+    if OF_GPS & {*parts_of(clock["from"])} and of_gps < now:
+        ahead = f", less {LEAPS} s by which GPS is ahead" if of_gps > LEAP else ""
+        yield f"{begins} 6 January 1980, as GPS does? Then add {GPS} s{ahead}: {date_of(of_gps)} UTC"
+    elif first > now and of_1904 > DATED:
+        yield f"{begins} 1904, as LabVIEW does? Then take {OF_1904} s off: {date_of(of_1904)}"
 
 
 def other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str, Any], t: Array) -> Iterator[str]:

@@ -19,6 +19,8 @@ PARTNERS = {"speed": "course", "course": "speed"}
 """Meanings that take the place of u and v together alone."""
 
 REMEDIES = {
+    "week": "it may be the week of the clock, whose seconds begin again with each: for dates write seconds since 1970, "
+    "315964800 + 604800 weeks + seconds, less 18 s by which GPS is ahead of UTC since 2017",
     "awd": "it may be the direction of the apparent wind from north: write the angle from the bow, less the heading",
     "blowing": "it may be a direction of the wind: map it to beta_w with direction = 'from' or 'towards'",
     "telegraph": "it may be an order of the shaft: map it to a command .n with factor = rpm / its largest value",

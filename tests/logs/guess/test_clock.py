@@ -61,6 +61,26 @@ def test_ticks_of_100_ns_are_refused_with_what_to_write(epoch: int, who: str, tm
         sniff(log_of(tmp_path, ["Timestamp,x", *rows]))
 
 
+@pytest.mark.parametrize(
+    ("name", "begin", "unit", "words"),
+    [
+        ("gps_time", 315_964_800 - 18, 1, "6 January 1980, as GPS does? Then add 315964800 s, less 18 s"),
+        ("GPS [ms]", 315_964_800 - 18, 1000, "by which GPS is ahead: 2024-05-14 08:00:00 UTC"),
+        ("gps_time", 0, 1, ""),  # since 1970, as its name does not say
+        ("time", 315_964_800 - 18, 1, ""),
+        ("Timestamp", -2_082_844_800, 1, "1904, as LabVIEW does? Then take 2082844800 s off: 2024-05-14 08:00:00"),
+    ],
+)
+def test_seconds_that_may_not_count_from_1970_are_asked(
+    name: str, begin: int, unit: int, words: str, tmp_path: Path
+) -> None:
+    """A date of ten years ago, or of the future, was given without a word."""
+    clock = unit * (pd.Timestamp("2024-05-14 08:00:00").timestamp() - begin + T)
+    TABLE.assign(time=clock).rename(columns={"time": name}).to_csv(tmp_path / "log.csv", index=False)
+    doubts = sniff(tmp_path / "log.csv").doubts
+    assert [words in doubt for doubt in doubts] == [True] * bool(words)
+
+
 def test_a_date_without_a_century_in_one_number_is_refused(tmp_path: Path) -> None:
     moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(np.arange(200), "s")
     log = pd.DataFrame({"time": moments.strftime("%d%m%y%H%M%S"), "N": 1.0, "psi": 2.0})
@@ -176,6 +196,16 @@ def test_a_clock_rounded_to_seconds_has_its_rate(tmp_path: Path) -> None:
     sniffed = sniff(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "time", "unit": "s", "every": 0.1}
     np.testing.assert_allclose(np.diff(sniffed.t), 0.1, rtol=1e-6)
+
+
+def test_a_date_beside_times_of_whole_seconds_is_kept(tmp_path: Path) -> None:
+    """The times alone were the clock, and the log had no date."""
+    t = pd.Timestamp("2024-05-14 23:59:50") + pd.to_timedelta(0.5 * np.arange(80), "s")
+    log = pd.DataFrame({"date": t.strftime("%d.%m.%Y"), "time": t.strftime("%H:%M:%S"), "N": 1.0, "psi": 2.0})
+    log.to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "time", "unit": "date", "date": "date", "every": 0.5}
+    np.testing.assert_allclose(sniffed.t, t[0].timestamp() + 0.5 * np.arange(80), atol=0.5)
 
 
 def test_a_clock_is_preferred_by_its_name_and_to_numbers_of_rows(tmp_path: Path) -> None:
