@@ -45,7 +45,7 @@ UNIT_WORDS = {
     "%": r"%|percent|pct|prozent",
 }
 """Unit -> regular expression of how logs write it, in lower case."""
-FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db|m/s\^?2|m/s²|kwh|kv|ma")
+FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db|m/s\^?2|m/s²|kwh|kv|ma|bfts?|beaufort")
 """Units of quantities that no column of a dataset has, in lower case."""
 
 

@@ -36,6 +36,8 @@ OF_AIS = re.compile(r"(1/10[., ']?000|1e-?0?4|10\^-4|0[.,]0001) ?(arc)?(min(utes
 SPEEDS, DOUBTED = ("m/s", "kn", "km/h"), 0.4  # of a speed without a unit; share of how far off the next part is
 KNOTS, OFF_KNOT = {0.1: "tenths of a knot", 0.01: "hundredths of a knot"}, 0.15
 """Part of a knot that AIS (ITU-R M.1371) and receivers write as whole numbers -> its name; how far off a speed is."""
+ARC = {1 / 60: r"(arc)? ?min(ute)?s?|['′]", 1 / 3600: r"(arc)? ?sec(ond)?s?|[\"″]|as"}
+"""Part of a degree [deg] -> regular expression of how logs write it as a unit, in lower case."""
 OF_KNOTS = {
     0.1: r"(1/10|0[.,]1|d) ?(kn|kts?|knots?)|(kn|kts?|knots?) ?[*x/] ?10",
     0.01: r"(1/100|0[.,]01|c) ?(kn|kts?|knots?)|(kn|kts?|knots?) ?[*x/] ?100",
@@ -72,7 +74,11 @@ def _take_positions(state: State) -> None:
         if both[0].max() <= 90 and both[1].max() <= 360:
             _take_sides(state, north, east)
             continue
-        if all(np.mean(one % 1 == 0) > WHOLE and one.max() > 1e6 for one in both) and _on_globe(both, FINE):
+        arc = next((part for part, words in ARC.items() if all(_has_unit(one, words) for one in (north, east))), None)
+        if arc is not None and _on_globe(both, arc):
+            for name in (north, east):
+                _scale(state, name, arc, f"{'minutes' if arc == 1 / 60 else 'seconds'} of arc, as its name says")
+        elif all(np.mean(one % 1 == 0) > WHOLE and one.max() > 1e6 for one in both) and _on_globe(both, FINE):
             fine = _fine(state, north, east)
             for name in (north, east):
                 _scale(state, name, fine, f"whole numbers of {PARTS[fine]}")
@@ -86,6 +92,11 @@ def _take_positions(state: State) -> None:
             if not lettered and min(state.columns[north].min(), state.columns[east].min()) >= 0:
                 words = f"do {north!r} and {east!r}, degrees and minutes without a sign, count to north and east? "
                 state.ask(("latitude", "longitude"), f"{words}If they are S or W, write sign = -1")
+
+
+def _has_unit(name: str, words: str) -> bool:
+    """Whether a name has a unit that is one of these words, a regular expression."""
+    return any(re.fullmatch(words, unit.strip().lower()) for unit in units_in(name))
 
 
 def _in_radians(state: State, north: str, east: str) -> bool:

@@ -197,6 +197,19 @@ def test_gon_that_a_compass_in_degrees_may_show_are_asked(turn: float, asks: boo
     assert ("'Heading', " in asked(drafted(frame, tmp_path)[0])) == asks
 
 
+@pytest.mark.parametrize(("unit", "parts"), [("min", 60.0), ("arcmin", 60.0), ('"', 3600.0), ("arcsec", 3600.0)])
+def test_positions_in_minutes_of_arc_are_read_as_their_names_say(unit: str, parts: float, tmp_path: Path) -> None:
+    """3806 minutes were taken for 38 degrees and 6 minutes."""
+    frame = on_globe(parts * LAT, parts * LON).rename(columns={one: f"{one} [{unit}]" for one in ("lat", "lon")})
+    proposal, dataset = drafted(frame, tmp_path)
+    for name in ("latitude", "longitude"):
+        column = proposal.column(name)
+        assert column is not None
+        assert column.extra["factor"] == pytest.approx(1 / parts)
+    north = dataset.frame["north"].to_numpy()
+    assert north - north[0] == pytest.approx(LOG["north"] - LOG["north"].iloc[0], abs=2.0)
+
+
 @pytest.mark.parametrize("how", ["blanks", "near Greenwich", "Italian"])
 def test_positions_of_receivers_are_degrees_in_strange_logs(how: str, tmp_path: Path) -> None:
     """Before, whole numbers with blanks between, and a longitude of less than a degree, were metres."""

@@ -22,6 +22,8 @@ from tests.logs.simulated import as_bridge, si_log
         ("AWD [deg]", "noise", "write the angle from the bow"),
         ("Telegraph [%]", "noise", "map it to a command .n with factor"),
         ("Wind blowing towards [deg]", "noise", "map it to beta_w with direction"),
+        ("Wind speed [Bft]", "noise", "its unit Bft does not fit wind speed"),
+        ("GPS Week", "noise", "315964800 + 604800 weeks + seconds, less 18 s"),
         ("row", "number", "it holds the numbers of the rows"),
     ],
 )
