@@ -16,6 +16,10 @@ OFFICE = "export it as .xlsx, or its sheet as CSV"
 TOPICS = "export the topics as CSV with one clock, or each with its own clock ([file.<name>] of a mapping)"
 
 
+FIELDS = "a row for each time and a column for each field"
+FRAME = rb"[0-9A-F]{3,8}"
+
+
 @dataclass(frozen=True)
 class Foreign:
     """One kind of file. starts : regular expression of its first bytes. name : what it is. remedy : what to do."""
@@ -87,6 +91,24 @@ FOREIGN = (
     ),
     Foreign(rb"\s*<\?xml[^>]*>.{0,2000}?<(?:gpx|kml)\b", "a track (GPX, KML)", "export it as CSV or NMEA 0183"),
     Foreign(rb"\s*<\?xml\b", "XML", "export the table as CSV"),
+    Foreign(
+        rb"\s*(?:\(\d+\.\d+\)\s+[a-z]\w*\s+" + FRAME + rb"(?:#|\s+\[\d)"  # candump
+        rb"|\d{4}-\d\d-\d\d[T-]\d\d:\d\d:\d\d[.\d]*Z?(?:,\d+){5}(?:,[0-9A-F]{2})+\s"  # canboat
+        rb"|A\d{6}\.\d{3} [0-9A-F]{5} [0-9A-F]{5} [0-9A-F]+\s"  # Actisense
+        rb"|\d\d:\d\d:\d\d\.\d{3} [RT] " + FRAME + rb"(?: [0-9A-F]{2})+\s)",  # Yacht Devices
+        "raw frames of a CAN bus or of NMEA 2000",
+        f"decode them, such as with the analyzer of canboat, and write a CSV with {FIELDS}",
+    ),
+    Foreign(
+        rb"\s*\{.{0,2000}?\"pgn\"\s*:",
+        "messages of NMEA 2000 as JSON",
+        f"write a CSV with {FIELDS}, such as with pandas.read_json(lines=True), json_normalize and pivot_table",
+    ),
+    Foreign(
+        rb"(?:#(?:group|datatype|default)\b.{0,3000}?)?,?[\w,]*,_value,_field\b",
+        "a table of InfluxDB with a row for each value",
+        f"pivot it by _time, _field and _value, so that it has {FIELDS}",
+    ),
     Foreign(
         rb"\s*(?:\{\s*\"|\[\s*[\[{])", "JSON", "write it as CSV, such as with pandas.read_json and to_csv(index=False)"
     ),

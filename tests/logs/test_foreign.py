@@ -77,6 +77,23 @@ FILES = {
     "log.h5": (b"\x89HDF\r\n\x1a\n" + BINARY, "HDF5", "CSV or Parquet"),
     "log.nc": (b"CDF\x01" + BINARY, "netCDF", "CSV or Parquet"),
     "log.feather": (b"ARROW1\0\0" + BINARY, "Feather", "Parquet"),
+    "candump.log": (b"(1715673600.250000) can0 09F112CC#01FFFF0A7FFF7FFD\n", "NMEA 2000", "analyzer of canboat"),
+    "candump.txt": (b" (000.000125)  vcan0  1CFF0100   [8]  01 00 3C 00 00 FF 7F FD\n", "a CAN bus", "a column for"),
+    "n2k.csv": (b"2024-05-14T08:00:00.250Z,2,127250,204,255,8,ff,10,9b,ff,7f,ff,7f,fd\n", "NMEA 2000", "canboat"),
+    "actisense.txt": (b"A173321.107 23FF7 1F513 012F3070002F30709F\n", "NMEA 2000", "a row for each time"),
+    "yd.raw": (b"08:00:01.500 R 09F112CC 01 10 9B FF 7F FF 7F FD\n", "NMEA 2000", "a row for each time"),
+    "n2k.json": (
+        b'{"version":"5.0.2","units":"std"}\n{"timestamp":"2024-05-14","prio":2,"pgn":127250,"fields":{}}\n',
+        "NMEA 2000 as JSON",
+        "a column for each field",
+    ),
+    "influx.csv": (
+        b"#group,false,false\n#datatype,string,long\n#default,_result,\n"
+        b",result,table,_start,_stop,_time,_value,_field,_measurement\n",
+        "InfluxDB",
+        "pivot it by _time",
+    ),
+    "flux.csv": (b",result,table,_start,_stop,_time,_value,_field,_measurement\n,,0,a,b,c,1,sog,nav\n", "InfluxDB", ""),
     "log.pdf": (b"%PDF-1.7\n" + BINARY, "a PDF", "CSV"),
 }
 
@@ -115,6 +132,8 @@ def test_a_data_base_is_named(tmp_path: Path) -> None:
         b"PAR1",
         b"MATLAB 5.0 MAT-file",
         b"$GPGGA,",
+        b"#group,false\n#datatype,dateTime\n,result,table,_time,sog,cog\n",
+        b"2024-05-14T08:00:00.250Z,2,127250,204,255,8,9.5\n",
         b"MDF,x\n1,2\n",
         b"",
     ],

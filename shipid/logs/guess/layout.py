@@ -314,11 +314,13 @@ def _is_number(cell: str) -> bool:
 
 
 def table_below(lines: str, form: TextFormat, missing: Iterable[str]) -> tuple[int, str] | None:
-    """Number, from 1, and first text of the line after an empty one that begins another table; None where none does.
+    """Number, from 1, and first text of the line that begins another table; None where none does.
 
-    It has words and no number, and lines above it, below the header, have some.
+    It has words and no number, and lines above it, below the header, have some. An empty line is before it, or it is
+    another header: it has as many cells as the line with numbers below it.
     """
-    empty, rows = False, 0
+    empty, rows, header = False, 0, [""]
+    last: tuple[int, list[str]] = 0, []
     for number, line in enumerate(lines.splitlines(), 1):
         row = [cell for cell in cells(line, form.separator) if cell and cell not in missing]
         if number > form.skip_rows and not row:
@@ -328,5 +330,9 @@ def table_below(lines: str, form: TextFormat, missing: Iterable[str]) -> tuple[i
             words = share == 0.0 and not any(re.match(rf"{TIME_OF_DAY}|{DAY_OF}", cell) for cell in row)
             if empty and words and rows > 1:
                 return number, row[0]
+            if share > 0.0 and len(row) == len(last[1]) > 1 and rows > 1:
+                return last[0], last[1][0]
+            header = row if header == [""] else header
+            last = (number, row) if words and row != header else (0, [])
             empty, rows = False, rows + (share > 0.0)
     return None

@@ -155,7 +155,10 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         if below is None or sampled:
             raise
         place, other = ("row", "sheet") if isinstance(model, SheetFormat) else ("line", "file")
-        message = f"another table begins below the log, with {below[1][:40]!r}: move it to another {other}"
+        message = (
+            f"another table begins below the log, with {below[1][:40]!r}: move it to another {other}. Its columns "
+        )
+        message += "can be joined to these ([file.<name>] of a mapping), and other runs can be files of one folder"
         raise DataError(message, file=file, path=f"{place} {below[0]}") from None
     columns = {name: values[once] for name, values in (columns | made).items()}
     named = {one for key in ("from", "date") if key in clock for one in names_of(clock[key])}

@@ -208,6 +208,16 @@ def test_a_table_below_the_log_is_named_with_its_line(below: list[list[str]], ki
         sniff(file)
 
 
+def test_a_table_right_below_the_log_is_named_with_its_line(tmp_path: Path) -> None:
+    """The remedy was to remove its header, with which its rows were some of the log."""
+    log = text().splitlines()
+    other = TABLE.rename(columns={"N": "E", "psi": "rpm"}).to_csv(index=False).splitlines()
+    remedy = r"another table begins below the log, with 'time': move it .*\[file.<name>\]"
+    with pytest.raises(DataError, match=f"line {len(log) + 1}: {remedy}"):
+        sniff(log_of(tmp_path, [*log, *other]))
+    assert len(sniff(log_of(tmp_path, [*log[:10], "# rudder, 20", *log[10:]])).t) == len(T)
+
+
 def test_words_beside_the_first_lines_are_no_header(tmp_path: Path) -> None:
     """Notes on the weather, on the right, have made the third line one of names, such as 0.5 and 30.5."""
     lines = text().splitlines()
