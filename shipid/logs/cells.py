@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.errors import DataError, choices
+from shipid.logs.amounts import is_unit, parted
 from shipid.logs.formats import Format, SheetFormat, TableFormat, TextFormat
 from shipid.logs.mapping import (
     OF_SHIP,
@@ -101,11 +102,12 @@ def column_of(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Serie
 
 
 def numbers_of(
-    log: pd.DataFrame, source: str, form: Format, file: Path, path: str, sides: str = ""
+    log: pd.DataFrame, source: str, form: Format, file: Path, path: str, sides: str = "", units: tuple[str, ...] = ()
 ) -> NDArray[np.float64]:
     """Turn a column into numbers, NaN where it is missing; text that is no number raises with its row.
 
-    With the letters of its `sides` it is an angle in degrees, which may be written as 59°26'12.3"N, or P12.5.
+    With the letters of its `sides` it is an angle in degrees, which may be written as 59°26'12.3"N, or P12.5. A number
+    may have one of its `units` behind it, and no other one.
     """
     column = column_of(log, source, file, path)
     if pd.api.types.is_numeric_dtype(column.dtype):
@@ -126,6 +128,20 @@ def numbers_of(
         raise DataError(message, file=file, path=row_in_words(log, grouped))
     plain = in_points(text, read.decimal, read.thousands).mask(missing)
     numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
+    if units and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
+        bare, behind = parted(text)
+        own = behind.map(lambda one: any(is_unit(one, unit) for unit in units)).to_numpy(dtype=bool)
+        other = np.flatnonzero(behind.ne("").to_numpy() & ~own & ~missing.to_numpy())
+        if len(other) and not sides:
+            message = (
+                f"{text.iloc[other[0]]!r} is not in {units[0]}, as the mapping has it (column {source!r}; {len(other)} "
+                "such rows): write one unit in the whole column"
+            )
+            raise DataError(message, file=file, path=row_in_words(log, other[0]))
+        text = bare.where(own, text)
+        missing |= text.isin(read.missing)
+        plain = in_points(text, read.decimal, read.thousands).mask(missing)
+        numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
     if sides and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
         words = in_points(text, read.decimal, None).mask(missing)
         angles = degrees_to_sides(words) if sides == OF_SHIP else degrees_in_text(words, sides)

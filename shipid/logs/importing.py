@@ -317,7 +317,8 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
     for name, column in mapping.columns.items():
         table, times, form, other = files[column.file or ""]
         sides = sides_of(name) if column.unit == "deg" and isinstance(column.source, str) else ""
-        parts = [numbers_of(table, one, form, other, f"columns.{name}.from", sides) for one in names_of(column.source)]
+        place, units = f"columns.{name}.from", (column.unit, *(["%"] if "factor" in column.model_fields_set else []))
+        parts = [numbers_of(table, one, form, other, place, sides, units) for one in names_of(column.source)]
         numbers = parts[0]
         if column.unit == "ddmm":
             numbers = of_minutes(numbers, table, other, f"columns.{name}.unit")
@@ -327,14 +328,14 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
             numbers = of_quaternion(parts, names_of(column.source), table, other, f"columns.{name}.from")
         elif len(parts) > 1:
             numbers = of_parts(parts, names_of(column.source), table, other, f"columns.{name}.from")
-        unit = to_si(column.unit, name)
-        factor = column.sign * column.factor * unit
+        size = to_si(column.unit, name)
+        factor = column.sign * column.factor * size
         values = numbers * factor if factor != 1.0 else numbers
         for source in names_of(column.source):
             uses[column.file or "", source] -= 1
             if not uses[column.file or "", source]:
                 table.pop(source)  # of a large log there is room for one copy only
-        values = values + column.offset * unit if column.offset else values
+        values = values + column.offset * size if column.offset else values
         channels[name] = (times - column.latency if column.latency else times, values)
     read = len(log)
     if mapping.resamples:

@@ -11,40 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
+from shipid.logs.amounts import UNIT_WORDS
 from shipid.logs.guess.evidence import Complex, Windows, effect
 from shipid.logs.guess.words import fits, how_much_says, is_order, may_be_measured, parts_of, side_of, units_in
 from shipid.logs.mapping import UNITS
 from shipid.logs.repairs import INPUTS
 from shipid.physics.signals import SIGNALS, signal_of
 
-UNIT_WORDS = {
-    "kn": r"kn|kts?|knots?|[节節]|ノット|노트|узл?ов|уз",
-    "m/s": r"mps|m/s|ms|m/sec|m s-1|ms-1|米/秒|м/с",
-    "km/h": r"kmh|km/h|kph",
-    "mph": r"mph|mi/h|miles/h",
-    "cm/s": r"cm/s|cmps|cms|cm/sec|cm s-1",
-    "mm/s": r"mm/s|mmps|mms|mm/sec|mm s-1",
-    "deg": r"degs?|°|degrees?|grad|deg t|deg true|grader|grados|gradi|graden|degres?|º|[度도]|град",
-    "rad": r"rads?|radians?",
-    "deg/s": r"(deg|°|º|grad|[度도]|град)/(s(ec)?|秒|초|с)|dps|degs?_?p?e?r?_?s(ec)?",
-    "deg/min": r"(deg|°|º|grad|[度도]|град)/(min|分|분|мин)|dpm|deg_?p?e?r?_?min",
-    "rad/s": r"rad/s(ec)?|rads|rad_?p?e?r?_?s(ec)?",
-    "rpm": r"rpm|1/min|min-1|min\^-1|u/min|r/min|o/min|rev/min|tr/min|omw/min|varv/min|giri/min|rev_?p?e?r?_?min"
-    r"|об/мин|[转轉転]/分",
-    "rev/s": r"rps|1/s|rev/s|hz|s-1",
-    "m": r"m|metres?|meters?|meter",
-    "km": r"km",
-    "cm": r"cm|centimet(er|re)s?",
-    "mm": r"mm|millimet(er|re)s?",
-    "ft": r"ft|feet|foot",
-    "nmi": r"nmi|nm|nautical miles?",
-    "N": r"n|newtons?",
-    "kN": r"kn|kilo ?newtons?",
-    "N m": r"n[ .*·]?m|newton ?met(er|re)s?",
-    "kN m": r"kn[ .*·]?m",
-    "%": r"%|percent|pct|prozent",
-}
-"""Unit -> regular expression of how logs write it, in lower case."""
 FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db|m/s\^?2|m/s²|kwh|kv|ma|bfts?|beaufort")
 """Units of quantities that no column of a dataset has, in lower case."""
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from shipid.errors import DataError
+from shipid.logs.amounts import is_amount
 from shipid.logs.dates import DAY_OF, TIME_OF_DAY
 from shipid.logs.foreign import foreign
 from shipid.logs.formats import LOOKED_AT, SheetFormat, TextFormat
@@ -297,12 +298,12 @@ def _places_of_numbers(rows: list[list[str]], decimal: str, thousands: str | Non
 
 
 def _number_share(row: list[str], decimal: str, thousands: str | None = None) -> float:
-    """Return the share of cells that are numbers; empty cells are not counted."""
+    """Return the share of cells that are numbers, with a unit or without; empty cells are not counted."""
     cells = [cell for cell in row if not NO_VALUE.fullmatch(cell.lower())]
     grouped = re.compile(grouped_by(decimal, thousands)) if thousands is not None else None
     cells = [cell.replace(str(thousands), "") if grouped and grouped.fullmatch(cell) else cell for cell in cells]
     cells = [cell.replace(",", ".") if decimal == "," else cell for cell in cells]
-    return sum(map(_is_number, cells)) / len(cells) if cells else 0.0
+    return sum(_is_number(cell) or is_amount(cell) for cell in cells) / len(cells) if cells else 0.0
 
 
 def _is_number(cell: str) -> bool:

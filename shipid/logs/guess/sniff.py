@@ -14,8 +14,9 @@ import pandas as pd
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
+from shipid.logs.amounts import UNIT_WORDS, is_amount, is_unit, parted
 from shipid.logs.cells import OFF_ONE
-from shipid.logs.formats import SheetFormat, TableFormat, TextFormat
+from shipid.logs.formats import LOOKED_AT, SheetFormat, TableFormat, TextFormat
 from shipid.logs.guess.clock import (
     Rows,
     are_whole,
@@ -129,6 +130,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         table = read_table(file, model, "time")
         notes = tuple(f"{name!r} is {table.attrs['other'][name]}" for name in table.attrs.get("to save anew", ()))
     _refuse_ships(table, file)
+    table, in_units, mixed = _without_units(table)
     columns, words = _numbers(table, form.get("decimal", "."), form.get("thousands"))
     in_parts = _degrees(columns)
     turned = _quaternions(columns)
@@ -144,7 +146,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     made = {name: degrees_in_parts([columns[part] for part in parts]) for name, parts in in_parts.items()}
     made |= {name: yaw_of([columns[part] for part in parts]) for name, parts in turned.items()}
     made |= {name: values for name, (source, values) in in_text.items() if name != source}
-    in_parts |= turned
+    in_parts |= turned | in_units
     in_parts |= {name: (in_text[name][0],) for name in made.keys() & in_text.keys()}
     words = [name for name in words if name not in columns]
     runs, since = restarts(table, columns)
@@ -168,8 +170,9 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     notes += tuple(
         f"column {name!r} holds words, not numbers{_as_number(name, says[name])}"
         for name in words
-        if name and name not in named
+        if name and name not in {*named, *mixed}
     )
+    notes += tuple(f"column {name!r} has numbers in {units}: write one unit" for name, units in mixed.items())
     constant = [name for name, values in columns.items() if np.isnan(values).all()]
     kept = {name: values for name, values in columns.items() if name not in {*named, *constant}}
     empty = tuple(f"column {name!r} is empty" for name in constant if name)
@@ -224,6 +227,36 @@ def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
         first = ", ".join(ships[:3])
         message = f"holds {len(ships)} ships ({name!r} is {first}{', ...' if len(ships) > 3 else ''})"
         raise DataError(f"{message}: write the rows of each ship to a separate log", file=file)
+
+
+def _without_units(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, tuple[str, ...]], dict[str, str]]:
+    """The table with numbers alone where a column has its unit behind each, such as 12.3 kn; it is in the name then.
+
+    Also new name -> name in the log, and column -> its units in words where it has several, which is not read.
+    """
+    names, result = [*map(str, table.columns)], table.copy(deep=False)
+    renamed: dict[str, tuple[str, ...]] = {}
+    mixed: dict[str, str] = {}
+    for place, name in enumerate(names):
+        column = table.iloc[:, place]
+        other = not name or {*SIDES} & fits(name).keys() or is_clock(name)
+        if other or not (column.dtype == object or pd.api.types.is_string_dtype(column.dtype)):
+            continue
+        first = column.dropna().head(LOOKED_AT).astype(str)
+        if not first.map(lambda cell: is_amount(cell.strip())).any():
+            continue
+        bare, units = parted(column.fillna("").astype(str).str.strip())
+        said = [*units[units.ne("")].value_counts().index]
+        if not any(all(is_unit(one, unit) for one in said) for unit in UNIT_WORDS):
+            mixed[name] = " and ".join(map(repr, said[:3]))
+            continue
+        result.isetitem(place, bare.to_numpy(dtype=object))
+        if not units_in(name):
+            north = said[0] == "M" and {"psi", "course"} & fits(name).keys()
+            names[place] = f"{name} [{'deg M' if north else said[0]}]"
+            renamed[names[place]] = (name,)
+    result.columns = pd.Index(names)
+    return result, renamed, mixed
 
 
 def _numbers(table: pd.DataFrame, decimal: str, thousands: str | None) -> tuple[dict[str, Array], list[str]]:

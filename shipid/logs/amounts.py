@@ -1,0 +1,73 @@
+"""Units as logs write them, and numbers with their unit behind them in a cell: 12.3 kn, 308.21 T, 45.2°."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+import pandas as pd
+
+UNIT_WORDS = {
+    "kn": r"kn|kts?|knots?|[节節]|ノット|노트|узл?ов|уз",
+    "m/s": r"mps|m/s|ms|m/sec|m s-1|ms-1|米/秒|м/с",
+    "km/h": r"kmh|km/h|kph",
+    "mph": r"mph|mi/h|miles/h",
+    "cm/s": r"cm/s|cmps|cms|cm/sec|cm s-1",
+    "mm/s": r"mm/s|mmps|mms|mm/sec|mm s-1",
+    "deg": r"degs?|°|degrees?|grad|deg t|deg true|grader|grados|gradi|graden|degres?|º|[度도]|град",
+    "rad": r"rads?|radians?",
+    "deg/s": r"(deg|°|º|grad|[度도]|град)/(s(ec)?|秒|초|с)|dps|degs?_?p?e?r?_?s(ec)?",
+    "deg/min": r"(deg|°|º|grad|[度도]|град)/(min|分|분|мин)|dpm|deg_?p?e?r?_?min",
+    "rad/s": r"rad/s(ec)?|rads|rad_?p?e?r?_?s(ec)?",
+    "rpm": r"rpm|1/min|min-1|min\^-1|u/min|r/min|o/min|rev/min|tr/min|omw/min|varv/min|giri/min|rev_?p?e?r?_?min"
+    r"|об/мин|[转轉転]/分",
+    "rev/s": r"rps|1/s|rev/s|hz|s-1",
+    "m": r"m|metres?|meters?|meter",
+    "km": r"km",
+    "cm": r"cm|centimet(er|re)s?",
+    "mm": r"mm|millimet(er|re)s?",
+    "ft": r"ft|feet|foot",
+    "nmi": r"nmi|nm|nautical miles?",
+    "N": r"n|newtons?",
+    "kN": r"kn|kilo ?newtons?",
+    "N m": r"n[ .*·]?m|newton ?met(er|re)s?",
+    "kN m": r"kn[ .*·]?m",
+    "%": r"%|percent|pct|prozent",
+}
+"""Unit -> regular expression of how logs write it, in lower case."""
+_AMOUNT = re.compile(r"([+-]?\d[\d.,'’ \u00a0\u202f]*?(?:[eE][+-]?\d+)?)\s*([^\d\s.,'’+-].{0,14}?)\s*")
+_NORTH = re.compile(r"(?:°|deg)? ?(t|m)")
+"""Behind an angle: of true, or of magnetic north."""
+
+
+def parted(texts: pd.Series[Any]) -> tuple[pd.Series[Any], pd.Series[Any]]:
+    """Return the numbers (N,) of texts such as 12.3 kn, as text, and their units; each other text with no unit."""
+    found = texts.str.extract(rf"^(?:{_AMOUNT.pattern})$")
+    units = found[1].map(lambda unit: _as_written(unit) if isinstance(unit, str) else "").astype(object)
+    return found[0].where(units.ne(""), texts), units
+
+
+@cache
+def _as_written(text: str) -> str:
+    """Return a unit as a name would have it in brackets; empty where it is none."""
+    north = _NORTH.fullmatch(text.lower())
+    if north and (north[1] == "t" or len(text) > 1):  # m alone is metres
+        return f"deg {north[1].upper()}"
+    if text in ("N", "n"):  # of a latitude
+        return ""
+    return text if any(re.fullmatch(words, text.lower()) for words in UNIT_WORDS.values()) else ""
+
+
+def is_unit(text: str, unit: str) -> bool:
+    """Whether a text behind a number says a unit of a mapping."""
+    known = {"Nm": "N m", "kNm": "kN m"}.get(unit, unit)
+    return bool(re.fullmatch(UNIT_WORDS.get(known, "(?!)"), text.lower())) or (
+        unit == "deg" and _NORTH.fullmatch(text.lower()) is not None
+    )
+
+
+def is_amount(cell: str) -> bool:
+    """Whether a cell is a number with a unit behind it."""
+    found = _AMOUNT.fullmatch(cell)
+    return found is not None and _as_written(found[2]) != ""

@@ -1,0 +1,110 @@
+"""Numbers with their unit behind them in a cell are read; a column with several units is not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.errors import DataError
+from shipid.files import write_new
+from shipid.logs.amounts import is_unit, parted
+from shipid.logs.guess.columns import Guess, guess
+from shipid.logs.guess.draft import draft_mapping
+from shipid.logs.importing import import_log, read_mapping
+from tests.logs.simulated import KNOT, as_bridge, si_log
+
+LOG = si_log()
+GROUND = (LOG["u"] + 1j * LOG["v"]) * np.exp(1j * LOG["psi"])
+BRIDGE = as_bridge(LOG).drop(columns=["u", "v"]).round(4)
+BRIDGE["sog"] = (np.abs(GROUND) / KNOT).round(3)
+BRIDGE["cog"] = (np.degrees(np.angle(GROUND)) % 360.0).round(2)
+UNITS = {"psi": " T", "r": " °/s", "rpm": " U/min", "rudder": "°", "sog": " kn", "cog": "°T", "N": " m", "E": "m"}
+
+
+def written(decimal: str = ".") -> pd.DataFrame:
+    """The log with a unit in every cell but those of the clock."""
+    texts = BRIDGE.astype(str)
+    texts = texts.assign(**{name: texts[name] + unit for name, unit in UNITS.items()})
+    return pd.DataFrame({name: texts[name].str.replace(".", decimal) for name in texts})
+
+
+def drafted(file: Path) -> tuple[Guess, Path]:
+    proposal = guess(file)
+    return proposal, write_new(draft_mapping(proposal, manoeuvres=False), file.parent / "draft.toml")
+
+
+@pytest.mark.parametrize(("decimal", "separator"), [(".", ","), (",", ";"), (".", "\t")])
+def test_units_in_cells_are_those_of_their_columns(decimal: str, separator: str, tmp_path: Path) -> None:
+    """Such a log was refused as no table of numbers."""
+    file = tmp_path / "log.csv"
+    frame = written(decimal)
+    frame.loc[[7, 8, 9], "sog"] = "---"
+    frame.to_csv(file, index=False, sep=separator, encoding="utf-8")
+    proposal, mapping = drafted(file)
+    assert {one.name: one.unit for one in proposal.columns if one.name in ("speed", "psi", "r")} == {
+        "speed": "kn",
+        "psi": "deg",
+        "r": "deg/s",
+    }
+    rows = import_log(read_mapping(mapping), file).frame
+    np.testing.assert_allclose(rows["north"], LOG["north"], atol=1e-3)
+    np.testing.assert_allclose(rows["u"].drop([7, 8, 9]), LOG["u"].drop([7, 8, 9]), atol=0.01)
+    np.testing.assert_allclose(rows["r"], LOG["r"], atol=1e-5)
+
+
+def test_several_units_in_a_column_are_refused(tmp_path: Path) -> None:
+    """By the draft, which leaves the column out, and by the import, with the row."""
+    frame = written()
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    _, mapping = drafted(tmp_path / "log.csv")
+    frame.loc[[3, 5], "sog"] = "2.5 m/s"
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    assert "column 'sog' has numbers in 'kn' and 'm/s': write one unit" in guess(tmp_path / "log.csv").sniffed.notes
+    text = mapping.read_text().replace("sha256", "# sha256")
+    mapping.write_text(text)
+    with pytest.raises(DataError, match=r"row 4: '2.5 m/s' is not in kn, as the mapping has it \(column 'sog'; 2 such"):
+        import_log(read_mapping(mapping), tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "number", "unit"),
+    [
+        ("12.3 kn", "12.3", "kn"),
+        ("-45.2°", "-45.2", "°"),
+        ("1.5e-3 rad/s", "1.5e-3", "rad/s"),
+        ("12,5 rpm", "12,5", "rpm"),
+        ("308.21 T", "308.21", "deg T"),
+        ("308.21°M", "308.21", "deg M"),
+        ("12.5 m", "12.5", "m"),
+        ("85 %", "85", "%"),
+        ("54.3 N", "54.3 N", ""),  # a latitude
+        ("7.0 S", "7.0 S", ""),  # to starboard
+        ("2 auto", "2 auto", ""),
+        ("P12.5", "P12.5", ""),
+        ("59°26'12.3\"N", "59°26'12.3\"N", ""),
+        ("12.3", "12.3", ""),
+        ("---", "---", ""),
+    ],
+)
+def test_a_number_and_its_unit(text: str, number: str, unit: str) -> None:
+    bare, units = parted(pd.Series([text]))
+    assert [*bare, *units] == [number, unit]
+
+
+def test_a_unit_is_that_of_a_mapping_in_any_of_its_words() -> None:
+    assert all(is_unit(text, "deg") for text in ("°", "deg", "deg T", "deg M", "M"))
+    assert all(is_unit(text, "kNm") for text in ("kNm", "kN m"))
+    assert not is_unit("m/s", "kn")
+    assert not is_unit("kn", "no unit")
+
+
+def test_per_cent_may_stand_where_a_factor_says_of_what(tmp_path: Path) -> None:
+    frame = written().assign(rpm=(BRIDGE["rpm"] / 2.0).round(2).astype(str) + " %")
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    _, mapping = drafted(tmp_path / "log.csv")
+    mapping.write_text(mapping.read_text().replace("factor = 1.0", "factor = 2.0"))
+    rows = import_log(read_mapping(mapping), tmp_path / "log.csv").frame
+    np.testing.assert_allclose(rows["propeller.n"], LOG["n"], atol=0.01)
