@@ -30,6 +30,7 @@ SHARES = {
     ("shares of 1", "norm", "normalised", "normalized", "-1..1", "-1...1", "-1 to 1", "p.u.", "pu"): 1.0,
 }
 """Words for a share of the largest value -> what that value is in it."""
+ASTERN = -0.5  # mean cosine of an azimuth angle, at most, that points aft
 GEARED = 5.0  # rev/s: an engine that is faster usually has a gear
 UNDER_WAY, NEARLY_ALWAYS = 0.3, 0.9  # of the usual way in a window; share of these windows
 NEAR = 15.0  # times from that: a unit further off is doubted
@@ -99,6 +100,8 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
             if not share:
                 extra.pop("sign", None)
                 state.findings[:] = [one for one in state.findings if one.columns != (name,)]
+        if signal == "alpha":
+            _ask_for_half_turn(state, name, unit, int(extra.get("sign", 1)))
         side = state.side_of(name)
         component = side or SIGNALS[signal].component
         if signal == "delta" and side:
@@ -139,6 +142,17 @@ def _ask_for_side(state: State, name: str, r: Array | None) -> bool:
     text = f"{name!r} is never negative, but the ship turns to both sides: which column says the side of the rudder, "
     state.ask(("delta",), f"{text}or which value is amidships (offset)?")
     return True
+
+
+def _ask_for_half_turn(state: State, name: str, unit: str, sign: int) -> None:
+    """Ask where an azimuth angle is about half a turn while the ship goes ahead: it may say where the water goes."""
+    turn = to_si(unit, "x.alpha")
+    astern = state.astern or any(np.mean(state.columns[one] < 0) > 0.5 for one in state.called("n"))
+    if astern or np.mean(np.cos(turn * state.columns[name])) > ASTERN:
+        return
+    half = f"offset = {-sign * np.pi / turn:.9g} ({unit})"
+    words = f"{name!r} is about half a turn while the ship goes ahead: does it say where the water goes?"
+    state.ask(("alpha",), f"{words} Then write {half}; here 0 is a thrust ahead")
 
 
 def _screws(state: State) -> set[str]:

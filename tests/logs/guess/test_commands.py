@@ -50,6 +50,17 @@ def test_what_steers(
 
 
 @pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("middle", "turns"), [(0.0, 1), (180.0, 1), (180.0, -1)])
+def test_an_azimuth_angle_of_half_a_turn_ahead_is_asked(middle: float, sign: int, turns: int) -> None:
+    """It says where the water goes; the units pushed astern at full speed ahead without a word."""
+    state = chosen({"azimuth": (middle - sign * RUDDER) % 360.0, "rpm": turns * RPM})
+    assert described(state)["thruster.alpha"] == ("azimuth", "deg", sign)
+    asked = [question.sentence for question in state.questions if question.about == ("alpha",)]
+    assert len(asked) == (middle == 180.0 and turns > 0)
+    assert all(f"write offset = {-sign * 180} (deg)" in sentence for sentence in asked)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
 def test_a_rudder_turns_a_ship_that_goes_astern_the_other_way(sign: int) -> None:
     """Its sign is that which it has ahead, and it is asked."""
     state = state_with_pose({"rudder": -sign * RUDDER})
