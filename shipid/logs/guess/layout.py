@@ -30,6 +30,10 @@ MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a com
 LONG_WIDTH = 8  # cells, at most, of a row with one value: time, name, value, unit, quality and the like
 MOST_HEADS = 3  # lines above the data: names in two, and units
 WIDE = 0.9  # share of every second byte that is 0, in text of two bytes a character
+STATISTICS = re.compile(
+    r"(min|max)(imum|\.)?|mean|avg|average|median|std(ev)?|sd|rms|mittel(wert)?|sum|count", re.IGNORECASE
+)
+"""First cell of a line of numbers between the names and the data that sums up the log."""
 NUMERIC = 0.8  # share of the cells of a line of data that are numbers
 _UNIT = re.compile(
     r"[\[(]?(s|secs?|seconds|ms|us|ns|mins?|minutes|h|hrs?|hours?|d|days?|m|mm|cm|km|meters?|metres?|ft|deg(rees)?|°|grad|rad|m/s|mps|m\*s-1|kn|kts?|knots?|km/h|kmh|mph|cm/s|mm/s|"
@@ -129,7 +133,8 @@ def _text_format(
     for i in marked:
         blanks = len(words[i]) == width + 1 and rows[i][0] not in MARKS  # between names, and not between numbers
         rows[i] = words[i][1:] if blanks else rows[i][rows[i][0] in MARKS :]
-    above = [i for i in range(data - 1, -1, -1) if any(rows[i])][:MOST_HEADS]
+    sums = [i for i in range(data) if shares[i] > 0.0 and STATISTICS.fullmatch(rows[i][0])]
+    above = [i for i in range(data - 1, -1, -1) if any(rows[i]) and i not in sums][:MOST_HEADS]
     if above and separator == "whitespace" and len(rows[above[0]]) > width:
         joined = cells(re.sub(r"\s+(?=[\[(])", "", lines[above[0]]), separator)[above[0] in marked :]
         if len(joined) == width:  # blanks before units
@@ -146,6 +151,8 @@ def _text_format(
     if called:
         return form | {"skip_rows": data, "names": _distinct(called)}
     if heads and heads[0] == above[0] and heads[0] in marked and rows[heads[0]] != cells(lines[heads[0]], separator):
+        return form | {"skip_rows": data, "names": _distinct([*rows[heads[0]], ""][:width])}
+    if heads and heads[0] == above[0] and sums and sums[-1] > heads[0]:
         return form | {"skip_rows": data, "names": _distinct([*rows[heads[0]], ""][:width])}
     if heads and heads[0] == above[0]:
         return form | {"skip_rows": heads[0]}

@@ -175,6 +175,21 @@ def test_names_in_several_lines(above: str, names: list[str] | None, tmp_path: P
     np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
 
 
+@pytest.mark.parametrize("units", ["", "s,m,deg\n"])
+def test_lines_that_sum_up_the_log_are_no_names(units: str, tmp_path: Path) -> None:
+    """The columns were called by the largest values."""
+    sums = "Min,0.0,30.0\nMax,14.25,39.5\nMean,7.1,34.75\n"
+    file = tmp_path / "log.csv"
+    file.write_text(text(above=f"time,North,Heading\n{units}{sums}", header=False))
+    sniffed = sniff(file)
+    assert [name.partition(" ")[0] for name in (sniffed.clock["from"], *sniffed.columns)] == [
+        "time",
+        "North",
+        "Heading",
+    ]
+    np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
+
+
 def test_a_table_beside_the_first_lines_is_left_out(tmp_path: Path) -> None:
     """A block of statistics has made the header longer than the rows, and the names of the log were lost."""
     lines = text().splitlines()
