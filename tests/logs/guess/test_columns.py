@@ -414,3 +414,16 @@ def test_the_stamps_of_ROS_are_no_pitch(nanoseconds: float, tmp_path: Path) -> N
 def test_a_roll_of_more_than_90_deg_is_none(tmp_path: Path) -> None:
     log = as_bridge(si_log()).assign(Roll=500.0 * np.sin(np.arange(2740.0)))
     assert described(guessed(log, tmp_path)) == CLEAN
+
+
+@pytest.mark.parametrize("exchanged", [True, False])
+def test_roll_and_pitch_that_are_exchanged_are_asked(exchanged: bool, tmp_path: Path) -> None:
+    """A ship heels as she turns; what else shows the sides of her is nothing of her pitch."""
+    log = si_log()
+    waves = np.sin(log["t"])
+    angles = {"roll": np.degrees(0.1 * log["u"] * log["r"]) + 0.2 * waves, "pitch": 0.5 + 0.3 * waves - 0.05 * log["u"]}
+    names = ["pitch", "roll"] if exchanged else ["roll", "pitch"]
+    file = tmp_path / "log.csv"
+    as_bridge(log).assign(**dict(zip(names, angles.values(), strict=True))).to_csv(file, index=False)
+    asked = [question.sentence for question in guess(file).questions if "phi" in question.about]
+    assert [sentence.partition("?")[0] for sentence in asked] == ["are 'roll' and 'pitch' exchanged"] * exchanged
