@@ -22,10 +22,6 @@ WORST = 12  # test runs in the table of those that pay
 BY = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
 
 
-def _frame(content: ReportContent, name: str) -> pd.DataFrame:
-    return content.frames.get(name, pd.DataFrame())
-
-
 def _judged(frame: pd.DataFrame) -> float:
     """The level of the sentences: 0.9 where it is promised, else the highest."""
     levels = [float(level) for level in pd.unique(frame.level)]
@@ -34,7 +30,7 @@ def _judged(frame: pd.DataFrame) -> float:
 
 def coverage(content: ReportContent) -> Figure | None:
     """Nominal against measured coverage, with intervals; None where no model of a close-up has a band."""
-    frame = _frame(content, "coverage")
+    frame = content.frame("coverage")
     names = [name for name in exemplars(content) if len(frame) and name in set(frame.model)]
     if not names:
         return None
@@ -115,7 +111,7 @@ def _takeaway(frame: pd.DataFrame, size: int) -> str:
 
 def width_map(content: ReportContent) -> Figure | None:
     """Mean radius of the bands over A and N_D; None where there is no map of the error either."""
-    cells, frame = content.cells, _frame(content, "coverage")
+    cells, frame = content.cells, content.frame("coverage")
     if "width" not in cells:
         return None
     if cells.width.notna().sum() < 2 and len(frame):  # too few runs for the level of the study: the highest there is
@@ -139,7 +135,7 @@ def width_map(content: ReportContent) -> Figure | None:
 
 def table(content: ReportContent) -> Table | None:
     """Coverage and width by model, N_D and level."""
-    frame = _frame(content, "coverage")
+    frame = content.frame("coverage")
     if frame.empty:
         return None
     width, end = length_places(frame["width"]), length_places(frame["end"])
@@ -172,7 +168,7 @@ def _share(row: dict[Hashable, Any]) -> Cell:
 
 
 def _refused(content: ReportContent) -> str:
-    frame = _frame(content, "no_band")
+    frame = content.frame("no_band")
     if frame.empty:
         return ""
     parts = [
@@ -184,7 +180,7 @@ def _refused(content: ReportContent) -> str:
 
 def groups(content: ReportContent) -> Table | None:
     """Coverage at one level by kind of manoeuvre, time ahead and speed."""
-    frame = _frame(content, "coverage_groups")
+    frame = content.frame("coverage_groups")
     if frame.empty:
         return None
     frame = frame[frame.model.isin(exemplars(content))]
@@ -218,7 +214,7 @@ def _lowest(frame: pd.DataFrame) -> str:
 
 def worst(content: ReportContent) -> Table | None:
     """Test runs whose paths leave their bands most often."""
-    frame = _frame(content, "coverage_runs")
+    frame = content.frame("coverage_runs")
     if frame.empty:
         return None
     shown = frame[frame.model.isin(exemplars(content))].head(WORST)

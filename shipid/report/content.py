@@ -179,6 +179,10 @@ class ReportContent:
         object.__setattr__(self, "snapshots", [_window(snapshot) for snapshot in self.snapshots])
         object.__setattr__(self, "alone", {spoken(model) for model in self.alone})
 
+    def frame(self, name: str) -> pd.DataFrame:
+        """One of `frames`; without rows and columns where there is none of that name."""
+        return self.frames.get(name, pd.DataFrame())
+
 
 def _renamed(frame: pd.DataFrame) -> pd.DataFrame:
     """A frame whose models have their names for people; itself where they have them."""

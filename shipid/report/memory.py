@@ -54,13 +54,9 @@ ROWS = (
 )
 
 
-def _frame(content: ReportContent, name: str) -> pd.DataFrame:
-    return content.frames.get(name, pd.DataFrame())
-
-
 def observer(content: ReportContent) -> Figure | None:
     """Measured and filtered motion, slow forces, current and test of the observer; None in a study without one."""
-    frame = _frame(content, "observer")
+    frame = content.frame("observer")
     if frame.empty:
         return None
     runs = [str(run) for run in pd.unique(frame.run)]
@@ -123,7 +119,7 @@ def _takeaway_observer(frame: pd.DataFrame, runs: Sequence[str]) -> str:
 
 
 def _moments(content: ReportContent, run: str) -> Floats:
-    orders = _frame(content, "orders")
+    orders = content.frame("orders")
     return orders.t[orders.run.eq(run)].to_numpy(dtype=float) if len(orders) else np.zeros(0)
 
 
@@ -162,7 +158,7 @@ def _along(frame: pd.DataFrame, moments: Floats, rows: Sequence[Row]) -> Plot:
 
 def gain(content: ReportContent) -> Figure | None:
     """H of both rivals over N_D, and their difference with its interval; None where nothing is compared."""
-    frame = _frame(content, "memory")
+    frame = content.frame("memory")
     if frame.empty:
         return None
     compared = _comparisons(frame)
@@ -281,7 +277,7 @@ def _takeaway_gain(frame: pd.DataFrame) -> str:
 
 def windows(content: ReportContent) -> Figure | None:
     """Error of both rivals at every instant of a test run; None where nothing is compared."""
-    frame, sums = _frame(content, "memory_over_time"), _frame(content, "memory")
+    frame, sums = content.frame("memory_over_time"), content.frame("memory")
     if frame.empty or sums.empty:
         return None
     shown = list(_extremes(sums[sums.N_D.isin(frame.N_D)]))
@@ -348,7 +344,7 @@ def _takeaway_windows(mine: pd.DataFrame, worst: Any) -> str:
 
 def difference_map(content: ReportContent) -> Figure | None:
     """Difference of H over A and N_D; None where no model was trained with two amounts or two models at one."""
-    frame = _frame(content, "memory")
+    frame = content.frame("memory")
     if frame.empty:
         return None
     frame = frame[frame.N_D > 0]
@@ -365,7 +361,7 @@ def difference_map(content: ReportContent) -> Figure | None:
         takeaway=_takeaway_map(frame),
         how="Each cell is a model, by its A from below, at an N_D: H with less H without what is compared. Blue is a "
         "gain, orange a loss, grey neither, paler the nearer to 0; bold where the 95 % interval over test runs is free "
-        "of 0. The interval is in the table below." + _left_out(_frame(content, "memory"), kept),
+        "of 0. The interval is in the table below." + _left_out(content.frame("memory"), kept),
         alternative=f"Cells with the difference of H for {counted(len(kept), 'model')} by A and N_D. "
         "The numbers are in the table below.",
         height=90 + CELL * max(group.model.nunique() for group in groups),
@@ -450,7 +446,7 @@ def _takeaway_map(frame: pd.DataFrame) -> str:
 
 def table(content: ReportContent) -> Table | None:
     """Every comparison with its interval."""
-    frame = _frame(content, "memory")
+    frame = content.frame("memory")
     if frame.empty:
         return None
     rows: list[list[Cell]] = []

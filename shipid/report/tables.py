@@ -155,8 +155,8 @@ def _with_trials(cells: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
 
 def kinds(content: ReportContent) -> Table | None:
     """Error over the horizon and at its end, by kind of test run; None without rows."""
-    frame = content.frames.get("kinds")
-    if frame is None or frame.empty:
+    frame = content.frame("kinds")
+    if frame.empty:
         return None
     pairs = zip(frame.source, frame.N_D, strict=True)
     how = [HOW[source] + (f", {N_D} runs" if N_D else "") for source, N_D in pairs]
