@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad_vec
 from scipy.stats import chi2
 
 from shipid.data.kinematics import STATES, Noise, _move, _start, _transition, smooth
@@ -72,6 +73,82 @@ def test_the_transition_is_the_slope_of_the_motion(dt: float) -> None:
     for x in rng.uniform([-50, -50, -4, -2, -2, -0.2], [50, 50, 4, 9, 2, 0.2], (5, 6)):
         slopes = [(_move(x + 1e-5 * e, dt) - _move(x - 1e-5 * e, dt)) / 2e-5 for e in np.eye(6)]
         np.testing.assert_allclose(_transition(x, dt), np.transpose(slopes), atol=1e-6)
+
+
+def by_least_squares(
+    t: np.ndarray,
+    prior: tuple[np.ndarray, np.ndarray],
+    of: np.ndarray,
+    change: np.ndarray,
+    samples: np.ndarray,
+    error: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Places and their rates (N, 2 k), and covariances, of all rows at once: what a smoother must give.
+
+    place' = of @ rate and rate' = white noise of the spectral density `change` (k, k); samples (N, k) of the places.
+    """
+    k, count = len(of), len(t)
+    ways, values = [np.eye(2 * k, 2 * k * count)], [prior[0]]
+    weights = [np.linalg.inv(prior[1])]
+    for row in range(count - 1):
+        dt = t[row + 1] - t[row]
+
+        def grown(left: float) -> np.ndarray:
+            """What noise adds that is `left` [s] before the end."""
+            way = np.vstack([of * left, np.eye(k)])
+            return way @ change @ way.T
+
+        step = np.zeros((2 * k, 2 * k * count))
+        step[:, 2 * k * row : 2 * k * (row + 1)] = -np.block([[np.eye(k), of * dt], [np.zeros((k, k)), np.eye(k)]])
+        step[:, 2 * k * (row + 1) : 2 * k * (row + 2)] = np.eye(2 * k)
+        ways.append(step)
+        values.append(np.zeros(2 * k))
+        weights.append(np.linalg.inv(quad_vec(grown, 0, dt, epsabs=1e-14)[0]))
+    for row, sample in enumerate(samples):
+        seen = np.zeros((k, 2 * k * count))
+        seen[:, 2 * k * row : 2 * k * row + k] = np.eye(k)
+        ways.append(seen)
+        values.append(sample)
+        weights.append(np.eye(k) / error**2)
+    information = sum(way.T @ weight @ way for way, weight in zip(ways, weights, strict=True))
+    pulled = sum(way.T @ weight @ value for way, weight, value in zip(ways, weights, values, strict=True))
+    covariance = np.linalg.inv(information)
+    whole = (covariance @ pulled).reshape(count, 2 * k)
+    return whole, np.stack([covariance[i : i + 2 * k, i : i + 2 * k] for i in range(0, 2 * k * count, 2 * k)])
+
+
+UNEVEN = np.append(0.0, np.cumsum(np.tile([0.5, 2.0, 1.0], 6)))
+
+
+def test_places_give_the_velocities_of_least_squares() -> None:
+    """The heading is known, so all is linear; noise ahead and across is turned into north and east, on uneven rows."""
+    psi, random = 0.7, np.random.default_rng(2)
+    given = Noise({"north": 0.5, "east": 0.5, "psi": 1e-8}, 0.08, 1e-9)
+    logged = {"north": 3.0 * UNEVEN, "east": 1.5 * UNEVEN}
+    logged = {name: way + 0.5 * random.standard_normal(len(way)) for name, way in logged.items()}
+    known = smooth(UNEVEN, logged | {"psi": np.full_like(UNEVEN, psi)}, given)
+    chosen = [STATES.index(name) for name in ("north", "east", "u", "v")]
+    first, spread = _start(UNEVEN, logged | {"psi": np.full_like(UNEVEN, psi)}, given)
+    turn = np.array([[np.cos(psi), -np.sin(psi)], [np.sin(psi), np.cos(psi)]])
+    samples = np.stack([logged["north"], logged["east"]], axis=1)
+    prior = first[chosen], spread[np.ix_(chosen, chosen)]
+    states, covariances = by_least_squares(UNEVEN, prior, turn, 0.08**2 * np.eye(2), samples, 0.5)
+    np.testing.assert_allclose(known.states[:, chosen], states, atol=1e-6)
+    np.testing.assert_allclose(known.covariances[:, chosen][:, :, chosen], covariances, atol=1e-6)
+
+
+def test_headings_give_the_yaw_rate_of_least_squares() -> None:
+    """Places that are worth nothing leave heading and yaw rate, which are linear."""
+    random = np.random.default_rng(3)
+    given = Noise({"north": 1e7, "east": 1e7, "psi": 0.01}, 1e-3, 2e-3)
+    psi = 0.02 * UNEVEN + 0.01 * random.standard_normal(len(UNEVEN))
+    logged = {"north": np.zeros_like(psi), "east": np.zeros_like(psi), "psi": psi}
+    known, (first, spread) = smooth(UNEVEN, logged, given), _start(UNEVEN, logged, given)
+    chosen = [STATES.index(name) for name in ("psi", "r")]
+    prior = first[chosen], spread[np.ix_(chosen, chosen)]
+    states, covariances = by_least_squares(UNEVEN, prior, np.eye(1), np.full((1, 1), 2e-3**2), psi[:, None], 0.01)
+    np.testing.assert_allclose(known.states[:, chosen], states, atol=1e-7)
+    np.testing.assert_allclose(known.covariances[:, chosen][:, :, chosen], covariances, rtol=1e-5, atol=1e-12)
 
 
 def test_wrong_noise_is_reported() -> None:
