@@ -150,7 +150,7 @@ def _look(family: str, families: Sequence[str]) -> Style:
     return Style(INK if family == DATA_DRIVEN else category(k), SYMBOLS[k // len(OKABE_ITO)], 0.0)
 
 
-def _place(row: Mapping[str, Any], order: Sequence[str], families: Sequence[str]) -> float:
+def _place(row: Mapping[Any, Any], order: Sequence[str], families: Sequence[str]) -> float:
     """Height of a point: the method, and a little for the family."""
     return order.index(row["method"]) + 0.14 * ((len(families) - 1) / 2 - families.index(row["family"]))
 
@@ -165,7 +165,7 @@ def _errors(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -
     for family in families:
         look = _look(family, families)
         rows = mine[mine.family.eq(family) & mine.H.notna()].to_dict("records")
-        y = [_place({str(key): value for key, value in row.items()}, order, families) for row in rows]
+        y = [_place(row, order, families) for row in rows]
         trace = line(spoken(family), [row["H"] for row in rows], y, [f"family:{family}"], mode="markers",
                      marker={"color": look.colour, "symbol": look.symbol, "size": 8})  # fmt: skip
         trace.update(
@@ -187,7 +187,7 @@ def _differences(mine: pd.DataFrame, order: Sequence[str], families: Sequence[st
         rows = mine[mine.family.eq(family) & mine.difference.notna() & mine.method.ne(mine.reference)].to_dict(
             "records"
         )
-        y = [_place({str(key): value for key, value in row.items()}, order, families) for row in rows]
+        y = [_place(row, order, families) for row in rows]
         middle = [float(row["difference"]) for row in rows]
         reach = {"type": "data", "symmetric": False, "color": look.colour, "thickness": 1.5, "width": 3}
         reaches = [(row["difference"], row["low"], row["high"]) for row in rows]

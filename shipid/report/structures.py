@@ -16,11 +16,7 @@ from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, decimals, figure, text
 from shipid.report.wording import counted, listed
 
-Row = dict[str, Any]
-
-
-def _records(frame: pd.DataFrame) -> list[Row]:
-    return [{str(key): value for key, value in row.items()} for row in frame.to_dict("records")]
+Row = Mapping[Any, Any]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -70,7 +66,7 @@ def structures(content: StructuresContent) -> Table:
             Cell("yes" if row["equal"] else "no", "yes" if row["equal"] else "no"),
             text(row["note"]),
         ]
-        for row in _records(content.table)
+        for row in content.table.to_dict("records")
     ]
     head = ["structure", "numbers", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]", "above the least [m]"]
     head += ["95 % interval [m]", "test runs [m]", "not worse", "why missing"]
@@ -88,7 +84,7 @@ def _between(low: float, high: float, places: int) -> Cell:
 
 def runs(content: StructuresContent) -> Table:
     """Error of the position, run by run."""
-    known = [row for row in _records(content.errors) if row["run"] != "all"]
+    known = [row for row in content.errors.to_dict("records") if row["run"] != "all"]
     named = {row["structure"] for row in known}
     names = [str(name) for name in content.table["structure"] if name in named]
     by_run = {(row["set"], row["run"], row["structure"]): row["position"] for row in known}
@@ -108,10 +104,10 @@ def runs(content: StructuresContent) -> Table:
 
 def manoeuvres(content: StructuresContent) -> Table:
     """Measures of standard manoeuvres by structure, the spread between structures beside the interval within one."""
-    known: list[Row] = [row for row in _records(content.manoeuvres) if row["measure"]]
+    known: list[Row] = [row for row in content.manoeuvres.to_dict("records") if row["measure"]]
     named = {row["structure"] for row in known}
     names = [str(name) for name in content.table["structure"] if name in named]
-    wide = {(row["manoeuvre"], row["measure"]): row for row in _records(content.spread)}
+    wide = {(row["manoeuvre"], row["measure"]): row for row in content.spread.to_dict("records")}
     rows = []
     for place in dict.fromkeys((row["manoeuvre"], row["measure"]) for row in known):
         by = {row["structure"]: row for row in known if (row["manoeuvre"], row["measure"]) == place}
@@ -160,7 +156,7 @@ def group_table(frame: pd.DataFrame, takeaway: str) -> Table | None:
             figure(100 * row["turning"], 1),
             figure(100 * row["error"], 1),
         ]
-        for row in _records(frame)
+        for row in frame.to_dict("records")
     ]
     head = ["group", "turning to", "rows", "u [m/s]", "v [m/s]", "r [deg/s]", "turning [%]", "standard error"]
     more = " Turning: predicted change of heading over the measured one, less 1."
@@ -171,7 +167,7 @@ def programme(content: StructuresContent) -> Table:
     """Manoeuvres to run next."""
     rows = [
         [text(row["manoeuvre"]), figure(row["hours"], 2), figure(row["apart"], 1)]
-        for row in _records(content.programme)
+        for row in content.programme.to_dict("records")
     ]
     best = content.programme.iloc[0]
     takeaway = f"The structures are farthest apart in: {best['manoeuvre']}."
