@@ -17,7 +17,7 @@ Sources: Lindley, Annals of Mathematical Statistics 27 (1956) 986; Chaloner, Ver
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +25,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, choices
 from shipid.identification.settings import SIGNALS
@@ -83,10 +84,15 @@ class Informed:
     information: Array
 
 
-def recorded(vessel: Vessel, rows: pd.DataFrame) -> Limits:
-    """Limits by the greatest recorded speed of the shafts that drive the ship ahead: a tunnel thruster is faster."""
+def recorded(vessel: Vessel, dataset: Dataset, runs: Iterable[str]) -> tuple[float, Limits]:
+    """Median speed [m/s] of some runs, and as limits the greatest speed of the shafts that drive the ship ahead.
+
+    A tunnel thruster turns faster, and is none of these.
+    """
+    rows = dataset.frame[dataset.frame["run"].isin(list(runs))]
     shafts = Controls(vessel).effects[0]
-    return Limits(n_rpm=max(float(rows[name].abs().max()) for name in shafts) / RPM) if shafts else Limits()
+    limits = Limits(n_rpm=max(float(rows[name].abs().max()) for name in shafts) / RPM) if shafts else Limits()
+    return float(np.median(np.hypot(rows["u"], rows["v"]))), limits
 
 
 def candidates(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | None = None) -> list[Candidate]:

@@ -559,13 +559,12 @@ def _programme(
 
     Also a sentence on those that the identified vessel cannot perform; without any other there is no table.
     """
-    rows = dataset.frame[dataset.frame["run"].isin(runs)]
-    speed = float(np.median(np.hypot(rows["u"], rows["v"])))
+    speed, limits = design.recorded(vessel, dataset, runs)
     unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
     motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
     spread = {name: width * (residual_level(judged, name) or EXACT) for name, width in motions.items()}
     try:
-        choice = design.candidates(vessel, (speed / 2, speed), design.recorded(vessel, rows))
+        choice = design.candidates(vessel, (speed / 2, speed), limits)
         contributions = design.informed_of_possible(
             vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
             interval=settings.step,

@@ -112,7 +112,7 @@ class Compared:
     @property
     def sentences(self) -> list[str]:
         """The structure chosen, the reason, and notes."""
-        rows = {str(row["structure"]): row for row in _records(self.table)}
+        rows = {str(row["structure"]): row for row in self.table.to_dict("records")}
         others = [name for name, row in rows.items() if name != self.chosen and row["equal"]]
         notes = [
             f"structure {self.chosen} has the least error of the position over {_length(self.ahead)} on runs that the "
@@ -126,7 +126,7 @@ class Compared:
             notes.append(
                 f"all others {'' if judged == len(rows) - 1 else 'that could be judged '}are shown to be worse"
             )
-        wide = [row for row in _records(self.spread) if row["spread"] > row["width"]]
+        wide = [row for row in self.spread.to_dict("records") if row["spread"] > row["width"]]
         if wide:
             worst = max(wide, key=lambda row: float(row["spread"] / max(abs(row["least"]), abs(row["greatest"]))))
             notes.append(
@@ -317,7 +317,7 @@ def _table(
     fitted: Sequence[str],
 ) -> pd.DataFrame:
     """One row for each structure, best first; those that could not be fitted last."""
-    means = {(row["set"], row["structure"]): row for row in _records(errors[errors["run"] == ALL])}
+    means = {(row["set"], row["structure"]): row for row in errors[errors["run"] == ALL].to_dict("records")}
     of_run = errors[(errors["set"] == "folds") & (errors["run"] != ALL)]
     position = {name: of_run[of_run["structure"] == name].set_index("run")["position"].to_dict() for name in counts}
     known = sorted(counts, key=lambda name: float(means["folds", name]["position"]))
@@ -406,7 +406,7 @@ def _manoeuvres(
         if name == chosen:
             far += [beyond(title, of_log(fit.vessel, one.frame), reach) for title, one in done.items()]
         if level is None or name not in equal:
-            frames = [
+            frames: list[Any] = [
                 {"manoeuvre": title, "measure": measure, "value": value}
                 for title, one in done.items()
                 for measure, value in _values(one).items()
@@ -414,7 +414,7 @@ def _manoeuvres(
         else:
             known = {fit.vessel.digest: done}
             measures = [(title, _measure(title, known)) for title in done]
-            frames = _records(bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level))
+            frames = bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level).to_dict("records")
         missing = [_title(*trial) for trial in TRIALS if _title(*trial) not in done]
         rows += [{"manoeuvre": title, "measure": "", "structure": name, "note": "diverges"} for title in missing]
         rows += [{"note": "", **row, "structure": name, "unit": units.get(row["measure"], "")} for row in frames]
@@ -441,14 +441,10 @@ def _measure(title: str, known: dict[str, dict[str, Measured]]) -> Measure:
     return measure
 
 
-def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    return [{str(key): value for key, value in row.items()} for row in frame.to_dict("records")]
-
-
 def _spread(manoeuvres: pd.DataFrame, equal: Sequence[str]) -> pd.DataFrame:
     """Range of every measure over the structures that are equally good, and the greatest interval within one."""
     rows = []
-    good = [row for row in _records(manoeuvres) if row["structure"] in equal and row["measure"]]
+    good = [row for row in manoeuvres.to_dict("records") if row["structure"] in equal and row["measure"]]
     for manoeuvre, measure in dict.fromkeys((row["manoeuvre"], row["measure"]) for row in good):
         of = [row for row in good if (row["manoeuvre"], row["measure"]) == (manoeuvre, measure)]
         values = np.array([row["value"] for row in of], dtype=float)
@@ -478,15 +474,14 @@ def _programme(
         good = [str(name) for name in table["structure"] if name in fits][:2]
     if len(good) < 2:
         return pd.DataFrame(columns=columns)
-    rows = dataset.frame[dataset.frame["run"].isin(runs)]
-    speed = float(np.median(np.hypot(rows["u"], rows["v"])))
     ship = with_gear(fits[chosen].vessel)
+    speed, limits = recorded(ship, dataset, runs)
     settings, judged = fits[chosen].solution.settings, fits[chosen].statistics
     deviations = {
         name: settings.weights[name] * residual_level(judged, name) for name in "uvr" if name in settings.weights
     }
     try:
-        choice = candidates(ship, (speed / 2, speed), recorded(ship, rows))
+        choice = candidates(ship, (speed / 2, speed), limits)
         interval = settings.step
         step = interval / steps_between(ship, interval)
         logs = {name: _logs(with_gear(fits[name].vessel), choice, step, interval) for name in good}

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.identification.design import (
@@ -211,5 +212,8 @@ def test_a_zigzag_is_replayed_as_logged() -> None:
 def test_recorded_limits_are_those_of_the_shafts_that_drive_the_ship() -> None:
     """A tunnel thruster at 600 rpm allowed 600 rpm to the main shaft."""
     ship = first_guess(Particulars(100.0, 16.0, 6.0, 0.7, 7.0, tunnel_thruster=True), "b", "b.toml").vessel
-    rows = pd.DataFrame({"propeller.n": [1.0, 2.0], "bow.n": [0.0, -10.0]})
-    assert recorded(ship, rows).n_rpm == pytest.approx(120.0)
+    rows = {"run": ["a", "a", "b"], "propeller.n": [1.0, 2.0, 3.0], "bow.n": [0.0, -10.0, 0.0]}
+    frame = pd.DataFrame({**rows, "u": [3.0, 4.0, 9.0], "v": [4.0, 3.0, 0.0]})
+    speed, limits = recorded(ship, Dataset(frame, {}), ["a"])
+    assert limits.n_rpm == pytest.approx(120.0)
+    assert speed == pytest.approx(5.0)
