@@ -28,8 +28,8 @@ from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
     SAME_A,
     Finding,
-    Verdict,
     every,
+    finding,
     manoeuvres,
     measured,
     metres,
@@ -101,12 +101,14 @@ def narrower(widths: Widths) -> Finding:
             f"{metres(table.mean(good, last))} for {good}: {measured(wider, 0)} more"
         )
         ratio = table.mean(bad, last) / table.mean(good, last)
-        return _finding("B1", verdict(every(wider.above), some(wider.below)), evidence, **{"ratio of widths": ratio})
+        return finding(
+            CLAIMS, "B1", verdict(every(wider.above), some(wider.below)), evidence, **{"ratio of widths": ratio}
+        )
     if len(models) < FEWEST_MODELS:
-        return _finding("B1", "undecided", f"{len(models)} models with physics, a trend needs {FEWEST_MODELS}")
+        return finding(CLAIMS, "B1", "undecided", f"{len(models)} models with physics, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, ALONE) for model in models])
     if np.isclose(A.min(), A.max()):
-        return _finding("B1", "undecided", SAME_A)
+        return finding(CLAIMS, "B1", "undecided", SAME_A)
     weights, places = doubling(np.log(A)), range(len(table.amounts))
     slopes = table.compare([[(float(w), m, k) for w, m in zip(weights, models, strict=True)] for k in places])
     order = np.array([[table.mean(model, k) for model in models] for k in places])
@@ -120,7 +122,7 @@ def narrower(widths: Widths) -> Finding:
     )
     numbers = {"least rank correlation of width and A": min(rises)}
     numbers |= {f"rise for twice the A at N_D = {table.amounts[last]} [m]": float(slopes.mean[last])}
-    return _finding("B1", verdict(every(risen), some(fallen)), evidence, **numbers)
+    return finding(CLAIMS, "B1", verdict(every(risen), some(fallen)), evidence, **numbers)
 
 
 def kept_promise(held: Array, run: NDArray[np.str_], level: float) -> Finding:
@@ -133,11 +135,7 @@ def kept_promise(held: Array, run: NDArray[np.str_], level: float) -> Finding:
     evidence = f"bands of {percent(level)} hold {percent(share)}{interval} of whole paths ({manoeuvres(count)}{each})"
     decided = verdict(low >= level - SHORT, high < level)
     numbers = {f"share at {percent(level)}": share}
-    return _finding("B2", decided if not too_few(count) else "undecided", evidence, **numbers)
-
-
-def _finding(key: str, decided: Verdict, evidence: str, **numbers: float) -> Finding:
-    return Finding(id=key, claim=CLAIMS[key], verdict=decided, evidence=evidence, numbers=numbers)
+    return finding(CLAIMS, "B2", decided if not too_few(count) else "undecided", evidence, **numbers)
 
 
 def _width_table(results: Results, physics: Sequence[str], widths: Mapping[str, Array]) -> ErrorTable:

@@ -45,6 +45,7 @@ from shipid.study.verdict import (
     Finding,
     Verdict,
     every,
+    finding,
     manoeuvres,
     measured,
     metres,
@@ -145,12 +146,8 @@ def read_grid(results: Results, metric: Metric) -> Grid | str:
     return Grid(table, sound[claims.moderate], sound[claims.high], left_out)
 
 
-def _finding(key: str, decided: Verdict, evidence: str, **numbers: float) -> Finding:
-    return Finding(id=key, claim=CLAIMS[key], verdict=decided, evidence=evidence, numbers=numbers)
-
-
 def _without(key: str, what: str) -> Finding:
-    return _finding(key, "undecided", f"no {what} model has a result in every cell")
+    return finding(CLAIMS, key, "undecided", f"no {what} model has a result in every cell")
 
 
 def _range(differences: Contrasts) -> str:
@@ -183,7 +180,7 @@ def _S1(grid: Grid) -> Finding:
         f"share shown to lead at N_D = {N}": number / count
         for number, N in ((won[0], amounts[0]), (won[-1], amounts[-1]))
     }
-    return _finding("S1", weakest((begins, keeps)), evidence, **numbers)
+    return finding(CLAIMS, "S1", weakest((begins, keeps)), evidence, **numbers)
 
 
 def _sides(differences: Sequence[Contrasts]) -> tuple[list[Array], list[Array]]:
@@ -204,7 +201,8 @@ def _S2(grid: Grid) -> Finding:
     )
     if not fallen.all():
         evidence += f"; not shown for: {named(m for m, good in zip(models, fallen, strict=True) if not good)}"
-    return _finding(
+    return finding(
+        CLAIMS,
         "S2",
         verdict(every(falls.above), some(falls.below)),
         evidence,
@@ -218,10 +216,10 @@ def _S2(grid: Grid) -> Finding:
 def _S3(grid: Grid) -> Finding:
     models, table = grid.physics, grid.table
     if len(models) < FEWEST_MODELS:
-        return _finding("S3", "undecided", f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
+        return finding(CLAIMS, "S3", "undecided", f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, ALONE) for model in models])
     if np.isclose(A.min(), A.max()):
-        return _finding("S3", "undecided", SAME_A)
+        return finding(CLAIMS, "S3", "undecided", SAME_A)
     weights = doubling(np.log(A))
     each = [[(float(w), m, k) for w, m in zip(weights, models, strict=True)] for k in range(len(grid.amounts))]
     last = len(grid.amounts) - 1
@@ -242,7 +240,7 @@ def _S3(grid: Grid) -> Finding:
     }
     risen = np.maximum(slopes.above, by_chance(A, order))
     fallen = np.maximum(slopes.below, by_chance(A, -order))
-    return _finding("S3", verdict(every(risen), some(fallen)), evidence, **numbers)
+    return finding(CLAIMS, "S3", verdict(every(risen), some(fallen)), evidence, **numbers)
 
 
 def _S4(grid: Grid) -> Finding:
@@ -268,10 +266,10 @@ def _S4(grid: Grid) -> Finding:
     if orders < FEWEST_ORDERS:
         seeds = f"{orders} {plural(orders, 'seed')}"
         evidence += f"; fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has {seeds}"
-        return _finding("S4", "undecided", evidence, **numbers)
+        return finding(CLAIMS, "S4", "undecided", evidence, **numbers)
     if not grid.moderate:
         evidence += "; no moderate model to compare their fluctuation with"
-        return _finding("S4", "undecided", evidence, **numbers)
+        return finding(CLAIMS, "S4", "undecided", evidence, **numbers)
     one_sided = every(lead.above) or every(lead.below)
     moves: Verdict = "undecided"
     if worst:
@@ -284,7 +282,7 @@ def _S4(grid: Grid) -> Finding:
         )
         numbers |= {"variation of the worst": worst_moves.mean(), "variation of moderate models": calm.mean()}
     split = verdict(bool(better.any() and worse.any()), one_sided)
-    return _finding("S4", weakest((split, moves)), evidence, **numbers)
+    return finding(CLAIMS, "S4", weakest((split, moves)), evidence, **numbers)
 
 
 def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
@@ -314,7 +312,7 @@ def _S5(H: Grid, H_90: Grid, by_H: list[Finding], by_H_90: list[Finding]) -> Fin
     evidence += listed(said) if said else "S1-S4 are the same"
     decided = verdict(alike >= ALIKE and not opposite, opposite or alike < UNLIKE)
     numbers = {"rank correlation of H and H_90": alike, "verdicts of S1-S4 that differ": float(len(changed))}
-    return _finding("S5", decided if H.table.runs >= FEWEST_RUNS else "undecided", evidence, **numbers)
+    return finding(CLAIMS, "S5", decided if H.table.runs >= FEWEST_RUNS else "undecided", evidence, **numbers)
 
 
 @dataclass(frozen=True)
@@ -331,10 +329,10 @@ def _S6(grid: Grid) -> Finding:
     if not grid.moderate:
         return _without("S6", "moderate")
     if len(grid.physics) < 2:
-        return _finding("S6", "undecided", "one physics model: there is no other to compare it with")
+        return finding(CLAIMS, "S6", "undecided", "one physics model: there is no other to compare it with")
     small = [k for k, amount in enumerate(grid.amounts) if amount <= grid.amounts[-1] / 2]
     if not small:
-        return _finding("S6", "undecided", f"no N_D is at most half of the largest, {grid.amounts[-1]}")
+        return finding(CLAIMS, "S6", "undecided", f"no N_D is at most half of the largest, {grid.amounts[-1]}")
     kinds: list[tuple[str, Callable[[Grid, Sequence[int]], list[Pair]]]] = [
         ("no physics with more runs", _more_data),
         ("more accurate physics alone", _better_physics),
@@ -343,7 +341,7 @@ def _S6(grid: Grid) -> Finding:
     for what, pairs_of in kinds:
         pairs = pairs_of(grid, small)
         if not pairs:
-            return _finding("S6", "undecided", "no physics model is more accurate than a moderate one")
+            return finding(CLAIMS, "S6", "undecided", "no physics model is more accurate than a moderate one")
         first = grid.table.compare([pair.terms for pair in pairs])
         above, below = first.above, first.below
         if pairs[0].also:
@@ -355,7 +353,7 @@ def _S6(grid: Grid) -> Finding:
         examples.append(f"{len(sure)} of {len(pairs)} comparisons show a moderate model better than {what}")
         examples[-1] += f": {', '.join(pair.text for pair in best)}" if best else ""
         numbers[f"share shown to beat {what}"] = len(sure) / len(pairs)
-    return _finding("S6", weakest(parts), "; ".join(examples), **numbers)
+    return finding(CLAIMS, "S6", weakest(parts), "; ".join(examples), **numbers)
 
 
 def _more_data(grid: Grid, small: Sequence[int]) -> list[Pair]:
@@ -402,13 +400,13 @@ def _S7(results: Results, grid: Grid) -> Finding:
     if not grid.physics:
         return _without("S7", "physics")
     if results.test.horizon < 3:
-        return _finding("S7", "undecided", "a second difference needs three steps ahead")
+        return finding(CLAIMS, "S7", "undecided", "a second difference needs three steps ahead")
     judged = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
     if smooth_by_construction(judged, results.plan.horizon):
         evidence = (
             "the compensation is a polynomial of time, which is smooth whatever it learned; 'path-trained' is not"
         )
-        return _finding("S7", "not testable", evidence)
+        return finding(CLAIMS, "S7", "not testable", evidence)
     first = grid.amounts[0]
     cells = judged_cells(results)
     cells = cells[cells["N_D"] == first]
@@ -429,7 +427,7 @@ def _S7(results: Results, grid: Grid) -> Finding:
         f"{metres(numbers['roughness of cooperative models [m]'])} in the mean, true paths "
         f"{metres(numbers['roughness of true paths [m]'])} ({manoeuvres(len(runs))})"
     )
-    return _finding("S7", decided, evidence, **numbers)
+    return finding(CLAIMS, "S7", decided, evidence, **numbers)
 
 
 def rough(true: Array, pure: Array, together: Array, counts: Array) -> tuple[Verdict, dict[str, float]]:

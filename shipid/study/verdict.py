@@ -55,9 +55,14 @@ def weakest(verdicts: Iterable[Verdict]) -> Verdict:
     return "refuted" if "refuted" in parts else verdict(set(parts) == {"confirmed"}, False)
 
 
+def finding(claims: Mapping[str, str], key: str, decided: Verdict, evidence: str, **numbers: float) -> Finding:
+    """The claim of this key with its verdict, the evidence in words, and its key numbers by name and unit."""
+    return Finding(id=key, claim=claims[key], verdict=decided, evidence=evidence, numbers=numbers)
+
+
 def undecided(claims: Mapping[str, str], reason: str) -> list[Finding]:
     """Every claim undecided, for the same reason."""
-    return [Finding(id=key, claim=claims[key], verdict="undecided", evidence=reason, numbers={}) for key in claims]
+    return [finding(claims, key, "undecided", reason) for key in claims]
 
 
 def metres(value: float) -> str:
