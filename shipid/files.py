@@ -266,6 +266,11 @@ def read_arrays(file: str | os.PathLike[str], *beginnings: str) -> dict[str, np.
         raise ValueError(f"{file} is not a whole .npz") from error
 
 
+def part_of(arrays: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:
+    """Arrays whose names begin with a prefix, by their names without it."""
+    return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
+
+
 def _plain(value: Any) -> Any:
     """Content of JSON: mappings, lists and scalars of Python."""
     if isinstance(value, Mapping):

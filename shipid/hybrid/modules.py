@@ -22,6 +22,7 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
+from shipid.files import part_of
 from shipid.hybrid.bands import nearest
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
@@ -31,7 +32,7 @@ from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, free, stepped_paths, true_steps
 from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
-from shipid.hybrid.units import Seen, Units, part_of, solve, taken
+from shipid.hybrid.units import Seen, Units, solve, taken
 from shipid.physics import TERMS
 from shipid.vessel.schema import behind, term_blocks
 

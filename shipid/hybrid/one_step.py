@@ -18,6 +18,7 @@ from pydantic import PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
+from shipid.files import part_of
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
@@ -25,7 +26,7 @@ from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, stepped_paths, true_steps
 from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
-from shipid.hybrid.units import Seen, Units, part_of, solve, taken
+from shipid.hybrid.units import Seen, Units, solve, taken
 
 Array = NDArray[np.float64]
 

@@ -22,6 +22,7 @@ from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError
+from shipid.files import part_of
 from shipid.hybrid.compensator import Normaliser, unflatten
 from shipid.hybrid.features import Inputs, Memory, feature_table, steps_of
 from shipid.hybrid.method import Fitted, Index, Task, shared_tables
@@ -29,7 +30,7 @@ from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of
-from shipid.hybrid.units import Seen, part_of, taken
+from shipid.hybrid.units import Seen, taken
 
 if TYPE_CHECKING:
     import torch

@@ -109,11 +109,6 @@ def taken(arrays: Mapping[str, Array], name: str) -> Array:
     return arrays[name]
 
 
-def part_of(arrays: Mapping[str, Array], prefix: str) -> dict[str, Array]:
-    """Arrays whose names begin with a prefix, without it."""
-    return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
-
-
 def solve(features: Array, targets: Array, ridges: Sequence[float], penalty: Array | None = None) -> Array:
     """Weights (R, M, K) that minimise mean |targets - features W|^2 + ridge |penalty W|^2 for R ridges.
 

@@ -18,6 +18,7 @@ from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError
 from shipid.files import (
     make_folder,
+    part_of,
     read_arrays,
     read_json,
     sweep,
@@ -349,19 +350,16 @@ def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]
     except (OSError, ValueError, KeyError):
         raise ResultError("missing or damaged: continue with `shipid study resume`", file=folder / TEST) from None
 
-    def named(prefix: str) -> dict[str, np.ndarray]:
-        return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
-
     windows = Windows(
         run=arrays["run"],
         t=arrays["t"],
-        columns=named("column "),
+        columns=part_of(arrays, "column "),
         future=arrays["future"],
-        planned=named("planned "),
-        past=named("past "),
-        states=named("states "),
+        planned=part_of(arrays, "planned "),
+        past=part_of(arrays, "past "),
+        states=part_of(arrays, "states "),
         horizon=meta["horizon"],
         step=meta["step"],
         shared_clock=meta["shared"],
     )
-    return windows, named("physics "), arrays["naive"]
+    return windows, part_of(arrays, "physics "), arrays["naive"]
