@@ -9,7 +9,7 @@ import numpy as np
 from shipid.errors import ShipidError
 from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
 from shipid.logs.guess.columns import Guess, guess
-from shipid.logs.guess.draft import ENABLED, draft_mapping
+from shipid.logs.guess.draft import ENABLED, untried
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping, to_si
 from tests.logs.drawn_logs import Verdict
@@ -28,7 +28,7 @@ def judge_raw(stranger: RawStranger, **known: Any) -> Verdict:
     except ShipidError as error:
         return Verdict("reported", (f"refused: {error.message}",))
     file = stranger.folder.parent / f"{stranger.folder.name}-draft.toml"
-    file.write_text(draft_mapping(guessed, manoeuvres=False), encoding="utf-8")
+    file.write_text(untried(guessed), encoding="utf-8")
     try:
         names = import_log(read_mapping(file), stranger.folder).runs
     except ShipidError as error:

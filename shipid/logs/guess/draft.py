@@ -33,21 +33,9 @@ QUESTIONS = (
 )
 
 
-def draft_mapping(guess: Guess, manoeuvres: bool = True) -> str:
-    """Return the text of a mapping: columns with their confidence, repairs, and manoeuvres if it can be imported.
-
-    Without `manoeuvres` the draft is neither tried nor cut into runs.
-    """
-    parts = [*_head(guess), *_origin(guess), *_columns(guess), *_estimate(guess), *_repairs(guess)]
-    text = (
-        "\n".join(
-            "\n" * part.startswith("\n") + " ".join(part.split()) if part.lstrip().startswith(("#", "[")) else part
-            for part in parts
-        )
-        + "\n"
-    )
-    if not manoeuvres:
-        return text
+def draft_mapping(guess: Guess) -> str:
+    """Return the text of a mapping: columns with their confidence, repairs, and manoeuvres if it can be imported."""
+    text = untried(guess)
     if guess.source.pattern is None and guess.file.stat().st_size > LARGE:
         return text + "\n# A large log: find its manoeuvres with `shipid data segment`.\n"
     try:
@@ -59,6 +47,18 @@ def draft_mapping(guess: Guess, manoeuvres: bool = True) -> str:
         place = f"{error.file}: " if guess.source.pattern is not None and error.file else ""
         return text + f"\n{NOT_YET}{place}{error.path or ''}: {error.message}\n"
     return text + segments_text(segments, guess.sniffed.clock.get("unit", "s"))
+
+
+def untried(guess: Guess) -> str:
+    """Return the text of a mapping that is neither tried nor cut into runs."""
+    parts = [*_head(guess), *_origin(guess), *_columns(guess), *_estimate(guess), *_repairs(guess)]
+    return (
+        "\n".join(
+            "\n" * part.startswith("\n") + " ".join(part.split()) if part.lstrip().startswith(("#", "[")) else part
+            for part in parts
+        )
+        + "\n"
+    )
 
 
 def segment_log(mapping: Mapping, log: Path) -> list[Segment]:

@@ -11,7 +11,7 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.files import write_new
 from shipid.logs.guess.columns import guess
-from shipid.logs.guess.draft import draft_mapping, moment, segment_log, segments_text
+from shipid.logs.guess.draft import draft_mapping, moment, segment_log, segments_text, untried
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.mapping import UNITS, Segment
 from shipid.logs.segments import kind_of
@@ -54,7 +54,7 @@ def test_orders_that_are_written_where_they_change_are_held(tmp_path: Path) -> N
     log = as_bridge(si_log()).round({"rudder": 1, "rpm": 0})
     written = log.assign(**{name: log[name].where(log[name].diff() != 0) for name in ("rudder", "rpm")})
     written.to_csv(tmp_path / "log.csv", index=False)
-    text = draft_mapping(guess(tmp_path / "log.csv"), manoeuvres=False)
+    text = untried(guess(tmp_path / "log.csv"))
     (tmp_path / "draft.toml").write_text(text)
     frame = import_log(read_mapping(tmp_path / "draft.toml"), tmp_path / "log.csv").frame
     assert len(frame) == len(log)

@@ -13,7 +13,7 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError
 from shipid.files import write_new
 from shipid.logs.guess.columns import Guess, guess
-from shipid.logs.guess.draft import draft_mapping
+from shipid.logs.guess.draft import draft_mapping, untried
 from shipid.logs.guess.pose import Frame
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.mapping import degrees_of
@@ -181,7 +181,7 @@ def test_messages_of_AIS_are_decoded(names: tuple[str, ...], silent: bool, tmp_p
 
 def test_numbers_that_are_no_rate_of_AIS_are_refused(tmp_path: Path) -> None:
     frame = as_ais(("t", "lat", "lon", "speed", "course", "heading", "turn"))
-    draft = draft_mapping(guess(as_file(frame, tmp_path)), False).replace("sha256", "# sha256")
+    draft = untried(guess(as_file(frame, tmp_path))).replace("sha256", "# sha256")
     wrong = as_file(frame.assign(turn=frame["turn"].where(frame.index != 5, 300)), tmp_path)
     with pytest.raises(DataError, match=r"columns\.r\.unit: 300 in row 6 is none of -128 to 127, as AIS has: is the"):
         import_log(read_mapping(write_new(draft, tmp_path / "draft.toml")), wrong)
@@ -315,7 +315,7 @@ def test_degrees_and_minutes(text: float, value: float) -> None:
 def test_minutes_above_60_are_refused_with_their_row(tmp_path: Path) -> None:
     frame = on_globe(*((x // 1 * 100 + x % 1 * 60).round(6) for x in (LAT, LON)))
     frame.to_csv(tmp_path / "log.csv", index=False)
-    mapping = write_new(draft_mapping(guess(tmp_path / "log.csv"), False), tmp_path / "draft.toml")
+    mapping = write_new(untried(guess(tmp_path / "log.csv")), tmp_path / "draft.toml")
     frame.loc[3, "lat"] = 6375.0
     frame.to_csv(tmp_path / "log.csv", index=False)
     mapping.write_text("\n".join(line for line in mapping.read_text().splitlines() if "sha256" not in line))
@@ -324,7 +324,7 @@ def test_minutes_above_60_are_refused_with_their_row(tmp_path: Path) -> None:
 
 
 def test_only_positions_are_in_degrees_and_minutes(tmp_path: Path) -> None:
-    mapping = draft_mapping(guess(as_file(BRIDGE, tmp_path)), False).replace('unit = "deg"', 'unit = "ddmm"', 1)
+    mapping = untried(guess(as_file(BRIDGE, tmp_path))).replace('unit = "deg"', 'unit = "ddmm"', 1)
     with pytest.raises(DocumentError, match="only latitude and longitude"):
         read_mapping(write_new(mapping, tmp_path / "draft.toml"))
 
@@ -441,7 +441,7 @@ def test_a_rudder_with_its_side_in_letters_is_read(style: str, tmp_path: Path) -
 @pytest.mark.parametrize("text", ["12.5", "P-12.5", "P12.5S", "Q12.5"])
 def test_a_rudder_without_its_side_among_others_is_refused(text: str, tmp_path: Path) -> None:
     frame = BRIDGE.assign(rudder=RUDDER.map(TEXTS["P12.5"]))
-    draft = draft_mapping(guess(as_file(frame, tmp_path)), False).replace("sha256", "# sha256")
+    draft = untried(guess(as_file(frame, tmp_path))).replace("sha256", "# sha256")
     wrong = as_file(frame.assign(rudder=frame["rudder"].where(frame.index != 5, text)), tmp_path)
     with pytest.raises(DataError, match=r"row 6: .* is no number( and no angle with S or P)? \(column 'rudder'"):
         import_log(read_mapping(write_new(draft, tmp_path / "draft.toml")), wrong)
