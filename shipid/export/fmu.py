@@ -154,7 +154,7 @@ def predictor_unit(model: Model, name: str) -> Packed:
     )  # fmt: skip
 
 
-def write_fmu(unit: Packed, file: Path, *, binary: bool = True) -> list[str]:
+def write_fmu(unit: Packed, file: Path) -> list[str]:
     """Write the FMU; the platforms of the binaries in it. ShipidError where the compiler fails."""
     source = unit.files.texts[f"{unit.files.name}.c"] + "\n" + unit.wrapper
     texts = {
@@ -165,7 +165,7 @@ def write_fmu(unit: Packed, file: Path, *, binary: bool = True) -> list[str]:
     digest = uuid.uuid5(uuid.NAMESPACE_URL, unit.title + "".join(texts.values()))
     texts["modelDescription.xml"] = description(unit, f"{{{digest}}}")
     texts[f"sources/{unit.files.name}.c"] = source.replace("@GUID@", f"{{{digest}}}")
-    place = BINARIES.get((platform.system(), platform.machine())) if binary and compiler() is not None else None
+    place = BINARIES.get((platform.system(), platform.machine())) if compiler() is not None else None
     with (
         tempfile.TemporaryDirectory() as folder,
         whole(file) as temporary,
