@@ -92,13 +92,18 @@ def grouped_by(decimal: str, thousands: str) -> str:
     return rf"[+-]?[1-9]\d{{0,2}}(?:{mark}\d{{3}})+(?:{point}\d*)?"
 
 
+def _is_binary(head: bytes, form: TextFormat) -> bool:
+    """Whether a file that begins so is no text in the encoding of the format: it has NUL bytes."""
+    return b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32"))
+
+
 def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
     if form.skip_rows == 0:
         refuse_foreign(file)
     with file.open("rb") as stream:
         head = stream.read(LONGEST_LINE)
-    if b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32")):
+    if _is_binary(head, form):
         kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, head[:4096])), None)
         message = "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding"
         if kind is not None:
@@ -295,7 +300,7 @@ def _large_text(
         return None
     with file.open("rb") as stream:
         head = stream.read(1_000_000)
-    if b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32")):
+    if _is_binary(head, form):
         return None
     widest(head, form.separator, file)
     text = head.decode(form.encoding, "replace").rpartition("\n")[0]
