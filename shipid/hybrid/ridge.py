@@ -78,6 +78,10 @@ class _Part:
         every = torch.arange(len(self.features), device=windows.device)
         return matmul(self.features if torch.equal(windows, every) else self.features[windows], self.axes)
 
+    def weights(self, ridge: float, columns: list[int] | slice) -> Tensor:
+        """Weights (M, C) of the axes, fitted to all windows, for some columns of the targets."""
+        return self.product[:, columns] / (self.eigenvalues + ridge)[:, None]
+
 
 @dataclass(frozen=True)
 class _LeftOut:
@@ -623,8 +627,7 @@ class _FewRows:
 
     def missed(self, ridge: float, columns: list[int] | slice) -> Tensor:
         """What the fit of all windows misses of some columns of the targets, (folds, b, C), in single precision."""
-        weights = (self.part.product[:, columns] / (self.part.eigenvalues + ridge)[:, None]).float()
-        fitted = matmul(self.flat, weights)
+        fitted = matmul(self.flat, self.part.weights(ridge, columns).float())
         return torch.sub(self.targets[:, columns], fitted, out=fitted).view(*self.shape, -1)
 
     def without(self, ridge: float, missed: Tensor, columns: list[int] | slice) -> Tensor:
@@ -665,8 +668,7 @@ class _ManyRows:
 
     def missed(self, ridge: float, columns: list[int] | slice) -> Tensor:
         """What the fit of all windows misses of some columns of the targets, (folds, b, C)."""
-        weights = self.part.product[:, columns] / (self.part.eigenvalues + ridge)[:, None]
-        return self.targets[..., columns] - matmul(self.rows, weights)
+        return self.targets[..., columns] - matmul(self.rows, self.part.weights(ridge, columns))
 
     def without(self, ridge: float, _: Tensor, columns: list[int] | slice) -> Tensor:
         """What a fit without each block misses of it."""
@@ -687,11 +689,7 @@ def _network(
     seen: Seen, layer: tuple[Array, Array], parts: Sequence[_Part], columns: slice, ridge: float, basis: Array
 ) -> Network:
     """The network whose targets are some columns of a trial, solved with all windows."""
-    x, y = (
-        (part.axes @ (part.product[:, columns] / (part.eigenvalues + ridge)[:, None])).cpu().numpy()
-        / part.features.shape[1] ** 0.5
-        for part in parts
-    )
+    x, y = ((part.axes @ part.weights(ridge, columns)).cpu().numpy() / part.features.shape[1] ** 0.5 for part in parts)
     if seen.reflection is not None:
         x, y = np.concatenate([x, x]) / 2**0.5, np.concatenate([y, -y]) / 2**0.5
     output = np.concatenate([x, y], axis=1)
