@@ -87,8 +87,11 @@ def row_of(number: int, params: Mapping[str, float], value: float, start: float,
     """The row of a trial that began at `start` by `time.process_time`; not a number where it diverged."""
     complete = bool(np.isfinite(value))
     return {
-        **{"number": number, "params": dict(params), "value": value if complete else np.nan},
-        **{"seconds": time.process_time() - start, "epochs": epochs},
+        "number": number,
+        "params": dict(params),
+        "value": value if complete else np.nan,
+        "seconds": time.process_time() - start,
+        "epochs": epochs,
         "state": "complete" if complete else "diverged",
     }
 

@@ -172,7 +172,7 @@ def _rows(content: ReportContent) -> pd.DataFrame:
 
 def _beside(content: ReportContent) -> str:
     """Sentence on the methods whose place on the map another has; empty if there are none."""
-    beside = overview(content).loc[lambda frame: same_physics(frame), "model"]
+    beside = overview(content).loc[same_physics, "model"]
     return f" Not on the map, where another method has their place: {listed(list(beside), 6)}." if len(beside) else ""
 
 
