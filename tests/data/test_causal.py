@@ -88,3 +88,8 @@ def test_what_holds_still_is_known_and_other_columns_stay() -> None:
 def test_a_column_that_is_not_there_is_named() -> None:
     with pytest.raises(DataError, match="missing column"):
         causal_columns(as_dataset(turning(np.arange(30.0))), ["V_w"])
+
+
+def test_what_holds_still_is_known_until_it_moves() -> None:
+    """The row that moves lies on a line to a later fix, so the last one before it is what is known."""
+    assert last_known(np.arange(7.0), np.array([4.0, 4.0, 4.0, 4.0, 5.0, 6.0, 7.0])).tolist() == [0, 1, 2, 3, 3, 3, 3]

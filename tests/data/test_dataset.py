@@ -205,6 +205,8 @@ def test_pieces_start_at_breaks() -> None:
     frame = turning(T).assign(flags=np.where(np.isin(T, [0.0, 5.0, 12.0]), 1, 0))
     starts = [(run, rows["t"].iloc[0], len(rows)) for run, rows in pieces(as_dataset(frame, turning(T)))]
     assert starts == [("a", 0.0, 10), ("a", 5.0, 14), ("a", 12.0, 16), ("b", 0.0, 40)]
+    other = Dataset(as_dataset(frame).frame, {"flags": ["interpolated"]})
+    assert [len(rows) for _, rows in pieces(other)] == [40], "a flag of another name"
 
 
 def test_sample_holds_commands_and_interpolates_states() -> None:

@@ -61,6 +61,10 @@ def test_the_scale_of_a_misread_thrust_is_reported() -> None:
     ship = load_vessel("kvlcc2-l7")
     log = log_of(ship, 600.0)
     assert check_outputs(ship, log)["ok"].all()
+    exact = predicted_outputs(ship, log)["propeller.thrust"]
+    for factor, ok in ((0.87, True), (0.84, False), (1.13, True), (1.16, False)):  # 15 % of the prediction
+        off = Dataset(log.frame.assign(**{"propeller.thrust": factor * exact}), log.metadata)
+        assert check_outputs(ship, off).set_index("check").loc["output propeller.thrust", "ok"].all() == ok
     wrong = Dataset(log.frame.assign(**{"propeller.thrust": -1.4 * log.frame["propeller.thrust"]}), log.metadata)
     table = check_outputs(ship, wrong).set_index("check")
     assert not table.loc["output propeller.thrust", "ok"].any()

@@ -25,6 +25,7 @@ from shipid.data.windows import (
     split_folds,
     split_runs,
     to_frame,
+    without_rows,
 )
 from shipid.errors import DataError
 from tests.logs.conftest import as_dataset, turning
@@ -566,3 +567,10 @@ def test_windows_over_a_time_without_rows_are_found() -> None:
     np.testing.assert_array_equal(over, (windows.run == "a") & (windows.t > 10) & (windows.t < 30))
     assert gaps(dataset, 10.0) == {}  # a step of the prediction as long
     assert gaps(as_dataset(turning(T[::2]), turning(T)), 0.1) == {}  # rows of another interval are no hole
+
+
+def test_instants_at_and_between_rows_are_in_no_time_without_rows() -> None:
+    """Rows at 0 ... 5 and 15 ... 20 s: only what lies between 5 and 15 s does; neither end does, nor the last row."""
+    t = np.append(np.arange(0.0, 6.0), np.arange(15.0, 21.0))
+    instants = np.array([0.0, 0.5, 5.0, 5.1, 10.0, 14.9, 15.0, 19.5, 20.0])
+    assert without_rows(t, instants, 1.0).tolist() == [False] * 3 + [True] * 3 + [False] * 3

@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 from scipy.stats import f_oneway
 
-from shipid.hybrid.calibration import _alike, _fitted, _rising, _runs, calibrated, radii
+from shipid.hybrid.calibration import (
+    CENTRES,
+    PRIOR,
+    _alike,
+    _fitted,
+    _from_training,
+    _rising,
+    _runs,
+    _slopes,
+    calibrated,
+    radii,
+)
 from tests.hybrid.runs import NAMES, made, runs
 
 AT = [49, 79, 89]  # 50, 80, 90 %
@@ -135,3 +146,31 @@ def test_what_a_score_is_divided_by_comes_from_the_other_runs(circle: bool) -> N
     one, other = (_fitted(of, errors, still, circle).scores for errors in (apart, larger))
     np.testing.assert_allclose(other[:, mine], 3.0 * one[:, mine], rtol=1e-12)
     assert (other[:, ~mine] < one[:, ~mine]).all()
+
+
+def test_slopes_without_a_run_are_those_of_the_other_runs() -> None:
+    """A ridge regression by least squares with rows that stand for the prior; every run counts as one sample."""
+    rng, place = np.random.default_rng(4), np.repeat(np.arange(4), [3, 9, 5, 7])
+    runs, traits = _runs(place), rng.standard_normal((24, 5))
+    scores = np.exp(0.4 * traits[:, 0] + 0.3 * traits[:, 4] + 0.2 * rng.standard_normal(24))
+    slopes, without = _slopes(runs, traits, scores)
+    target = np.log(scores)
+    noise = runs.weight @ (target - runs.weight @ target) ** 2
+    prior = np.sqrt(noise) / PRIOR * np.eye(6)[1:]
+    for found, kept in [(slopes, place >= 0), *((without[i], place != i) for i in range(4))]:
+        root = np.sqrt(runs.count * runs.weight[kept])[:, None]
+        rows = np.concatenate([root * np.column_stack([np.ones(kept.sum()), traits[kept]]), prior])
+        wanted = np.linalg.lstsq(rows, np.append(root[:, 0] * target[kept], np.zeros(5)), rcond=None)[0]
+        assert wanted[-1] > 0
+        np.testing.assert_allclose(found, wanted[1:], rtol=1e-6)
+
+
+def test_distances_are_in_spreads_of_the_columns_from_points_of_all_runs() -> None:
+    """A column that hardly varies counts by a thousandth of its size, whatever its sign."""
+    rng, place = np.random.default_rng(5), np.repeat(np.arange(3), 200)
+    points = np.column_stack([rng.standard_normal(600), np.full(600, -5.0)])
+    centres, spread, away = _from_training(_runs(place), points)
+    assert len(centres) == 3 * np.ceil(CENTRES / 3)
+    np.testing.assert_allclose(spread, [points[:, 0].std(), 5e-3])
+    assert (away > 0).all()
+    assert (away < 1).all()

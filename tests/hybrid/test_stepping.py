@@ -8,7 +8,7 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.stepping import free, stepped_paths, true_steps
+from shipid.hybrid.stepping import TrueSteps, free, stepped_paths, true_steps
 from shipid.observer import Observer
 from tests.hybrid.worlds import HORIZON, folds_of, ship, world
 
@@ -117,3 +117,10 @@ def test_folds_choose_steps_by_their_windows(here):
     parts = [set(here.train.run[steps.window[steps.of(part)]]) for part in (training, validation)]
     assert all(parts)
     assert not parts[0] & parts[1]
+
+
+def test_what_is_missing_is_an_acceleration_whatever_the_step():
+    """0.2 m/s too slow after 2 s is 0.1 m/s^2 too little."""
+    one, after = np.zeros(1, int), np.array([[3.2, 0.0, -0.04]])
+    steps = TrueSteps(Instants({}), np.array([[3.0, 0.1, 0.0]]), after, one, one, step=2.0)
+    np.testing.assert_allclose(steps.missing, [[0.1, -0.05, -0.02]])

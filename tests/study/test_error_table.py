@@ -100,3 +100,11 @@ def test_both_errors_are_taken_in_each_manoeuvre(run: str) -> None:
     true = np.zeros_like(path)
     np.testing.assert_allclose(_by_run(path, true, place), [part.mean() for part in parts])
     np.testing.assert_allclose(_by_run(path, true, place, "H_90"), [np.quantile(part, 0.9) for part in parts])
+
+
+@pytest.mark.parametrize("seeds", [1, 4])
+def test_what_training_adds_to_a_mean_falls_with_the_root_of_the_seeds(seeds: int, made: Any) -> None:
+    """Seeds that do not differ: what is assumed of one weighs as `WORTH` samples, those of each model as one less."""
+    table = error_table(made({(name, 10, seed): 2.0 for name in H for seed in range(seeds)}, runs=8), ["good", "bad"])
+    of_one = TRAINING * np.sqrt(WORTH / (WORTH + (seeds - 1) * len(H)))
+    np.testing.assert_allclose(table.noise, of_one / np.sqrt(seeds))

@@ -187,6 +187,7 @@ def test_resampled_means_keep_pairs() -> None:
 def test_noise_of_training() -> None:
     """One seed says nothing; many seeds of many models take the place of what is assumed."""
     assert training_noise([np.array([2.0]), np.array([3.0])]) == pytest.approx(TRAINING)
+    assert training_noise([np.zeros(3)]) == pytest.approx(TRAINING), "without any error there is no share of it"
     rng = np.random.default_rng(5)
     many = [rng.normal(2.0, 0.2, 5) for _ in range(200)]
     assert training_noise(many) == pytest.approx(0.1, rel=0.1)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from shipid.study.declared import NO_MODEL
+from shipid.study.evidence import Contrasts
 from shipid.study.verdict import (
     every,
     interval,
+    measured,
     metres,
     named,
     runs,
@@ -60,6 +62,12 @@ def test_numbers_in_words() -> None:
     assert runs(1) == "1 run"
     assert too_few(1) == "1 test manoeuvre gives no interval, 5 would"
     assert too_few(5) == ""
+
+
+def test_a_difference_has_the_decimals_of_its_greatest_number_whatever_its_sign() -> None:
+    mean, low, high = (np.array([value]) for value in (-9.0, -12.0, -6.0))
+    assert measured(Contrasts(mean, low, high, mean, mean), 0) == "-9.0 m [-12.0, -6.0]"
+    assert measured(Contrasts(-mean, -high, -low, mean, mean), 0) == "9.0 m [6.0, 12.0]"
 
 
 def test_a_range_of_one_number_is_that_number() -> None:

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from shipid.study.error_table import ErrorTable
-from shipid.study.worth import _estimate, break_even, runs_without_physics
+from shipid.study.worth import Estimate, _estimate, break_even, runs_without_physics
 
 
 def table(
@@ -131,3 +131,10 @@ def test_a_better_model_is_worth_more_runs(seed: int) -> None:
     values = [one.value for one in worth]
     assert values == sorted(values, reverse=True)
     assert all(one.low <= one.value <= one.high for one in worth)
+
+
+def test_an_interval_says_nothing_where_it_holds_all_that_was_tried() -> None:
+    limits = (10.0, 40.0)
+    ends = [(5.0, 45.0), (10.0, 40.0), (5.0, 39.0), (11.0, 45.0), (11.0, 39.0), (np.nan, np.nan)]
+    unknown = [Estimate(20.0, low, high, limits).unknown for low, high in ends]
+    assert unknown == [True, True, False, False, False, False]
