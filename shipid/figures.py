@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.arguments import of_class
+from shipid.arguments import number, of_class
 from shipid.errors import ShipidError, choices
 from shipid.report.checks import CheckContent
 from shipid.report.content import ReportContent
@@ -118,6 +118,8 @@ def prediction(
     t : instant of prediction [s], the nearest recorded one; default: the middle of the run.
     N_D : manoeuvres the models were trained on; default: the most.
     """
+    if t is not None and not np.isfinite(number("t", t)):
+        raise ShipidError(f"t must be a time in seconds, not {t}", path="prediction")
     content = content_of(source)
     panel, record = Panel(window_plot(content, run, t, N_D)), browser(content)
     assert record is not None  # window_plot has raised where there are no windows
@@ -237,8 +239,14 @@ def _completed(cells: pd.DataFrame) -> pd.DataFrame:
     if lacking := [name for name in ("model", "N_D", "H") if name not in cells]:
         raise ShipidError(f"lacks the columns {', '.join(lacking)}", path="cells")
     for name in ("N_D", "H", "A"):
-        if name in cells and not pd.api.types.is_numeric_dtype(cells[name]) and len(cells):
-            raise ShipidError(f"the column {name} must hold numbers, not {cells[name].dtype}", path="cells")
+        column = cells.get(name)
+        numeric = pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_complex_dtype(column)
+        if column is not None and not numeric and len(cells):
+            raise ShipidError(f"the column {name} must hold numbers, not {column.dtype}", path="cells")
+    amounts = cells["N_D"].to_numpy(dtype=float, na_value=np.nan)
+    if (amounts % 1 != 0).any():  # so is what is no number
+        odd = amounts[amounts % 1 != 0][0]
+        raise ShipidError(f"the column N_D must hold numbers of runs, not {odd:g}", path="cells")
     unknown = dict.fromkeys(("A", "A_90", "A_rms", "H_90", "rms"), np.nan)
     plain = {"family": "given", "seed": 0, "sentence": "", "hyperparameters": "", "seconds": 0.0}
     ok = pd.Series(np.where(cells["H"].notna(), "ok", "failed"), index=cells.index)

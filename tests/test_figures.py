@@ -97,6 +97,21 @@ def test_what_holds_nothing_to_draw_is_one_sentence() -> None:
         figures.gain(cells[:0])
     with pytest.raises(ShipidError, match="cells: the column H must hold numbers, not str"):
         figures.gain(cells.astype({"H": "str"}))
+    with pytest.raises(ShipidError, match="cells: the column H must hold numbers, not complex128"):
+        figures.gain(cells.astype({"H": complex}))
+    for amount, words in ((np.nan, "nan"), (10.5, "10.5")):
+        with pytest.raises(ShipidError, match=f"cells: the column N_D must hold numbers of runs, not {words}"):
+            figures.error_map(cells.assign(N_D=[amount, 30]))
+    nullable = cells.astype({"N_D": "Int64"})
+    assert figures.gain(nullable).data, "whole numbers of any type"
+    with pytest.raises(ShipidError, match="not nan"):
+        figures.gain(nullable.assign(N_D=pd.array([10, None], dtype="Int64")))
+
+
+@pytest.mark.parametrize("t", ["12", float("nan"), True])
+def test_the_instant_of_a_prediction_is_a_number(content: ReportContent, t: object) -> None:
+    with pytest.raises(ShipidError, match="t must be a"):
+        figures.prediction(content, t=t)  # type: ignore[arg-type]
 
 
 def test_the_path_of_a_prediction_is_the_recorded_one(content: ReportContent) -> None:
