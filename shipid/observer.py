@@ -206,7 +206,7 @@ def filter_function(model: Dynamics) -> ca.Function:
 
     (state, commands, environment, parameters, measured, noise, numbers, dt) -> (state, estimate, innovation, spread).
     state packs x, P by columns, actuators' memory, unsettled acceleration, the commands before and the log-likelihood
-    remembered; see `unpacked`. commands and environment are those in force since the instant before; a measurement
+    remembered; their lengths are `sizes`. commands and environment are those in force since the instant before; a measurement
     (6,) that is NaN is left out. innovation (6,) and spread (6,) are those of the prediction, before any update.
     """
     count, (num_memory, num_commands) = len(STATES), (len(model.memory), len(model.commands))
@@ -269,7 +269,7 @@ def filter_function(model: Dynamics) -> ca.Function:
 
 @lru_cache(maxsize=16)
 def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
-    """The whole observer's step as a pure function, for K filters: what goes aboard.
+    """The whole observer's step as a pure function of CasADi, for K filters: `observe` and exports in C do the same.
 
     (states (n, K), commands, environment, parameters, measured, noise, numbers (., K), dt) -> (states, estimate (11,),
     innovation (6,), spread (6,), weights (K,)); estimates are means by the weights, the innovation that of the mixture.
