@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings_bands import Widths, _width_table, kept_promise, narrower
@@ -47,6 +48,20 @@ def test_a_plainly_kept_and_a_plainly_broken_promise_are_seen() -> None:
     rng = np.random.default_rng(4)
     assert [held(rng, 0.97, runs=60) for _ in range(20)].count("confirmed") >= 18
     assert [held(rng, 0.6) for _ in range(20)].count("refuted") >= 18
+
+
+@pytest.mark.parametrize(
+    ("shares", "expected"), [((0.88, 0.92), "confirmed"), ((0.76, 1.0), "undecided"), ((0.8, 0.92), "refuted")]
+)
+def test_a_promise_is_kept_from_5_points_below_the_level_on(shares: tuple[float, float], expected: str) -> None:
+    """40 manoeuvres of 25 windows, by Student: of the first the interval ends between 0.85 and 0.9."""
+    inside = [np.arange(25) < round(25 * share) for share in np.tile(shares, 20)]
+    error = stats.t.ppf(0.975, 39) * np.tile(shares, 20).std(ddof=1) / np.sqrt(40)
+    low, high = np.mean(shares) - error, np.mean(shares) + error
+    assert expected == ("confirmed" if low >= 0.85 else "refuted" if high < 0.9 else "undecided")
+    assert low < 0.9
+    found = kept_promise(np.concatenate(inside).astype(float), np.repeat(np.arange(40).astype(str), 25), LEVEL)
+    assert found["verdict"] == expected
 
 
 def test_few_test_manoeuvres_decide_nothing() -> None:
