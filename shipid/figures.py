@@ -238,10 +238,9 @@ def _completed(cells: pd.DataFrame) -> pd.DataFrame:
     """Give a table of cells the columns that it lacks."""
     if lacking := [name for name in ("model", "N_D", "H") if name not in cells]:
         raise ShipidError(f"lacks the columns {', '.join(lacking)}", path="cells")
-    for name in ("N_D", "H", "A"):
-        column = cells.get(name)
-        numeric = pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_complex_dtype(column)
-        if column is not None and not numeric and len(cells):
+    for name in [name for name in ("N_D", "H", "A") if name in cells and len(cells)]:
+        column = cells[name]
+        if not pd.api.types.is_numeric_dtype(column) or pd.api.types.is_complex_dtype(column):
             raise ShipidError(f"the column {name} must hold numbers, not {column.dtype}", path="cells")
     amounts = cells["N_D"].to_numpy(dtype=float, na_value=np.nan)
     if (amounts % 1 != 0).any():  # so is what is no number
