@@ -394,55 +394,20 @@ def plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
 def _take(state: State, best: Pose, sure: list[str]) -> None:
     """Take a hypothesis: decide sign, origin and frame of the heading, and ask where nothing decides."""
     best = _unseen(state, best) if best.misfit > UNSEEN else _other_way(state, _signed(state, best))
-    north, east, heading, unit = best.north, best.east, best.heading, best.unit
+    heading, unit = best.heading, best.unit
     turn = 2 * np.pi / to_si(unit, "psi")
     psi, false = evidence.heal(state.columns[heading], turn, state.t)
     angle = psi * to_si(unit, "psi")
-    spread = 1.0 - abs(complex(np.mean(np.exp(1j * angle))))
-    misfits = 1.0 - abs(best.same), 1.0 - abs(best.mirrored)
-    mirrored = misfits[1] * MIRROR < misfits[0]
-    undecided = spread < STRAIGHT or max(misfits) < MIRROR * max(min(misfits), 1e-9)
-    if undecided and not mirrored and misfits[1] < misfits[0] and spread >= STRAIGHT:
-        mirrored = True
-    if best.counts:
-        mirrored, undecided = best.counts < 0, False
+    mirrored, undecided = _mirrored(best, angle)
     compass = _is_compass(heading)
     clear = best.on_globe or all(
         fits(name).get(meaning, 0.0) > 0.9 and (compass or not _lettered(name))
-        for name, meaning in ((north, "north"), (east, "east"))
+        for name, meaning in ((best.north, "north"), (best.east, "east"))
     )
-    phase = float(np.angle(best.mirrored if mirrored else best.same))
-    quarter = _of_astern(state, best, -angle if mirrored else angle, round(phase / (np.pi / 2)))
-    sign, offset = 1, 0.0
+    reading = _read(state, best, -angle if mirrored else angle, mirrored, clear)
+    sign, offset, confidence = reading.sign, reading.offset, reading.confidence
+    north, east = (best.east, best.north) if reading.swap else (best.north, best.east)
     agreement = max(abs(best.same), abs(best.mirrored))
-    confidence = float(np.clip(1.0 - 0.5 * min(misfits) / max(max(misfits), 1e-9), 0.5, 0.99)) * min(
-        1.0, agreement + 0.1
-    )
-    swap = False
-    if mirrored and quarter in (1, -1):
-        swap = not best.on_globe and (compass or not clear) and quarter == 1 and not best.settled
-        if swap and clear:
-            sentence = f"course and heading agree only with {north!r} as east and {east!r} as north"
-            state.find("north and east swapped", (north, east), abs(best.mirrored), sentence)
-        elif swap and not state.numbered and compass:
-            sentence = f"course and heading agree with {north!r} as east and {east!r} as north, as in many local frames"
-            state.find("x is east", (north, east), abs(best.mirrored), sentence)
-        elif not swap:
-            sign, offset = -1, 90.0 * quarter
-            sentence = f"{heading!r} counts to port from {'east' if quarter == 1 else 'west'}, as in mathematics"
-            state.find("heading counted from east", (heading,), abs(best.mirrored), sentence)
-        confidence = min(0.9, abs(best.mirrored))
-    elif mirrored:
-        sign, offset = -1, 90.0 * quarter
-        sentence = f"{heading!r} rises where the course falls: it counts to port, or east is west"
-        state.find("heading counted to port", (heading,), abs(best.mirrored), sentence)
-        confidence = min(0.9, abs(best.mirrored))
-    elif quarter:
-        offset = 90.0 * quarter
-        sentence = f"course and heading differ by {np.degrees(phase):.0f} deg: another zero of {heading!r} is taken"
-        state.find("zero of the heading", (heading,), abs(best.same), sentence)
-    if swap:
-        north, east = east, north
     misnamed = not best.on_globe and best.settled in state.columns
     if misnamed and all(fits(one).get(way, 0.0) > 0.9 for one, way in ((north, "east"), (east, "north"))):
         sentence = f"{best.settled!r} agrees with the track only with {north!r} as north and {east!r} as east"
@@ -473,6 +438,61 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     state.position = np.conj(place) if best.east_sign < 0 else place
     state.psi = sign * angle + np.radians(offset)
     state.chosen = evidence.windows(state.t, evidence.lively(state.t, state.psi, state.chosen))
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """How a hypothesis is read: sign and offset [deg] of the heading; `swap`: its north is east, and its east north."""
+
+    confidence: float
+    sign: int = 1
+    offset: float = 0.0
+    swap: bool = False
+
+
+def _mirrored(best: Pose, angle: Array) -> tuple[bool, bool]:
+    """Whether a heading (N,) [rad] counts to port, or east is west, and whether the motion leaves that open."""
+    if best.counts:
+        return best.counts < 0, False
+    spread = 1.0 - abs(complex(np.mean(np.exp(1j * angle))))
+    same, mirrored = 1.0 - abs(best.same), 1.0 - abs(best.mirrored)
+    undecided = spread < STRAIGHT or max(same, mirrored) < MIRROR * max(min(same, mirrored), 1e-9)
+    better = undecided and mirrored < same and spread >= STRAIGHT
+    return better or mirrored * MIRROR < same, undecided
+
+
+def _read(state: State, best: Pose, psi: Array, mirrored: bool, clear: bool) -> _Reading:
+    """Decide from where the heading counts, psi (N,) [rad] in the way of the course, and note what is not as usual.
+
+    clear : whether the names say what is north and what is east.
+    """
+    north, east, heading = best.north, best.east, best.heading
+    phase = float(np.angle(best.mirrored if mirrored else best.same))
+    quarter = _of_astern(state, best, psi, round(phase / (np.pi / 2)))
+    if mirrored and quarter in (1, -1):
+        confidence, compass = min(0.9, abs(best.mirrored)), _is_compass(heading)
+        if best.on_globe or (clear and not compass) or quarter == -1 or best.settled:
+            sentence = f"{heading!r} counts to port from {'east' if quarter == 1 else 'west'}, as in mathematics"
+            state.find("heading counted from east", (heading,), abs(best.mirrored), sentence)
+            return _Reading(confidence, -1, 90.0 * quarter)
+        if clear:
+            sentence = f"course and heading agree only with {north!r} as east and {east!r} as north"
+            state.find("north and east swapped", (north, east), abs(best.mirrored), sentence)
+        elif not state.numbered and compass:
+            sentence = f"course and heading agree with {north!r} as east and {east!r} as north, as in many local frames"
+            state.find("x is east", (north, east), abs(best.mirrored), sentence)
+        return _Reading(confidence, swap=True)
+    if mirrored:
+        sentence = f"{heading!r} rises where the course falls: it counts to port, or east is west"
+        state.find("heading counted to port", (heading,), abs(best.mirrored), sentence)
+        return _Reading(min(0.9, abs(best.mirrored)), -1, 90.0 * quarter)
+    if quarter:
+        sentence = f"course and heading differ by {np.degrees(phase):.0f} deg: another zero of {heading!r} is taken"
+        state.find("zero of the heading", (heading,), abs(best.same), sentence)
+    misfits = 1.0 - abs(best.same), 1.0 - abs(best.mirrored)
+    agreement = max(abs(best.same), abs(best.mirrored))
+    confidence = float(np.clip(1.0 - 0.5 * min(misfits) / max(max(misfits), 1e-9), 0.5, 0.99))
+    return _Reading(confidence * min(1.0, agreement + 0.1), offset=90.0 * quarter)
 
 
 def _unseen(state: State, best: Pose) -> Pose:
