@@ -19,7 +19,7 @@ from shipid.measures.record import (
     settled,
     value_at,
 )
-from tests.measures.made_records import every, stopped
+from tests.measures.made_records import circle, every, stopped
 
 T = np.cumsum(np.array([0.0, 0.7, 0.4, 0.5, 0.9, 0.3, 0.6, 0.8, 0.5, 0.4]))
 
@@ -156,3 +156,12 @@ def test_plateaus_are_those_of_a_plain_search(seed: int) -> None:
     for last in random.integers(0, len(values), 20):
         off = np.flatnonzero(np.abs(values[:last] - values[last]) > tolerance)
         assert _level_from(values, int(last), tolerance) == (off[-1] + 1 if len(off) else 0)
+
+
+@pytest.mark.parametrize("row", [3000, 12_000, 20_000])
+def test_axes_of_the_heading_at_a_moment(row: int) -> None:
+    """By complex numbers: north + i east from there, turned back by the heading."""
+    record = circle()
+    ahead, aside = record.along(float(record.t[row]))
+    place = record.north + 1j * record.east
+    np.testing.assert_allclose(ahead + 1j * aside, (place - place[row]) * np.exp(-1j * record.psi[row]), atol=1e-6)
