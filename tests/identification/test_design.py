@@ -213,7 +213,8 @@ def test_recorded_limits_are_those_of_the_shafts_that_drive_the_ship() -> None:
     """A tunnel thruster at 600 rpm allowed 600 rpm to the main shaft."""
     ship = first_guess(Particulars(100.0, 16.0, 6.0, 0.7, 7.0, tunnel_thruster=True), "b", "b.toml").vessel
     rows = {"run": ["a", "a", "b"], "propeller.n": [1.0, 2.0, 3.0], "bow.n": [0.0, -10.0, 0.0]}
-    frame = pd.DataFrame({**rows, "u": [3.0, 4.0, 9.0], "v": [4.0, 3.0, 0.0]})
+    rest = dict.fromkeys(("north", "east", "psi", "r"), 0.0)
+    frame = pd.DataFrame({**rows, "t": [0.0, 1.0, 2.0], "u": [3.0, 4.0, 9.0], "v": [4.0, 3.0, 0.0], **rest, "flags": 0})
     speed, limits = recorded(ship, Dataset(frame, {}), ["a"])
     assert limits.n_rpm == pytest.approx(120.0)
     assert speed == pytest.approx(5.0)
