@@ -78,7 +78,8 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     if not table.amounts or len(sound) < 2:
         return undecided(CLAIMS, f"no two models with physics have a band of {percent(level)}")
     cells = judged_cells(results)
-    cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin([*sound, NO_MODEL])]
+    judged = [name for name in (*sound, NO_MODEL) if name in table.H]  # a model with a failed cell may have no band
+    cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin(judged)]
     held = {name: [bands[cell][1] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
     shares = [share_of(np.mean(held[name], axis=0), run) for name in sound]
     first = narrower(Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals))

@@ -10,8 +10,10 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from shipid.hybrid.bands import Region
+from shipid.study import findings_bands
 from shipid.study.error_table import ErrorTable
-from shipid.study.findings_bands import Widths, _width_table, kept_promise, narrower
+from shipid.study.findings_bands import Widths, _width_table, band_findings, kept_promise, narrower
 from shipid.study.verdict import Verdict
 from tests.study.made_up import Size, table
 
@@ -145,3 +147,31 @@ def test_widths_are_means_of_each_manoeuvre_where_every_model_has_a_band() -> No
     np.testing.assert_array_equal(drawn.counts, [2, 1])
     for name in names:
         np.testing.assert_array_equal(drawn.H[name], [[[2.0, 7.0]]])
+
+
+def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its cell has no band: the report of a whole study ended in a traceback for it."""
+    run, models = np.repeat(["a", "b", "c", "d", "e"], 2), ("good", "bad")
+    rows = [
+        {"cell": f"{name}-9", "foundation": name, "method": "drawn", "N_D": 9, "seed": 0} for name in (*models, "none")
+    ]
+    results: Any = SimpleNamespace(
+        cells=pd.DataFrame(rows),
+        complete=True,
+        plan=SimpleNamespace(judged="drawn", plain=None, level=LEVEL),
+        test=SimpleNamespace(run=run, future=np.ones((2, 10, 2))),
+        paths={f"{name}-9": np.zeros((2, 10, 2)) for name in models},
+        physics=dict.fromkeys(models, np.zeros((2, 10, 2))),
+    )
+    wide = np.full((2, 10), 9.0)
+
+    def regions(*_: Any) -> Any:
+        return (
+            (row, {LEVEL: Region(np.broadcast_to([1.0, 0.0], (2, 10, 2)), wide, wide)}, np.ones((2, 10, 2)))
+            for row in rows[:2]
+        )
+
+    monkeypatch.setattr(findings_bands, "regions", regions)
+    first, second = band_findings(results, models, rivals=True)
+    assert first["verdict"] == "undecided"  # both are as wide
+    assert second["numbers"] == {"share at 90 %": 1.0}
