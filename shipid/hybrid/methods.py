@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -42,6 +43,9 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
         what = "needs `fit`" if isinstance(known, type) and issubclass(known, Method) else "must be a class of Method"
         raise DocumentError(f"METHODS[{kind!r}] {what}, such as shipid.hybrid.alone.Alone", path=f"{path}.kind")
     method: Method = parse(known, dict(settings), None, path)
+    past = method.past
+    if not isinstance(past, (int, float)) or not 0 <= past < math.inf:
+        raise DocumentError(f"{known.__name__}.past must be seconds, from 0 on, not {past!r}", path=f"{path}.kind")
     return method
 
 
