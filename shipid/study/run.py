@@ -58,7 +58,19 @@ from shipid.study.workers import import_for_workers, on_workers
 from shipid.units import percent
 from shipid.version import __version__
 
-PACKAGES = ("casadi", "numpy", "torch", "optuna", "pandas", "pyarrow", "dask", "distributed", "plotly")
+PACKAGES = (
+    "casadi",
+    "numpy",
+    "scipy",
+    "scikit-learn",
+    "torch",
+    "optuna",
+    "pandas",
+    "pyarrow",
+    "dask",
+    "distributed",
+    "plotly",
+)
 
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
 SESSIONS = "sessions"  # name of the claim on the record of what a run is computed with

@@ -92,6 +92,16 @@ def test_another_shipid_that_goes_on_is_noted(
         assert set(stored) == {__version__, other}
 
 
+@pytest.mark.parametrize("package", ["scikit-learn", "scipy"])
+def test_another_version_of_a_package_that_computes_is_noted(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A forest is that of scikit-learn, a fit or a learned force that of SciPy: nothing said that one was another."""
+    before, version = run.session_on("cpu", {}), run.version
+    monkeypatch.setattr(run, "version", lambda name: "9.8.7" if name == package else version(name))
+    (words,) = store.differences(before, run.session_on("cpu", {}))
+    assert words.startswith(f"packages.{package} was ")
+    assert words.endswith(", now 9.8.7")
+
+
 def test_a_method_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The finished cells are those of the method as it was; nothing said so."""
     file = tmp_path / "mine.py"
