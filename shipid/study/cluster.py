@@ -122,6 +122,8 @@ def _results(
             yield task, results
             del future, results  # a worker may forget them
     except (OSError, TimeoutError, CancelledError):
+        if given.status == "error":  # the work was refused, and all that needs it with it
+            raise ShipidError(_unread(given), path=f"--scheduler {scheduler}") from None
         raise gone() from None
     if mistake is not None:
         raise mistake
@@ -133,6 +135,15 @@ def _results(
 
 def _given(shared: Shared) -> Shared:
     return shared
+
+
+def _unread(given: Any) -> str:
+    """Why what is shared could not be sent, in one line: the scheduler unpacks it, and may lack a module."""
+    error = given.exception(timeout=SILENT)
+    while error.__cause__ is not None:
+        error = error.__cause__
+    remedy = "start scheduler and workers where shipid, and methods that you wrote, can be imported as here"
+    return f"the Dask scheduler cannot read the work ({str(error).splitlines()[0]}): {remedy}"
 
 
 class _Watch:

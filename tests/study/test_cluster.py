@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import shutil
@@ -169,6 +170,22 @@ def test_a_worker_with_another_shipid_is_named(other: str, tmp_path: Path, caplo
     words = "may die of a task .*No module named" if other == "nothing" else "has another shipid: code"
     assert re.search(words, caplog.text)
     assert len(caplog.records) == 1
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_cannot_read_the_work_is_not_said_to_be_gone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It unpacks what workers get, and needs the module of a user's method as they do."""
+    (tmp_path / "own_method_here.py").write_text("class Own:\n    pass\n")
+    (tmp_path / "there").mkdir()
+    with a_cluster(tmp_path / "there") as (address, _):
+        monkeypatch.syspath_prepend(str(tmp_path))
+        own = importlib.import_module("own_method_here").Own()
+        words = r"the Dask scheduler cannot read the work \(No module named 'own_method_here'\): start scheduler and"
+        with pytest.raises(ShipidError, match=words) as caught:
+            list(on_dask(address, lambda _, __: 0, own, [("t", 1)], "x"))
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.slow
