@@ -4,8 +4,8 @@ The width is the mean radius [m] of the band of the study's level over the horiz
 manoeuvre; it is judged as errors are (`shipid.study.evidence`).
 
 B1 : at every N_D that has bands the width rises along ln A over the physics models, and it would hardly do so if the
-    models had their A in any other order. At full scale, with one accurate and one inaccurate model: the band of the
-    inaccurate model is wider at the largest N_D.
+    models had their A in any other order. At full scale, with one accurate and one inaccurate model: at the largest N_D
+    the band of the model whose A is shown to be larger is wider, whichever the study calls accurate.
 B2 : the share of whole test paths inside their bands is the level, at the largest N_D and in the mean over models; each
     test manoeuvre counts the same, however long it is, as in the promise.
     Confirmed if its 95 % interval lies above the level less 5 points, refuted if it lies below the level.
@@ -53,7 +53,7 @@ SHORT = 0.05  # B2: a share that lies so far below its level is a broken promise
 class Widths:
     """What B1 compares: widths in place of H, at the amounts of data at which every model has a band.
 
-    physics : models with physics. rivals : whether they are the accurate and the inaccurate model, in this order.
+    physics : models with physics. rivals : whether they are the accurate and the inaccurate model.
     """
 
     table: ErrorTable
@@ -95,16 +95,17 @@ def narrower(widths: Widths) -> Finding:
     table, models = widths.table, widths.physics
     last = len(table.amounts) - 1
     if widths.rivals:
-        good, bad = models
+        good, bad = sorted(models, key=lambda model: table.mean(model, ALONE))  # the roles say nothing of the test
         wider = table.compare([[(1.0, bad, last), (-1.0, good, last)]])
+        apart = every(table.compare([[(1.0, bad, ALONE), (-1.0, good, ALONE)]]).above)
         evidence = (
             f"at N_D = {table.amounts[last]} the mean radius of the band is {metres(table.mean(bad, last))} for {bad}, "
             f"{metres(table.mean(good, last))} for {good}: {measured(wider, 0)} more"
         )
+        evidence += "" if apart else "; it is not shown which of them is more accurate"
         ratio = table.mean(bad, last) / table.mean(good, last)
-        return finding(
-            CLAIMS, "B1", verdict(every(wider.above), some(wider.below)), evidence, **{"ratio of widths": ratio}
-        )
+        decided = verdict(apart and every(wider.above), apart and some(wider.below))
+        return finding(CLAIMS, "B1", decided, evidence, **{"ratio of widths": ratio})
     if len(models) < FEWEST_MODELS:
         return finding(CLAIMS, "B1", "undecided", f"{len(models)} models with physics, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, ALONE) for model in models])

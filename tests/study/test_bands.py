@@ -152,9 +152,12 @@ def test_one_model_has_one_radius(results: Results) -> None:
 
 def test_findings_say_what_the_cells_hold(results: Results) -> None:
     verdicts = {one["id"]: one for one in findings(results)}
-    top = results.cells[results.cells["N_D"] == results.cells["N_D"].max()].groupby("foundation")[["coverage", "width"]]
+    top = results.cells[results.cells["N_D"] == results.cells["N_D"].max()].groupby("foundation")[
+        ["A", "coverage", "width"]
+    ]
     means = top.mean()
-    ratio = means.loc["wrong", "width"] / means.loc["right", "width"]
+    good, bad = means["A"].dropna().sort_values().index
+    ratio = means.loc[bad, "width"] / means.loc[good, "width"]
     assert verdicts["B1"]["numbers"]["ratio of widths"] == pytest.approx(ratio)
     assert verdicts["B2"]["numbers"]["share at 80 %"] == pytest.approx(means["coverage"].mean())
     assert verdicts["B2"]["verdict"] == "undecided", "two test runs decide nothing"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -78,6 +79,17 @@ def test_of_two_models_the_less_accurate_has_the_wider_band(bad: float, expected
     finding = narrower(Widths(drawn, ("good", "bad"), rivals=True))
     assert finding["verdict"] == expected
     assert finding["numbers"]["ratio of widths"] == pytest.approx(bad, rel=0.3)
+
+
+@pytest.mark.parametrize(("A", "expected"), [(0.5, "confirmed"), (1.0, "undecided")])
+def test_which_of_two_models_is_more_accurate_is_seen_from_the_test(A: float, expected: str) -> None:
+    """The band of the model that the study calls accurate is wider: the claim was refuted where so is its A."""
+    widths = {"good": np.array([4.0, 2.0]), "bad": np.array([2.0, 1.0])}
+    drawn = table(np.random.default_rng(1), Size(runs=20, amounts=(5, 20)), {"good": 1.0, "bad": A}, widths)
+    drawn = replace(drawn, A={"good": drawn.A["good"], "bad": A * drawn.A["good"][::-1]})
+    finding = narrower(Widths(drawn, ("good", "bad"), rivals=True))
+    assert finding["verdict"] == expected
+    assert ("it is not shown which of them is more accurate" in finding["evidence"]) == (expected == "undecided")
 
 
 def test_fewer_models_than_an_order_needs_decide_nothing() -> None:
