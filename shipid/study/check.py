@@ -16,6 +16,7 @@ WORDS = {
     "missing": "missing: `shipid study resume` computes it again",
     "damaged": "damaged: `shipid study resume` computes it again",
     "edited": "changed after it was written: put it back, or delete it and resume",
+    "foreign": "is of another study: delete it and {}, and resume",
     "unreadable": "cannot be read ({}): let this user read it, or delete it and resume",
 }
 

@@ -17,7 +17,7 @@ from shipid.data.dataset import read_dataset
 from shipid.errors import ResultError, ShipidError
 from shipid.files import read_arrays, read_table, write_text
 
-FOLDER = "seals"
+FOLDER, PROVENANCE = "seals", "provenance.json"
 TRIES = 10  # looks at files that other processes may write at the same time
 FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results.parquet"}
 """Name of a seal that is not of a batch -> the first file in it."""
@@ -27,6 +27,7 @@ FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results
 class Fault:
     """A file that is not what was written: `missing`, `damaged` (no whole file of its kind) or `edited`.
 
+    `foreign`: a cell of another study, copied into this folder with its seal; `reason` names the record of its search.
     `unreadable`: the system does not let this user read it, or the disk fails; it may be whole, and `reason` says why.
     """
 
@@ -91,6 +92,9 @@ def wrong(folder: Path, fault: Fault) -> ResultError:
     if fault.kind == "unreadable":
         remedy = "let this user read it, or delete it and continue with `shipid study resume`"
         return ResultError(f"cannot be read ({fault.reason}): {remedy}", file=folder / fault.file)
+    if fault.kind == "foreign":
+        message = f"is of another study: delete it and {fault.reason}, and continue with `shipid study resume`"
+        return ResultError(message, file=folder / fault.file)
     if fault.kind != "edited":
         return ResultError("missing or damaged: continue with `shipid study resume`", file=folder / fault.file)
     message = "was changed after it was written: put it back, or delete it and continue with `shipid study resume`"
@@ -107,7 +111,7 @@ def mend(folder: Path) -> Iterator[str]:
         again = faults(folder)  # another process may just have written some of these files
         damaged = [fault for fault in damaged if fault in again]
     for fault in damaged:
-        if fault.kind in ("edited", "unreadable"):
+        if fault.kind in ("edited", "unreadable", "foreign"):
             raise wrong(folder, fault)
         if (folder / fault.file).is_dir():
             raise ResultError("is a folder where a file belongs: remove it and resume", file=folder / fault.file)
@@ -139,6 +143,8 @@ def _faults(folder: Path, seal: Path) -> Iterator[Fault]:
         try:
             if _digest(folder / path) != digest:
                 yield Fault(name, path, "edited" if _readable(folder / path) else "damaged")
+            elif path.startswith("cells/") and _is_foreign(folder, folder / path):
+                yield Fault(name, path, "foreign", f"trials/{name}.log")
         except (FileNotFoundError, NotADirectoryError):
             yield Fault(name, path, "missing")
         except OSError as error:
@@ -155,6 +161,16 @@ def _inside(path: str) -> bool:
 def _digest(file: Path) -> str:
     with file.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _is_foreign(folder: Path, cell: Path) -> bool:
+    """Whether a predictor names another study than the provenance of the folder; one that names none does not."""
+    try:
+        header = json.loads(str(read_arrays(cell, "header")["header"]))
+        study = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["digest"]
+        return bool(header["provenance"].get("digest", study) != study)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False  # said elsewhere
 
 
 def _readable(file: Path) -> bool:

@@ -36,7 +36,7 @@ from shipid.study.plan import WITH, Plan, Unit, build_plan
 from shipid.version import __version__
 from shipid.vessel.load import check_vessel
 
-STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", "provenance.json", "foundations.json"
+STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", seals.PROVENANCE, "foundations.json"
 DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
 JOURNALS, TRIALS = "trials", "trials.log"
 RESULTS = "results"  # name of the seal of the tables

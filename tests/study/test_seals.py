@@ -148,6 +148,22 @@ def test_two_cells_swapped_are_refused(folder: Path) -> None:
         seals.check(folder)
 
 
+def test_a_cell_of_another_study_is_refused_though_its_seal_came_with_it(folder: Path) -> None:
+    """Where two folders are merged, cells of one name take each other's place: the report mixed two studies."""
+    record = read_json(folder / store.PROVENANCE)
+    write_json(folder / store.PROVENANCE, {**record, "digest": "0123456789abcdef"})
+    cell = seals.faults(folder)[0]
+    assert {fault.kind for fault in seals.faults(folder)} == {"foreign"}
+    assert len(seals.faults(folder)) == len(list((folder / "cells").iterdir()))
+    with pytest.raises(
+        ResultError, match=rf"is of another study: delete it and trials/{cell.seal}\.log, and"
+    ) as caught:
+        list(seals.mend(folder))
+    assert caught.value.file == str(folder / cell.file)
+    write_json(folder / store.PROVENANCE, record)
+    seals.check(folder)
+
+
 def test_a_seal_names_files_inside_the_folder_only(folder: Path) -> None:
     seal = next((folder / "seals").glob("N*"))
     seal.write_text(f"{'0' * 64}  ../../etc/passwd\n")
