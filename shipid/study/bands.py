@@ -27,6 +27,7 @@ SHOWN = (0.5, 0.8, 0.9, 0.95)
 """Nominal levels that the report compares with what was measured."""
 CONFIDENCE = 0.95
 SPEEDS = 3  # groups of equal size
+NEW_KIND = "no run of this kind calibrated the band: nothing is promised"
 
 
 def share_interval(held: Array, run: Array) -> tuple[float, float]:
@@ -133,6 +134,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
         for name in np.unique(kind):
             chosen, known = kind == name, bands.kinds.get(str(name), 0)
             few = "" if bands.promises(level, str(name)) else f"{known} runs of this kind calibrated the band: too few"
+            few = NEW_KIND if bands.kinds and not known else few
             add("kind", str(name), chosen, held[chosen], float(radius[chosen].mean()), few)
         for place in range(SPEEDS):
             chosen = part == place
@@ -169,7 +171,12 @@ def answer(results: Results) -> list[tuple[str, str]]:
     sentence += f"their mean radius is {radius}."
     sentences = [(sentence, "coverage")]
     groups = groups_frame(results)
-    few = sorted(set(groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]))
+    new = sorted(set(groups.loc[groups["note"].eq(NEW_KIND), "group"]))
+    if new:
+        sentences.append(
+            (f"Nothing is promised for {listed(new)}: no such run calibrated the bands.", "coverage-groups")
+        )
+    few = sorted({*groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]} - {*new})
     if few:
         text = f"Too few runs calibrate a band of {percent(level)} for one kind of manoeuvre alone: {listed(few)}."
         sentences.append((text, "coverage-groups"))

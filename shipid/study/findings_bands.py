@@ -8,7 +8,8 @@ B1 : at every N_D that has bands the width rises along ln A over the physics mod
     the band of the model whose A is shown to be larger is wider, whichever the study calls accurate.
 B2 : the share of whole test paths inside their bands is the level, at the largest N_D and in the mean over models; each
     test manoeuvre counts the same, however long it is, as in the promise.
-    Confirmed if its 95 % interval lies above the level less 5 points, refuted if it lies below the level.
+    Confirmed if its 95 % interval lies above the level less 5 points, refuted if it lies below the level. Manoeuvres of
+    a kind that no run of calibration has are left out.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.metrics import rank_correlation, share_of
+from shipid.report.wording import listed
 from shipid.study.bands import regions, share_interval
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable, error_table
@@ -84,10 +86,30 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     shares = [share_of(np.mean(held[name], axis=0), run) for name in sound]
     first = narrower(Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals))
     first["evidence"] += f"; these bands hold {span(percent(min(shares)), percent(max(shares)))} of whole paths"
-    second = kept_promise(np.mean([one for ones in held.values() for one in ones], axis=0), run, level)
+    whole = np.mean([one for ones in held.values() for one in ones], axis=0)
+    second = _of_known_kinds(whole, run, level, results.kinds, [results.bands[cell].kinds for cell in cells["cell"]])
     note = too_few(table.runs)
     few = f"; {note}" if note else ""
     return [Finding(**{**one, "evidence": one["evidence"] + few}) for one in (first, second)]
+
+
+def _of_known_kinds(
+    held: Array, run: NDArray[np.str_], level: float, kinds: Mapping[str, str], calibrated: Sequence[Mapping[str, int]]
+) -> Finding:
+    """Verdict on B2 without test runs of a kind that no run of calibration has: bands promise nothing for them.
+
+    held, run : as for `kept_promise`. kinds : test run -> kind of manoeuvre. calibrated : kinds of each band, if known.
+    """
+    new = {str(name) for name in run if any(known and kinds[str(name)] not in known for known in calibrated)}
+    if not new:
+        return kept_promise(held, run, level)
+    these = listed(sorted({kinds[name] for name in new}))
+    left_out = f"no run of the kind {these} calibrated them, so they promise nothing for {manoeuvres(len(new))}"
+    like = ~np.isin(run, list(new))
+    if not like.any():
+        return _finding("B2", "undecided", left_out)
+    finding = kept_promise(held[like], run[like], level)
+    return Finding(**{**finding, "evidence": f"{finding['evidence']}; {left_out}"})
 
 
 def narrower(widths: Widths) -> Finding:

@@ -163,6 +163,15 @@ def test_findings_say_what_the_cells_hold(results: Results) -> None:
     assert verdicts["B2"]["verdict"] == "undecided", "two test runs decide nothing"
 
 
+def test_a_kind_that_no_run_of_calibration_has_is_promised_nothing(results: Results) -> None:
+    """The sentence spoke of a band for this kind alone; that of all kinds promises it nothing either."""
+    other = {cell: replace(band, kinds={"spiral": band.runs}) for cell, band in results.bands.items()}
+    words = [sentence for sentence, _ in bands.answer(replace(results, bands=other))]
+    (kind,) = set(results.kinds.values())
+    assert f"Nothing is promised for {kind}: no such run calibrated the bands." in words
+    assert not any("Too few runs calibrate" in sentence for sentence in words)
+
+
 def test_too_few_runs_are_reported(tiny_run: Path) -> None:
     results = read_results(tiny_run)  # 0.9 of 6 runs
     assert results.cells["coverage"].isna().all()

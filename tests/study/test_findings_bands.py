@@ -14,7 +14,7 @@ from scipy import stats
 from shipid.hybrid.bands import Region
 from shipid.study import findings_bands
 from shipid.study.error_table import ErrorTable
-from shipid.study.findings_bands import Widths, _width_table, band_findings, kept_promise, narrower
+from shipid.study.findings_bands import Widths, _of_known_kinds, _width_table, band_findings, kept_promise, narrower
 from shipid.study.verdict import Verdict
 from tests.study.made_up import Size, table
 
@@ -45,6 +45,20 @@ def test_long_manoeuvres_that_are_harder_break_no_promise() -> None:
         verdicts.append(finding["verdict"])
     assert verdicts.count("refuted") <= 14
     assert "(24 test manoeuvres, each counts the same)" in finding["evidence"]
+
+
+def test_a_kind_that_no_run_of_calibration_has_breaks_no_promise() -> None:
+    """Circles keep it, zigzags, which no band knows, do not: the promise was refuted for them."""
+    run = np.repeat(np.arange(30).astype(str), 10)
+    kinds = {str(k): "zigzag" if k < 10 else "turning" for k in range(30)}
+    inside = np.array([kinds[name] == "turning" for name in run], dtype=float)
+    inside[-1] = 0.0
+    assert kept_promise(inside, run, LEVEL)["verdict"] == "refuted"
+    finding = _of_known_kinds(inside, run, LEVEL, kinds, [{"turning": 12}, {}])
+    assert finding["verdict"] == "confirmed"
+    assert "(20 test manoeuvres); no run of the kind zigzag calibrated them" in finding["evidence"]
+    assert _of_known_kinds(inside, run, LEVEL, kinds, [{"steps": 12}])["verdict"] == "undecided"
+    assert _of_known_kinds(inside, run, LEVEL, kinds, [{}]) == kept_promise(inside, run, LEVEL)
 
 
 def test_a_plainly_kept_and_a_plainly_broken_promise_are_seen() -> None:
@@ -174,6 +188,8 @@ def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(monk
         test=SimpleNamespace(run=run, future=np.ones((2, 10, 2))),
         paths={f"{name}-9": np.zeros((2, 10, 2)) for name in models},
         physics=dict.fromkeys(models, np.zeros((2, 10, 2))),
+        kinds=dict.fromkeys("abcde", "zigzag"),
+        bands={f"{name}-9": SimpleNamespace(kinds={"zigzag": 9}) for name in models},
     )
     wide = np.full((2, 10), 9.0)
 
