@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from shipid.arguments import by_name, number
 from shipid.checked import Checked
 from shipid.data.windows import Instants, Windows, locked
 from shipid.errors import DataError, ShipidError
@@ -214,12 +215,29 @@ def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
         one = given.get(case)
         if not isinstance(one, Fitted):
             raise DataError(f"{name}.fit must give a Fitted for {case!r}, not {type(one).__name__}")
-        lacking = next((key for row in one.trials for key in TRIAL if key not in row), None)
-        if lacking is not None:
-            raise DataError(f"{name}.fit: a trial lacks {lacking!r}: make it by shipid.hybrid.trials.row_of")
-        if one.left_out is not None and np.shape(one.left_out) != shape:
-            raise DataError(f"{name}.fit: left_out must be {shape}, not {np.shape(one.left_out)}")
+        _check_fitted(f"{name}.fit", one, shape)
     return dict(given)
+
+
+def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...]) -> None:
+    """DataError where the parts of a result are not what a study stores: it could not be read back."""
+    if not isinstance(one.trials, list | tuple) or not all(isinstance(row, Mapping) for row in one.trials):
+        raise DataError(f"{where}: trials must be a list of rows: make each by shipid.hybrid.trials.row_of")
+    for row in one.trials:
+        lacking = next((key for key in TRIAL if key not in row), None)
+        if lacking is not None:
+            raise DataError(f"{where}: a trial lacks {lacking!r}: make it by shipid.hybrid.trials.row_of")
+        by_name(f"{where}: params of a trial", row["params"], "a name to a number", DataError)
+        for key in ("value", "seconds"):
+            number(f"{where}: {key} of a trial", row[key], DataError)
+    number(f"{where}: seconds", one.seconds, DataError)
+    if one.left_out is not None and np.shape(one.left_out) != shape:
+        raise DataError(f"{where}: left_out must be {shape}, not {np.shape(one.left_out)}")
+    if one.corrector is not None:
+        chosen = one.corrector.hyperparameters
+        by_name(f"{where}: hyperparameters of the corrector", chosen, "a name to a number", DataError)
+        for key, value in chosen.items():
+            number(f"{where}: hyperparameters of the corrector: {key}", value, DataError)
 
 
 def ended(error: SystemExit, kind: type) -> str:

@@ -11,6 +11,7 @@ import pytest
 
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError, ShipidError
+from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Case, Fitted, Method, Task, fit_all, same_table, shared_tables
 from shipid.hybrid.methods import METHODS
@@ -107,6 +108,11 @@ ROW = row_of(0, {}, 1.0, 0.0)
         ({}, "must give a Fitted for 'right', not NoneType"),
         (dict.fromkeys(("right", "wrong", "none"), (None, [ROW], 0.0)), "must give a Fitted for 'right', not tuple"),
         ({"right": Fitted(None, [{"number": 0}], 0.0)}, "a trial lacks 'params': make it by .*row_of"),
+        ({"right": Fitted(None, None, 0.0)}, "trials must be a list of rows"),  # type: ignore[arg-type]
+        ({"right": Fitted(None, [{**ROW, "params": None}], 0.0)}, "params of a trial must be a dict"),
+        ({"right": Fitted(None, [{**ROW, "value": "low"}], 0.0)}, "value of a trial must be a number, not 'low'"),
+        ({"right": Fitted(None, [ROW], "1 s")}, "seconds must be a number, not '1 s'"),  # type: ignore[arg-type]
+        ({"right": Fitted(Unchanged({"k": "3"}), [ROW], 0.0)}, "hyperparameters of the corrector: k must be a n"),  # type: ignore[dict-item]
         ({"right": Fitted(None, [ROW], 0.0, np.zeros((2, 4)))}, r"left_out must be \(3, \d+, 2\), not \(2, 4\)"),
     ],
 )
