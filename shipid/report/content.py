@@ -121,7 +121,7 @@ class ReportContent:
     answer : a few sentences, in order.
     cells : one row per cell: model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres
         A, A_90, H, H_90, rms; then member, runs, minutes, seconds, hyperparameters (text). Failed cells have NaN.
-    naive : mean, p90, rms [m] of the floor of constant u, v, r.
+    naive : mean, p90, rms [m] of constant u, v, r.
     models : model, family, A, A_90, A_rms [m], status, description; where known, A_along and A_across [m], the mean
         absolute error of the physics along x and y of the frame (11).
     factors : one row per perturbed number of a model: model, path, group ("hull", "inertia", ...), factor [1]; a term

@@ -25,7 +25,7 @@ from shipid.report.selection import (
     spread,
     thinned,
 )
-from shipid.report.wording import counted, listed, metres, shortened
+from shipid.report.wording import CONSTANT, counted, listed, metres, shortened
 
 BY = ["model", "source", "N_D"]
 ERROR, GAP, COMMAND, MARGIN = 270, 30, 104, 56  # heights of the parts of error over time [px]
@@ -134,7 +134,7 @@ def model_chips(content: ReportContent, sources: set[str]) -> list[Chip]:
         for name in exemplars(content)
     ]
     sources = {drawn_source(content, name, source) for name in exemplars(content) for source in sources}
-    words = {"cooperative": "compensated or no physics", "physics": "physics alone", "naive": "constant velocity"}
+    words = {"cooperative": "compensated or no physics", "physics": "physics alone", "naive": CONSTANT}
     return chips + [
         Chip(f"source:{source}", word, NAIVE if source == "naive" else INK, DASHES[source])
         for source, word in words.items()
@@ -177,7 +177,7 @@ def _traces(content: ReportContent, means: pd.DataFrame, across: str, column: st
         source = drawn_source(content, model, given)
         ink = {"color": NAIVE, "width": 1.5} if source == "naive" else {"color": looks[model].colour}
         ink = {"width": looks[model].width if given == "cooperative" else 1.5, **ink} if model else ink
-        name = "constant velocity" if source == "naive" else model if model == pure else f"{model}, {_word(source)}"
+        name = CONSTANT if source == "naive" else model if model == pure else f"{model}, {_word(source)}"
         keys = [f"source:{source}"] + ([f"model:{model}"] if model else [])
         traces.append(line(name, points[:, 0], points[:, 1], keys, unit, line={"dash": DASHES[source], **ink}))
         if model and given == "cooperative":

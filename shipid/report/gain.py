@@ -26,7 +26,7 @@ from shipid.report.figure import (
 )
 from shipid.report.palette import INK, NAIVE, Style, accuracy_range, styles
 from shipid.report.selection import data_driven, in_words, left_out, nothing_learns, overview, spread, trained
-from shipid.report.wording import counted, listed, metres, shortened
+from shipid.report.wording import CONSTANT, counted, listed, metres, shortened
 
 ROW = 46  # height of a model in the dumbbell figure [px]
 MOST_LINES, FAR = 12, 30.0  # models with physics that have a line; H by the least H that needs a logarithmic axis
@@ -34,7 +34,7 @@ LONGEST = 28  # characters of a name that fit beside its numbers on a phone
 
 
 class Statistic(NamedTuple):
-    """One way to sum up the position error: its columns in the cells, the models and the naive floor."""
+    """One way to sum up the position error: its columns in the cells, the models and constant u, v, r."""
 
     name: str
     cell: str
@@ -49,8 +49,8 @@ STATISTICS = (
 )
 HOW = (
     "Position error over all predicted points of all windows of all test manoeuvres: its mean is H (15), of the "
-    "physics alone A (14). Where a cell was trained with several seeds, {seeds}. The dashed line is the naive floor: "
-    "surge, sway and yaw rate held at their values at the instant of prediction."
+    "physics alone A (14). Where a cell was trained with several seeds, {seeds}. The dashed line is constant u, v, r: "
+    "surge, sway and yaw rate stay as they are at the instant of prediction, the least that any model must beat."
 )
 
 
@@ -122,7 +122,7 @@ def _over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
             Control("Position error", [statistic.name for statistic in STATISTICS]),
             Control("Axis", ["linear", "logarithmic"], int(far)),
         ],
-        chips=[*chips, Chip("naive", "constant velocity", NAIVE, "dash")],
+        chips=[*chips, Chip("naive", CONSTANT, NAIVE, "dash")],
         scale=Scale("error of the physics alone, A [m]", *span) if span else None,
     )
 
@@ -174,8 +174,8 @@ def _lines(content: ReportContent, means: pd.DataFrame, statistic: Statistic, lo
 def _floor(content: ReportContent, statistic: Statistic, ends: list[float], across: bool) -> Trace:
     level = [content.naive[statistic.naive]] * 2
     ink = {"color": NAIVE, "dash": "dash", "width": 1.5}
-    trace = line("constant velocity", *((ends, level) if across else (level, ends)), ["naive"], line=ink)
-    trace["hovertemplate"] = f"constant velocity: {metres(level[0])}<extra></extra>"
+    trace = line(CONSTANT, *((ends, level) if across else (level, ends)), ["naive"], line=ink)
+    trace["hovertemplate"] = f"{CONSTANT}: {metres(level[0])}<extra></extra>"
     return trace
 
 
@@ -222,7 +222,7 @@ def _dumbbell(content: ReportContent, means: pd.DataFrame) -> Figure:
         chips=[
             Chip("before", "physics alone", INK, "none", symbol="circle-open"),
             Chip("after", "with compensation (or no physics)", INK, "none", symbol="circle"),
-            Chip("naive", "constant velocity", NAIVE, "dash"),
+            Chip("naive", CONSTANT, NAIVE, "dash"),
         ],
     )
 
@@ -292,4 +292,4 @@ def _takeaway_dumbbell(content: ReportContent, means: pd.DataFrame) -> str:
         text = "No physics model has a result with data"
     if pure and pure in after.index:
         text += f"; {in_words(content, pure)} has H = {metres(after[pure])}"
-    return f"{text}; the naive floor is {metres(content.naive['mean'])}."
+    return f"{text}; {CONSTANT} {metres(content.naive['mean'])}."

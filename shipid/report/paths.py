@@ -30,7 +30,7 @@ from shipid.report.selection import (
     spread,
     thinned,
 )
-from shipid.report.wording import counted, listed, metres, number
+from shipid.report.wording import CONSTANT, counted, listed, metres, number
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
 MOST_WINDOWS = 600  # in all
@@ -286,7 +286,7 @@ def _line(content: ReportContent, model: str, source: str) -> dict[str, Any]:
     width = style.width if style and of_cell else 1.5
     source = drawn_source(content, model, source)
     return {
-        "name": words.get(source, "constant velocity"),
+        "name": words.get(source, CONSTANT),
         "cell": of_cell,
         "keys": [f"source:{source}"] + ([f"model:{model}"] if model else []),
         "line": {"color": style.colour if style else NAIVE, "dash": DASHES[source], "width": width},

@@ -9,11 +9,11 @@ from pathlib import Path
 from shipid.report import tables
 from shipid.report.content import ReportContent, Sentence
 from shipid.report.page import LEAD, write
-from shipid.report.wording import metres
+from shipid.report.wording import CONSTANT, metres
 
 
 def summary(content: ReportContent) -> str:
-    """Answer, findings, naive floor, models, cells and provenance as Markdown."""
+    """Answer, findings, errors of constant u, v, r, models, cells and provenance as Markdown."""
     naive = content.naive
     findings = [[f.id, f.claim, f.verdict, f.evidence] for f in content.findings]
     parts = [
@@ -21,8 +21,8 @@ def summary(content: ReportContent) -> str:
         _listed(content.answer[:LEAD]),
         *(["## In detail", _listed(content.answer[LEAD:])] if content.answer[LEAD:] else []),
         *(["## Findings", _grid(["", "claim", "verdict", "evidence"], findings)] if findings else []),
-        "## Naive floor",
-        f"Constant surge, sway and yaw rate: mean {metres(naive['mean'])}, 90th percentile {metres(naive['p90'])}, "
+        f"## {CONSTANT.capitalize()}",
+        f"Mean error {metres(naive['mean'])}, 90th percentile {metres(naive['p90'])}, "
         f"root mean square {metres(naive['rms'])}.",
     ]
     for table in filter(None, (tables.kinds(content), tables.models(content), tables.cells(content))):

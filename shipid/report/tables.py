@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 
 from shipid.report.content import PUBLISHED, Floats, ReportContent, spoken
 from shipid.report.selection import nothing_learns
-from shipid.report.wording import counted, fixed, listed, number
+from shipid.report.wording import CONSTANT, counted, fixed, listed, number
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ KINDS = {
     "mean": ("over the horizon [m]", 2),
     "end": ("at its end [m]", 2),
 }
-HOW = {"naive": "constant u, v, r", "physics": "physics alone", "cooperative": "with data"}
+HOW = {"naive": CONSTANT, "physics": "physics alone", "cooperative": "with data"}
 REPAIRS = {
     "kind": ("repair", None),
     "column": ("column", None),

@@ -8,6 +8,9 @@ from collections.abc import Sequence
 
 from shipid.units import decimals_of, plural
 
+CONSTANT = "constant u, v, r"
+"""Name of the path that no model and no data are needed for: the motion at the instant goes on."""
+
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 

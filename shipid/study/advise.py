@@ -69,13 +69,15 @@ def best_model(results: Results) -> str | None:
 class Sides:
     """Names of models that are shown to be better than a rival, shown to be worse, and the others.
 
-    left_out : how many are not compared, since another cell of theirs has no result.
+    left_out : how many are not compared, since another cell of theirs has no result. lacking : whether there are models
+        without a result at this amount of data.
     """
 
     better: list[str]
     worse: list[str]
     open: list[str]
     left_out: int = 0
+    lacking: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,12 @@ class Case:
     def at(self, amount: int) -> pd.DataFrame:
         """Rows of physics models at an amount of data."""
         return self.rows[(self.rows["N_D"] == amount) & (self.rows["family"] != NO_MODEL)]
+
+    def lacks(self, amount: int) -> bool:
+        """Whether a physics model has no result at an amount of data, failed or not finished."""
+        cells = judged_cells(self.results)
+        here = cells[(cells["N_D"] == amount) & ~cells["family"].isin([NO_MODEL, *self.results.aside])]
+        return not self.results.complete or here["model"].nunique() > len(self.at(amount))
 
     def place(self, amount: int) -> int:
         """Index of an amount of data in the error table; ValueError if it is not there."""
@@ -318,7 +326,7 @@ def _against_none(case: Case, amount: int) -> Sides:
     if not models:
         return Sides([], [], [])
     sides = case.sides(models, case.table.against(NO_MODEL, models, case.place(amount)))
-    return replace(sides, left_out=len(case.at(amount)) - len(models))
+    return replace(sides, left_out=len(case.at(amount)) - len(models), lacking=case.lacks(amount))
 
 
 def _enough_runs(case: Case) -> str:
@@ -411,8 +419,8 @@ def _counted(sides: Sides, rival: str) -> str:
     """Which models are better than a rival and which are worse, as one sentence."""
     count = len(sides.better) + len(sides.worse) + len(sides.open)
     if len(sides.better) == count:
-        where = " in every cell" if sides.left_out else ""
-        return f"every physics model with a result{where} does better than {rival}"
+        which = " with a result in every cell" if sides.left_out else " with a result" if sides.lacking else ""
+        return f"every physics model{which} does better than {rival}"
     verb = "do" if len(sides.better) > 1 else "does"  # none does
     verb = "is shown to do" if sides.open and not sides.better else verb
     parts = [f"{len(sides.better) or 'none'} of {count} physics models {verb} better than {rival}"]
@@ -462,7 +470,7 @@ def _trend(case: Case) -> list[str]:
 
 
 def _floor(case: Case) -> str:
-    """Which models do no better than constant motion, at the largest amount of data."""
+    """Which models do no better than constant u, v, r, at the largest amount of data."""
     results, table, place = case.results, case.table, case.place(case.largest)
     rows = case.rows[case.rows["N_D"] == case.largest]
     models = [str(name) for name in rows["model"] if name in table.H]
@@ -470,21 +478,19 @@ def _floor(case: Case) -> str:
     _, run = np.unique(results.test.run, return_inverse=True)
     still = np.bincount(run, results.naive.mean(axis=0)) / np.bincount(run)
     if not models:
-        return f"Keeping u, v and r constant gives {metres(floor)}."
+        return f"Constant u, v, r give {metres(floor)}."
     errors = np.stack([table.by_run(model, place) for model in models])
     training = np.array([table.mean(model, place) for model in models]) * table.noise[place]
     sides = case.sides(models, contrasts(still - errors, table.counts, training))
     if len(sides.better) == len(models):
         whole = "" if len(models) == len(rows) else " with a result in every cell"
-        return (
-            f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} every model{whole} beats it."
-        )
+        return f"Constant u, v, r give {metres(floor)}: at {runs(case.largest)} every model{whole} beats them."
     parts = []
     if sides.worse:
         parts.append(f"{named(sides.worse)} {plural(len(sides.worse), 'is', 'are')} worse")
     if sides.open:
-        parts.append(f"{named(sides.open)} {plural(len(sides.open), 'is', 'are')} not shown to beat it")
-    return f"Keeping u, v and r constant gives {metres(floor)}: at {runs(case.largest)} {', and '.join(parts)}."
+        parts.append(f"{named(sides.open)} {plural(len(sides.open), 'is', 'are')} not shown to beat them")
+    return f"Constant u, v, r give {metres(floor)}: at {runs(case.largest)} {', and '.join(parts)}."
 
 
 def _nominal(nominal: pd.DataFrame, largest: int, plan: Plan) -> list[str]:

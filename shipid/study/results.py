@@ -281,7 +281,7 @@ def _shown_cells(results: Results) -> list[dict[str, Any]]:
 def horizon_frame(results: Results) -> pd.DataFrame:
     """Mean and 90th percentile error, mean error along x and across [m] and of the course [deg], per step ahead [s].
 
-    Of physics, cooperative models and the naive floor; x and y are those of the frame (11).
+    Of physics, cooperative models and constant u, v, r; x and y are those of the frame (11).
     """
     parts = [_horizon(results, constant_motion(results.test), "naive", 0, 0, "naive")]
     for model, path in _physics_beside(results):

@@ -343,7 +343,7 @@ def write_test(folder: Path, test: Windows, paths: Mapping[str, np.ndarray], nai
 
 
 def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]:
-    """Test windows, physics paths by foundation, and the naive floor's errors (T, S)."""
+    """Test windows, physics paths by foundation, and the errors (T, S) of constant u, v, r."""
     try:
         arrays = read_arrays(folder / TEST)
         meta = json.loads(str(arrays["meta"]))

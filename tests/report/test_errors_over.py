@@ -23,7 +23,7 @@ def test_horizon_draws_the_rows_of_its_size(simulation, statistic, column, index
         ("moderate-2, compensated", "moderate-2", "cooperative", size),
         ("moderate-2, physics alone", "moderate-2", "physics", 0),
         ("no physics", "no physics", "cooperative", size),
-        ("constant velocity", "", "naive", 0),
+        ("constant u, v, r", "", "naive", 0),
     ]:
         rows = frame[(frame.model == model) & (frame.source == source) & frame.N_D.eq(count)]
         # Lines are thinned to what a pixel shows, so they are compared where they have points.

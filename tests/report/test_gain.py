@@ -29,7 +29,7 @@ def test_lines_are_means_over_seeds(simulation, view, column, floor):
         np.testing.assert_allclose(line.y, expected, rtol=1e-6)
         (points,) = drawn[f"{model}, seed"]
         np.testing.assert_allclose(sorted(points.y), sorted(cells[cells.model == model][column]), rtol=1e-6)
-    np.testing.assert_allclose(drawn["constant velocity"][0].y, floor, rtol=1e-6)
+    np.testing.assert_allclose(drawn["constant u, v, r"][0].y, floor, rtol=1e-6)
 
 
 def test_a_failed_size_leaves_a_gap(simulation):
@@ -117,7 +117,7 @@ def test_one_size_is_a_dumbbell(full_scale):
     assert after.marker.symbol == "circle"
     assert figure.takeaway == (
         "accurate (Gunnerus, 28.9 m), best in validation, has H = 0.94 m; compensation improves 2 of 2 physics models; "
-        '"no physics" has H = 4.30 m; the naive floor is 5.01 m.'
+        '"no physics" has H = 4.30 m; constant u, v, r 5.01 m.'
     )
 
 

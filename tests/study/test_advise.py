@@ -38,7 +38,7 @@ def test_best_model_and_its_worth_in_runs(made: Any) -> None:
     assert "How many runs? With 10 runs, good (best in validation) has 1.50 m mean error" in advice
     assert f"without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
     assert "leaves 25 % of the error of physics alone (over 2 models)" in advice
-    assert "Keeping u, v and r constant gives 10.0 m: at 60 runs every model beats it." in advice
+    assert "Constant u, v, r give 10.0 m: at 60 runs every model beats them." in advice
     assert "with 60 runs 1 of 2 physics models does better than no physics; bad does worse." in advice
 
 
@@ -62,7 +62,7 @@ def test_no_amount_of_data_replaces_physics(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
     assert "With 10 runs, good (best in validation) has 1.50 m mean error; without physics 30 runs are not" in advice
     assert "are not enough for that: they give 4.00 m" in advice
-    assert "every physics model with a result does better than no physics" in advice
+    assert "every physics model does better than no physics" in advice
 
 
 def test_physics_worth_no_run_at_all(made: Any) -> None:
@@ -78,10 +78,7 @@ def test_harm_is_reported_with_names(made: Any) -> None:
     """At 10 runs `bad` harms; at 30 it does not."""
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)})))
     assert "With 10 runs 1 of 2 physics models does better than no physics; bad does worse; " in advice
-    assert (
-        "with 30 runs every physics model with a result does better than no physics, even with an error A of 6.00 m."
-        in advice
-    )
+    assert "with 30 runs every physics model does better than no physics, even with an error A of 6.00 m." in advice
     both = text(made(grid({"good": (1.5, 3.5), "bad": (5.0, 4.0), "none": (4.0, 3.0)})))
     assert "ith 30 runs none of 2 physics models does better than no physics; good and bad do worse." in both
     assert "every physics model" not in both
@@ -91,13 +88,13 @@ def test_harm_is_reported_with_names(made: Any) -> None:
 
 def test_what_holds_at_both_ends_is_said_once(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
-    first = "With 10 or 30 runs every physics model with a result does better than no physics, even with an error A of"
+    first = "With 10 or 30 runs every physics model does better than no physics, even with an error A of"
     assert advice.startswith(f"{first} 6.00 m.\n")
 
 
 def test_what_holds_with_one_run_and_with_more_is_said_once(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}, (1, 30))))
-    assert advice.startswith("With 1 or 30 runs every physics model with a result does better than no physics, even")
+    assert advice.startswith("With 1 or 30 runs every physics model does better than no physics, even")
 
 
 def test_a_tie_is_no_help(made: Any) -> None:
@@ -106,11 +103,11 @@ def test_a_tie_is_no_help(made: Any) -> None:
 
 
 def test_a_tie_is_no_harm(made: Any) -> None:
-    """`bad` has 6 m alone and compensated, and so has constant motion."""
+    """`bad` has 6 m alone and compensated, and so have constant u, v, r."""
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (7.0, 6.0), "none": (9.0, 8.0)}), naive=6.0))
     assert "harms" not in advice
     assert "It is not shown that compensation helps bad." in advice
-    assert 'at 30 runs "no physics" is worse, and bad is not shown to beat it.' in advice
+    assert 'at 30 runs "no physics" is worse, and bad is not shown to beat them.' in advice
 
 
 def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
@@ -145,9 +142,9 @@ def test_data_that_did_not_help_is_reported(made: Any) -> None:
     assert "no better than with" not in text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (5.0, 4.0)})))
 
 
-def test_constant_motion_that_is_not_beaten(made: Any) -> None:
+def test_constant_u_v_r_that_are_not_beaten(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.5))
-    assert 'gives 2.50 m: at 30 runs "no physics" is worse.' in advice
+    assert 'give 2.50 m: at 30 runs "no physics" is worse.' in advice
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=1.9))
     assert 'bad and "no physics" are worse.' in advice
 
@@ -190,7 +187,7 @@ def test_how_good_physics_must_be(made: Any) -> None:
         "How good must the physics be, 8 s ahead? With 10 or 30 runs physics pays even with an error A of 16.0 m, the "
         "worst tried.\n"
     )
-    assert "At 10 and at 30 runs every physics model with a result does better than no physics." in advice
+    assert "At 10 and at 30 runs every physics model does better than no physics." in advice
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (0.2, 0.2)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
     assert "With 10 or 30 runs physics does not pay even with an error A of 1.00 m, the best tried" in advice
@@ -230,7 +227,7 @@ def test_no_limit_of_A_where_all_models_have_the_same(made: Any) -> None:
     H = {name: (1.0 + 0.1 * k, 1.0) for k, name in enumerate(alone)} | {"none": (3.0, 3.0)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
     assert "worst tried" not in advice
-    every = "every physics model with a result does better than no physics, even with an error A of 2.00 m"
+    every = "every physics model does better than no physics, even with an error A of 2.00 m"
     assert advice.startswith(f"With 10 or 30 runs {every}.")
 
 
@@ -347,17 +344,18 @@ def test_failed_cells_are_reported_and_not_counted(made: Any) -> None:
     """`bad` has no result at 30 runs: nothing is claimed of every model, and the failure is named."""
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, None), "none": (9.0, 4.0)})))
     assert "1 of 6 cells has no result (bad: no training converged)" in advice
-    assert "every physics model with a result does better than no physics" in advice
+    assert "With 10 runs every physics model with a result in every cell does better than no physics" in advice
+    assert "with 30 runs every physics model with a result does better than no physics" in advice
     assert "(over 1 model)" in advice
 
 
 def test_every_model_leaves_out_none_without_saying_so(made: Any) -> None:
-    """`bad` is worse than `none` at 10 runs and `worst` than constant motion at 30; each failed at the other amount."""
+    """`bad` is worse than `none` at 10 runs and `worst` than constant u, v, r at 30; each failed at the other amount."""
     alone = {"good": 2.0, "bad": 6.0, "worst": 9.0}
     H = {"good": (1.5, 1.0), "bad": (12.0, None), "worst": (None, 11.0), "none": (9.0, 4.0)}
     advice = text(made(grid(H), alone=alone))
     assert "With 10 or 30 runs every physics model with a result in every cell does better than no physics" in advice
-    assert "at 30 runs every model with a result in every cell beats it" in advice
+    assert "at 30 runs every model with a result in every cell beats them" in advice
 
 
 def test_an_amount_without_any_result_takes_no_interval_of_the_others(made: Any) -> None:
