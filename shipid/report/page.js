@@ -166,6 +166,10 @@
     const plots = figure.querySelectorAll(".plot");
     setUp(figure, () => json(script), (views, hidden) => {
       const key = chosen(figure).join("-");
+      const keys = new Set(views[key].flatMap((spec) => spec.data.flatMap((trace) => trace.meta || [])));
+      for (const chip of figure.querySelectorAll(".chips button")) {
+        chip.parentElement.hidden = !keys.has(chip.dataset.key); // the legend of this view
+      }
       views[key].forEach((spec, i) => draw(plots[i], spec, hidden, key));
     });
   }

@@ -3,6 +3,8 @@ import hashlib
 import itertools
 import json
 import re
+import shutil
+import subprocess
 import zlib
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -194,6 +196,31 @@ def test_a_link_to_a_figure_without_data_is_left_out(plain):
     assert "#horizon" not in [a["href"] for a, _ in Page(render(bare)).all("a")]
     with pytest.raises(ValueError, match=r"no figure is called 'horizons'; valid: .*\bbrowser, cells, "):
         render(replace(plain, answer=[Sentence("Nothing.", "horizons")]))
+
+
+def test_the_legend_holds_what_its_view_draws(simulation, tmp_path):
+    """Bars have no lines of equal H: their entry in the legend was there, and did nothing."""
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if browser is None:
+        pytest.skip("needs Chromium or Chrome")
+    text = render(simulation)
+    radios = re.findall(r'<input type="radio" name="map-[^>]*>', text)
+    assert len(radios) == 2
+    bars = text.replace(radios[0], radios[0].replace(" checked", "")).replace(radios[1], f"{radios[1][:-1]} checked>")
+    for name, page, shown in (("map", text, True), ("bars", bars, False)):
+        file = tmp_path / f"{name}.html"
+        file.write_text(page, encoding="utf-8")
+        options = [
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--virtual-time-budget=20000",
+            "--window-size=1280,9000",
+        ]
+        command = [browser, *options, f"--user-data-dir={tmp_path}/{name}", "--dump-dom", file.as_uri()]
+        drawn = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+        assert bool(re.search(r'<li><button[^>]* data-key="iso"', drawn)) == shown, name
+        assert bool(re.search(r'<li hidden=""><button[^>]* data-key="iso"', drawn)) != shown, name
 
 
 def test_structure_for_those_who_listen(page):

@@ -350,7 +350,7 @@ def test_failed_cells_are_reported_and_not_counted(made: Any) -> None:
 
 
 def test_every_model_leaves_out_none_without_saying_so(made: Any) -> None:
-    """`bad` is worse than `none` at 10 runs and `worst` than constant u, v, r at 30; each failed at the other amount."""
+    """`bad` is worse than `none` at 10 runs and `worst` than constant u, v, r at 30; each failed once."""
     alone = {"good": 2.0, "bad": 6.0, "worst": 9.0}
     H = {"good": (1.5, 1.0), "bad": (12.0, None), "worst": (None, 11.0), "none": (9.0, 4.0)}
     advice = text(made(grid(H), alone=alone))
