@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
@@ -387,7 +388,8 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
             *["in band"] * banded,
             "verdict",
         ]
-        lines = [_difference(row, banded) for row in part.to_dict("records")]
+        places = max(3, *map(decimals_of, part[["first", "other"]].max(axis=1)))
+        lines = [_difference(row, places, banded) for row in part.to_dict("records")]
         answer.rows("errors", errors, table(heads, lines))
         answer.say(
             f"verdict: lower or higher where the test shows it, corrected for {len(part)} rows; empty: it does not"
@@ -398,10 +400,9 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     return errors
 
 
-def _difference(row: Mapping[Any, Any], banded: bool) -> list[str]:
-    """One row of a comparison as words."""
+def _difference(row: Mapping[Any, Any], places: int, banded: bool) -> list[str]:
+    """One row of a comparison as words, with so many decimals."""
     known = row["low"] == row["low"] and row["verdict"] != "identical"
-    places = max(decimals_of(max(row["first"], row["other"])), 3)
     interval = f" [{row['low']:+.{places}f}, {row['high']:+.{places}f}]" if known else ""
     amount = "A" if row["N_D"] == 0 else str(row["N_D"])
     shares = row["coverage_first"], row["coverage_other"]
@@ -421,13 +422,23 @@ def _with_ends(mean: float, low: float, high: float) -> str:
     return f"{mean:.{places}f} [{low:.{places}f}, {high:.{places}f}]"
 
 
+def _to_three_digits(mean: float, low: float, high: float) -> str:
+    """A number with an interval, in the decimals that give the largest of them three digits."""
+    size = max((abs(value) for value in (mean, low, high) if math.isfinite(value)), default=0.0)
+    places = max(2 - math.floor(math.log10(size)), 0) if size else 2
+    return f"{mean:z.{places}f} [{low:z.{places}f}, {high:z.{places}f}]"
+
+
 def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     """Show findings, errors and bands of one study over several worlds; returns the errors."""
     from shipid.study.compare import compare_bands, compare_errors, compare_findings
 
     findings, errors, bands = compare_findings(worlds), compare_errors(worlds), compare_bands(worlds)
     words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
-    values = [f"{row.mean:.3g} [{row.low:.3g}, {row.high:.3g}]" * bool(row.number) for row in findings.itertuples()]
+    values = [
+        _to_three_digits(row["mean"], row["low"], row["high"]) if row["number"] else ""
+        for row in findings.to_dict("records")
+    ]
     shown = table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True))
     answer.rows("findings", findings, shown if len(findings) else None)
     texts = [_with_ends(*numbers) for numbers in errors[["mean", "low", "high"]].to_numpy()]

@@ -13,10 +13,12 @@ import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
-from shipid.cli.study import _difference
+from shipid.cli.answer import Answer
+from shipid.cli.study import _show_matched, _to_three_digits
 from shipid.document import bundled
 from shipid.engine import engines
 from shipid.errors import ShipidError
+from shipid.study.matched import Comparison
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
 from tests.cli.running import ended, output_of
@@ -199,17 +201,31 @@ def test_a_run_whose_lines_cannot_be_printed_gives_its_claims_back(
     assert not (tmp_path / "run" / "claims").exists()
 
 
-def test_differences_of_a_ship_model_are_no_zeros() -> None:
+def test_differences_of_a_ship_model_are_no_zeros_and_a_column_has_the_same_decimals(capsys) -> None:
     row = {
+        "folder": "b",
         "family": "a",
         "method": "drawn",
-        "N_D": 10,
         "cells": 1,
-        "first": 0.0004,
-        "other": 0.0002,
-        "verdict": "lower",
+        "coverage_first": np.nan,
+        "coverage_other": np.nan,
     }
-    row |= {"difference": -0.0002, "low": -0.0003, "high": -0.0001, "coverage_first": 0.9, "coverage_other": 0.9}
-    assert _difference(row, banded=False)[4:] == ["0.0004", "0.0002", "-0.0002 [-0.0003, -0.0001]", "lower"]
-    row |= {"first": 1.5, "other": 1.0, "difference": -0.5, "low": -0.6, "high": -0.4}
-    assert _difference(row, banded=False)[4:] == ["1.500", "1.000", "-0.500 [-0.600, -0.400]", "lower"]
+    small = {"N_D": 100, "first": 0.0004, "other": 0.0002, "difference": -0.0002, "low": -0.0003, "high": -0.0001}
+    large = {"N_D": 10, "first": 1.5, "other": 1.0, "difference": -0.5, "low": -0.6, "high": -0.4}
+    errors = pd.DataFrame([{**row, **numbers, "verdict": "lower"} for numbers in (large, small)])
+    _show_matched(Comparison(("a", "b"), pd.DataFrame(), errors, ()), Answer(as_json=False))
+    shown = [line.split()[4:] for line in capsys.readouterr().out.splitlines() if "drawn" in line]
+    assert shown == [
+        ["1.5000", "1.0000", "-0.5000", "[-0.6000,", "-0.4000]", "lower"],
+        ["0.0004", "0.0002", "-0.0002", "[-0.0003,", "-0.0001]", "lower"],
+    ]
+    _show_matched(Comparison(("a", "b"), pd.DataFrame(), errors[:1], ()), Answer(as_json=False))
+    assert " 1.500   1.000   -0.500 [-0.600, -0.400]" in capsys.readouterr().out
+
+
+def test_a_number_over_worlds_and_its_interval_have_the_same_decimals() -> None:
+    """They were 0.86 [0.812, 0.9] and 12.3 [-0.0451, 24.7]."""
+    assert _to_three_digits(0.86, 0.8121, 0.9) == "0.860 [0.812, 0.900]"
+    assert _to_three_digits(12.34, -0.0451, 24.66) == "12.3 [0.0, 24.7]"
+    assert _to_three_digits(1234.4, 1200.0, 1300.2) == "1234 [1200, 1300]"
+    assert _to_three_digits(0.0, np.nan, np.nan) == "0.00 [nan, nan]"
