@@ -19,6 +19,7 @@ AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name h
 SCREW = SIGNALS["n"].component  # of a shaft speed or pitch without a side: that of the azimuth unit where there is one
 FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
 ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
+FASTEST = 200.0  # rev/s: no shaft is faster, not that of a small craft that turns within a length, either
 TOGETHER = 0.2  # of the range of a column: how far twin rudders are apart
 TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 USUAL = np.radians(20.0)  # rudder angle of a usual turn
@@ -278,7 +279,7 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
     """Return unit, confidence, reason and further keys of a shaft speed.
 
     The distance of the ship in one turn of the shaft, relative to the radius of her turns, separates revolutions per
-    second from revolutions per minute. Nothing separates per cent from either.
+    second from revolutions per minute, where both are possible. Nothing separates per cent from either.
     """
     values = state.columns[name]
     top = float(np.abs(values).max())
@@ -325,8 +326,8 @@ def _off_advance(state: State, values: Array, unit: str) -> float:
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
     speed = float(np.median(np.abs(state.chosen.change(state.position)) / span))
     rate = float(np.percentile(np.abs(state.chosen.change(state.psi).real) / span, 90)) / _hard_over(state)
-    shaft = float(np.median(np.abs(values))) * to_si(unit, "propeller.n")
-    if not (speed > 0 and rate > 0 and shaft > 0):
+    shaft, top = (float(f(np.abs(values))) * to_si(unit, "propeller.n") for f in (np.median, np.max))
+    if not (speed > 0 and rate > 0 and shaft > 0) or top > FASTEST:
         return np.inf
     ratio = speed / shaft / (speed / rate) / ADVANCE
     return max(ratio, 1.0 / ratio)

@@ -119,6 +119,18 @@ def test_the_unit_of_a_shaft(name: str, values: np.ndarray, unit: str, asked: bo
     assert {finding.kind for finding in state.findings} == kinds
 
 
+@pytest.mark.parametrize("name", ["shaft [rpm]", "shaft speed"])
+def test_the_shaft_of_a_craft_that_turns_within_her_length(name: str) -> None:
+    """She turns as far in one turn of the shaft as ships in many: up to 1000 rpm were read as 60,000 rpm."""
+    columns = {name: 1000.0 * RPM / RPM.max()}
+    state = state_with_pose(columns)
+    state.t = state.t * RPM.max() / 20000.0
+    state.r = R * 20000.0 / RPM.max()
+    choose_commands(state)
+    assert described(state)["propeller.n"][:2] == (name, "rpm")
+    assert not state.findings
+
+
 def test_a_shaft_that_counts_the_other_way_has_its_sign() -> None:
     """Before, the shaft of a left-handed screw ran astern while the ship went ahead, without a word."""
     state = chosen({"rudder": RUDDER, "rpm_port": RPM, "rpm_stbd": -RPM})
