@@ -49,6 +49,7 @@ LENGTHS_AHEAD = (
 WIND, WIND_LENGTH = 6.0, 28.9  # m/s, m: up to a moderate breeze on R/V Gunnerus, as in the bundled studies
 HORIZONS = (1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 450, 600)  # s
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
+SMALLER = (2, 4, 8)  # parts of the step: a small craft is stiff in yaw
 STEPS, LOGGED_STEPS, LONGEST_STEP = 15, 30, 2.0  # steps ahead at least, of constant and of recorded orders; s
 LEAST_SENSE = 0.1  # correlation of an angle with the change of r
 SYSTEMATIC = 0.05  # positions and velocities differ by a factor, not by scatter
@@ -271,15 +272,15 @@ def _first_that_runs(
     dataset: Dataset | None = None,
     warnings: Sequence[str] = (),
 ) -> Draft:
-    """Explicit Euler, else RK4, else RK4 at half the step; milder families in turn: the first that rolls out."""
+    """Explicit Euler, else RK4, else RK4 at smaller and smaller steps; milder families in turn: the first that runs."""
     horizon, step = ahead
     euler = Choice("prediction.integrator", "euler", "the paper's; take rk4 if you take a longer step")
     rk4 = Choice("prediction.integrator", "rk4", "explicit Euler diverges on these runs")
-    halved = [
-        horizon,
-        Choice(step.path, step.value / 2, f"{step.why}; twice as long diverges"),
+    smaller = [
+        ([horizon, Choice(step.path, step.value / parts, f"{step.why}; twice as long diverges")], rk4)
+        for parts in SMALLER
     ]
-    for (front, method), chosen in product(((ahead, euler), (ahead, rk4), (halved, rk4)), families):
+    for (front, method), chosen in product(((ahead, euler), (ahead, rk4), *smaller), families):
         choices = [*before, *front, method, *after, *_claims([family["name"] for family in chosen])]
         plan = _planned(choices, chosen, out, vessels)
         try:

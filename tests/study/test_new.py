@@ -350,6 +350,20 @@ def test_a_template_vessel_is_studied(tmp_path: Path, template: Path) -> None:
     read_plan(tmp_path / "study.toml")
 
 
+def test_a_vessel_that_is_stiff_in_yaw_takes_smaller_steps(tmp_path: Path) -> None:
+    """Her yaw decays in 1/8 s: RK4 at half of the step diverges, at a quarter it does not."""
+    ship = load_vessel(SHIP).parameters
+    decay = -8.0 * (ship["inertia.I_z"] - ship["added_mass.N_rdot"])
+    patch = f'name = "stiff"\nextends = "{SHIP}"\n[hull.derivatives]\nN_r = {decay}\n'
+    file = tmp_path / "stiff.toml"
+    file.write_text(patch, encoding="utf-8")
+    draft, document = drafted(tmp_path, trial(), str(file))
+    plain = drafted(tmp_path, trial())[1]["prediction"]["step"]
+    assert document["prediction"]["step"] == plain / 4
+    assert document["prediction"]["integrator"] == "rk4"
+    assert "twice as long diverges" in draft.text
+
+
 @pytest.mark.parametrize("vessel", ["kvlcc2-l7", "mariner", pytest.param("otter", marks=pytest.mark.slow)])
 def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> None:
     out = tmp_path / "study.toml"
