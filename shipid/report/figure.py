@@ -117,9 +117,12 @@ def label(text: str) -> str:
     return html.escape(text, quote=False)
 
 
+MILLION = 6  # power of ten from which ticks are short: Plotly would write -5k on one axis and -6000 on the other
+
+
 def axis(title: str, **options: Any) -> dict[str, Any]:
     """Make an axis; its title carries the unit."""
-    base = {"gridcolor": GRID, "linecolor": GRID, "zeroline": False, "automargin": True}
+    base = {"gridcolor": GRID, "linecolor": GRID, "zeroline": False, "automargin": True, "minexponent": MILLION}
     return {**base, "title": {"text": title, "standoff": 8, "font": {"size": 13}}, **options}
 
 

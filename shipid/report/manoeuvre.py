@@ -212,7 +212,7 @@ def _panel(title: str, traces: list[Trace], content: ManoeuvreContent | None = N
     drawn = np.concatenate([trace["y"] for trace in [*marks, *traces]])
     if len(drawn) and np.nanmax(drawn) - np.nanmin(drawn) < ROUNDING:
         y["range"] = [float(np.nanmin(drawn)) - 1, float(np.nanmax(drawn)) + 1]
-    return Panel(Plot([*marks, *traces], layout(axis("time [s]", nticks=6), y, hovermode="closest")))
+    return Panel(Plot([*marks, *traces], layout(axis("time [s]", nticks=4), y, hovermode="closest")))
 
 
 def _value(content: ManoeuvreContent, measure: str) -> float:

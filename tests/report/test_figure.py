@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipid.report.figure import apart, axis, label, layout, line, logarithmic, plane
+from shipid.report.figure import Panel, Plot, apart, axis, label, layout, line, logarithmic, plane
 
 
 def test_tick_names_of_a_map_of_kilometres_leave_room_for_its_title():
@@ -52,3 +52,9 @@ def test_names_moved_apart_keep_their_order_and_their_distance(places, gap):
     assert all(place <= 100.0 + 1e-9 for place in moved)
     if all(b - a >= gap for a, b in itertools.pairwise(places)):
         assert moved == pytest.approx(places)
+
+
+def test_ticks_of_one_page_are_written_in_one_way():
+    """Plotly writes -5k where the next axis has -6000."""
+    made = Panel(Plot([], plane("east [m]", "north [m]"))).figure.layout
+    assert made.xaxis.minexponent == made.yaxis.minexponent == 6

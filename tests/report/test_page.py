@@ -189,6 +189,12 @@ def test_three_sentences_come_before_the_details_and_warnings_are_open(plain):
         assert bool(rest) == bool(summary)
 
 
+def test_a_heading_does_not_break_before_a_unit(plain):
+    title = "Tanker, 304.8 m: how far is she off 30 s ahead?"
+    page = Page(render(replace(plain, title=title)))
+    assert [text for _, text in page.all("h1")] == ["Tanker, 304.8\u00a0m: how far is she off 30\u00a0s ahead?"]
+
+
 def test_a_link_to_a_figure_without_data_is_left_out(plain):
     linked = replace(plain, answer=[Sentence("Errors grow.", "horizon")])
     assert "#horizon" in [a["href"] for a, _ in Page(render(linked)).all("a")]
