@@ -132,7 +132,8 @@ def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
     kept = frame.factor[frame.factor != 0]
     text = f"{counted(len(kept), 'number')} in {counted(len(names), 'model')}"
     if len(kept):
-        text += f", times factors from {number(kept.min())} to {number(kept.max())}"
+        low, high = number(kept.min()), number(kept.max())
+        text += f", times {low}" if low == high else f", times factors from {low} to {high}"
     else:
         text = f"{counted(len(names), 'model')} changed"
     text += f"; {counted(removed, 'term')} removed" if removed else ""

@@ -70,7 +70,7 @@ def _verdict(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in mine[mine.failed.gt(0)].itertuples()]
     text += f", without a result: {listed(failed)}" if failed else ""
     partly = [str(row.method) for row in mine[mine.missing.gt(mine.failed)].itertuples()]
-    return text + (f", not on every model: {listed(partly)}" if partly else "")
+    return text + (f" (left out: {listed(partly)}, not on every model)" if partly else "")
 
 
 def _frame(content: ReportContent | MethodsContent) -> pd.DataFrame:

@@ -61,6 +61,8 @@ def test_removed_terms_are_no_numbers_times_a_factor(full_scale):
     assert factors(replace(full_scale, factors=frame)).takeaway == (
         "2 numbers in 1 model, times factors from 0.60 to 0.70; 1 term removed."
     )
+    same = factors(replace(full_scale, factors=frame.assign(factor=0.6))).takeaway
+    assert same == "3 numbers in 1 model, times 0.60."
     gone = frame.assign(factor=0.0)
     assert factors(replace(full_scale, factors=gone)).takeaway == "1 model changed; 3 terms removed."
 
