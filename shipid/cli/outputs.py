@@ -19,10 +19,26 @@ OUTPUTS = ("out", "csv", "html", "log", "save")
 """Names of options that say what to write."""
 RESULTS = ("study.toml", "provenance.json")
 """Files that a folder of results has."""
+NO_NUMBER = {
+    "float_parsing": "is no number: write it with a point and without a unit, such as 3.5",
+    "int_parsing": "is no whole number",
+    "int_from_float": "is no whole number",
+}
+"""What Pydantic calls a mistake -> what would be right."""
 
 
 class Guarded(typer.core.TyperCommand):
     """A command that refuses numbers that are not finite, and a file named to be read and written, or written twice."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take the arguments as Typer does; what is no number is told with its value, which Typer leaves out."""
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as error:
+            found: list[Any] = getattr(error.__cause__, "errors", list)()
+            if found and (words := NO_NUMBER.get(found[0]["type"])):
+                error.message = f"{found[0]['input']!r} {words}"
+            raise
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; ShipidError for a number that is not finite, or for a file that must not be written.

@@ -139,6 +139,24 @@ def test_numbers_are_finite(words: str, value: str) -> None:
     assert (status, error) == (1, f"error: ANGLES: {value}: must be a finite number\n")
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            "manoeuvre otter turning --speed 1,5",
+            "'--speed': '1,5' is no",
+        ),
+        ("manoeuvre otter zigzag 20/20", "'[ANGLES]...': '20/20' is no"),
+        ("study run quick --workers two", "'--workers': 'two' is no"),
+    ],
+)
+def test_what_is_no_number_is_named(words: str, said: str) -> None:
+    """The message of Typer had no value: of several angles none was named."""
+    code, _, error = ended(*words.split())
+    assert code == 2
+    assert said in error
+
+
 def test_every_command_is_guarded() -> None:
     """Also one that is added later, if its output has one of the names."""
 
