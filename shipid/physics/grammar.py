@@ -111,6 +111,9 @@ def derivative(name: str) -> Monomial:
     """
     if name.endswith("dot"):
         raise ValueError(f"{name!r} is an acceleration derivative: it belongs in [added_mass]")
+    if "delta" in name:
+        where = "a block such as [thruster.rudder] with kind = 'rudder_derivatives'"
+        raise ValueError(f"{name!r} is a rudder derivative: it belongs in {where}")
     return monomial(name, (HEEL, *MOTIONS))
 
 

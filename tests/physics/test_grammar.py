@@ -79,6 +79,12 @@ def test_acceleration_derivatives_are_sent_to_added_mass(name: str) -> None:
         derivative(name)
 
 
+@pytest.mark.parametrize("name", ["Y_delta", "X_deltadelta", "N_vvdelta"])
+def test_rudder_derivatives_are_sent_to_the_rudder(name: str) -> None:
+    with pytest.raises(ValueError, match=r"belongs in a block such as \[thruster.rudder\]"):
+        derivative(name)
+
+
 @pytest.mark.parametrize(
     ("name", "unit"),
     [("X_udot", "kg"), ("Y_rdot", "kg m"), ("N_vdot", "kg m"), ("N_rdot", "kg m^2"), ("K_pdot", "kg m^2")],
