@@ -20,6 +20,7 @@ from shipid.units import plural
 Document = dict[str, Any]
 
 LARGEST = 20_000_000  # bytes of a document
+LONGEST_LINE = 80  # characters of a line that a message shows
 DEEPEST = 40  # tables and lists inside one another
 MOST_NUMBER, MOST_INTEGER = 1e24, 10**15
 MUST, BE = "must ", "be "
@@ -115,6 +116,20 @@ def read(file: Path | str) -> Document:
     return document
 
 
+def _wrong_line(text: str, message: str) -> str:
+    """The line of a mistake, and what would be right where that is known; empty where the parser names no line."""
+    place, lines = re.search(r"at line (\d+)", message), text.split("\n")
+    if place is None or int(place[1]) > len(lines):
+        return ""
+    line = lines[int(place[1]) - 1].strip()
+    shown = line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
+    if re.search(r"=\s*[-+]?\d+,\d", line):
+        return f": {shown!r}: write decimals with a point"
+    if "\\" in line:
+        return f": {shown!r}: write / in a path, or the text in single quotes"
+    return f": {shown!r}"
+
+
 def loads(text: str, file: Path | str | None = None) -> Document:
     """Parse TOML text; DocumentError for invalid syntax, and for what the parser cannot hold."""
     try:
@@ -122,7 +137,7 @@ def loads(text: str, file: Path | str | None = None) -> Document:
     except RecursionError:
         raise DocumentError(f"is nested deeper than {DEEPEST} tables or lists", file=file) from None
     except tomllib.TOMLDecodeError as error:
-        raise DocumentError(f"not valid TOML: {error}", file=file) from None
+        raise DocumentError(f"not valid TOML: {error}{_wrong_line(text, str(error))}", file=file) from None
     except ValueError:  # of an integer with thousands of digits
         raise DocumentError(
             f"has an integer larger than {MOST_INTEGER:.0e}: write a smaller number", file=file

@@ -144,6 +144,19 @@ def test_read_refuses_what_is_no_document(tmp_path: Path) -> None:
             documents.read(missing)
 
 
+@pytest.mark.parametrize(
+    ("line", "remedy"),
+    [
+        ("x_G = -3,4", r"'x_G = -3,4': write decimals with a point"),
+        (r'dataset = "C:\logs\a.parquet"', r"write / in a path, or the text in single quotes"),
+        ("name = Ada", r"\(at line 2, column 8\): 'name = Ada'$"),
+    ],
+)
+def test_a_line_that_is_no_toml_is_shown(line: str, remedy: str) -> None:
+    with pytest.raises(DocumentError, match=remedy):
+        documents.loads(f"a = 1\n{line}\nb = 2\n")
+
+
 def test_find_prefers_the_folder_of_the_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "here").mkdir()
     (tmp_path / "here" / "x.toml").write_text("a = 1")
