@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, floor, log10
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from shipid.report.content import PageContent, Sentence
 from shipid.report.page import page, write
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, decimals, figure, text
-from shipid.report.wording import counted, listed
+from shipid.report.wording import counted, fixed, listed
 
 Row = Mapping[Any, Any]
 
@@ -132,8 +132,11 @@ def _valued(row: Row) -> Cell:
     value, low, high = (float(row[name]) for name in ("value", "low", "high"))
     if value != value:
         return text(None)
-    shown = f"{value:.4g}" + (f" ({low:.4g} … {high:.4g})" if low == low and high == high else "")
-    return Cell(shown.replace("-", "−"), value)
+    places = max(3 - floor(log10(abs(value))), 0) if value else 3
+    shown = fixed(value, places)
+    if low == low and high == high:
+        shown += f" ({fixed(low, places)} … {fixed(high, places)})"
+    return Cell(shown, value)
 
 
 def groups(content: StructuresContent) -> Table | None:

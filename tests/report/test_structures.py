@@ -38,7 +38,7 @@ def content() -> StructuresContent:
 
 def test_the_page_shows_all_and_escapes_names(tmp_path: Path) -> None:
     text = write_structures(content(), tmp_path / "page.html").read_text()
-    for word in ("A is best.", "a &lt;b&gt;", "20 (19 … 21)", "short horizon", "0.050 … 0.200", "stop"):
+    for word in ("A is best.", "a &lt;b&gt;", "20.00 (19.00 … 21.00)", "short horizon", "0.050 … 0.200", "stop"):
         assert word in text
     assert "a <b>" not in text.replace("a <b>ship", "")
 
