@@ -134,7 +134,7 @@ def test_the_command_prints_both_tables(made: Any, monkeypatch: pytest.MonkeyPat
     assert result.exit_code == 0, result.output
     lines = [" ".join(line.split()) for line in result.output.splitlines()]
     assert "finding in 2 worlds number mean [95 % over worlds]" in lines
-    assert "R1 2 confirmed H / A, accurate 0.625 [-0.963, 2.21]" in lines
+    assert "R1 2 confirmed H / A, accurate 0.62 [-0.96, 2.21]" in lines
     assert "H [m], mean [least, greatest] N_D = 0 N_D = 30" in lines
     assert "good 2.00 [2.00, 2.00] 1.25 [1.00, 1.50]" in lines
     assert "none - 9.00 [9.00, 9.00]" in lines
