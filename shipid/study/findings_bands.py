@@ -107,9 +107,9 @@ def _of_known_kinds(
     left_out = f"no run of the kind {these} calibrated them, so they promise nothing for {manoeuvres(len(new))}"
     like = ~np.isin(run, list(new))
     if not like.any():
-        return _finding("B2", "undecided", left_out)
-    finding = kept_promise(held[like], run[like], level)
-    return Finding(**{**finding, "evidence": f"{finding['evidence']}; {left_out}"})
+        return finding(CLAIMS, "B2", "undecided", left_out)
+    kept = kept_promise(held[like], run[like], level)
+    return Finding(**{**kept, "evidence": f"{kept['evidence']}; {left_out}"})
 
 
 def narrower(widths: Widths) -> Finding:
