@@ -233,6 +233,8 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...]) -> None:
     number(f"{where}: seconds", one.seconds, DataError)
     if one.left_out is not None and np.shape(one.left_out) != shape:
         raise DataError(f"{where}: left_out must be {shape}, not {np.shape(one.left_out)}")
+    if one.left_out is not None and np.asarray(one.left_out).dtype.kind not in "fiu":
+        raise DataError(f"{where}: left_out must be real numbers, not {np.asarray(one.left_out).dtype}")
     if one.corrector is not None:
         chosen = one.corrector.hyperparameters
         by_name(f"{where}: hyperparameters of the corrector", chosen, "a name to a number", DataError)

@@ -280,7 +280,8 @@ def _test_runs(plan: Plan, windows: Windows) -> list[str]:
     wanted, runs = plan.study.split.test, windows.spans
     if isinstance(wanted, int):
         if wanted >= len(runs):
-            raise DocumentError(f"{wanted}: there are only {len(runs)} runs", file=plan.file, path="split.test")
+            there = f"there {plural(len(runs), 'is one run', f'are {len(runs)} runs')}, and one at least must train"
+            raise DocumentError(f"{wanted}: {there}", file=plan.file, path="split.test")
         return list(nested_runs(runs, [wanted], plan.study.split.seed)[wanted])
     for name in wanted:
         if name not in runs:

@@ -68,6 +68,16 @@ def test_defect_fails_its_check(defect: Callable[[pd.DataFrame], pd.DataFrame], 
     assert caught <= failed(defect(frame))
 
 
+def test_a_small_craft_may_turn_faster_than_a_ship() -> None:
+    """At 1.5 rad/s, as her heading shows; a yaw rate in degrees is still refused."""
+    t = 0.1 * np.arange(600)
+    r, psi = 1.5 * np.cos(0.2 * t), 7.5 * np.sin(0.2 * t)
+    still = dict.fromkeys(("u", "v", "north", "east"), np.zeros(len(t)))
+    frame = turning(T).iloc[[0] * len(t)].reset_index(drop=True).assign(t=t, psi=psi, r=r, **still)
+    assert "range r" not in failed(frame)
+    assert "range r" in failed(frame.assign(r=np.degrees(r)))
+
+
 def test_shared_rows_are_reported() -> None:
     assert "overlap" in failed(turning(T), turning(T + 10.0))
     table = check_dataset(as_dataset(turning(T), turning(T)))

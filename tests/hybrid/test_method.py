@@ -128,6 +128,15 @@ def test_what_a_method_gives_is_checked(gives: Any, message: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_errors_left_out_that_are_no_numbers_are_refused() -> None:
+    class Mine(Method):
+        def fit(self, given: Task) -> dict[str, Fitted]:
+            return dict.fromkeys(given.cases, Fitted(None, [ROW], 0.0, np.full(given.targets["right"].shape, None)))
+
+    with pytest.raises(DataError, match=r"^Mine\.fit: left_out must be real numbers, not object"):
+        fit_all(Mine(), task())
+
+
 @pytest.mark.parametrize("words", [[], ["no licence"], [3]])
 def test_a_method_that_ends_the_process_is_named(words: list[Any]) -> None:
     """Its worker was said to be killed, perhaps for want of memory; without workers the command ended as if well."""
