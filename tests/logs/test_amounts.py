@@ -12,7 +12,7 @@ from shipid.errors import DataError
 from shipid.files import write_new
 from shipid.logs.amounts import is_unit, parted
 from shipid.logs.guess.columns import Guess, guess
-from shipid.logs.guess.draft import draft_mapping
+from shipid.logs.guess.draft import untried
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.simulated import KNOT, as_bridge, si_log
 
@@ -33,7 +33,7 @@ def written(decimal: str = ".") -> pd.DataFrame:
 
 def drafted(file: Path) -> tuple[Guess, Path]:
     proposal = guess(file)
-    return proposal, write_new(draft_mapping(proposal, manoeuvres=False), file.parent / "draft.toml")
+    return proposal, write_new(untried(proposal), file.parent / "draft.toml")
 
 
 @pytest.mark.parametrize(("decimal", "separator"), [(".", ","), (",", ";"), (".", "\t")])
