@@ -23,6 +23,7 @@ from shipid.study.verdict import interval, manoeuvres, metres, named, runs, show
 from shipid.study.worth import Estimate, break_even, runs_without_physics
 from shipid.units import percent, plural
 
+ROUNDING = 1e-9  # relative: an A that is the end of an interval is not beyond it
 MANY = 3  # methods that learn: their comparison is what the study asks
 SHOWN = 5  # models that a sentence lists
 BEST = "best in validation"
@@ -279,8 +280,8 @@ def _but(case: Case, limit: Estimate, sides: Sides) -> str:
     """Models that are shown to do the opposite of what the interval of a limit says of their A."""
     low, high = (limit.low, limit.high) if np.isfinite(limit.low) else (limit.value, limit.value)
     A = {model: case.table.mean(model, ALONE) for model in case.fixed}
-    worse = [model for model in sides.worse if model in A and A[model] < low]
-    better = [model for model in sides.better if model in A and A[model] > high]
+    worse = [model for model in sides.worse if model in A and A[model] < low * (1 - ROUNDING)]
+    better = [model for model in sides.better if model in A and A[model] > high * (1 + ROUNDING)]
     parts = [f"{named(worse)} with less {plural(len(worse), 'does', 'do')} worse"] if worse else []
     parts += [f"{named(better)} with more {plural(len(better), 'does', 'do')} better"] if better else []
     return f", but {' and '.join(parts)}" if parts else ""
