@@ -280,7 +280,7 @@ def _test_runs(plan: Plan, windows: Windows) -> list[str]:
     wanted, runs = plan.study.split.test, windows.spans
     if isinstance(wanted, int):
         if wanted >= len(runs):
-            there = f"there {plural(len(runs), 'is one run', f'are {len(runs)} runs')}, and one at least must train"
+            there = f"there {plural(len(runs), 'is only one run', f'are only {len(runs)} runs')}"
             raise DocumentError(f"{wanted}: {there}", file=plan.file, path="split.test")
         return list(nested_runs(runs, [wanted], plan.study.split.seed)[wanted])
     for name in wanted:
