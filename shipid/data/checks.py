@@ -52,8 +52,7 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     for run, stretches in by_run.items():
         heading = [*_heading(stretches)]
         proved = {"r"} if _proves_rate(heading) else set()  # a small craft turns faster than any ship
-        ranges = [*_ranges(stretches, proved)]
-        results = [*_clock(stretches), *ranges, *heading, *_path(stretches), *_wind(stretches)]
+        results = [*_clock(stretches), *_ranges(stretches, proved), *heading, *_path(stretches), *_wind(stretches)]
         table += [{"run": run, **row} for row in [*results, *_repetition(run, stretches, whole, shared)]]
     return pd.DataFrame(table)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
 

@@ -53,7 +53,7 @@ class _Sum:
 
     @property
     def plain(self) -> bool:
-        """Whether it adds or subtracts values, two at least, and multiplies none: its digits would suffer from that."""
+        """Whether it adds or subtracts two values or more as they are: multiplied out, it would lose digits."""
         return len(self.terms) > 1 and all(_is_unit(value) for value in self.late.values())
 
 
@@ -78,7 +78,8 @@ class _Collector:
         self.sums: dict[int, _Sum] = {}
         self.written: dict[int, ca.SX] = {}  # of instructions
         self.products: dict[Monomial, ca.SX] = {}
-        self.scaled: dict[tuple[int, int], ca.SX] = {}  # products of coefficients, by their places in memory
+        # products of coefficients, after these, by their places in memory: which must stay theirs
+        self.scaled: dict[tuple[int, int], tuple[ca.SX, ca.SX, ca.SX]] = {}
 
     def function(self) -> ca.Function:
         """The function with its terms collected."""
@@ -155,8 +156,8 @@ class _Collector:
         """The product of two coefficients, the same expression each time."""
         key = x.element_hash(), y.element_hash()
         if key not in self.scaled:
-            self.scaled[key] = x * y
-        return self.scaled[key]
+            self.scaled[key] = x, y, x * y
+        return self.scaled[key][2]
 
     def atom(self, value: ca.SX) -> _Sum:
         """A new atom."""

@@ -98,3 +98,24 @@ def test_truth_and_choices_stay() -> None:
     for at in (-3.0, 0.2, 4.0):
         expected = 2 * at - 2.0 if at * 2.0 > 1 else np.tanh(at) / 2.0
         assert float(collected(2.0, at)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_drawn_sums_of_products_and_quotients_keep_their_value(seed: int) -> None:
+    """A product of coefficients was another one's where its place in memory had been that of a quotient."""
+    random = np.random.default_rng(seed)
+    p, x = ca.SX.sym("p", 12), ca.SX.sym("x", 12)
+    numbers, at = random.uniform(0.5, 2.0, 12), random.uniform(0.5, 2.0, 12)
+    forms = [
+        lambda a, b, y, z: a * y / b,  # noqa: ARG005
+        lambda a, b, y, z: y / (a * b),  # noqa: ARG005
+        lambda a, b, y, z: (a * y) * (1 / b) * z,
+        lambda a, b, y, z: -(a * y) / b,  # noqa: ARG005
+        lambda a, b, y, z: (a * y + b * z) * y / a,
+    ]
+    made, expected = ca.SX(0), 0.0
+    for _ in range(60):
+        form, (i, j, k, m) = forms[random.integers(len(forms))], random.integers(12, size=4)
+        made += form(p[i], p[j], x[k], x[m])
+        expected += form(numbers[i], numbers[j], at[k], at[m])
+    assert float(collect_terms(function(made, p, x), EARLY)(numbers, at)) == pytest.approx(expected, rel=1e-12)
