@@ -43,9 +43,7 @@ def vessel_wrapper(name: str, sizes: Mapping[str, int], num_states: int, variabl
         at[group] = place
         place += sizes[group]
     total = place + 1
-    given = ", ".join(
-        f"self->values + {at[group]}" for group in ("carry", "commands", "environment", "loads", "parameters")
-    )
+    given = ", ".join(f"self->values + {first}" for first in at.values())
     begin = f"""    double carry[{sizes["carry"]}];
     int i;
     memcpy(carry, self->values, sizeof carry);

@@ -145,14 +145,19 @@ int main(void)
 """
 
 
+def run_c(unit, source, folder):
+    """Compile a main program with the sources of an FMU, with sanitizers; it returns the line that fails, else 0."""
+    with zipfile.ZipFile(unit) as archive:
+        archive.extractall(folder)
+    (folder / "sources" / "main.c").write_text(source)
+    compile_([compiler()], folder / "sources", *SANITIZERS, "-o", "main", "main.c")
+    result = subprocess.run([folder / "sources" / "main"], capture_output=True, text=True)
+    assert (result.returncode, result.stderr[:1000]) == (0, "")
+
+
 def test_calls_out_of_order_and_states_of_others_are_refused(ship, tmp_path):
     """Before, the bytes of another ship's state, of the same size, made this one continue with her numbers."""
-    with zipfile.ZipFile(ship) as archive:
-        archive.extractall(tmp_path)
-    (tmp_path / "sources" / "main.c").write_text(CALLS_OUT_OF_ORDER)
-    compile_([compiler()], tmp_path / "sources", *SANITIZERS, "-o", "main", "main.c")
-    result = subprocess.run([tmp_path / "sources" / "main"], capture_output=True, text=True)
-    assert (result.returncode, result.stderr[:1000]) == (0, "")
+    run_c(ship, CALLS_OUT_OF_ORDER, tmp_path)
 
 
 WITHOUT_A_COMPONENT = """
@@ -231,12 +236,7 @@ int main(void)
 
 def test_no_component_and_damaged_states_are_refused(aboard, tmp_path):
     """Before, both ended the tool: damaged bytes gave the recorder places in the past that it does not have."""
-    with zipfile.ZipFile(aboard) as archive:
-        archive.extractall(tmp_path)
-    (tmp_path / "sources" / "main.c").write_text(WITHOUT_A_COMPONENT)
-    compile_([compiler()], tmp_path / "sources", *SANITIZERS, "-o", "main", "main.c")
-    result = subprocess.run([tmp_path / "sources" / "main"], capture_output=True, text=True)
-    assert (result.returncode, result.stderr[:1000]) == (0, "")
+    run_c(aboard, WITHOUT_A_COMPONENT, tmp_path)
 
 
 def test_the_sources_compile_without_a_warning(aboard, tmp_path):
