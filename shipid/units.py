@@ -28,6 +28,11 @@ def length_text(length: float) -> str:
     return f"{length:.{decimals_of(length)}f}"
 
 
+def decimals_for(value: float, digits: int) -> int:
+    """Number of decimals that gives a number so many digits, none at least; that of 1 for 0."""
+    return max(digits - 1 - math.floor(math.log10(abs(value))), 0) if value else digits - 1
+
+
 def percent(share: float, decimals: int = 0, *, signed: bool = False) -> str:
     """A share as text, with a space before the sign as after any number (ISO 80000-1): 0.284 is 28 %."""
     return f"{100 * share:{'+' if signed else ''}.{decimals}f} %"

@@ -10,7 +10,7 @@ import pytest
 
 import shipid
 from shipid.logs.mapping import UNITS
-from shipid.units import DEGREE, KNOT, MINUTE, RPM, length_text, percent
+from shipid.units import DEGREE, KNOT, MINUTE, RPM, decimals_for, length_text, percent
 
 
 @pytest.mark.parametrize(
@@ -35,6 +35,13 @@ def test_logs_use_the_same_factors() -> None:
 )
 def test_lengths_of_a_small_model_are_no_zeros(length: float, text: str) -> None:
     assert length_text(length) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "decimals"), [(12.3, 3, 1), (-0.0451, 3, 4), (1234.0, 3, 0), (9.99, 4, 3), (0.0, 3, 2)]
+)
+def test_a_number_has_so_many_digits(value: float, digits: int, decimals: int) -> None:
+    assert decimals_for(value, digits) == decimals
 
 
 def test_percent_signs_stand_apart_from_their_number() -> None:

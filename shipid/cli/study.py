@@ -16,7 +16,7 @@ from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyN
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import counted, digits, draw, ended_by, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import decimals_of, length_text, percent
+from shipid.units import decimals_for, decimals_of, length_text, percent
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -425,7 +425,7 @@ def _with_ends(mean: float, low: float, high: float) -> str:
 def _to_three_digits(mean: float, low: float, high: float) -> str:
     """A number with an interval, in the decimals that give the largest of them three digits."""
     size = max((abs(value) for value in (mean, low, high) if math.isfinite(value)), default=0.0)
-    places = max(2 - math.floor(math.log10(size)), 0) if size else 2
+    places = decimals_for(size, 3)
     return f"{mean:z.{places}f} [{low:z.{places}f}, {high:z.{places}f}]"
 
 

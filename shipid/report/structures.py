@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import degrees, floor, log10
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from shipid.report.page import page, write
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, decimals, figure, text
 from shipid.report.wording import counted, fixed, listed
+from shipid.units import decimals_for
 
 Row = Mapping[Any, Any]
 
@@ -132,7 +133,7 @@ def _valued(row: Row) -> Cell:
     value, low, high = (float(row[name]) for name in ("value", "low", "high"))
     if value != value:
         return text(None)
-    places = max(3 - floor(log10(abs(value))), 0) if value else 3
+    places = decimals_for(value, 4)
     shown = fixed(value, places)
     if low == low and high == high:
         shown += f" ({fixed(low, places)} … {fixed(high, places)})"
