@@ -72,6 +72,7 @@ _NO_PRE = """#ifndef __clang__ // GCC would keep what one branch has computed in
 #endif
 """
 PARTS = 12  # tasks for each core at least: for an even load
+NOTED = 128  # vectors of distances that are counted at a time: between the steps a count costs five times as much
 BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
 
 
@@ -176,15 +177,27 @@ def compiler_version(command: str) -> str:
 
 
 def _measure(of: Precision) -> str:
-    """C function: distances of a group, tallied. A number without its last bits is the number of its bin."""
+    """C functions: distances of a group, noted and later tallied. A number without its last bits is its bin's."""
     shift = SHIFT - DOUBLE.mantissa + of.mantissa
     first = ((1 << of.bits - of.mantissa - 2) - 1 + OCTAVES[0]) * BINS_AN_OCTAVE
     most = float(np.nextafter(of.dtype.type(2.0 ** OCTAVES[1]), 0))
     return f"""
-static inline V measured(V north, V east, long samples, unsigned *tally) {{
+typedef struct {{ long count; unsigned short bins[{NOTED}][W]; }} Notes;
+static __attribute__((noinline)) void count(Notes *notes, unsigned *tally) {{
+  const unsigned short *bins = notes->bins[0];
+  for (long i = 0; i < notes->count * W; ++i) ++tally[bins[i]];
+  notes->count = 0;
+}}
+static inline V measured(V north, V east, long samples, Notes *notes, unsigned *tally) {{
+  typedef unsigned short Bins __attribute__((vector_size(2 * W), aligned(2)));
   V distance = v_sqrt(north * north + east * east);
   M bins = ((M)v_min(v_max(distance, K({LEAST!r})), K({most!r})) >> {shift}) - {first};
-  for (int i = 0; i < W && i < samples; ++i) ++tally[bins[i]];
+  if (samples < W) {{
+    for (int i = 0; i < samples; ++i) ++tally[bins[i]];
+  }} else {{
+    *(Bins *)notes->bins[notes->count++] = __builtin_convertvector(bins, Bins);
+    if (notes->count == {NOTED}) count(notes, tally);
+  }}
   return distance;
 }}
 """
@@ -334,6 +347,8 @@ ONE_VARIANT(records, (steps / every + 1) * num_rows * stride)
 ONE_VARIANT(sums, stride)
 ONE_VARIANT(worst, stride)
 if (tally) tally += number * {BINS};
+Notes notes;
+notes.count = 0;
 for (long front = groups * part / parts; front < last; front += {block}) {{
   long end = front + {block} < last ? front + {block} : last;
   EACH_GROUP(end) {{
@@ -367,14 +382,15 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
       long record = (k + 1) / every;
       const U *there = goal + 2 * (g * (steps / every) + record - 1);
       if (records) NOTE(record)
-      if (goal) distance[j] += measured(ROW(0) - there[0], ROW(1) - there[1], samples - g * W, tally);
+      if (goal) distance[j] += measured(ROW(0) - there[0], ROW(1) - there[1], samples - g * W, &notes, tally);
     }}
   }}
   EACH_GROUP(end) {{
     if (goal) *AT(sums, 0) = distance[j];
     *AT(worst, 0) = greatest[j];
   }}
-}}"""
+}}
+if (tally) count(&notes, tally);"""
         return f"""{_NO_PRE}{head(wanted)}
 {wanted.lookup.head() if wanted.lookup else ""}
 {self.functions()}
