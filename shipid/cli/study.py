@@ -179,7 +179,7 @@ def study_screen(
     from shipid.engine.engines import ENGINES, REPEATED, named
     from shipid.files import write_table
     from shipid.study import screen
-    from shipid.study.prepare import obtain
+    from shipid.study.prepare import obtain, partition
 
     engine = "single" if single else REPEATED
     named(engine, device)
@@ -187,9 +187,10 @@ def study_screen(
         raise ShipidError("needs a C compiler, and there is none: install gcc, or leave it out", path="--single")
     plan, file = _before_work(study, changes, device, out, "screen")
     wanted, dataset = screen.families(plan, family), obtain(plan)
-    for note in screen.notes(plan, dataset, wanted):
+    cut = partition(plan, dataset)
+    for note in screen.notes(plan, cut, wanted):
         typer.echo(note, err=True)
-    blocks = counted(screen.screen(plan, dataset, wanted, members, device, engine), members * len(wanted))
+    blocks = counted(screen.screen(plan, dataset, wanted, members, device, engine, cut), members * len(wanted))
     frame = screen.joined(list(blocks))
     write_table(file, frame)
     spread = screen.spread(frame)

@@ -343,7 +343,8 @@ V given = K(0); // its product with 0 is no number where a parameter is none
 for (int i = 0; i < {parameters}; ++i) given += parameters[i] = K(values[number / parts * {parameters} + i]);
 stage0(parameters, saved0);
 const long groups = stride / W, part = number % parts, last = groups * (part + 1) / parts;
-ONE_VARIANT(records, (steps / every + 1) * num_rows * stride)
+const long num_records = steps / every;
+ONE_VARIANT(records, (num_records + 1) * num_rows * stride)
 ONE_VARIANT(sums, stride)
 ONE_VARIANT(worst, stride)
 if (tally) tally += number * {BINS};
@@ -361,7 +362,10 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
     greatest[j] += 0 * sum;
     if (records) NOTE(0)
   }}
-  for (long k = 0; k < steps; ++k) EACH_GROUP(end) {{
+  for (long k = 0, record = 0; k < steps; ++k) {{
+  const int due = k + 1 == (record + 1) * every;
+  record += due;
+  EACH_GROUP(end) {{
     V *x = states[j], *m = memories[j], *tau = taus[j], *saved1 = known[j], all = K(0);
     const U *components[{max(1, len(widths))}];
     {drawn}
@@ -378,13 +382,12 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
     for (int i = 0; i < {nm}; ++i) all += m[i];
     for (int i = {n}; i < {2 * n}; ++i) greatest[j] = v_max(v_fabs(x[i]), greatest[j]);
     greatest[j] += 0 * all;
-    if ((k + 1) % every == 0) {{
-      long record = (k + 1) / every;
-      const U *there = goal + 2 * (g * (steps / every) + record - 1);
-      if (records) NOTE(record)
-      if (goal) distance[j] += measured(ROW(0) - there[0], ROW(1) - there[1], samples - g * W, &notes, tally);
+    if (due && records) NOTE(record)
+    if (due && goal) {{
+      const U *there = goal + 2 * (g * num_records + record - 1);
+      distance[j] += measured(ROW(0) - there[0], ROW(1) - there[1], samples - g * W, &notes, tally);
     }}
-  }}
+  }} }}
   EACH_GROUP(end) {{
     if (goal) *AT(sums, 0) = distance[j];
     *AT(worst, 0) = greatest[j];

@@ -26,9 +26,10 @@ from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, Variant, members
 
 Array = np.ndarray
-MEMBERS = 256  # of a block
+Cut = tuple[Windows, Windows, list[str]]  # what `partition` gives
+MEMBERS = 512  # of a block
 NUMBERS = (
-    4_000_000  # sums of windows and tallies of a block, for each of pool and test: fewer members if windows are many
+    12_000_000  # sums of windows and tallies of a block, for each of pool and test: fewer members if windows are many
 )
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
 DRIVERS = 5  # of a family that are named
@@ -49,10 +50,10 @@ def families(plan: Plan, name: str | None = None) -> list[Family]:
     return chosen
 
 
-def notes(plan: Plan, dataset: Dataset, wanted: Sequence[Family]) -> list[str]:
+def notes(plan: Plan, cut: Cut, wanted: Sequence[Family]) -> list[str]:
     """Windows that a study leaves out, and inputs that the base vessels need and the runs do not have."""
-    pool, _, redrawn = partition(plan, dataset)
-    return [*redrawn, *dict.fromkeys(note for f in wanted for note in not_measured(plan.vessels[str(f.base)], pool))]
+    pool, _, left_out = cut
+    return [*left_out, *dict.fromkeys(note for f in wanted for note in not_measured(plan.vessels[str(f.base)], pool))]
 
 
 def screen(
@@ -62,6 +63,7 @@ def screen(
     count: int,
     device: str = "cpu",
     engine: str = REPEATED,
+    cut: Cut | None = None,
 ) -> Iterator[pd.DataFrame]:
     """Roll `count` members of each family out on all windows of a study, pool and test; yield the rows block by block.
 
@@ -70,6 +72,7 @@ def screen(
     that the study itself draws, none redrawn. A_90 comes from a tally and is exact to 0.2 %.
 
     engine : as of `rollout`; "single" takes half the time and gives A to about six digits.
+    cut : the windows of the study as of `partition`, where they are cut already.
 
     Raises ShipidError for a plan or a dataset that is none, and an engine that does not exist.
     """
@@ -80,7 +83,7 @@ def screen(
         of_class("family", family, Family, "as of `plan.families`")
         one_of(f"base of the family {family.name!r}", family.base, plan.vessels)
     count = whole_number("count", count, 1)
-    pool, test, _ = partition(plan, dataset)
+    pool, test, _ = partition(plan, dataset) if cut is None else cut
     size = min(MEMBERS, max(1, NUMBERS // (len(pool) + len(test) + BINS)))
     for family in wanted:
         base = plan.vessels[str(family.base)]

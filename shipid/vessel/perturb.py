@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -36,6 +36,7 @@ from shipid.physics.grammar import derivative, deviation
 from shipid.vessel.load import Vessel
 
 _CONDITION = re.compile(r"(?P<pattern>[^\[\]]+)(?:\[\s*order\s*(?P<relation>>=|<=|==|>|<)\s*(?P<order>\d+)\s*\])?")
+_BETWEEN = "\x1f"  # of the parts of a key
 _RELATIONS: dict[str, Callable[[int, int], bool]] = {
     ">=": lambda a, b: a >= b,
     "<=": lambda a, b: a <= b,
@@ -325,6 +326,10 @@ class _Change:
     arguments: Mapping[str, Any]
     keys: Mapping[str, tuple[str, int]]
 
+    def key(self, path: str) -> str:
+        """What the draw of a path depends on, beside its member."""
+        return _BETWEEN.join(map(str, self.keys.get(path, (path, 0))))
+
 
 def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Change]:
     """Perturbations of a family on its base; DocumentError for a path that the base does not have."""
@@ -375,15 +380,21 @@ class _Drawn:
 
     def _values(self, number: int, counter: int) -> dict[str, float]:
         """Path -> value of everything that one member changes."""
-        family, original, values = self.family, self.original, dict[str, float]()
-        for change in self.changes:
-            for path, argument in change.arguments.items():
-                u = 0.0
-                if change.rule.drawn(argument):
-                    key, times = change.keys.get(path, (path, 0))
-                    u = uniform(family.seed, family.name, number, key, times, counter)
-                values[path] = change.rule.change(values.get(path, original[path]), argument, u)
+        original, values = self.original, dict[str, float]()
+        member = f"{self.family.seed}{_BETWEEN}{self.family.name}{_BETWEEN}{number}"
+        for path, change, argument, key in self._steps:
+            u = 0.0 if key is None else _fraction(f"{member}{_BETWEEN}{key}{_BETWEEN}{counter}")
+            values[path] = change(values.get(path, original[path]), argument, u)
         return values
+
+    @cached_property
+    def _steps(self) -> list[tuple[str, Callable[[float, Any, float], float], Any, str | None]]:
+        """Path, rule, argument and key of its draw, if it is drawn, of everything that a member changes, in order."""
+        return [
+            (path, one.rule.change, argument, one.key(path) if one.rule.drawn(argument) else None)
+            for one in self.changes
+            for path, argument in one.arguments.items()
+        ]
 
     def _variant(self, number: int, values: Mapping[str, float], counter: int) -> Variant:
         family, base, original = self.family, self.base, self.original
@@ -409,7 +420,12 @@ class _Drawn:
 
 def uniform(*key: Any) -> float:
     """A number in [0, 1) that depends on the key alone: the first 53 bits of its SHA-256."""
-    digest = hashlib.sha256("\x1f".join(map(str, key)).encode()).digest()
+    return _fraction(_BETWEEN.join(map(str, key)))
+
+
+def _fraction(key: str) -> float:
+    """As `uniform`, of a key whose parts are joined."""
+    digest = hashlib.sha256(key.encode()).digest()
     return (int.from_bytes(digest[:8], "big") >> 11) / 2.0**53
 
 

@@ -270,6 +270,7 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "shipid.engine.engines:check_device": lambda *_: None,
         "shipid.engine.engines:named": lambda *_: None,
         "shipid.study.prepare:obtain": lambda *_: LOG,
+        "shipid.study.prepare:partition": lambda *_: (),
         "shipid.study.screen:notes": lambda *_: [],
         "shipid.study.rotate:turns": lambda *given: given[2],
         "shipid.study.store:stored_plan": lambda *_: SimpleNamespace(program="shipid", parts={}),

@@ -193,7 +193,9 @@ def test_what_is_not_measured_is_reported(recorded: Callable[..., tuple[Plan, Da
         {"name": "wide", "base": "gunnerus-28.9", "perturb": [{"parameters": ["inertia.m"], "factor": [0.9, 1.1]}]}
     ]
     plan, dataset = recorded(weaving(), split={"test": 2}, family=families_)
-    assert notes(plan, dataset, families(plan)) == ["R/V Gunnerus, 28.9 m: V_w, beta_w not measured, assumed 0"]
+    assert notes(plan, partition(plan, dataset), families(plan)) == [
+        "R/V Gunnerus, 28.9 m: V_w, beta_w not measured, assumed 0"
+    ]
 
 
 @pytest.mark.parametrize(
