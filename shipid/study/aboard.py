@@ -52,6 +52,7 @@ class Played:
     points : a row for each point of each path: run, t, ahead, north, east, physics_north, physics_east, error [m] where
         the log goes on. With a band also band_along, band_across [m], band_course [rad, clockwise from north].
     assumed : what the vessel feels and the log does not hold; it is 0.
+    skipped : instants at which a prediction was due before there was a past.
     plan : whether orders were taken as held where the predictor knows a plan.
     band : what was asked of the band; None: none was asked. bands : of the predictor, where it has some.
     track : run, t [s], north, east [m] as measured, for a page. gaps : times without rows, in words.
@@ -123,7 +124,7 @@ def play(
 def _along(
     predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, every: float, band: Band | None
 ) -> tuple[list[dict[str, object]], list[pd.DataFrame], int]:
-    """Predictions along one unbroken stretch; how many rows came before there was a past."""
+    """Predictions along one unbroken stretch; at how many instants that were due there was no past yet."""
     t = rows["t"].to_numpy()
     slack = clock_slack(t)
     entries: list[dict[str, Any]] = []
@@ -232,9 +233,10 @@ def summary(played: Played) -> list[str]:
     """Summary of a replay, as lines."""
     instants, points = played.instants, played.points
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
+    early = f"{played.skipped} {plural(played.skipped, 'instant')} before there was a past"
     lines = [
         f"{len(instants)} predictions in {runs} {plural(runs, 'run')}, "
-        f"{played.horizon * played.step:g} s ahead; {played.skipped} rows before there was a past"
+        f"{played.horizon * played.step:g} s ahead; {early}"
     ]
     if played.assumed:
         lines.append(f"not in the log, taken as 0: {', '.join(played.assumed)}")

@@ -26,7 +26,7 @@ def content(banded: bool = True, physics: bool = True) -> AboardContent:
     instants = pd.DataFrame({"run": NASTY, "t": times, "outside": times > 20, "latency": 0.01})
     instants["error"] = np.where(times < 36, 1.0 + times / 10, np.nan)
     track = pd.DataFrame({"run": NASTY, "t": times, "north": 5 * times, "east": 0.0})
-    lines = ["10 predictions in 1 run, 5 s ahead; 0 rows before there was a past", "alarm: at 4 of 10 instants"]
+    lines = ["10 predictions in 1 run, 5 s ahead; 0 instants before there was a past", "alarm: at 4 of 10 instants"]
     return AboardContent(
         title="played", name="cell", lines=[*lines, "latency: 10 ms"], instants=instants, points=points, track=track
     )

@@ -235,6 +235,14 @@ def test_instants_too_far_apart_are_not_said_to_be_runs_too_short(tmp_path):
         play(file, saved(log().iloc[:1].assign(V_w=0.0, beta_w=0.0), tmp_path), every=1e4)
 
 
+def test_instants_without_a_past_are_counted_and_not_rows(tmp_path):
+    """Rows of 0.5 s, and a past of 3 s: six rows have none, but only at 0 and 2 s was a prediction due."""
+    file = drawn("path-drawn", 2, vessel="mariner").predictor.save(tmp_path / "cell.npz")
+    frame = log().assign(V_w=0.0, beta_w=0.0, t=0.5 * np.arange(60))
+    lines = summary(play(file, saved(frame, tmp_path), every=2.0))
+    assert "2 instants before there was a past" in lines[0]
+
+
 def test_alarms_are_at_the_times_that_the_log_has():
     """Dates where its clock has them, and not seconds since 1970; else seconds of its clock."""
     rows = pd.DataFrame({"run": "a", "t": [1652954400.0, 1652954405.0, 1652954410.0], "outside": [True, True, False]})
