@@ -69,9 +69,9 @@ def coverage(content: ReportContent) -> Figure | None:
         takeaway=_takeaway(frame, counts[-1]),
         how="A band is a region around every step of a predicted path; it holds a path if it holds all its steps. It "
         "is calibrated on errors of models that saw the run neither in training nor in the choice of hyperparameters, "
-        "and counts runs, not windows. Measured on the test runs, which no model saw. Bars are exact binomial 95 % "
-        f"intervals for so many windows as the {counted(int(frame.runs.max()), 'test run')} are worth: windows of one "
-        "run are alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less."
+        "and counts runs, not windows. Measured on the test runs, on which no cell trained. Bars are exact binomial "
+        f"95 % intervals for so many windows as the {counted(int(frame.runs.max()), 'test run')} are worth: windows "
+        "of one run are alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less."
         + (drawn if len(names) < banded else ""),
         alternative="Points of the measured over the promised share of paths with intervals, one line per model. The "
         "numbers are in the table below.",

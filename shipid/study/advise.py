@@ -153,18 +153,21 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     rows = every_model[~every_model["family"].isin(results.aside)]
     caveats = _caveats(results)
     sentences = [(f"{'; '.join(caveats)}.", "cells")] if caveats else []
+    not_judged = [(text, "models") for text in _not_judged(results)]
     largest = int(rows["N_D"].max()) if len(rows) else 0
     best = best_model(results)
     meets = {name for name, way in results.plan.pairs if way.name == results.plan.judged}
     judged_by = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
     if len(rows) and not judged_by.compensates:
-        return [*sentences, (_nothing_learns(results, rows[rows["N_D"] == largest]), "cells")]
+        return [*sentences, (_nothing_learns(results, rows[rows["N_D"] == largest]), "cells"), *not_judged]
     if len(rows) and meets == {NO_MODEL}:
-        return [*sentences, (_apart(results, largest), "cells")]
+        return [*sentences, (_apart(results, largest), "cells"), *not_judged]
     if best is None:
         where = f" at {runs(largest)}" if largest else ""
         of = f" of the method {results.plan.judged!r}" if len(results.plan.methods) > 1 else ""
-        return [*sentences, (f"No cell{of} with physics has a result{where}, so there is no conclusion yet.", "cells")]
+        counts = " that counts" if not_judged else ""
+        text = f"No cell{of} with physics{counts} has a result{where}, so there is no conclusion yet."
+        return [*sentences, (text, "cells"), *not_judged]
     case = Case(results, rows, best)
     chart = "map" if _has_map(rows) else "gain"
     pure = rows[rows["family"] == NO_MODEL]
@@ -195,7 +198,15 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     sentences += [(text, "gain") for text in (*_alone(case), *_trend(case), _floor(case))]
     nominal = every_model[every_model["family"] == claims.nominal] if claims else every_model[:0]
     sentences += [(text, "gain") for text in _nominal(nominal, largest, results.plan)]
-    return [*sentences, *((text, "cells") for text in _how_to_read(case))]
+    return [*sentences, *not_judged, *((text, "cells") for text in _how_to_read(case))]
+
+
+def _not_judged(results: Results) -> list[str]:
+    """Which families saw the test runs, so that no other sentence counts them; nothing where none did."""
+    saw = results.plan.saw(results.test.spans)
+    it, them = plural(len(saw), "it is", "they are"), plural(len(saw), "it", "them")
+    text = f"The numbers of {named(saw)} were set from runs that test: {it} shown, and no other sentence counts {them}."
+    return [text] if saw else []
 
 
 def _nothing_learns(results: Results, rows: pd.DataFrame) -> str:

@@ -152,10 +152,10 @@ def groups_frame(results: Results) -> pd.DataFrame:
 def answer(results: Results) -> list[tuple[str, str]]:
     """What bands promise and held, and which kinds of manoeuvre had too few runs, each with the anchor of its figure.
 
-    Means over the models at the largest N_D that has bands.
+    Means over the models at the largest N_D that has bands, without families whose numbers were set from test runs.
     """
     level, frame = results.plan.level, coverage_frame(results)
-    mine = frame[frame["level"].eq(level)]
+    mine = frame[frame["level"].eq(level) & ~frame["family"].isin(results.plan.saw(results.test.spans))]
     if mine.empty:
         refused = refused_frame(results).groupby("reason", sort=False)["model"]
         reasons = {str(reason).removeprefix(NO_BAND): named(map(str, models)) for reason, models in refused}

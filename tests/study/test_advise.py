@@ -295,7 +295,7 @@ def test_identified_models_are_not_best_in_validation(made: Any) -> None:
 
 
 def test_numbers_that_were_set_from_runs_that_train_are_named(made: Any) -> None:
-    """Such a model knows more runs than its N_D says. One that saw a test run is in no sentence."""
+    """Such a model knows more runs than its N_D says. One that saw a test run is in one sentence, which says so."""
     H = grid({"good": (1.0, 0.5), "bad": (2.0, 1.0), "none": (4.0, 2.0)})
 
     def seen(*runs: str) -> Results:
@@ -309,7 +309,17 @@ def test_numbers_that_were_set_from_runs_that_train_are_named(made: Any) -> None
     assert "were set from" not in text(seen("no run"))
     assert best_model(seen("trains")) == "good"
     assert best_model(seen("trains", "a")) == "bad"
-    assert "were set from" not in text(seen("trains", "a"))
+    unfair = text(seen("trains", "a"))
+    assert "The numbers of good were set from runs that test: it is shown, and no other sentence counts it." in unfair
+    assert unfair.count("good ") == 1, "the figures have two models, the other sentences one"
+    assert "were set from" not in text(seen())
+
+
+def test_where_all_physics_saw_the_test_nothing_is_said_to_lack_a_result(made: Any) -> None:
+    family = [{"name": name, "base": "gunnerus-28.9", "seen": ["a"]} for name in ("good", "bad")]
+    said = text(made(grid({"good": (1.0, 0.5), "bad": (2.0, 1.0), "none": (4.0, 2.0)}), changes={"family": family}))
+    assert "No cell with physics that counts has a result" in said
+    assert "The numbers of good and bad were set from runs that test: they are shown" in said
 
 
 def test_both_baselines_without_physics_are_named(made: Any) -> None:

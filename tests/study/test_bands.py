@@ -25,6 +25,7 @@ from shipid.study.findings import findings
 from shipid.study.plan import Plan, read_plan
 from shipid.study.results import Results, border, read_results
 from shipid.study.verdict import metres
+from shipid.units import percent
 from tests.study.test_commands import weaving
 from tests.study.tiny import run_here, tiny_plan
 
@@ -161,6 +162,16 @@ def test_findings_say_what_the_cells_hold(results: Results) -> None:
     assert verdicts["B1"]["numbers"]["ratio of widths"] == pytest.approx(ratio)
     assert verdicts["B2"]["numbers"]["share at 80 %"] == pytest.approx(means["coverage"].mean())
     assert verdicts["B2"]["verdict"] == "undecided", "two test runs decide nothing"
+
+
+def test_a_family_that_saw_the_test_is_not_in_the_mean(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    frame = bands.coverage_frame(results)
+    top = frame[(frame["N_D"] == frame["N_D"].max()) & (frame["level"] == results.plan.level)]
+    rest = top[top["family"] != top["family"].iloc[0]]
+    monkeypatch.setattr(Plan, "saw", lambda *_: [top["family"].iloc[0]])
+    mean = f"held {percent(rest['coverage'].mean())} of the whole test paths (mean of {len(rest)} models"
+    assert len(rest) > 1
+    assert mean in bands.answer(results)[0][0]
 
 
 def test_a_kind_that_no_run_of_calibration_has_is_promised_nothing(results: Results) -> None:
