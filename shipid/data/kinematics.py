@@ -12,6 +12,7 @@ the transition at the filtered state.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,33 +61,29 @@ def smooth(t: Array, measured: dict[str, Array], noise: Noise) -> Smoothed:
     """
     names = [name for name in STATES if name in measured]
     seen = [STATES.index(name) for name in names]
-    samples = np.stack([measured[name] for name in names], axis=1)
-    errors = np.diag([noise.sample[name] ** 2 for name in names])
+    samples = np.stack([measured[name] for name in names], axis=1).tolist()
+    errors = [noise.sample[name] ** 2 for name in names]
+    steps, squares = np.diff(t).tolist(), 0.0
     x, cov = _start(t, measured, noise)
-    squares = 0.0
-    means, covs, transitions, ahead_means, ahead_covs = [], [], [], [], []
+    means, ahead_means = np.empty((2, len(t), 6))  # a row ahead of the first sample is not used
+    covs, ahead_covs, transitions = np.empty((3, len(t), 6, 6))
     for index, sample in enumerate(samples):
         if index:
-            dt = t[index] - t[index - 1]
-            transition, change = _transition(x, dt), _change(x, dt, noise)
-            x, cov = _move(x, dt), transition @ cov @ transition.T + change
-            transitions.append(transition)
-            ahead_means.append(x)
-            ahead_covs.append(cov)
-        innovation, spread = sample - x[seen], cov[np.ix_(seen, seen)] + errors
-        gain = np.linalg.solve(spread, cov[seen]).T
-        squares += float(innovation @ np.linalg.solve(spread, innovation)) if index else 0.0
-        x = x + gain @ innovation
-        kept = np.eye(6)
-        kept[:, seen] -= gain
-        cov = kept @ cov @ kept.T + gain @ errors @ gain.T  # Joseph's form stays symmetric
-        means.append(x)
-        covs.append(cov)
+            transition, change = _transition(x, steps[index - 1]), _change(x, steps[index - 1], noise)
+            x, cov = _move(x, steps[index - 1]), transition @ cov @ transition.T + change
+            transitions[index], ahead_means[index], ahead_covs[index] = transition, x, cov
+        for state, value, error in zip(seen, sample, errors, strict=True):  # one by one, as they err independently
+            row, innovation = cov[state], value - float(x[state])
+            spread = float(row[state]) + error
+            squares += innovation**2 / spread if index else 0.0
+            gain = row / spread
+            x, cov = x + innovation * gain, cov - gain[:, None] * row
+        means[index], covs[index] = x, cov
+    back = np.linalg.solve(ahead_covs[1:], transitions[1:] @ covs[:-1]).transpose(0, 2, 1)
     for index in range(len(t) - 2, -1, -1):
-        back = np.linalg.solve(ahead_covs[index], transitions[index] @ covs[index]).T
-        means[index] = means[index] + back @ (means[index + 1] - ahead_means[index])
-        covs[index] = covs[index] + back @ (covs[index + 1] - ahead_covs[index]) @ back.T
-    return Smoothed(np.stack(means), np.stack(covs), squares / max(1, (len(t) - 1) * len(seen)))
+        means[index] += back[index] @ (means[index + 1] - ahead_means[index + 1])
+        covs[index] += back[index] @ (covs[index + 1] - ahead_covs[index + 1]) @ back[index].T
+    return Smoothed(means, covs, squares / max(1, (len(t) - 1) * len(seen)))
 
 
 def _start(t: Array, measured: dict[str, Array], noise: Noise) -> tuple[Array, Array]:
@@ -110,28 +107,41 @@ def _start(t: Array, measured: dict[str, Array], noise: Noise) -> tuple[Array, A
 
 def _move(x: Array, dt: float) -> Array:
     """State after dt [s] at constant u, v, r; the heading of the way is that of its middle."""
-    psi = x[2] + x[5] * dt / 2
-    c, s = np.cos(psi), np.sin(psi)
-    return x + dt * np.array([x[3] * c - x[4] * s, x[3] * s + x[4] * c, x[5], 0.0, 0.0, 0.0])
+    north, east, psi, u, v, r = x.tolist()
+    c, s = math.cos(psi + r * dt / 2), math.sin(psi + r * dt / 2)
+    return np.array([north + dt * (u * c - v * s), east + dt * (u * s + v * c), psi + dt * r, u, v, r])
 
 
 def _transition(x: Array, dt: float) -> Array:
     """Jacobian of `_move`."""
-    psi = x[2] + x[5] * dt / 2
-    c, s = np.cos(psi), np.sin(psi)
-    result = np.eye(6)
-    result[0, 2], result[1, 2] = -dt * (x[3] * s + x[4] * c), dt * (x[3] * c - x[4] * s)
-    result[:2, 3], result[:2, 4] = (dt * c, dt * s), (-dt * s, dt * c)
-    result[:2, 5] = dt / 2 * result[:2, 2]
-    result[2, 5] = dt
-    return result
+    _, _, psi, u, v, r = x.tolist()
+    c, s = dt * math.cos(psi + r * dt / 2), dt * math.sin(psi + r * dt / 2)
+    by_north, by_east = -u * s - v * c, u * c - v * s  # of the heading
+    return np.array(
+        [
+            [1.0, 0.0, by_north, c, -s, dt / 2 * by_north],
+            [0.0, 1.0, by_east, s, c, dt / 2 * by_east],
+            [0.0, 0.0, 1.0, 0.0, 0.0, dt],
+            [0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def _change(x: Array, dt: float, noise: Noise) -> Array:
-    """Covariance that white accelerations of u, v, r add in dt [s]."""
-    psi = x[2] + x[5] * dt / 2
-    c, s = np.cos(psi), np.sin(psi)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    power = np.diag([noise.acceleration**2, noise.acceleration**2, noise.angular_acceleration**2])
-    cross = dt**2 / 2 * turn @ power
-    return np.block([[dt**3 / 3 * turn @ power @ turn.T, cross], [cross.T, dt * power]])
+    """Covariance that white accelerations of u, v, r add in dt [s]; those of u and v are alike in all directions."""
+    psi = float(x[2] + x[5] * dt / 2)
+    linear, angular = noise.acceleration**2, noise.angular_acceleration**2
+    place, heading, turn = dt**3 / 3 * linear, dt**3 / 3 * angular, dt**2 / 2 * angular
+    c, s = dt**2 / 2 * linear * math.cos(psi), dt**2 / 2 * linear * math.sin(psi)
+    return np.array(
+        [
+            [place, 0.0, 0.0, c, -s, 0.0],
+            [0.0, place, 0.0, s, c, 0.0],
+            [0.0, 0.0, heading, 0.0, 0.0, turn],
+            [c, s, 0.0, dt * linear, 0.0, 0.0],
+            [-s, c, 0.0, 0.0, dt * linear, 0.0],
+            [0.0, 0.0, turn, 0.0, 0.0, dt * angular],
+        ]
+    )
