@@ -320,7 +320,9 @@ def spikes(values: Array) -> NDArray[np.bool_]:
     """
     result = _spikes(values, values)
     for turn in TURNS:
-        if result.any() and 0.9 * turn < np.ptp(values) <= 1.02 * turn:  # an angle that crosses its 0 for a row?
+        if (
+            result.any() and 0.9 * turn < np.ptp(values) and _may_be_angle(values, turn)
+        ):  # an angle that crosses its 0 for a row?
             result &= _spikes(np.unwrap(values, period=turn), values)
     return result
 
@@ -340,7 +342,10 @@ def _spikes(values: Array, written: Array) -> NDArray[np.bool_]:
     steps = np.abs(np.diff(values, prepend=values[0]))
     moves = float(np.mean(steps > 0)) > 0.5  # an order is held, and may be given for a moment
     wild = off > np.maximum((0.02 if moves else 1.0) * (high - low), 8 * around(off, 0.9))
-    wild &= ~np.any([np.abs(off / turn - 1) < 0.05 for turn in TURNS], axis=0)
+    for turn in TURNS:
+        whole = np.abs(off / turn - 1) < 0.05
+        if _may_be_angle(values[whole | ~wild], turn):
+            wild &= ~whole
     touching = wild | np.append(False, wild[:-1])
     usual = around(np.where(touching, 0.0, steps), 1.0)
     result = none.copy()
@@ -351,6 +356,12 @@ def _spikes(values: Array, written: Array) -> NDArray[np.bool_]:
         result[first:end] = end - first <= 2 and agrees and size > 4 * usual[first:end].max()
     one_value = len(np.unique(written[result])) == 1
     return result if result.mean() <= (0.1 if one_value else 0.02) else none
+
+
+def _may_be_angle(values: Array, turn: float) -> bool:
+    """Whether all values (N,) lie within one turn that begins at 0, or up to three quarters of a turn below."""
+    low, high = values.min() / turn, values.max() / turn
+    return bool(any(low > -0.02 - below and high < 1.02 - below for below in (0.0, 0.25, 0.5, 0.75)))
 
 
 def spans_of(rows: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -244,6 +244,18 @@ def test_what_a_ship_does_after_a_long_stay_is_no_spike() -> None:
     np.testing.assert_array_equal(np.flatnonzero(evidence.spikes(absent)), [500, 15_000])
 
 
+@pytest.mark.parametrize("turn", [360.0, 2 * np.pi, 400.0, 3600.0, 6400.0])
+def test_what_is_no_angle_may_be_off_by_the_number_of_a_whole_turn(turn: float) -> None:
+    """A speed of 8 kn that is 14.28 kn for a row, a yaw rate of 40 deg/min that is 400 deg/min."""
+    t = np.arange(2000.0)
+    speed = turn / 10 + np.round(0.02 * turn * np.sin(t / 90), 2)
+    rate = np.round(0.04 * turn * np.sin(t / 60), 2)
+    for signal in (speed, rate):
+        spoilt = signal.copy()
+        spoilt[[300, 900]] += turn
+        np.testing.assert_array_equal(np.flatnonzero(evidence.spikes(spoilt)), [300, 900])
+
+
 @pytest.mark.parametrize("seed", range(300))
 def test_a_heading_that_crosses_north_for_a_row_has_no_spike(seed: int) -> None:
     """Fast small craft, rows far apart; and a row far off is one, as an angle and as a length."""
@@ -252,6 +264,7 @@ def test_a_heading_that_crosses_north_for_a_row_has_no_spike(seed: int) -> None:
     size, period, middle = random.uniform(20, 40), random.uniform(6, 30), random.uniform(-40, 40)
     heading = middle + size * np.sin(2 * np.pi * t / period + random.uniform(0, 7))
     assert not evidence.spikes(np.round(heading % 360, 1)).any()
+    assert not evidence.spikes(np.round(90 - heading % 360, 1)).any()  # to port from east
     slow = np.round((middle + 100 + 20 * np.sin(t / 40)) % 360, 1)
     slow[100] = (slow[100] + 120) % 360
     assert np.flatnonzero(evidence.spikes(slow)).tolist() == [100]
