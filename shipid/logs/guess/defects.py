@@ -24,7 +24,8 @@ FEW = 4  # times that a sentence names
 MEASURED = ("speed", "u", "v", "r")
 LEVELS, BESIDE = 30, 3  # values that a signal has at least; of them beside a limit
 PILE, ABOVE, RETURNS = 0.03, 4.0, 3  # of the rows, at a limit; times as many as beside it; visits
-HELD_SHARE, HELD_ROWS = 0.2, 60  # of the rows; repeats in a row that are no rest
+HELD_SHARE, STAY = 0.2, 3.0  # of the rows; times the usual repeats in a row, from which on the ship rests
+TOGETHER = 0.5  # share of the steps of a held position that both of its columns make, at least
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
@@ -42,12 +43,15 @@ def _held_positions(state: State) -> None:
     others = [one.source for one in state.suggestions if one.name in ("psi", "r")]
     if len(places) < 2 or not others:
         return
-    same, going = ([np.diff(state.columns[name]) == 0 for name in names] for names in (places, others))
-    held = np.all(same, axis=0) & ~np.all(going, axis=0)
-    edges = evidence.spans_of(held)
-    lengths = edges[:, 1] - edges[:, 0]  # rows that repeat the one before; long stays are those of a ship at rest
-    some = lengths[lengths <= HELD_ROWS]
-    share = float(some.sum()) / len(held)
+    steps, moves = (np.stack([np.diff(state.columns[name]) != 0 for name in names]) for names in (places, others))
+    if np.mean(steps.all(axis=0)) < TOGETHER * np.mean(steps.any(axis=0)):
+        return  # rounded: each repeats for itself
+    edges = evidence.spans_of(np.all(~steps, axis=0))
+    lengths = edges[:, 1] - edges[:, 0]  # rows that repeat the one before
+    moved = np.append(0, np.cumsum(moves.any(axis=0)))
+    lengths = lengths[moved[edges[:, 1]] > moved[edges[:, 0]]]
+    some = lengths[lengths <= STAY * np.median(lengths)] if len(lengths) else lengths  # longer: a ship at rest
+    share = float(some.sum()) / len(state.t)
     if share > HELD_SHARE:
         late = float(np.mean(some)) / 2 * float(np.median(np.diff(state.t)))
         sentence = (

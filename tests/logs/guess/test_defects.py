@@ -164,6 +164,24 @@ def test_a_slower_receiver_that_was_held_is_named(every: int, tmp_path: Path) ->
     assert len(found) == (every > 1)
 
 
+@pytest.mark.parametrize(("every", "late"), [(25, "0.48"), (100, "2"), (1, "")])
+def test_how_late_held_positions_are_does_not_depend_on_the_digits_of_the_heading(
+    every: int, late: str, tmp_path: Path
+) -> None:
+    """At 25 Hz a heading in tenths of a degree repeats, too; positions in decimetres, each for itself, are not held."""
+    t = np.arange(0.0, 300.0, 0.04)
+    psi = 0.8 * np.sin(t / 25)
+    way = np.cumsum(5.0 * np.exp(1j * psi)) * 0.04
+    place = way[np.arange(len(t)) // every * every]
+    both = (np.round(part, 1 if every == 1 else 4) for part in (place.real, place.imag))
+    log = dict(zip(("time", "N", "E"), (np.round(t, 2), *both), strict=True))
+    log |= {"psi": np.round(np.degrees(psi), 1), "r [deg/s]": np.round(np.degrees(0.8 / 25 * np.cos(t / 25)), 1)}
+    pd.DataFrame(log).to_csv(tmp_path / "log.csv", index=False)
+    found = [one.sentence for one in guess(tmp_path / "log.csv").findings if one.kind == "held positions"]
+    assert len(found) == (late != "")
+    assert all(f"on average {late} s late" in sentence for sentence in found)
+
+
 def test_a_speed_of_0_far_from_the_others_is_no_speed(tmp_path: Path) -> None:
     """Before, one speed in twenty-five that was 0 was drafted as a factor of 1.04."""
     drawn = np.random.default_rng(0).random(len(CLEAN)) < 0.04
