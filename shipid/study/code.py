@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import inspect
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -25,10 +26,54 @@ def of_users(kind: type) -> bool:
 
 
 def users_code(kinds: Iterable[type]) -> str:
-    """Digest (8 hex digits) of the files that classes of a user are in; those of a notebook have none."""
-    files = set()
+    """Digest (8 hex digits) of the files that classes of a user are in, and of what these import from beside them.
+
+    Classes of a notebook have none.
+    """
+    files: set[Path] = set()
     for kind in filter(of_users, kinds):
         with suppress(OSError, TypeError):  # a class of a notebook
-            files.add(Path(inspect.getfile(kind)))
-    texts = [file.read_bytes() for file in sorted(files) if file.is_file()]
+            files |= _with_imported(Path(inspect.getfile(kind)).resolve(), kind.__module__.count("."))
+    texts = [file.read_bytes() for file in sorted(files)]
     return hashlib.sha256(b"\n".join(texts)).hexdigest()[:8] if texts else "unknown"
+
+
+def _with_imported(file: Path, depth: int) -> set[Path]:
+    """A file and those from beside it that it imports, and that these import in turn.
+
+    Beside it is its folder, and those above it to the one that holds its package; `depth` folders above at least.
+    """
+    while (file.parents[depth] / "__init__.py").is_file():
+        depth += 1
+    top, files, left = file.parents[depth], set[Path](), {file}
+    while left:
+        one = left.pop()
+        if one.is_file() and one not in files:
+            files.add(one)
+            folders = [folder for folder in one.parents if folder.is_relative_to(top)]
+            left |= {place for name in _imported(one, top) for folder in folders for place in _places(folder, name)}
+    return files
+
+
+def _imported(file: Path, top: Path) -> Iterator[str]:
+    """Dotted names that a file may import as modules; a relative one is completed, as seen from the folder `top`."""
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (SyntaxError, ValueError, RecursionError):  # nobody can have imported it
+        return
+    here = file.relative_to(top).parts
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = here[: max(len(here) - node.level, 0)] if node.level else ()
+            parts = [*above, *filter(None, [node.module])]
+            yield from (".".join([*parts, alias.name]) for alias in node.names)  # or a name in the module of `parts`
+
+
+def _places(folder: Path, name: str) -> Iterator[Path]:
+    """Where the module of a dotted name, and the packages that it is in, would be in a folder."""
+    place = folder
+    for part in name.split("."):
+        place /= part
+        yield from (place.with_name(f"{part}.py"), place / "__init__.py")

@@ -161,7 +161,7 @@ class Plan:
 
     @property
     def code(self) -> dict[str, str]:
-        """Name of each method that the user wrote -> digest of its file and of that of its corrector."""
+        """Name of each method that the user wrote -> digest of its code and of that of its corrector."""
         kinds = {way.name: type(way.method) for way in self.methods}
         return {
             name: users_code((kind, getattr(kind, "corrector", kind))) for name, kind in kinds.items() if of_users(kind)

@@ -7,8 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import shipid
-from shipid.study.code import code_digest
+from shipid.study.code import code_digest, users_code
 
 
 def digest_of(copy: Path) -> str:
@@ -28,3 +30,35 @@ def test_another_commit_of_the_same_version_has_another_digest(tmp_path: Path) -
     assert changed != code_digest()
     file.rename(file.with_name("measure.py"))
     assert digest_of(tmp_path) not in (changed, code_digest())
+
+
+def test_what_a_method_of_a_user_imports_from_beside_it_is_part_of_its_code(tmp_path: Path) -> None:
+    """A helper that changed left the digest as it was, so cells of two methods were mixed without a word."""
+    files = {
+        "mine.py": "import json\nfrom laws import *\nfrom parts.inner import law\nclass Mine: ...\n",
+        "laws.py": "def load():\n    import slow.deep as deep\n",  # as late as when it is called
+        "slow/deep.py": "import laws\n",  # a folder without __init__.py, and a ring
+        "parts/__init__.py": "",
+        "parts/inner.py": "from . import even\nfrom .odd import x as law\nimport beside\n",
+        "parts/even.py": "",
+        "parts/odd.py": "from ..parts.low import x\nx = 1\n",
+        "parts/low.py": "x = 1\n",
+        "parts/beside.py": "",  # what a script in the folder of a package imports
+        "other.py": "",
+        "json/other.py": "",
+    }
+    for name, text in files.items():
+        place = tmp_path / name
+        place.parent.mkdir(exist_ok=True)
+        place.write_text(text, encoding="utf-8")
+    kind = type("Mine", (), {"__module__": "mine"})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("inspect.getfile", lambda _: str(tmp_path / "mine.py"))
+        before = users_code([kind])
+        for name, text in files.items():
+            (tmp_path / name).write_text(f"{text}# another\n", encoding="utf-8")
+            assert (users_code([kind]) == before) == name.endswith("other.py"), name
+            (tmp_path / name).write_text(text, encoding="utf-8")
+        assert users_code([kind]) == before
+        (tmp_path / "laws.py").write_text("def (", encoding="utf-8")
+        assert users_code([kind]) != before
