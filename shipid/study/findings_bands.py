@@ -29,6 +29,7 @@ from shipid.study.evidence import FEWEST_MODELS, by_chance, doubling
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
     SAME_A,
+    WHICH,
     Finding,
     every,
     finding,
@@ -124,7 +125,7 @@ def narrower(widths: Widths) -> Finding:
             f"at N_D = {table.amounts[last]} the mean radius of the band is {metres(table.mean(bad, last))} for {bad}, "
             f"{metres(table.mean(good, last))} for {good}: {measured(wider, 0)} more"
         )
-        evidence += "" if apart else "; it is not shown which of them is more accurate"
+        evidence += "" if apart else f"; {WHICH}"
         ratio = table.mean(bad, last) / table.mean(good, last)
         decided = verdict(apart and every(wider.above), apart and some(wider.below))
         return finding(CLAIMS, "B1", decided, evidence, **{"ratio of widths": ratio})

@@ -17,6 +17,7 @@ from shipid.units import decimals_of, plural
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
 MOST_NAMES = 5  # in one sentence
 SAME_A = "all physics models have the same A, so nothing can rise with it"
+WHICH = "it is not shown which of them is more accurate"
 
 
 class Finding(TypedDict):

@@ -57,6 +57,27 @@ def test_a_gap_shrinks_whichever_model_has_the_larger_error(made: Any) -> None:
     assert verdicts(made(one(1.0, 5.5, 9.0), alone=alone, runs=RUNS))["R3"] == "refuted"
 
 
+@pytest.mark.parametrize(
+    ("alone", "H", "expected"),
+    [
+        ((6.0, 2.0), (1.9, 1.5), "confirmed"),  # `good` is the inaccurate one: 1.9 m against 2 m
+        ((6.0, 2.0), (3.0, 1.5), "refuted"),  # 3 m against 2 m, not 1.5 m against 6 m
+        ((2.0, 2.0), (1.5, 1.5), "confirmed"),  # whichever it is
+        ((2.0, 2.0), (1.5, 3.0), "undecided"),
+        ((2.0, 2.0), (3.0, 3.0), "refuted"),
+    ],
+)
+def test_which_model_is_inaccurate_is_seen_from_the_test(
+    made: Any, alone: tuple[float, float], H: tuple[float, float], expected: str
+) -> None:
+    """A claim of 3 m compensated against 2 m alone was confirmed where the study calls the 6 m model accurate."""
+    results = made(one(*H, 9.0), alone=dict(zip(("good", "bad"), alone, strict=True)), runs=RUNS)
+    finding = {one["id"]: one for one in findings(results)}["R2"]
+    assert finding["verdict"] == expected
+    assert finding["evidence"].startswith(f"inaccurate and compensated {H[0]:.2f} m") or alone == (2.0, 2.0)
+    assert ("it is not shown which of them is more accurate" in finding["evidence"]) == (alone == (2.0, 2.0))
+
+
 @pytest.mark.filterwarnings("error")
 def test_physics_that_made_the_data_are_no_traceback(made: Any) -> None:
     """No error at all, alone and compensated: nothing is left to gain, and no number is missing."""
