@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 Range = tuple[FiniteFloat, FiniteFloat]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+MOST_HELM, MOST_HEADING = 90.0, 180.0  # deg
+Helm = Annotated[FiniteFloat, Field(ge=-MOST_HELM, le=MOST_HELM)]
 
 HELMS = (25, 20, 15, 10, 5, 3, 1, 0, -1, -3, -5, -10, -15, -20, -25)
 SPIRAL = (*HELMS, *HELMS[-2::-1])  # to the other side and back
@@ -260,7 +262,7 @@ class Timed(Executed):
 class HelmOver(Timed):
     """A manoeuvre that begins with the helm put over to one side."""
 
-    angle_deg: Annotated[Positive, Field(description="deg of helm")] = 20.0
+    angle_deg: Annotated[Positive, Field(le=MOST_HELM, description="deg of helm")] = 20.0
     side: Annotated[Literal["starboard", "port"], Field(description="to which the ship turns first")] = "starboard"
 
     @property
@@ -281,7 +283,7 @@ class HelmOver(Timed):
 class TurningCircle(HelmOver):
     """The helm is put over and held."""
 
-    angle_deg: Annotated[Positive, Field(description="deg of helm")] = 35.0
+    angle_deg: Annotated[Positive, Field(le=MOST_HELM, description="deg of helm")] = 35.0
 
 
 class PullOut(HelmOver):
@@ -299,7 +301,9 @@ class Zigzag(HelmOver):
 
     execute_heading_deg: Annotated[
         Positive | None,
-        Field(description="deg off the heading at the first order, to either side; absent: as the helm"),
+        Field(
+            le=MOST_HEADING, description="deg off the heading at the first order, to either side; absent: as the helm"
+        ),
     ] = None
 
     @property
@@ -321,9 +325,7 @@ class Zigzag(HelmOver):
 class Spiral(Executed):
     """Direct (Dieudonne) spiral: one helm angle after another, each held until the turn is steady."""
 
-    angles_deg: Annotated[
-        tuple[FiniteFloat, ...], Field(min_length=1, description="deg, > 0 to starboard, in order")
-    ] = SPIRAL
+    angles_deg: Annotated[tuple[Helm, ...], Field(min_length=1, description="deg, > 0 to starboard, in order")] = SPIRAL
     hold: Annotated[Positive, Field(description="s that each is held")]
 
     @property
@@ -348,7 +350,7 @@ class ReverseSpiral(Executed):
         tuple[FiniteFloat, ...], Field(min_length=1, description="deg/s, > 0 to starboard, in order")
     ] = RATES
     hold: Annotated[Positive, Field(description="s that each is held")]
-    angle_deg: Annotated[Positive, Field(description="deg: greatest helm")] = 35.0
+    angle_deg: Annotated[Positive, Field(le=MOST_HELM, description="deg: greatest helm")] = 35.0
 
     @property
     def greatest_helm(self) -> float:
@@ -410,7 +412,7 @@ class Excitation(Timed):
     """Helm and shaft move about zero and n_rpm by a multisine or by random levels (APRBS), within rate limits."""
 
     signal: Literal["multisine", "aprbs"]
-    angle_deg: Annotated[NotNegative, Field(description="deg, greatest helm; 0: not moved")] = 0.0
+    angle_deg: Annotated[NotNegative, Field(le=MOST_HELM, description="deg, greatest helm; 0: not moved")] = 0.0
     amplitude_rpm: Annotated[NotNegative, Field(description="rpm about n_rpm at most; 0: not moved")] = 0.0
     period: Annotated[Positive, Field(description="s, of the multisine")] = 200.0
     harmonics: Annotated[

@@ -14,6 +14,8 @@ from shipid.errors import ShipidError, choices
 from shipid.simulation.approach import Controls, balanced_shaft, service_speed
 from shipid.simulation.manoeuvre import (
     HELMS,
+    MOST_HEADING,
+    MOST_HELM,
     RATES,
     Approached,
     CrashStop,
@@ -30,7 +32,6 @@ from shipid.vessel.stability import growth
 Side = Literal["starboard", "port"]
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
 LEAST_STEPS, MOST_STEPS = 10, 1e7  # steps for a ship length, and of a manoeuvre
-MOST_HELM, MOST_HEADING = 90.0, 180.0  # deg; the first angle of a reverse spiral is a rate in deg/s
 APPROACHES = ("steady", "helmsman", "rest")
 SPIRALS = ("spiral", "reverse-spiral")
 ROUND = ("turning", "pull-out", *SPIRALS)
@@ -100,7 +101,7 @@ def standard(
     if any(angle <= 0 for angle in angles):
         raise ShipidError("angles are positive: --side gives the direction of the first turn", path="ANGLES")
     for place, angle in enumerate(angles):
-        greatest = MOST_HEADING if place else MOST_HELM
+        greatest = MOST_HEADING if place else MOST_HELM  # as much of a reverse spiral, in deg/s
         if not angle <= greatest:
             raise ShipidError(f"{angle:g} deg: give at most {greatest:g} deg", path="ANGLES")
     if not isinstance(side, str) or side not in get_args(Side):

@@ -77,6 +77,8 @@ start_speed = [4.0, 6.0]
         (GIVEN.replace('"zigzag"', '"zigzak"', 1), "manoeuvre.0.kind", "did you mean 'zigzag'"),
         (GIVEN.replace("angle_deg = 20", "angel_deg = 20"), "manoeuvre.1.angel_deg", "unknown key"),
         (GIVEN + 'n_rmp = 7\n', "manoeuvre.1.n_rmp", "unknown key"),
+        (GIVEN.replace("angle_deg = 20", "angle_deg = 400"), "manoeuvre.1.angle_deg", "must be at most 90"),
+        (GIVEN.replace("heading_deg = 10", "heading_deg = 200"), "manoeuvre.1.execute_heading_deg", "at most 180"),
         (GIVEN.replace("step = 0.5", "step = -1"), "step", "must be above 0"),
         (GIVEN.replace("step = 0.5", "stride = 1"), "stride", "unknown key"),
     ],
