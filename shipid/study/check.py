@@ -32,9 +32,16 @@ class Checked:
 def check_folder(folder: Path) -> Checked:
     """Check the files of a run's folder against their digests, those of all its parts included.
 
-    Raises ResultError if it is not the folder of a run, or if its study, vessels or provenance were edited.
+    Raises ResultError if it is not the folder of a run, or if its study, vessels or provenance were edited. Of a study
+    that this shipid does not take the files are checked, and a line says why nothing else is.
     """
-    plan = store.stored_plan(folder)
+    try:
+        plan = store.stored_plan(folder)
+    except store.NotTaken as error:
+        faults = [_faults(place) for place in (folder, *sorted((folder / store.PARTS).glob("*/")))]
+        every = [fault for _, found in faults for fault in found]
+        counted = f"{len(every)} {plural(len(every), 'fault')}; how far the run is cannot be said: {error}"
+        return Checked([*(line for lines, _ in faults for line in lines), counted], every)
     names = [name for name in plan.parts if store.part_folder(folder, name).is_dir()]
     checked = [_checked(store.part_folder(folder, name), plan.parts[name].plan, name) for name in names]
     checked.append(_checked(folder, plan))
@@ -44,12 +51,17 @@ def check_folder(folder: Path) -> Checked:
     return Checked(lines, [fault for one in checked for fault in one.faults])
 
 
+def _faults(folder: Path) -> tuple[list[str], list[Fault]]:
+    """Files of one folder that are not as they were written, with a line each."""
+    faults = seals.faults(folder)
+    return [f"{folder / fault.file}: {WORDS[fault.kind].format(fault.reason)}" for fault in faults], faults
+
+
 def _checked(folder: Path, plan: Plan, part: str = "") -> Checked:
     """Check one folder of cells; `part` is its name in a study of several parts."""
     if part:
         store.stored_plan(folder)  # says what was edited
-    faults = seals.faults(folder)
-    lines = [f"{folder / fault.file}: {WORDS[fault.kind].format(fault.reason)}" for fault in faults]
+    lines, faults = _faults(folder)
     if plan.parts:
         return Checked(lines, faults)
     done = sum(len(unit.pairs) for unit in store.finished(folder, plan.units))

@@ -45,6 +45,10 @@ UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m
 METRICS = tuple(UNITS)
 
 
+class NotTaken(ResultError):
+    """The folder of a run whose documents this shipid does not take: of another version, or of a user's method."""
+
+
 class Cell(NamedTuple):
     """Result of a cell: its row, and where it has a result its predictor and the test paths (T, S, 2) [m] it gives."""
 
@@ -154,7 +158,7 @@ def _describe(folder: Path, plan: Plan) -> None:
 def stored_plan(folder: Path) -> Plan:
     """The plan of a run from its folder alone: the study and the vessels as they were when the run began.
 
-    Raises ResultError where it is no folder of a run, is damaged, or is of a version whose documents were different.
+    Raises ResultError where it is no folder of a run or is damaged, `NotTaken` where it may be whole.
     """
     if not (folder / STUDY).is_file():
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
@@ -169,12 +173,12 @@ def stored_plan(folder: Path) -> Plan:
     except (TypeError, KeyError, AttributeError, ValueError):
         raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
     except DocumentError as error:
-        raise _of_another_version(error, folder / VESSELS) from None
+        raise _not_taken(error, folder / VESSELS) from None
     try:
         sources, changes = (provenance.get(key, {}) for key in ("sources", "changes"))
         plan = build_plan(document, Path(provenance["file"]), vessels, sources, changes)
     except DocumentError as error:
-        raise _of_another_version(error, folder / STUDY) from None
+        raise _not_taken(error, folder / STUDY) from None
     if plan.digest != provenance["digest"]:
         raise ResultError(
             "its study or vessels were changed by hand, or this shipid has other defaults: run the study again",
@@ -183,13 +187,13 @@ def stored_plan(folder: Path) -> Plan:
     return plan
 
 
-def _of_another_version(error: DocumentError, file: Path) -> ResultError:
+def _not_taken(error: DocumentError, file: Path) -> NotTaken:
     """The error for a document in the folder of a run that was right when the run began."""
     message = (
         f"shipid {__version__} does not take it ({error.message}): "
         "if the run is of another version, read its report.html, and run the study again into a new folder"
     )
-    return ResultError(message, file=file, path=error.path)
+    return NotTaken(message, file=file, path=error.path)
 
 
 def _provenance(folder: Path) -> dict[str, Any]:

@@ -9,7 +9,8 @@ import pytest
 
 from shipid.errors import ResultError
 from shipid.files import TEMPORARY
-from shipid.study import store
+from shipid.hybrid.methods import METHODS
+from shipid.study import seals, store
 from shipid.study.check import check_folder
 from tests.study.tiny import tiny_plan
 
@@ -44,3 +45,26 @@ def test_a_run_that_has_just_begun(tmp_path: Path) -> None:
     assert check_folder(tmp_path / "run").lines == ["0 of 8 cells finished, 0 faults"]
     with pytest.raises(ResultError, match=r"no study\.toml"):
         check_folder(tmp_path)
+
+
+def test_files_of_a_study_whose_method_is_not_here_are_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the script of a user's method is gone, the check of files gave up, too."""
+    folder, changes = tmp_path / "run", {"method": [{"name": "mine", "kind": "mine"}], "repeat": {"seed": [0, 1]}}
+    with monkeypatch.context() as patch:
+        patch.setitem(METHODS, "mine", type("Mine", (METHODS["path-drawn"],), {"__module__": "mine"}))
+        plan = tiny_plan(tmp_path, changes)
+        store.open_folder(folder, plan)
+        for name, part in plan.parts.items():
+            store.open_folder(store.part_folder(folder, name), part.plan)
+    check = check_folder(folder)
+    assert not check.faults
+    (line,) = check.lines
+    assert line.startswith("0 faults; how far the run is cannot be said: ")
+    assert "needs the script that puts it into METHODS" in line
+    part = store.part_folder(folder, next(iter(plan.parts)))
+    (part / "test.npz").write_bytes(b"whole")
+    seals.write_seal(part, "common", [part / "test.npz"])
+    (part / "test.npz").write_bytes(b"half")
+    check = check_folder(folder)
+    assert [fault.file for fault in check.faults] == ["test.npz"]
+    assert check.lines[0].startswith(f"{part / 'test.npz'}: damaged")
