@@ -27,7 +27,7 @@ from shipid.simulation.manoeuvre import (
 )
 from shipid.units import RPM, plural
 from shipid.vessel.load import Vessel
-from shipid.vessel.stability import growth
+from shipid.vessel.stability import growths
 
 Side = Literal["starboard", "port"]
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
@@ -171,7 +171,8 @@ def _settling(controls: Controls, speed: float, n: float, passing: float, least:
     The time is eight time constants of a small yaw about the straight course at a speed [m/s] and shaft speed [rev/s],
     the slowest of all turns, but at most 200 times that for a ship length, `passing` [s].
     """
-    decay = abs(growth(controls.vessel, speed, controls.ahead(n))) * passing  # in a ship length
+    rates = growths(controls.vessel, speed, controls.ahead(n))
+    decay = min(map(abs, rates)) * passing  # in a ship length
     return float(np.clip(DECAYS / decay if decay > 0 else np.inf, least, LONGEST))
 
 

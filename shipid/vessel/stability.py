@@ -12,17 +12,27 @@ from shipid.vessel.load import Vessel
 
 HELD = ("north", "east", "psi", "u")  # states that no transverse force depends on in calm water, and the speed
 WATER = "waves."  # prefix of states of the water, which no motion changes: time, and where the current carries it
-STEP = 1e-4  # of the speed, for differences
+STEP, FINE = 1e-4, 1e-2  # size of a small yaw over the speed; of differences about it over that size
+SHARE = 0.1  # of sway or yaw in a motion: a motion with less, such as roll or heave, is no yaw
+TURNS = 2  # of the search for the motion that grows most to one side
 
 
 def growth(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> float:
-    """Largest real part [1/s] of the eigenvalues of sway, yaw and what moves with them, in calm water.
+    """Largest real part [1/s] of the eigenvalues of sway and yaw, with what moves with them, in calm water.
 
-    It is negative where the ship is course-stable (Fossen 2021), and -inf where the equations give no number.
+    It is negative where the ship is course-stable (Fossen 2021), and -inf where the equations give no number. Of the
+    two sides it is the one to which she turns more, see `growths`.
 
     speed : straight ahead [m/s], above 0. orders : commands [SI], such as shaft speeds; rudders and azimuths are
     amidships, and every actuator has reached its order.
     """
+    return max(growths(vessel, speed, orders))
+
+
+def growths(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> tuple[float, float]:
+    """As `growth`, of a small yaw to starboard and to port: they differ where the wake or the rudder's inflow does."""
+    from scipy.linalg import eig  # a study is read without it
+
     model = dynamics(vessel)
     given = {name: neutral(name) if steers(name) else orders[name] for name in model.commands}
     names = (*model.state, *model.hidden)
@@ -35,11 +45,32 @@ def growth(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> float:
         list(vessel.parameters.values()),
         np.zeros(model.num_dof),
     )
+    size = STEP * speed / np.where([name in "pqr" for name in names], vessel.length or 1.0, 1.0)
+    turning = [names[place] in "vr" for place in moving]
 
     def rates(change: np.ndarray) -> np.ndarray:
         return np.array(model.rates(straight + change, *rest)).ravel()
 
-    size = STEP * speed / np.where([name in "pqr" for name in names], vessel.length or 1.0, 1.0)
-    columns = [(rates(step) - rates(-step))[moving] / (2 * step.max()) for step in np.diag(size)[moving]]
-    slopes = np.column_stack(columns)
-    return float(np.linalg.eigvals(slopes).real.max()) if np.isfinite(slopes).all() else -np.inf
+    def fastest(about: np.ndarray, fine: float) -> tuple[float, np.ndarray]:
+        """Growth of what grows most near a small motion, and that motion, as large as `size` and to starboard."""
+        steps = np.diag(fine * size)[moving]
+        slopes = np.column_stack([(rates(about + d) - rates(about - d))[moving] / (2 * d.max()) for d in steps])
+        if not np.isfinite(slopes).all():
+            return -np.inf, np.zeros(len(names))
+        values, left, right = eig(slopes, left=True)
+        parts = np.abs(left * right)[turning].max(axis=0)
+        yaws = np.where(parts >= SHARE * np.abs((left.conj() * right).sum(axis=0)), values.real, -np.inf)
+        motion = np.zeros(len(names))
+        motion[moving] = right[:, np.argmax(yaws)].real
+        motion /= np.abs(motion / size).max()
+        return float(yaws.max()), motion if motion[names.index("r")] >= 0 else -motion
+
+    _, begun = fastest(np.zeros(len(names)), 1.0)
+
+    def to_side(side: float) -> float:
+        found, motion = fastest(side * begun, FINE)
+        for _ in range(TURNS):
+            found, motion = fastest(side * motion, FINE)
+        return found
+
+    return to_side(1.0), to_side(-1.0)
