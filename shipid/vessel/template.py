@@ -276,14 +276,16 @@ def added_mass(given: Particulars) -> Values:
     """Clarke et al. (1983), surge by Soeding, in Brix (1993); of a beamy ship Motora's charts.
 
     Clarke's regressions are of ships four times as long as their beam and more. Of a beamier one they give a yaw
-    inertia near 0 or below, and couple sway and yaw too much.
+    inertia near 0 or below, and couple sway and yaw so much that the water would move with an energy below 0.
     """
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
     prime = -math.pi * (T / L) ** 2 * given.rho / 2 * L**3
     yaw = prime * L**2 * (1 / 12 + 0.017 * C_b * B / T - 0.33 * B / L)
+    sway = prime * (1 + 0.16 * C_b * B / T - 5.1 * (B / L) ** 2)
+    by_yaw, by_sway = prime * L * (0.67 * B / L - 0.0033 * (B / T) ** 2), prime * L * (1.1 * B / L - 0.041 * B / T)
     m = given.rho * given.volume
     m_x, m_y, k_zz = motora(L, B, T, C_b)
-    if -yaw < BEAMY * m * k_zz**2:
+    if -yaw < BEAMY * m * k_zz**2 or sway * yaw <= ((by_yaw + by_sway) / 2) ** 2:
         charts, symmetric = "Motora's charts, by Zhou et al. (1983)", "a beamy ship counts as alike fore and aft"
         return {
             "X_udot": Value(-m * m_x, "kg", charts),
@@ -296,9 +298,9 @@ def added_mass(given: Particulars) -> Values:
     surge = m / (math.pi * math.sqrt(L**3 / given.volume) - 14)
     return {
         "X_udot": Value(-surge, "kg", "-m / (pi sqrt(L^3 / volume) - 14), Soeding in Brix (1993)"),
-        "Y_vdot": Value(prime * (1 + 0.16 * C_b * B / T - 5.1 * (B / L) ** 2), "kg", clarke),
-        "Y_rdot": Value(prime * L * (0.67 * B / L - 0.0033 * (B / T) ** 2), "kg m", clarke),
-        "N_vdot": Value(prime * L * (1.1 * B / L - 0.041 * B / T), "kg m", clarke),
+        "Y_vdot": Value(sway, "kg", clarke),
+        "Y_rdot": Value(by_yaw, "kg m", clarke),
+        "N_vdot": Value(by_sway, "kg m", clarke),
         "N_rdot": Value(yaw, "kg m^2", clarke),
     }
 

@@ -325,6 +325,24 @@ def test_a_beamy_ship_has_the_yaw_inertia_of_the_charts() -> None:
     assert added_mass(MARINER)["N_rdot"].note == "Clarke et al. (1983)"
 
 
+def test_no_motion_of_the_water_has_an_energy_below_0() -> None:
+    """Clarke's formulae couple sway and yaw of 4 % of drawn ships so much that it had."""
+    rng = np.random.default_rng(61126)
+    drawn = 0
+    while drawn < 300:
+        block, slenderness, flatness = rng.uniform((0.4, 2.0, 1.8), (0.9, 5.0, 6.0))
+        if not 0.04 <= block / slenderness <= 0.3:
+            continue
+        drawn += 1
+        water = {
+            k: -v.number
+            for k, v in added_mass(Particulars(1.0, 1 / slenderness, 1 / slenderness / flatness, block)).items()
+        }
+        coupling = (water["Y_rdot"] + water["N_vdot"]) / 2
+        assert np.linalg.eigvalsh([[water["Y_vdot"], coupling], [coupling, water["N_rdot"]]]).min() > 0
+        assert water["X_udot"] > 0
+
+
 def test_a_tug_turns_in_little_room() -> None:
     """28 x 12.2 m with two azimuth units: between one and two lengths across; more is said of so beamy a ship."""
     given = Particulars(28.0, 12.2, 4.4, 0.5, speed=6.0, propulsor="azimuth")
