@@ -385,9 +385,12 @@ class ReverseSpiral(Executed):
 
 
 class CrashStop(Timed):
-    """Full astern, the helm amidships."""
+    """Full astern, the helm amidships: a shaft turns the other way, of a controllable pitch the pitch is reversed."""
 
-    astern_rpm: Annotated[Positive, Field(description="rpm ordered astern")]
+    astern_rpm: Annotated[
+        Positive,
+        Field(description="rpm ordered astern; with a controllable pitch rpm of the shaft while the pitch is astern"),
+    ]
 
     def check(self, controls: Controls) -> None:
         """Raise DocumentError for a vessel whose thrust is known about her service speed alone."""
@@ -406,6 +409,15 @@ class CrashStop(Timed):
     def shaft(self, t: Array) -> Array:
         """Shaft speed [rev/s] at times (T,)."""
         return np.where(_from(self.execute_at, t), -self.astern_rpm, self.n_rpm) * RPM
+
+    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
+        """Name -> (T,): the commands [SI] at times t (T,) [s]."""
+        orders, astern = super().inputs(controls, t, speed), _from(self.execute_at, t)
+        for shaft in controls.drives:
+            pitch = f"{shaft.rpartition('.')[0]}.pitch"
+            if pitch in orders:
+                orders |= {part: np.where(astern, -orders[part], orders[part]) for part in (shaft, pitch)}
+        return orders
 
 
 class Excitation(Timed):

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.measures.recognise import record_of
+from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.zigzag import zigzag
 from shipid.simulation.manoeuvre import (
     KINDS,
@@ -28,7 +28,7 @@ from shipid.simulation.manoeuvre import (
 )
 from shipid.simulation.perform import perform
 from shipid.units import DEGREE
-from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from tests.conftest import LAG
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -258,6 +258,23 @@ def test_crash_stop_reverses_the_thrust_and_stops(vessel: Vessel) -> None:
     assert 5 < t[stopped] - 3 < 60
     assert (np.diff(u[(t > 3.5) & (t < t[stopped])]) < 0).all()
     assert np.abs(log["r"]).max() < 1e-12
+
+
+def test_a_controllable_pitch_is_reversed_in_a_crash_stop() -> None:
+    """Its gear turns slowly and stops at -0.5; the shaft goes on turning as it did, and the log is known for a stop."""
+    fixed = load_vessel("kvlcc2-l7")
+    screw = {name: fixed.document["thruster"]["propeller"][name] for name in ("x", "D_p", "t_P", "w_P0")}
+    gear = {"pitch": {"kind": "rate_limit", "rate": 0.05, "low": -0.5, "high": 0.9}}
+    screw |= {"kind": "controllable_pitch", "k_P": 0.4063, "k_J": 0.4, "actuator": gear}
+    ship = check_vessel({**fixed.document, "thruster": {**fixed.document["thruster"], "propeller": screw}}, "CP")
+    log = one(ship, CrashStop(n_rpm=600, astern_rpm=500, execute_at=3, duration=150))
+    before = log["t"].to_numpy() < 2.95
+    np.testing.assert_allclose(log["propeller.n"], np.where(before, 10.0, 500 / 60))
+    np.testing.assert_allclose(log["propeller.pitch"], np.where(before, 0.8, -0.8))
+    reached = log["actual.propeller.pitch"].to_numpy()
+    np.testing.assert_allclose(reached, np.where(before, 0.8, np.maximum(0.8 - 0.05 * (log["t"] - 3), -0.5)), atol=1e-9)
+    assert np.interp(10.0, log["t"], log["u"]) > 0 > log["u"].min()
+    assert kinds_of(record_of(log))[0] == ("stop",)
 
 
 def test_actuators_limit_what_is_ordered() -> None:
