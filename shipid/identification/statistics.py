@@ -214,7 +214,7 @@ def statistics(fit: LinearFit) -> Statistics:
     best = covariances[chosen]
     half = np.where(basis.unseen & ~basis.held, np.inf, best.half_widths)
     errors = np.where(basis.unseen & ~basis.held, np.inf, best.errors)
-    alone = _alone(inner, best, covariances["fisher"], colours)
+    alone = _alone(inner, half)
     together = combinations(inner.jacobian, inner.paths)
     n = len(fit.paths)
     full = {name: _spread(values, free, n) for name, values in {"errors": errors, "half": half, "alone": alone}.items()}
@@ -416,10 +416,9 @@ def against_priors(fit: LinearFit) -> dict[str, tuple[float, float, float]]:
     widths, centre = _widths(inner), centre[_free_places(fit)]
     if not np.isfinite(widths).any():
         return {}
-    step = -inverted(inner.jacobian.T @ inner.jacobian)[0] @ (inner.jacobian.T @ inner.residuals)
-    factors, left = inner.factors + step, inner.residuals + inner.jacobian @ step
-    seen = statistics(replace(inner, factors=factors, residuals=left, prior_widths=None))
-    half, errors = (seen.high - seen.low) / 2, (seen.high - seen.low) / 2 / stdtrit(np.inf, 0.5 + LEVEL / 2)
+    seen = statistics(_by_data_alone(inner))
+    factors, half = seen.fit.factors, (seen.high - seen.low) / 2
+    errors = half / stdtrit(np.inf, 0.5 + LEVEL / 2)
     far = np.abs(factors - centre) > CONTRARY * np.hypot(widths, errors)
     return {inner.paths[j]: (float(widths[j]), float(factors[j]), float(half[j])) for j in np.flatnonzero(far)}
 
@@ -523,14 +522,23 @@ def blocks(fit: LinearFit, length: float) -> Index:
     return result
 
 
-def _alone(fit: LinearFit, best: Covariance, plain: Covariance, colours: Mapping[str, Whiteness]) -> Array:
-    """Half-widths (n,) without priors: those of the Fisher form, times the ratio of chosen to Fisher errors."""
-    levels = np.array([colours[name].level for name in fit.signals])
-    inverse, unseen = inverted(fit.jacobian.T @ fit.jacobian)
-    influence = (levels[:, None] * fit.jacobian) @ inverse
-    widened = np.where(plain.errors > 0, best.errors / np.where(plain.errors > 0, plain.errors, 1.0), 1.0)
-    quantile = stdtrit(best.freedom, 0.5 + LEVEL / 2)
-    return np.asarray(np.where(unseen, np.inf, np.sqrt((influence**2).sum(axis=0)) * widened * quantile))
+def _by_data_alone(fit: LinearFit) -> LinearFit:
+    """The linearisation of the fit without priors, which is one step of Gauss-Newton away; every factor is free."""
+    step = -inverted(fit.jacobian.T @ fit.jacobian)[0] @ (fit.jacobian.T @ fit.residuals)
+    left = fit.residuals + fit.jacobian @ step
+    return replace(fit, factors=fit.factors + step, residuals=left, prior_widths=None)
+
+
+def _alone(fit: LinearFit, half: Array) -> Array:
+    """Half-widths (n,) without priors; half : (n,) those with them. Every factor of the fit is free.
+
+    The form of covariance is that of the fit without priors: where these decide, all forms agree with them, and none
+    shows what correlated residuals would do to the data alone.
+    """
+    if not np.isfinite(_widths(fit)).any():
+        return half
+    seen = statistics(_by_data_alone(fit))
+    return np.asarray((seen.high - seen.low) / 2)
 
 
 def _shared(fit: LinearFit, free: Index) -> Array:

@@ -236,6 +236,15 @@ def test_a_prior_much_narrower_than_the_data_is_the_error_in_every_form(phi: flo
         np.testing.assert_allclose(form.errors, widths, rtol=1e-3)
 
 
+@pytest.mark.parametrize("width", [1e-3, 0.02, 1.0])
+@pytest.mark.parametrize("phi", [0.0, 0.8])
+def test_what_the_data_alone_say_is_not_changed_by_priors(phi: float, width: float) -> None:
+    """Correlated residuals widen it as without priors: tight priors hid them, and factors were called identified."""
+    without = statistics(one(phi))
+    widths = np.where(np.arange(COUNT) < 4, width, np.inf)
+    np.testing.assert_allclose(statistics(one(phi, prior_widths=widths)).alone, without.alone, rtol=1e-6)
+
+
 def test_a_pair_that_acts_as_one_is_named() -> None:
     """p1 has 2 x the effect of p0, but for 1e-6: neither is identified, their combination is named, others are."""
     jacobian = JACOBIAN.copy()
