@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset, pieces
 from shipid.engine.rollout import SPEED_LIMIT, rollout
 from shipid.errors import DataError
-from shipid.identification.residuals import build
+from shipid.identification.residuals import CURRENT, build
 from shipid.identification.segments import LEAST_STEPS, ShootingSegment
 from shipid.identification.settings import ENVIRONMENT, Identify, overrides, overrides_of
 from shipid.simulation.log import LEANING, aboard, column_of, horizontal
@@ -44,7 +44,7 @@ class FreeRuns:
 def unfelt(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[str]) -> list[str]:
     """Columns of states and weather of the vessel that neither dataset, settings nor nuisances give: they are 0."""
     model = dynamics(vessel)
-    given = {*map(str, dataset.frame), *(("V_c", "beta_c") if "current" in settings.widths else ())}
+    given = {*map(str, dataset.frame), *(CURRENT if "current" in settings.widths else ())}
     needed = [column_of(name) for name in (*model.state, *model.environment)]
     overridden = overrides(settings, runs, vessel, model.environment, dataset.runs)
     return [

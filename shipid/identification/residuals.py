@@ -44,6 +44,7 @@ SIZES = {"u": 0.1, "v": 0.1, "w": 0.1, "north": 1.0, "east": 1.0, "down": 0.1, "
 COMPILE_FROM = (
     4e4  # steps times entries of the sensitivities: below it CasADi's virtual machine is faster than compiling
 )
+CURRENT = ("V_c", "beta_c")  # channels that the nuisance of that name estimates
 MOST_LATE = 4.0  # prior widths that a latency may reach
 
 
@@ -119,14 +120,7 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
     numbers = {run: {path: x for path, x in of.items() if path in vessel.parameters} for run, of in overridden.items()}
     segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags, numbers, settings.commands)
     weather = _weather(segments, overridden, model.environment, [n for n in names if n.startswith("current")])
-    free = {path for group in unknown.groups for path in group}
-    twice = next(((run, path) for run, values in overridden.items() for path in values if path in free), None)
-    if twice is not None:
-        path = f"{BLOCK}.runs.{'.'.join(twice)}"
-        raise DocumentError(
-            "is free in the fit and also set for a run: fix it, or remove the value of the run",
-            path=path,
-        )
+    _check_set_for_a_run(unknown, overridden, widths)
     return Problem(
         vessel=vessel,
         runs=tuple(runs),
@@ -160,6 +154,20 @@ def _check_outputs(vessel: Vessel, dataset: Dataset, settings: Identify) -> None
             raise DataError(message, path=path)
 
 
+def _check_set_for_a_run(
+    unknown: Unknowns, overridden: Mapping[str, Mapping[str, float]], widths: Mapping[str, float]
+) -> None:
+    """Raise DocumentError for a value of a run that the fit estimates: a factor, or the current of each run."""
+    remedies = {path: "is free in the fit and also set for a run: fix it" for group in unknown.groups for path in group}
+    if "current" in widths:
+        estimated = "is set for a run, and nuisance.current estimates it: leave that nuisance out"
+        remedies |= {f"{ENVIRONMENT}.{name}": estimated for name in CURRENT}
+    for run, values in overridden.items():
+        for path in (path for path in values if path in remedies):
+            message = f"{remedies[path]}, or remove the value of the run"
+            raise DocumentError(message, path=f"{BLOCK}.runs.{run}.{path}")
+
+
 def _weather(
     segments: Sequence[ShootingSegment],
     overridden: Mapping[str, Mapping[str, float]],
@@ -169,7 +177,7 @@ def _weather(
     """Environment channels that the data or an override provide and that the fit does not estimate."""
     given = {name for name in channels if any(np.any(one.columns[name]) for one in segments if name in one.columns)}
     given |= {path.removeprefix(f"{ENVIRONMENT}.") for values in overridden.values() for path in values}
-    return [name for name in channels if name in given and not (estimated and name in ("V_c", "beta_c"))]
+    return [name for name in channels if name in given and not (estimated and name in CURRENT)]
 
 
 def _with_weather(segment: ShootingSegment, weather: Sequence[str], overridden: Mapping[str, float]) -> ShootingSegment:

@@ -508,6 +508,7 @@ def test_a_start_that_diverges_is_reported() -> None:
         ({"runs": {"M01.environment.V_x": 1.0}}, "cannot be set for a run"),
         ({"runs": {"M01.environment.V_w": "calm"}}, "is not a number"),
         ({"runs": {f"M01.{FEW[0]}": 1.0}}, "is free in the fit"),
+        ({"runs": {"M01.environment.beta_c": 1.0}, "nuisance": ["current"]}, "nuisance.current estimates it"),
         ({"start": {"hull.derivatives.X_rr": 1.0}}, "is not free in the fit"),
     ],
 )
