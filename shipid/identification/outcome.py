@@ -51,6 +51,7 @@ from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import patch_text
+from shipid.vessel.ranges import contradictions
 
 Array = NDArray[np.float64]
 BEFORE, AFTER = "before", "after"
@@ -141,6 +142,7 @@ class Identified:
             source=f"identified from {count} of dataset {self.digest} by shipid {__version__}",
             values=solution.values,
             provenance=_plain(self._provenance()),
+            unusual=tuple(_odd(vessel.with_values(solution.values))),
         )
 
     def _provenance(self) -> dict[str, Any]:
@@ -309,7 +311,13 @@ def run_identification(
                 if path not in determined
             ),
         )
-        warnings += tuple(filter(None, (verdict(vessel, path, solution.values) for path in solution.values)))
+        judgements = {path: verdict(vessel, path, solution.values) for path in solution.values}
+        judgements |= {
+            path: f"{path}: {words}; hold it, or give it a prior"
+            for path, words in _odd(pair[AFTER]).items()
+            if not judgements.get(path)
+        }
+        warnings += tuple(filter(None, judgements.values()))
         outputs = _outputs(pair, dataset, fitted)
         warnings += tuple(_unused(outputs, settings))
         groups = _groups(pair[AFTER], dataset, tested or fitted, settings)
@@ -339,6 +347,11 @@ def run_identification(
             beyond=_beyond(pair[AFTER], dataset, fitted, logs),
             outputs=outputs,
         )
+
+
+def _odd(vessel: Vessel) -> dict[str, str]:
+    """Numbers that a document is refused for unless they are `unusual` in it: dotted path -> a sentence."""
+    return contradictions(vessel.document, vessel.parameters)
 
 
 def _nothing_free(solution: Solution) -> str:

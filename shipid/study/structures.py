@@ -49,6 +49,7 @@ from shipid.study.new import proposed_horizon
 from shipid.study.verdict import shown
 from shipid.version import __version__
 from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.ranges import UNUSUAL, contradictions
 
 Array = NDArray[np.float64]
 Report = Callable[[str], object]
@@ -145,8 +146,11 @@ class Compared:
 
     def document(self) -> str:
         """The vessel with the chosen structure, fitted to all runs, as TOML."""
+        vessel = self.fits[self.chosen].vessel
+        odd = list(contradictions(vessel.document, vessel.parameters))  # refused where it is read, unless it is named
         document = {
-            **self.fits[self.chosen].vessel.document,
+            **vessel.document,
+            **({UNUSUAL: [*vessel.document.get(UNUSUAL, []), *odd]} if odd else {}),
             "name": f"{self.vessel.name}, {self.chosen}",
             "source": f"structure {self.chosen} identified from {len(self.runs)} runs of dataset {self.digest} by "
             f"shipid {__version__}, on {self.vessel.key}, digest {self.vessel.digest}",

@@ -34,6 +34,7 @@ from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
 from shipid.physics.grammar import derivative, deviation
 from shipid.vessel.load import Vessel
+from shipid.vessel.ranges import UNUSUAL
 
 _CONDITION = re.compile(r"(?P<pattern>[^\[\]]+)(?:\[\s*order\s*(?P<relation>>=|<=|==|>|<)\s*(?P<order>\d+)\s*\])?")
 _BETWEEN = "\x1f"  # of the parts of a key
@@ -247,10 +248,16 @@ def patch_text(
     source: str,
     values: Mapping[str, float],
     provenance: Mapping[str, Any] | None = None,
+    unusual: Sequence[str] = (),
 ) -> str:
-    """A patch document as TOML: a base, by bundled name or by path from the patch, and new values by dotted path."""
+    """A patch document as TOML: a base, by bundled name or by path from the patch, and new values by dotted path.
+
+    unusual : paths of numbers that would be refused where the patch is read.
+    """
     patch = tomlkit.document()
     patch.update({"name": name, "base": base, "base_digest": base_digest, "source": source})
+    if unusual:
+        patch[UNUSUAL] = list(unusual)
     patch["set"] = dict(values)
     if provenance:
         patch["provenance"] = dict(provenance)

@@ -126,11 +126,14 @@ def contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> t
     is one; shares are below 1; a unit is on the side of its name; wind drives a ship where it goes; a ship at rest
     stays upright, and displaces her mass.
     """
+    first = next(iter(contradictions(document, values).items()), None)
+    return None if first is None else (first[0], f"{first[1]}; {_remedy(first[0])}")
+
+
+def contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, str]:
+    """Dotted path of every number that contradicts another one, unless `unusual` names it -> a sentence."""
     meant = document.get(UNUSUAL, [])
-    for path, sentence in _contradictions(document, values):
-        if not _is_meant(path, meant):
-            return path, f"{sentence}; {_remedy(path)}"
-    return None
+    return {path: words for path, words in _contradictions(document, values) if not _is_meant(path, meant)}
 
 
 def _contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> Iterator[tuple[str, str]]:

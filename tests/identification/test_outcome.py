@@ -209,6 +209,18 @@ def test_a_patch_on_a_bundled_vessel_names_it(identified: Identified, tmp_path: 
     assert tomllib.loads(replace(identified, vessel=SHIP).patch(tmp_path / "a.toml"))["base"] == "gunnerus-28.9"
 
 
+def test_a_patch_names_estimates_that_contradict_others_and_is_read(identified: Identified, tmp_path: Path) -> None:
+    """A force of the rudder ahead of midships, a rudder aft: the patch was written, and refused where it was read."""
+    tanker, odd = load_vessel("kvlcc2-l7"), "thruster.rudder.x_H"
+    found = replace(identified, vessel=tanker, solution=replace(identified.solution, values={odd: 4.4}))
+    again = load_vessel(write_patch(found, tmp_path / "patch.toml"))
+    assert again.parameters == tanker.parameters | {odd: 4.4}
+    assert again.document["unusual"] == [odd]
+    assert "on the same side" in outcome._odd(tanker.with_values({odd: 4.4}))[odd]
+    assert not outcome._odd(again)
+    assert "unusual" not in tomllib.loads(identified.patch(tmp_path / "usual.toml"))
+
+
 def test_the_profile_agrees_with_the_interval(identified: Identified) -> None:
     curve = identified.profiles[0]
     row = identified.estimates.set_index("path").loc[curve.path]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -104,6 +105,18 @@ def test_the_vessel_chosen_and_the_page_are_written(comparison: Compared, tmp_pa
     text = page.read_text()
     for word in ("modulus", "abkowitz", "tactical diameter", "Which structure"):
         assert word in text
+
+
+def test_a_vessel_whose_estimates_contradict_others_is_written_and_read(tmp_path: Path) -> None:
+    """A thrust deduction above 1: the file was written, and then refused."""
+    vessel = SHIP.with_values({"thruster.propeller.t_P": 1.1})
+    parts = {"vessel": SHIP, "chosen": "present", "fits": {"present": SimpleNamespace(vessel=vessel)}}
+    made = SimpleNamespace(**parts, runs=SHIP.key, digest=SHIP.digest)
+    file = tmp_path / "chosen.toml"
+    file.write_text(Compared.document(made))  # type: ignore[arg-type]
+    again = load_vessel(file)
+    assert again.parameters == vessel.parameters
+    assert again.document["unusual"] == ["thruster.propeller.t_P"]
 
 
 def test_gear_that_is_off_for_the_log_is_on_in_manoeuvres() -> None:
