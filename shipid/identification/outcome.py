@@ -49,7 +49,7 @@ from shipid.simulation.measured import measure_standard
 from shipid.units import percent, plural
 from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel
+from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import patch_text
 from shipid.vessel.ranges import contradictions
 
@@ -129,18 +129,23 @@ class Identified:
         return (*(combination.sentence() for combination in combinations), *map(str, others))
 
     def patch(self, file: Path) -> str:
-        """The patch as TOML, to be written to `file`: `load_vessel` on it rebuilds the identified vessel exactly."""
+        """The patch as TOML, to be written to `file`: `load_vessel` on it rebuilds the identified vessel exactly.
+
+        Numbers that were changed after the base was read, by `Vessel.with_values`, are in the patch, too. Raises
+        ShipidError where more than numbers were changed: no patch holds that.
+        """
         vessel, solution = self.vessel, self.solution
         bundled = documents.bundled("models").get(vessel.key)
         is_bundled = bundled is not None and bundled.resolve() == Path(vessel.file).resolve()
         base = vessel.key if is_bundled else os.path.relpath(vessel.file, file.parent)
         count = f"{len(self.runs)} {plural(len(self.runs), 'run')}"
+        digest, changed = _as_read(vessel)
         return patch_text(
             name=f"{vessel.name}, identified",
             base=base,
-            base_digest=vessel.digest,
+            base_digest=digest,
             source=f"identified from {count} of dataset {self.digest} by shipid {__version__}",
-            values=solution.values,
+            values=changed | dict(solution.values),
             provenance=_plain(self._provenance()),
             unusual=tuple(_odd(vessel.with_values(solution.values))),
         )
@@ -347,6 +352,25 @@ def run_identification(
             beyond=_beyond(pair[AFTER], dataset, fitted, logs),
             outputs=outputs,
         )
+
+
+def _as_read(vessel: Vessel) -> tuple[str, dict[str, float]]:
+    """Digest of the document in the vessel's file, and the numbers that were changed since it was read.
+
+    A vessel whose file cannot be read any more is as it was.
+    """
+    try:
+        read = load_vessel(vessel.file)
+    except ShipidError:
+        return vessel.digest, {}
+    if read.digest == vessel.digest:
+        return read.digest, {}
+    before = read.parameters
+    changed = {path: value for path, value in vessel.parameters.items() if before.get(path) != value}
+    if vessel.units.keys() != before.keys() or read.with_values(changed).digest != vessel.digest:
+        message = "more than numbers of it were changed after it was read: a patch on it is another vessel"
+        raise ShipidError(f"{message}; write the change in a file that `extends` it, and load that", file=vessel.file)
+    return read.digest, changed
 
 
 def _odd(vessel: Vessel) -> dict[str, str]:

@@ -209,6 +209,17 @@ def test_a_patch_on_a_bundled_vessel_names_it(identified: Identified, tmp_path: 
     assert tomllib.loads(replace(identified, vessel=SHIP).patch(tmp_path / "a.toml"))["base"] == "gunnerus-28.9"
 
 
+def test_a_patch_holds_what_was_changed_after_the_base_was_read(identified: Identified, tmp_path: Path) -> None:
+    """It was refused where it was read: the base was said to have changed."""
+    changed = SHIP.with_values({"inertia.m": 1.1 * SHIP.parameters["inertia.m"], FEW[0]: 1.0})
+    again = load_vessel(write_patch(replace(identified, vessel=changed), tmp_path / "patch.toml"))
+    assert again.parameters == changed.parameters | dict(identified.solution.values)
+    other = replace(identified, vessel=SHIP.with_values({"current.kind": "uniform"}))
+    with pytest.raises(ShipidError, match="more than numbers of it were changed"):
+        write_patch(other, tmp_path / "other.toml")
+    assert not (tmp_path / "other.toml").exists()
+
+
 def test_a_patch_names_estimates_that_contradict_others_and_is_read(identified: Identified, tmp_path: Path) -> None:
     """A force of the rudder ahead of midships, a rudder aft: the patch was written, and refused where it was read."""
     tanker, odd = load_vessel("kvlcc2-l7"), "thruster.rudder.x_H"
