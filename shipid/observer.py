@@ -35,7 +35,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.arguments import of_class
 from shipid.checked import Checked
-from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, clock_slack, stretches
+from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, after_pauses, clock_slack, stretches
 from shipid.data.windows import PathSource, Windows
 from shipid.engine.casadi import summed_rates
 from shipid.engine.samples import on_samples
@@ -58,12 +58,13 @@ NUMBERS = (
 COLUMNS = (*MEASURED, "X", "Y", "N", "current_north", "current_east")
 """Estimates as columns, `observer.u`, ...; X, Y, N are the slow force as acceleration, M^-1 tau [m/s^2, rad/s^2]."""
 AGE = "observer.age"
-"""Column: time [s] since the first row of the unbroken stretch. An observer needs some 20 sqrt(L / g) to settle."""
+"""Column: time [s] since the observer began. It needs some 20 sqrt(L / g) to settle."""
 DIVERGED = 1e9  # SI: no state, variance or likelihood of a sound filter is so large
 SPIKE = 300.0  # standard deviations: a measurement as far off is a fault of the log and moves nothing
 FADES = (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, 1e6)  # x sqrt(L / g): between which `tune_observer` chooses
 YAW = 3.0  # change of the moment, x I_z g / L, over that of the force, x m g
 LONGEST = 0.6  # x sqrt(L / g): by longer steps of the filters the midpoint rule takes its own error for a force
+PAUSE = 6.0  # x sqrt(L / g): after a longer time without rows what the physics did is worse than to begin anew
 ROUNDING = 1e-5  # of a step: so much longer than the longest it is still one
 CALM = 1e-6  # m/s: keeps the direction of no wind defined
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
@@ -131,7 +132,8 @@ class Bank:
 
     numbers : (K, len(NUMBERS)). noise : (6,) standard deviations of samples. first : (K, 17) those of the first state
     in addition to the measured ones. fade : time constant [s] of the force ahead. mass : (3, 3), tau = mass @ a.
-    longest : step [s] beyond which the time between two rows is divided.
+    longest : step [s] beyond which the time between two rows is divided. pause : time [s] between two rows, see
+    `after_pauses`, beyond which the filters begin anew.
     """
 
     vessel: Vessel
@@ -142,6 +144,7 @@ class Bank:
     fade: float
     mass: Array
     longest: float
+    pause: float
 
     @cached_property
     def model(self) -> Dynamics:
@@ -196,8 +199,9 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     sizes = {"north": length, "east": length, "psi": 1.0, "u": speed, "v": speed, "r": 1 / time}
     noise = np.array([settings.noise.get(name, 5e-4 * size) for name, size in sizes.items()])
     return Bank(
-        vessel, settings, np.array(numbers), noise, np.array(first), settings.fade * time, vessel.mass, LONGEST * time
-    )
+        vessel, settings, np.array(numbers), noise, np.array(first), settings.fade * time, vessel.mass,
+        LONGEST * time, PAUSE * time,
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=16)
@@ -275,7 +279,7 @@ def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
     (states (n, K), commands, environment, parameters, measured, noise, numbers (., K), dt) -> (states, estimate (11,),
     innovation (6,), spread (6,), weights (K,)); estimates are means by the weights, the innovation that of the mixture.
     A dt beyond `Bank.longest` is to be divided by `Bank.parts`: call it for each part, with NaN for the measurement in
-    all but the last.
+    all but the last. After a pause beyond `Bank.pause` take the states of `begin`.
     """
     one = filter_function(model)
     inputs = [ca.MX.sym(one.name_in(i), one.size1_in(i)) for i in range(one.n_in())]
@@ -390,7 +394,7 @@ class Estimates:
     columns : `observer.u`, ... (N,), in the order of the table; see COLUMNS and AGE. `observer.test` is the normalised
         innovation squared over the number of measurements, less those left out: 1 in the mean where the assumptions
         hold.
-    innovation, spread : (N, 6), measured less predicted, and its variance; NaN in the first row of a stretch.
+    innovation, spread : (N, 6), measured less predicted, and its variance; NaN where the observer begins.
     weights : (N, K) of the filters.
     """
 
@@ -401,7 +405,7 @@ class Estimates:
 
     @property
     def age(self) -> Array:
-        """Time [s] since the first row of the stretch, (N,): `observer.age`."""
+        """Time [s] since the observer began, (N,): `observer.age`."""
         return self.columns[AGE]
 
     def select(self, rows: Array) -> Estimates:
@@ -413,7 +417,8 @@ class Estimates:
 def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, *, calls: float = 1) -> Estimates:
     """Run the observer along every unbroken stretch of a dataset, all of them together.
 
-    Wind that is not measured is zero. `calls` is how many calls of this size are to come in all: for many it pays to
+    It begins anew after a pause in the rows of more than 6 sqrt(L / g), as the recorder of exported C does. Wind that
+    is not measured is zero. `calls` is how many calls of this size are to come in all: for many it pays to
     compile. Raises DocumentError for a vessel that is not of three degrees of freedom, ShipidError for a command that
     the dataset lacks.
     """
@@ -423,9 +428,13 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
     missing = next((name for name in model.commands if name not in frame), None)
     if missing is not None:
         raise ShipidError(f"{vessel.name} takes {missing!r}: {choices(missing, dataset.commands)}")
-    places = [rows for _, rows in stretches(dataset)]
-    longest = max(map(len, places))
     table = {name: frame[name].to_numpy(dtype=float) for name in map(str, frame) if name not in ("run", "flags")}
+    places = [
+        part
+        for _, rows in stretches(dataset)
+        for part in np.split(rows, np.flatnonzero(after_pauses(table["t"][rows], filters.pause)))
+    ]
+    longest = max(map(len, places))
     zero = np.zeros(len(frame))
     commands, weather = (
         np.array([table.get(name, zero) for name in names]).reshape(-1, len(frame)).T

@@ -31,6 +31,8 @@ BREAK = "break"
 
 DATED = 1e8  # s: a clock that is farther is one of dates, seconds since 1970
 MOST_FLAGS = 62  # bits of an integer
+RARE = 3.0  # times the shortest interval of late: a pause is longer
+FORGOTTEN = 1.1  # times: by so much the shortest interval of late grows with each row
 _KEY = b"shipid"
 
 
@@ -191,6 +193,19 @@ def clock_slack(t: Array) -> float:
     """
     rounding = 4.0 * float(np.spacing(np.abs(t).max()))
     return max(rounding, 1e-3 * float(np.diff(t).min())) if len(t) > 1 else rounding
+
+
+def after_pauses(t: Array, longest: float) -> NDArray[np.bool_]:
+    """Whether each row at t (N,) [s] of one stretch comes after a pause, by it and the rows before it alone.
+
+    A pause is longer than `longest` [s] and than `RARE` times the shortest interval of late, which grows by the factor
+    `FORGOTTEN` with each row. The recorder of exported C has the same rule.
+    """
+    found, least = np.zeros(len(t), dtype=bool), 0.0
+    for i, apart in enumerate(np.diff(t).tolist(), start=1):
+        found[i] = apart > longest and not apart <= RARE * least
+        least = min(least * FORGOTTEN, apart) if least else apart
+    return found
 
 
 def cumulative_integral(t: Array, rate: Array) -> Array:

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
+from shipid.data.dataset import FORGOTTEN, RARE
 from shipid.errors import ShipidError
 from shipid.export.band import COLUMNS
 from shipid.export.blocks import Block, Formula, Precision, c_functions
@@ -33,8 +34,7 @@ from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
 PARTS_OF_STEP = 8  # of three rows within such a part of a step a recorder keeps the first and the last
-GAP = 3.0  # steps, and shortest intervals of rows: after a longer pause a recorder begins anew
-FORGOTTEN = 1.1  # times: by so much a recorder lets the shortest interval grow with each row
+GAP = 3.0  # steps: after a longer pause, see `after_pauses`, the past of a recorder begins anew
 
 
 def predictor_files(model: Model, name: str, precision: Precision) -> Files:
@@ -208,10 +208,10 @@ typedef struct {{
 
 void {name}_init({name} *self);
 
-/* Keep a row that was measured at t [s], entries as in {name}_row_names. Rows come in order; after a pause of more than
- * {GAP * physics.step:g} s and {
-            GAP:g} times the shortest interval of late the past begins anew; the shortest grows by a tenth with each row, so
- * that it is forgotten. The heading may wrap, and so may angles of thrusters and rudders: 350 deg is -10 deg. Between
+/* Keep a row that was measured at t [s], entries as in {name}_row_names. Rows come in order. A pause is longer than
+ * {RARE:g} times the shortest interval of late; the shortest grows by a tenth with each row, so that it is forgotten.
+ * {self._after_pauses()}
+ * The heading may wrap, and so may angles of thrusters and rudders: 350 deg is -10 deg. Between
  * stops that are less than a turn apart the angle within them is taken, so a jump is real. A unit that turns all round
  * goes on by the shortest way. The first row is taken by the turn that training had. Rows may come as often as they
  * like: of three within {physics.step / PARTS_OF_STEP:g} s the past keeps the first and the last. */
@@ -444,14 +444,16 @@ double {name}_factor(double miss, double level, int kind)
             )
         return f"""int {name}_record({name} *self, double t, const {real} *row)
 {{
-    int i, newest = (self->first + self->count - 1) % {cap};
+    int i, newest = (self->first + self->count - 1) % {cap}{", alone = 0" if self._goes_on else ""};
     real kept[{n + 4}]{", moved" if angled else ""};
     if (!isfinite(t)) return {name}_NOT_FINITE;
     for (i = 0; i < {n}; ++i) if (!isfinite(row[i])) return {name}_NOT_FINITE;
     if (self->count && !(t > self->t[newest])) return {name}_TIME;
     if (self->count) {{
         const double apart = t - self->t[newest];
-        if (apart > {GAP * step!r} && !(apart <= {GAP!r} * self->least)) self->count = 0;
+        if (!(apart <= {RARE!r} * self->least)) {{
+{self._anew()}
+        }}
         if (self->least > 0) self->least *= {FORGOTTEN!r};
         if (!(self->least > 0 && self->least < apart)) self->least = apart;
     }}
@@ -473,7 +475,7 @@ double {name}_factor(double miss, double level, int kind)
 {rates}
 {first_actuators}
 {begin_filters}    }}
-    if (self->count == {cap}) {{
+{"    if (alone) self->count = 0;" + chr(10) if self._goes_on else ""}    if (self->count == {cap}) {{
         self->first = (self->first + 1) % {cap};
         --self->count;
     }}
@@ -483,6 +485,30 @@ double {name}_factor(double miss, double level, int kind)
     return 0;
 }}
 """
+
+    @property
+    def _pause(self) -> float:
+        """Time [s] between two rows beyond which all begins anew: that of the observer, where there is one."""
+        return GAP * self.model.physics.step if self.filters is None else float(self.filters.pause)
+
+    @property
+    def _goes_on(self) -> bool:
+        """Whether observer, actuators and angles go on over pauses after which the past begins anew."""
+        return self._pause > GAP * self.model.physics.step
+
+    def _anew(self) -> str:
+        """C of what begins anew after a pause."""
+        lines = [f"            if (apart > {self._pause!r}) self->count = 0;"]
+        if self._goes_on:
+            lines.insert(0, f"            alone = apart > {GAP * self.model.physics.step!r};")
+        return "\n".join(lines)
+
+    def _after_pauses(self) -> str:
+        """What begins anew after pauses, in words."""
+        if not self._goes_on:
+            return f"After one of more than {self._pause:g} s the past begins anew."
+        past = f"After one of more than {GAP * self.model.physics.step:g} s the past begins anew"
+        return f"{past}, of more than {self._pause:.4g} s observer, actuators and angles, too."
 
     @property
     def _reached(self) -> list[int]:

@@ -27,7 +27,7 @@ from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import MOTIONS, Memory
 from shipid.hybrid.physics import Physics
-from shipid.observer import LONGEST, Observer, observe
+from shipid.observer import AGE, LONGEST, Observer, bank, observe
 from shipid.predictor import Predictor
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
@@ -355,23 +355,77 @@ def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
     np.testing.assert_allclose(np.stack(predicted, axis=1), expected, rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("flagged", [True, False])
-def test_a_pause_is_a_break_aboard_and_one_in_python_where_it_is_flagged(flagged, tmp_path):
-    """As the page on exports says: else the observer of Python goes on by the physics."""
+@pytest.mark.parametrize("step", [0.4, 5.0])
+def test_after_a_pause_an_observer_begins_anew_aboard_and_in_python(step, tmp_path):
+    """Row by row over drawn logs with pauses, those after which the past alone begins anew aboard among them."""
+    vessel, settings = variety()["actuators"], Observer(waves=(0.0,), change=(1.0,))
+    pause = bank(vessel, settings).pause
+    assert (pause > 3 * step) == (step < 1)
+    predictor = Predictor(
+        Physics(vessel, 5, step, "rk4", settings), "alone", Unchanged({}), {"u": (-99.0, 99.0)}, run_up=3.0
+    )
+    exported, anew = model(predictor), np.zeros(0, dtype=bool)
+    files = predictor_files(exported, "odd", Precision())
+    size, loaded = _size_of_struct(files, tmp_path) + 64, library(files, tmp_path)
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    path = np.zeros((5, 2))
+    for seed, every in enumerate((0.3, 1.0, 4.0, 15.0)):
+        rng = np.random.default_rng(seed)
+        frame = log_of(vessel, 30 * every, rng, every).frame
+        for place in rng.integers(1, len(frame), 6):
+            frame.loc[place:, "t"] += rng.choice([2.0, 4.0, 0.9 * pause, 1.1 * pause, 60.0])
+        t, orders = frame["t"].to_numpy(), {name: frame[name].to_numpy() for name in dynamics(vessel).commands}
+        least, found = np.inf, [False]
+        for apart in np.diff(t):
+            found.append(apart > pause and (not np.isfinite(least) or apart > 3 * least))
+            least = min(1.1 * least, apart)
+        anew = np.append(anew, found)
+        parts = np.split(np.arange(len(t)), np.flatnonzero(found))
+        along = [memory_along(vessel, {name: orders[name][part] for name in orders}, t[part]) for part in parts]
+        hidden = {name: np.concatenate([each[name] for each in along]) for name in along[0]}
+        columns = {name: frame[name].to_numpy() for name in frame if name not in ("run", "flags")}
+        estimates = observe(vessel, Dataset(frame, {"clock": "run"}), settings).columns
+        begun = np.repeat([t[part[0]] for part in parts], list(map(len, parts)))
+        np.testing.assert_allclose(estimates[AGE], t - begun, atol=1e-9)
+        expected = predictor.predict(Instants(columns, hidden=hidden, estimates=estimates))
+        kept = np.zeros(size, dtype=np.uint8)
+        loaded.odd_init(pointer(kept))
+        for i, row in enumerate(frame[list(order)].to_numpy(dtype=float)):
+            assert loaded.odd_record(pointer(kept), t[i], pointer(np.ascontiguousarray(row))) == 0
+            assert loaded.odd_predict(pointer(kept), None, pointer(path)) == (OUTSIDE if t[i] - begun[i] < 3 else 0)
+            np.testing.assert_allclose(path, expected[:, i], rtol=0, atol=1e-9)
+    assert 5 < anew.sum() < 30
+
+
+def test_the_past_begins_anew_before_the_observer_does(tmp_path):
+    """Over a pause of 6 s the filters go on, as in Python, and no row of the past lies before it."""
     vessel, settings = variety()["gunnerus-28.9"], Observer(waves=(0.0,), change=(1.0,))
-    dataset = log_of(vessel, 16, np.random.default_rng(3), 1.0)
-    frame = dataset.frame
-    frame.loc[frame.index[8] :, "t"] += 20.0
-    if flagged:
-        frame.loc[frame.index[8], "flags"] = 1
-    dataset = Dataset(frame, {"clock": "run", "flags": ["break"]})
-    exported = model(Predictor(Physics(vessel, 5, 1.0, "euler", settings), "alone", Unchanged({}), {"u": (-9.0, 9.0)}))
-    path = path_after(exported, frame["t"], frame, tmp_path)
+    rng, strange = np.random.default_rng(1), drawn("path-drawn", 7, vessel="gunnerus-28.9")
+    frame = log_of(vessel, 20, rng, 1.0).frame
+    frame.loc[10:, "t"] += 6.0
+    dataset, t = Dataset(frame, {"clock": "run"}), frame["t"].to_numpy()
+    physics, corrector = Physics(vessel, 5, 1.0, "rk4", settings), strange.predictor.corrector
+    inputs = type(corrector.inputs)(corrector.inputs.commands, Memory(history=(1.0, 3.0), observer=True))
     estimates = observe(vessel, dataset, settings).columns
-    columns = {name: frame[name].to_numpy()[-1:] for name in frame if name not in ("run", "flags")}
-    last = Instants(columns, estimates={name: values[-1:] for name, values in estimates.items()})
-    apart = np.abs(path - exported.predictor.predict(last)[:, 0]).max()
-    assert apart < 1e-10 if flagged else apart > 0.1
+    assert (np.diff(estimates[AGE]) > 0).all()
+    instants = Instants(sample(frame, t), past_of(frame, t, 3, 1.0, "position"), None, None, estimates)
+    table = inputs.table(physics, instants)
+    network = network_of(rng, list(table), table, 5, 2, False)
+    predictor = Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}), {"u": (-99.0, 99.0)})
+    exported = model(predictor)
+    files = predictor_files(exported, "odd", Precision())
+    kept, loaded = np.zeros(_size_of_struct(files, tmp_path) + 64, dtype=np.uint8), library(files, tmp_path)
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    expected, path = predictor.predict(instants), np.zeros((5, 2))
+    loaded.odd_init(pointer(kept))
+    for i, row in enumerate(frame[list(order)].to_numpy(dtype=float)):
+        assert loaded.odd_record(pointer(kept), t[i], pointer(np.ascontiguousarray(row))) == 0
+        young = t[i] - t[0 if i < 10 else 10] < 3.0
+        assert loaded.odd_predict(pointer(kept), None, pointer(path)) == (NO_PAST if young else 0)
+        if not young:
+            np.testing.assert_allclose(path, expected[:, i], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["learned-force", "path-drawn"])
