@@ -65,10 +65,10 @@ def names_of(name: str, value: Any, error: Kind = ShipidError) -> tuple[str, ...
     return (value,) if isinstance(value, str) else tuple(str(one) for one in value)
 
 
-def function_or_none(name: str, value: Any, error: Kind = ShipidError) -> None:
-    """Raise `error` for a value that is neither a function nor None."""
+def function_or_none(name: str, value: Any) -> None:
+    """Raise ShipidError for a value that is neither a function nor None."""
     if value is not None and not callable(value):
-        raise error(f"{name} must be a function, or None, not {value!r}")
+        raise ShipidError(f"{name} must be a function, or None, not {value!r}")
 
 
 def of_class(name: str, value: Any, kind: type, remedy: str, error: Kind = ShipidError) -> None:

@@ -302,7 +302,7 @@ def _uncrossed(case: Case, sides: Sides) -> str:
     """What is known at an amount without a limit of A: who pays, up to which A."""
     worst = max((case.table.mean(model, ALONE) for model in case.fixed), default=0.0)
     paying = not sides.worse and not sides.open and worst > 0
-    return _counted(sides, "no physics") + (f", even with an error A of {metres(worst)}" if paying else "")
+    return _counted(sides) + (f", even with an error A of {metres(worst)}" if paying else "")
 
 
 def _any(count: int) -> str:
@@ -418,7 +418,7 @@ def _physics_or_none(case: Case, judged: bool, planned: bool) -> list[str]:
         return [f"Not every cell has a result without physics, so it is unknown whether physics harms at {where}."]
     every = {amount: _against_none(case, amount) for amount in dict.fromkeys((case.smallest, case.largest))}
     spoken = {  # else the first sentence names them
-        amount: _counted(sides, "no physics")
+        amount: _counted(sides)
         for amount, sides in every.items()
         if (sides.better or sides.worse) and _limit_of_A(case, amount, sides) is not None
     }
@@ -427,15 +427,15 @@ def _physics_or_none(case: Case, judged: bool, planned: bool) -> list[str]:
     return [f"At {runs(amount)} {words}." for amount, words in spoken.items()]
 
 
-def _counted(sides: Sides, rival: str) -> str:
-    """Which models are better than a rival and which are worse, as one sentence."""
+def _counted(sides: Sides) -> str:
+    """Which models are better than no physics and which are worse, as one sentence."""
     count = len(sides.better) + len(sides.worse) + len(sides.open)
     if len(sides.better) == count:
         which = " with a result in every cell" if sides.left_out else " with a result" if sides.lacking else ""
-        return f"every physics model{which} does better than {rival}"
+        return f"every physics model{which} does better than no physics"
     verb = "do" if len(sides.better) > 1 else "does"  # none does
     verb = "is shown to do" if sides.open and not sides.better else verb
-    parts = [f"{len(sides.better) or 'none'} of {count} physics models {verb} better than {rival}"]
+    parts = [f"{len(sides.better) or 'none'} of {count} physics models {verb} better than no physics"]
     if sides.worse:
         parts.append(f"{named(sides.worse)} {plural(len(sides.worse), 'does', 'do')} worse")
     if sides.open:
