@@ -37,7 +37,7 @@ from shipid.units import GRAVITY, RPM, percent, plural
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import order_of
-from shipid.vessel.schema import SHARED
+from shipid.vessel.schema import SHARED, term_blocks
 
 LETTERS = {"ä": "ae", "ö": "oe", "ü": "ue", "ø": "oe", "å": "aa", "æ": "ae", "ß": "ss", "ł": "l", "đ": "d"}
 CORRECTED = "-corrected"  # ends the name of a family whose numbers the log corrects
@@ -596,7 +596,9 @@ def _truth(
     vessel = controls.vessel
     length = vessel.length or 0.0
     fine = min(_round_down(length / service / STEPS_A_LENGTH), step / 10)
-    yield Choice("truth.vessel", named)
+    waves = any(key.startswith("waves.") for _, key, _ in term_blocks(vessel.document))
+    calm = "in calm water: a table [truth.waves] with H_s and T_p draws a sea for the [waves] of the vessel"
+    yield Choice("truth.vessel", named, calm if waves else "")
     yield Choice("truth.manoeuvres", MANOEUVRES, f"{MANOEUVRES - TESTS} for training, {TESTS} for the test")
     if past:
         yield Choice("truth.run_up", past, "s before the first instant of prediction: the past of the memory")

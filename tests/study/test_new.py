@@ -378,6 +378,14 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
     assert max(plan.study.grid.N_D) == truth.manoeuvres - plan.study.split.test  # type: ignore[operator]
 
 
+@pytest.mark.parametrize(("name", "said"), [("gunnerus-28.9-6dof", True), ("gunnerus-28.9", False)])
+def test_a_vessel_that_feels_waves_is_said_to_be_in_calm_water(tmp_path: Path, name: str, said: bool) -> None:
+    """Her study draws no sea, and its question spoke of the ship in waves."""
+    text = draft_study([name], None, tmp_path / "study.toml").text
+    assert ("# in calm water: a table [truth.waves] with H_s and T_p draws a sea" in text) == said
+    assert "H_s =" not in text
+
+
 @pytest.mark.parametrize("name", ["otter", "kvlcc2-l7", "gunnerus-33.9"])
 def test_every_coefficient_of_the_hull_is_degraded(name: str) -> None:
     """Also the drag of a cross-flow and the resistance: with linear damping alone a model is nearly the ship."""
