@@ -104,7 +104,7 @@ def identify(
     given: dict[str, Any] = {
         "parameters": parameters and _paths(parameters),
         "fixed": fixed and _paths(fixed),
-        "together": together and [group.split(",") for group in together],
+        "together": together and [_paths([group]) for group in together],
         "prior": prior and pairs(prior, "--prior", "paths=0.3"),
         "bounds": bounds and pairs(bounds, "--bounds", "paths=[0.5,2]"),
         "nuisance": nuisance and _widths(nuisance),

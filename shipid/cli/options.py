@@ -40,12 +40,12 @@ def parsed(changes: list[str] | None) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for change in changes or []:
         path, equals, text = change.partition("=")
-        if not equals or not path:
+        if not equals or not path.strip():
             raise DocumentError(f"{change!r}: write --set path=value, such as --set grid.N_D=[10,30]", path="--set")
         try:
-            result[path] = loads(f"value = {text}")["value"]
+            result[path.strip()] = loads(f"value = {text}")["value"]
         except DocumentError:
-            result[path] = text
+            result[path.strip()] = text
         check_values(result, "--set")
     return result
 
@@ -58,9 +58,9 @@ def pairs(given: list[str], option: str, example: str) -> dict[str, Any]:
     for pair in given:
         path, equals, text = pair.rpartition("=")
         try:
-            if not equals or not path:
+            if not equals or not path.strip():
                 raise ValueError
-            result[path] = loads(f"value = {text}")["value"]
+            result[path.strip()] = loads(f"value = {text}")["value"]
         except (ValueError, DocumentError):
             raise DocumentError(f"{pair!r}: write {example}", path=option) from None
     return result

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,23 @@ def test_settings_of_a_file_give_way_to_options(file: Path, monkeypatch: pytest.
     text = Path("a.toml").read_text()
     assert "horizon = 20" in text
     assert 'method = "euler"' in text
+
+
+def test_spaces_after_commas_and_around_equals_signs_are_no_part_of_a_path(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """--together and --prior refused them, and asked for the same path."""
+    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(command, "_look", lambda *_: None)
+    both = f"{ONE}, hull.derivatives.N_uv"
+    output_of(
+        *("identify", "gunnerus-28.9", file, "--parameters", both, "--together", both, "--prior", "hull.* = 0.5"),
+        *("--set", "weights.u = 0.05", "--horizon", 20, "--out", "a.toml"),
+    )
+    given = tomllib.loads(Path("a.toml").read_text())["provenance"]["settings"]
+    assert given["together"] == [[ONE, "hull.derivatives.N_uv"]]
+    assert given["prior"] == {"hull.*": 0.5}
+    assert given["weights"]["u"] == 0.05
 
 
 MISTAKES = {
