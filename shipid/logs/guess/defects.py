@@ -28,6 +28,7 @@ HELD_SHARE, STAY = 0.2, 3.0  # of the rows; times the usual repeats in a row, fr
 TOGETHER = 0.5  # share of the steps of a held position that both of its columns make, at least
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
+CLEAR = 0.008  # rad: standard error of a heading that is off, at most, where the courses of the log show it
 NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
 STEPS_ABOUT = 5  # steps before and after a row, at least, whose median is usual there
 FARTHER = 2.0  # times the way from row to row that a ship would go in a hole of the clock, at least
@@ -135,6 +136,7 @@ def defects_of_motion(state: State) -> None:
         _factor_of_rate(state)
     if state.position is not None and state.velocity is None:
         _jumps(state, _own_path(state), spikes=False)
+        _heading_offset(state)
     if state.velocity is None or state.position is None or state.body is None:
         return
     _ask_for_set_clock(state)
@@ -302,21 +304,60 @@ def when(state: State, t: float) -> str:
 
 
 def _heading_offset(state: State) -> None:
-    """Report a heading offset: the median of arg(u + i v) in the straightest runs, where a ship has no drift angle."""
-    assert state.body is not None
+    """Report a heading offset: by all courses, beside a steady current, or by the straightest runs."""
     assert state.psi is not None
-    r = state.r if state.r is not None else np.gradient(state.psi, state.t)
-    rows = evidence.straight(r, state.t) & (np.abs(state.body) > 0.3 * np.percentile(np.abs(state.body), 90))
-    if rows.mean() < 0.02:
+    angle, error, current = _off_on_all_courses(state)
+    if error < CLEAR:
+        why = f"on all courses the way leaves the heading by {np.degrees(angle):+.1f} deg (+- {np.degrees(error):.1f})"
+        why += f", beside a steady current of {abs(current):.2g} m/s: heading off, or wind"
+    elif state.body is None:
         return
-    drift = np.angle(-state.body[rows] if state.astern else state.body[rows])
-    angle = float(np.median(drift))
-    scatter = float(np.median(np.abs(drift - angle)))
-    if np.pi / 4 > abs(angle) > max(OFFSET, 1.5 * scatter):  # one of more is a drift, or the zero of the heading
-        sentence = f"in straight runs the course leaves the heading by {np.degrees(angle):+.1f} deg"
-        sentence += ": heading off, or wind and current"
+    else:
+        r = state.r if state.r is not None else np.gradient(state.psi, state.t)
+        rows = evidence.straight(r, state.t) & (np.abs(state.body) > 0.3 * np.percentile(np.abs(state.body), 90))
+        if rows.mean() < 0.02:
+            return
+        # median of arg(u + i v), where a ship has no drift angle
+        drift = np.angle(-state.body[rows] if state.astern else state.body[rows])
+        angle = float(np.median(drift))
+        error = float(np.median(np.abs(drift - angle))) / 2
+        why = f"in straight runs the course leaves the heading by {np.degrees(angle):+.1f} deg"
+        why += ": heading off, or wind and current"
+    if np.pi / 4 > abs(angle) > max(OFFSET, 3 * error):  # one of more is a drift, or the zero of the heading
         repair = {"kind": "heading_offset", "offset": round(angle, 4), "unit": "rad"}
-        state.find("heading offset", ("psi",), 0.6, sentence, repair)
+        state.find("heading offset", ("psi",), 0.6, why, repair)
+
+
+def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
+    """How far the heading is off [rad], its standard error, and a steady current, north + i east [m/s].
+
+    Over each window the way across the heading is off * (way along it) + arm * (turn) + (current across): a sway in
+    turns, an antenna and a late heading are an arm.
+    """
+    assert state.psi is not None
+    assert state.position is not None
+    span = state.t[state.chosen.last] - state.t[state.chosen.first]
+    psi = state.chosen.change(evidence.integral(state.t, state.psi)).real / span
+    north = np.exp(-1j * psi)
+    if state.body is None:
+        ran = state.chosen.change(state.position) / span * north
+    else:
+        ran = state.chosen.change(evidence.integral(state.t, state.body)) / span
+    ran = -ran if state.astern else ran
+    columns = (ran.real, state.chosen.change(state.psi).real / span, north.imag, north.real)
+    design = np.stack(columns, axis=1)
+    keep = np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90)
+    for _ in range(2):
+        if keep.sum() < 40:
+            return 0.0, np.inf, 0j
+        found = np.linalg.lstsq(design[keep], ran.imag[keep], rcond=None)[0]
+        miss = np.abs(ran.imag - design @ found)
+        keep &= miss <= 6.0 * np.median(miss[keep]) + 1e-9
+    parts = np.array_split(np.flatnonzero(keep), 10)
+    others = [np.concatenate(parts[:i] + parts[i + 1 :]) for i in range(len(parts))]
+    without = [np.linalg.lstsq(design[rows], ran.imag[rows], rcond=None)[0][0] for rows in others]
+    error = float(np.std(without)) * np.sqrt(len(without) - 1)  # of the jackknife
+    return float(found[0]), error, complex(found[2], found[3])
 
 
 def _times(state: State, rows: NDArray[np.intp]) -> str:

@@ -207,9 +207,9 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
     turn = np.exp(1j * state.psi)
     state.body = np.asarray(velocity / turn if frame == "earth" else velocity)
     fit = Fit(fit.scale / factor, fit.error / factor, fit.left)
-    if frame == "earth":
-        fit, velocity = _as_track(state, fit, velocity, (first, second))
-    state.velocity = np.asarray(velocity if frame == "earth" else velocity * turn)
+    along = "" if frame == "earth" else next((one.source for one in state.suggestions if one.name == "psi"), "psi")
+    ground = velocity if frame == "earth" else velocity * turn
+    fit, state.velocity = _as_track(state, fit, np.asarray(ground), (first, second), along=along)
     _factor(state, rest, fit, (first, second), unit)
 
 
@@ -375,12 +375,13 @@ def _ask_if_exchanged(state: State, seen: Complex, speed: str, course: str, fit:
 
 
 def _as_track(
-    state: State, fit: Fit, velocity: Complex, sources: tuple[str, ...], unit: str = "deg"
+    state: State, fit: Fit, velocity: Complex, sources: tuple[str, ...], unit: str = "deg", along: str = ""
 ) -> tuple[Fit, Complex]:
     """Ask where the track is turned against velocities over ground (N,) [m/s]; return both as turned with it.
 
-    The north of a map, or of a compass, is another one. Where the ship turns, a position that is late, or of another
-    point, is turned, too, by as much as she turns. On a straight way a current may turn the track.
+    The north of a map, or of a compass, is another one; velocities `along` a heading are turned where it is off. Where
+    the ship turns, a position that is late, or of another point, is turned, too, by as much as she turns. On a straight
+    way a current may turn the track.
     """
     assert state.position is not None
     assert state.psi is not None
@@ -397,8 +398,14 @@ def _as_track(
     if not max(TURNED, 5 * error) < abs(angle) < np.pi / 4:
         return fit, velocity
     names = " and ".join(map(repr, sources))
-    words = f"the track is turned by {np.degrees(angle):+.1f} +- {np.degrees(error):.1f} deg against {names}: is their "
-    words += "north another than that of the positions, as that of a map or of a compass?"
+    words = f"the track is turned by {np.degrees(angle):+.1f} +- {np.degrees(error):.1f} deg against {names}"
+    if along:
+        heading = next((one.unit for one in state.suggestions if one.name == "psi"), "rad")
+        words += f" along {along!r}: is the heading off, or the north of the positions another? Then write "
+        state.ask(("psi", "u", "v"), f"{words}offset = {angle / to_si(heading, 'psi'):.4g} ({heading}) for psi")
+        turn = np.exp(1j * angle)
+        return evidence.fit(seen[keep], ran[keep] * turn), np.asarray(velocity * turn)
+    words += ": is their north another than that of the positions, as that of a map or of a compass?"
     remedy = f"offset = {angle / to_si(unit, 'psi'):.4g} ({unit}) for course, and for psi, too, if it counts so"
     remedy = f"Then write {remedy}" if len(sources) == 1 else "Then turn the positions, or these"
     state.ask(("psi", "course", "u", "v"), f"{words} {remedy}")

@@ -92,6 +92,41 @@ def test_a_defect_is_reported_with_its_size(kind: str, tmp_path: Path) -> None:
     assert re.search(sentence, findings[kind].sentence), findings[kind].sentence
 
 
+def in_a_current(frame: pd.DataFrame, north: float, east: float) -> pd.DataFrame:
+    c, s = np.cos(np.radians(frame["psi"])), np.sin(np.radians(frame["psi"]))
+    moved = {"N": frame["N"] + north * frame["time"], "E": frame["E"] + east * frame["time"]}
+    return frame.assign(**moved, u=frame["u"] + c * north + s * east, v=frame["v"] + c * east - s * north)
+
+
+@pytest.mark.parametrize("angle", [-5.0, -3.0, 0.0, 3.0, 5.0])
+@pytest.mark.parametrize("velocities", [True, False])
+def test_a_heading_that_is_off_is_found_in_a_current_and_without_velocities(
+    angle: float, velocities: bool, tmp_path: Path
+) -> None:
+    """Straight runs alone tell a current of 0.7 m/s and 3 deg not apart, and they need velocities."""
+    log = turned(in_a_current(CLEAN, -0.4, 0.6), angle)
+    log = log if velocities else log.drop(columns=["u", "v"])
+    found = [one for one in guessed(tmp_path, log).findings if one.kind == "heading offset"]
+    assert len(found) == (angle != 0.0)
+    for one in found:
+        assert one.repair is not None
+        assert np.degrees(one.repair["offset"]) == pytest.approx(angle, abs=0.5)
+        assert re.search(r"current of 0\.[67]\d? m/s", one.sentence), one.sentence
+
+
+@pytest.mark.parametrize("angle", [-4.0, 0.0, 4.0])
+def test_a_heading_along_which_the_velocities_are_not_the_track_is_asked(angle: float, tmp_path: Path) -> None:
+    """u and v were measured in the ship, so that they are right; a repair that turns them is none."""
+    result = guessed(tmp_path, CLEAN.assign(psi=(CLEAN["psi"] - angle) % 360.0))
+    asked = [one.sentence for one in result.questions if "track is turned" in one.sentence]
+    assert len(asked) == (angle != 0.0)
+    assert "heading offset" not in result.kinds
+    for sentence in asked:
+        offset = re.search(r"offset = (\S+) \(deg\) for psi", sentence)
+        assert offset is not None
+        assert float(offset[1]) == pytest.approx(angle, abs=0.3)
+
+
 @pytest.mark.parametrize("factor", [0.9, 1.0, 10 / 9])
 @pytest.mark.parametrize("delay", [0.0, 2.0])
 def test_a_yaw_rate_times_a_factor_is_scaled(factor: float, delay: float, tmp_path: Path) -> None:
