@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from shipid.errors import ShipidError
-from shipid.study.code import code_digest
+from shipid.study.code import asked, code_digest
 from shipid.version import __version__
 
 DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed in seconds
@@ -22,6 +22,7 @@ DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed 
     "distributed.comm.retry.count": 0,
 }
 KEPT = "what is finished is kept: go on with `shipid study resume`"
+REMEDY = "start scheduler and workers where shipid, and methods that you wrote, can be imported as here"
 LOOK = 2.0  # s between looks at the scheduler while nothing comes
 SILENT = 30.0  # s that a scheduler may take to answer
 PATIENCE = 20.0  # s without any worker until that is reported
@@ -39,6 +40,7 @@ def on_dask(
     shared: Shared,
     tasks: Iterable[tuple[str, Task]],
     name: str,
+    needs: object = None,
 ) -> Iterator[tuple[Task, Result]]:
     """Tasks and what `work(shared, task)` makes of them, in the order in which they finish.
 
@@ -49,6 +51,7 @@ def on_dask(
     scheduler : address of a Dask scheduler, such as `tcp://host:8786`.
     shared : sent once to each worker. tasks : with a key each, taken when workers are about to need them. name : of the
         whole work; beside it the keys name this client, since a scheduler computes a key once for all its clients.
+    needs : a small part of `shared`; a worker that cannot read it is named, since it dies of the whole without a word.
 
     Raises
     ------
@@ -69,7 +72,7 @@ def on_dask(
         except (OSError, ValueError) as error:
             raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
         try:
-            yield from _results(client, scheduler, work, shared, tasks, name)
+            yield from _results(client, scheduler, work, shared, tasks, name, needs)
         finally:
             with suppress(Exception):  # a client whose scheduler is gone complains in many ways
                 client.close(timeout=2)
@@ -82,6 +85,7 @@ def _results(
     shared: Shared,
     tasks: Iterable[tuple[str, Task]],
     name: str,
+    needs: object,
 ) -> Iterator[tuple[Task, Result]]:
     from dask.distributed import CancelledError, KilledWorker
 
@@ -91,11 +95,14 @@ def _results(
     ended: SimpleQueue[Any] = SimpleQueue()
     killed: list[str] = []
     mistake: Exception | None = None
+    given: Any = None
     keys = f"shipid-{name}-{client.id}"
     try:
+        watch = _Watch(client, needs)
+        watch.look()  # before anything is sent: what cannot be read ends a worker
         given = client.submit(_given, shared, key=f"{keys}-shared", pure=False)  # made again if its worker dies
         left: dict[str, tuple[str, Task, Any]] = {}
-        waiting, watch = iter(tasks), _Watch(client)
+        waiting = iter(tasks)
         while True:
             watch.look()
             for key, task in islice(waiting, max(AHEAD * watch.threads - len(left), 0)):
@@ -122,7 +129,7 @@ def _results(
             yield task, results
             del future, results  # a worker may forget them
     except (OSError, TimeoutError, CancelledError):
-        if given.status == "error":  # the work was refused, and all that needs it with it
+        if given is not None and given.status == "error":  # the work was refused, and all that needs it with it
             raise ShipidError(_unread(given), path=f"--scheduler {scheduler}") from None
         raise gone() from None
     if mistake is not None:
@@ -142,19 +149,22 @@ def _unread(given: Any) -> str:
     error = given.exception(timeout=SILENT)
     while error.__cause__ is not None:
         error = error.__cause__
-    remedy = "start scheduler and workers where shipid, and methods that you wrote, can be imported as here"
-    return f"the Dask scheduler cannot read the work ({str(error).splitlines()[0]}): {remedy}"
+    return f"the Dask scheduler cannot read the work ({str(error).splitlines()[0]}): {REMEDY}"
 
 
 class _Watch:
     """Looks at a scheduler: OSError where it is gone, a warning where it has no worker for a while.
 
-    Workers that have joined are asked for their code: one that lacks what a task needs dies of it without a word.
+    Workers that have joined are asked for their code, and whether they can read what tasks need: one that lacks it dies
+    of its first task without a word.
 
     threads : of all workers at the last look; at least 1, so that there is something to wait for.
     """
 
-    def __init__(self, client: Any) -> None:
+    def __init__(self, client: Any, needs: object = None) -> None:
+        from distributed.protocol.pickle import dumps
+
+        self._needs: bytes = dumps(needs)
         self._client, self._alone, self._warned = client, time.monotonic(), False
         self._looked, self.threads = float("-inf"), 1
         self._asked: set[str] = set()
@@ -184,15 +194,22 @@ class _Watch:
         answers: dict[str, Any] = {}
         with suppress(OSError, TimeoutError):  # a worker that is slow to answer gets its tasks all the same
             answers = self._client.sync(
-                ask, code_digest, workers=list(workers), on_error="return", callback_timeout=SILENT
+                ask, asked, self._needs, workers=list(workers), on_error="return", callback_timeout=SILENT
             )
         for address, answer in sorted(answers.items()):
+            if isinstance(answer, OSError):
+                log.warning("the worker %s died before it said what it can read: %s", address, REMEDY)
+                continue
             if isinstance(answer, Exception):
                 log.warning(
                     "the worker %s has no shipid %s as here, and may die of a task (%s)", address, __version__, answer
                 )
-            elif answer != code_digest():
-                log.warning("the worker %s has another shipid: code %s, here %s", address, answer, code_digest())
+                continue
+            code, missing = answer
+            if missing:
+                log.warning("the worker %s cannot read the work, and dies of it (%s): %s", address, missing, REMEDY)
+            elif code != code_digest():
+                log.warning("the worker %s has another shipid: code %s, here %s", address, code, code_digest())
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import inspect
+import pickle
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
@@ -18,6 +19,15 @@ def code_digest() -> str:
     files = sorted((file.relative_to(package).as_posix(), file) for file in package.rglob("*.py"))
     lines = (f"{name} {hashlib.sha256(file.read_bytes()).hexdigest()}\n" for name, file in files)
     return hashlib.sha256("".join(lines).encode()).hexdigest()[:8]
+
+
+def asked(packed: bytes) -> tuple[str, str]:
+    """What a worker is asked: `code_digest`, and why it cannot read what is packed; empty where it can."""
+    try:
+        pickle.loads(packed)
+    except Exception as error:
+        return code_digest(), str(error).partition("\n")[0] or type(error).__name__
+    return code_digest(), ""
 
 
 def of_users(kind: type) -> bool:

@@ -36,7 +36,7 @@ from shipid.metrics import lengths, position_error, share_of, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
 from shipid.study.claims import WAIT, Claims, Holder, TakenOver, pause
-from shipid.study.code import code_digest
+from shipid.study.code import code_digest, of_users
 from shipid.study.declared import Foundation, Way
 from shipid.study.envelope import envelope
 from shipid.study.foundations import Prediction, predictions
@@ -607,10 +607,11 @@ def _compute(
         return
     from shipid.study.cluster import on_dask  # takes time to import, and memory in every worker
 
-    shared = plan, prepared, device, trials, holder
+    shared = plan, prepared, device, trials, holder, plan.code
+    of_user = [way.method for way in plan.methods if of_users(type(way.method))]
     noted: list[Mapping[str, Any]] = []
     named = ((unit.key, unit) for unit in units)
-    for unit, (session, results) in on_dask(scheduler, _there, shared, named, plan.digest):
+    for unit, (session, results) in on_dask(scheduler, _there, shared, named, plan.digest, of_user):
         if session not in noted:
             noted.append(session)
             with Claims(folder) as claims, claims.alone(SESSIONS):
@@ -620,10 +621,13 @@ def _compute(
         yield unit, results
 
 
-def _there(shared: tuple[Plan, Prepared, str, Path, Holder], unit: Unit) -> tuple[dict[str, Any], Results | str]:
+def _there(
+    shared: tuple[Plan, Prepared, str, Path, Holder, Mapping[str, str]], unit: Unit
+) -> tuple[dict[str, Any], Results | str]:
     """A unit on a machine of a cluster: what it was computed with, and the results."""
-    plan, prepared, device, trials, holder = shared
-    return session_on(device, plan.code), _claimed(plan, prepared, unit, device, trials, holder)
+    plan, prepared, device, trials, holder, code = shared
+    sent = {way.name: code[way.name] for way in plan.methods if type(way.method).__module__ == "__main__"}
+    return session_on(device, {**plan.code, **sent}), _claimed(plan, prepared, unit, device, trials, holder)
 
 
 def _claimed(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path, holder: Holder) -> Results | str:

@@ -189,6 +189,30 @@ def test_a_scheduler_that_cannot_read_the_work_is_not_said_to_be_gone(
 
 
 @pytest.mark.slow
+def test_a_worker_that_cannot_read_the_work_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
+    """The scheduler has the module of a user's method and the worker has not: it died, and nobody said why."""
+    from dask.distributed import Client
+
+    (tmp_path / "own_method_there.py").write_text("class Own:\n    pass\n")
+    (tmp_path / "without").mkdir()
+    with (
+        a_cluster(tmp_path, workers=0) as (address, _),
+        a_worker(address, tmp_path / "without", "--no-nanny"),
+        Client(address) as client,
+    ):
+        monkeypatch.syspath_prepend(str(tmp_path))
+        own = importlib.import_module("own_method_there").Own()
+        client.wait_for_workers(1)
+        watch = cluster._Watch(client, [own])
+        watch.look()
+    (record,) = caplog.records
+    words = r"worker tcp\S+ cannot read the work, .*\(No module named 'own_method_there'\): start scheduler and workers"
+    assert re.search(words, record.getMessage())
+
+
+@pytest.mark.slow
 def test_a_worker_with_the_same_shipid_is_not_named(tmp_path: Path, caplog: Any) -> None:
     with a_cluster(tmp_path) as (address, _):
         assert list(on_dask(address, napping(0.0), 10, [("t", 1)], "x")) == [(1, 11)]

@@ -591,3 +591,15 @@ def test_a_number_of_workers_that_is_none_is_refused_before_any_work(tmp_path: P
     with pytest.raises(ShipidError, match="workers must be a whole number, 1 or more, not"):
         next(run_study(tiny_plan(tmp_path), tmp_path / "run", workers=workers))
     assert not (tmp_path / "run").exists()
+
+
+def test_a_method_in_the_script_itself_has_the_code_of_the_script_on_a_cluster(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its class travels by value: what a worker was started by has nothing to do with it."""
+    kind = type("Mine", (METHODS["path-drawn"],), {"__module__": "__main__"})
+    monkeypatch.setitem(METHODS, "mine", kind)
+    monkeypatch.setattr(run, "_claimed", lambda *_: "left")
+    plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine"}, {"name": "bare", "kind": "alone"}]})
+    session, _ = run._there((plan, None, "cpu", tmp_path, None, {"mine": "01234567"}), plan.units[0])  # type: ignore[arg-type]
+    assert session["code of the method"] == {"mine": "01234567"}
