@@ -16,6 +16,7 @@ MOST_ROWS, SCATTER = 0.9, 3.0  # of the changes from row to row, and how far suc
 LEVEL_RATE = 0.05  # of the largest rate: rates closer than this are one level
 LAST = 0.25  # of a level of rate: it is read in its last quarter
 LEFT_OUT = 0.05  # of a level of rate: at its end the helm is over for the next level already
+UNSETTLED = 0.01  # of the distance of levels: a narrower loop is what is left of turns that were not quite steady
 ONE_SIDE = "the ship turns to one side at every helm angle"
 
 
@@ -68,10 +69,11 @@ def spiral(record: Record) -> Measures:
     Returns
     -------
     Measures : `neutral_helm` [rad], mean of the helm angles at which the rate changes sign on the two branches;
-        `loop_width` [rad], their difference; `loop_height` [rad/s], the difference of the rates at helm 0. Width and
-        height are 0 for a stable ship; their resolution is `levels_apart` [rad], the distance of the steady levels
-        between which the rate changes sign, the larger of both ways. `levels`, `levels_not_steady`: counts. A ship that
-        turns to one side at every helm angle has no height: her loop may be wider than the spiral.
+        `loop_width` [rad], their difference; `loop_height` [rad/s], the difference of the rates at helm 0. Their
+        resolution is `levels_apart` [rad], the distance of the steady levels between which the rate changes sign, the
+        larger of both ways. Width and height are 0 for a stable ship, as is a loop below a hundredth of that distance.
+        `levels`, `levels_not_steady`: counts. A ship that turns to one side at every helm angle has no height: her
+        loop may be wider than the spiral.
     """
     measures, points = Measures(), levels(record)
     ways = [(points.helm[way], points.rate[way]) for way in _ways(points.helm)]
@@ -80,11 +82,14 @@ def spiral(record: Record) -> Measures:
     apart = [_around_zero(rate, helm) for helm, rate in ways] if len(ways) == 2 else [NAN, NAN]
     why = "the rate does not change sign on the way there and on the way back, on levels that are steady"
     measures.add("neutral_helm", (zero[0] + zero[1]) / 2, "rad", why)
-    measures.add("loop_width", abs(zero[1] - zero[0]), "rad", why)
+    width, height, resolved = abs(zero[1] - zero[0]), abs(flat[1] - flat[0]), max(apart)
+    if width < UNSETTLED * resolved:
+        width = height = 0.0
+    measures.add("loop_width", width, "rad", why)
     branch = bool(np.isnan(zero).all() and flat[0] * flat[1] > 0)  # both ways may lie on one branch of a loop
     unknown = ONE_SIDE if branch else "the helm does not pass 0 on both ways"
-    measures.add("loop_height", NAN if branch else abs(flat[1] - flat[0]), "rad/s", unknown)
-    measures.add("levels_apart", max(apart) if np.isfinite(apart).all() else NAN, "rad", why)
+    measures.add("loop_height", NAN if branch else height, "rad/s", unknown)
+    measures.add("levels_apart", resolved if np.isfinite(apart).all() else NAN, "rad", why)
     measures.add("levels", len(points.helm), "-", "")
     measures.add("levels_not_steady", points.skipped, "-", "")
     return measures

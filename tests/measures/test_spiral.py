@@ -24,6 +24,15 @@ def test_a_stable_ship_has_no_loop() -> None:
     np.testing.assert_allclose(points.rate, GAIN * np.array(LEVELS) * DEGREE, atol=1e-5)
 
 
+def test_what_is_left_of_a_turn_is_no_loop() -> None:
+    """Rates that lag by 0.4 % of a level, as they do eight time constants after the helm."""
+    record = every(stable_spiral(), 0.5)
+    back = record.t >= START + HOLD * 8
+    late = np.where(back, -1.0, 1.0) * np.where(record.t >= START, 0.004 * GAIN * DEGREE, 0.0)
+    measures = spiral(replace(record, r=record.r + late))
+    assert measures["loop_width"].value == measures["loop_height"].value == 0.0
+
+
 @pytest.mark.parametrize(("share", "noise"), [(1.0, 0.05), (0.2, 0.03), (0.2, 0.0), (0.04, 0.0)])
 def test_levels_may_be_as_close_as_the_helm_is_quiet(share: float, noise: float) -> None:
     """Helm angles of 20 deg to 0.8 deg at most, with noise [deg]: levels that run together made a loop."""
