@@ -14,8 +14,8 @@ import pytest
 
 from shipid.engine import native
 from shipid.engine.integrate import Batch, Job
-from shipid.engine.native import compiler, run_native, target
-from shipid.engine.rollout import distances, rollout
+from shipid.engine.native import NOTED, compiler, measure_native, run_native, target
+from shipid.engine.rollout import distances, prepared, rollout
 from shipid.engine.vectors import DOUBLE, Target
 from shipid.errors import ShipidError
 from shipid.metrics import position_error, tally
@@ -182,6 +182,27 @@ def test_distances_are_those_of_the_paths(count: int, num_variants: int, draw_in
         np.testing.assert_allclose(measured.total, [variant.sum(axis=0) for variant in expected], rtol=1e-12)
         np.testing.assert_array_equal(measured.tally, [tally(variant) for variant in expected])
         assert not measured.diverged.any()
+
+
+@pytest.mark.parametrize("every", [1, 3])
+@pytest.mark.parametrize("count", [5, 67])
+def test_distances_of_a_long_rollout_are_all_counted(count: int, every: int, draw_inputs: Callable[..., Any]) -> None:
+    """More than are noted at a time, also where a record is not every step and a start is no number."""
+    given = draw_inputs(SHIP, count)
+    given["start"]["u"][-1] = np.nan
+    steps = every * (NOTED + 9)
+    model, batch = prepared(SHIP, **given, components={}, num_steps=steps, parameters=None, memory=None,
+                            tau_extra=None, helmsman=None)  # fmt: skip
+    job = Job(0.5, steps, "euler", every, (model.state.index("north"), model.state.index("east")))
+    goal = np.random.default_rng(0).uniform(-90, 90, (steps // every, 2, count))
+    records, worst = run_native(model, batch, job)
+    total, counts, fastest = measure_native(model, batch, job, goal)
+    apart = np.hypot(*(records[1:, 0] - goal.transpose(0, 2, 1)).transpose(2, 0, 1))
+    np.testing.assert_allclose(total[0], apart.sum(axis=0), rtol=1e-12)
+    np.testing.assert_array_equal(fastest, worst)
+    assert np.isnan(total[0, -1])
+    assert counts[0].sum() == apart.size
+    assert np.abs(counts[0].astype(int) - tally(apart)).sum() <= 2  # a distance may be rounded into the next bin
 
 
 @pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "esso-190k"])
