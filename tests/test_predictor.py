@@ -215,6 +215,9 @@ def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
         ({"0.std": np.zeros(1)}, "'0.std' must be above 0"),
         ({"bands.spread": np.array([1.0, 0.0])}, "'bands.spread' must be above 0"),
         ({"bands.deviation": -np.ones(5)}, "'bands.deviation' must be above 0"),
+        ({"bands.whole": np.arange(98.0)}, r"damaged: 'whole' of the band must be \(99,\), not \(98,\)"),
+        ({"bands.centres": np.zeros((0, 6))}, "damaged: 'centres' of the band must be"),
+        ({"bands.slopes": np.array(0.1)}, r"damaged: 'slopes' of the band must be \(5,\), not \(\)"),
         ({"vessel": {"document": {"name": "x"}, "file": "x.toml"}}, "damaged"),
     ],
 )

@@ -187,11 +187,19 @@ class Bands:
 
     @classmethod
     def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild what `header` and `arrays` gave; ResultError where a part is missing."""
+        """Rebuild what `header` and `arrays` gave; ResultError where a part is missing or has another shape."""
         names = [one.name for one in fields(cls) if one.name not in ("runs", "names", "far", "length", "kinds")]
         missing = next((name for name in names if name not in arrays), None)
         if missing is not None:
             raise ResultError(f"damaged: the band lacks {missing!r}")
+        steps, columns = np.size(arrays["along"]), len(header["names"])
+        centres = max(len(np.atleast_1d(arrays["centres"])), 1)
+        shapes = {"along": (steps,), "across": (steps,), "whole": LEVELS.shape, "steps": (len(LEVELS), steps)}
+        shapes |= {"centres": (centres, columns), "spread": (columns,), "by_kind": (len(header["kinds"]), len(LEVELS))}
+        shapes |= dict.fromkeys(("middle", "deviation", "low", "high", "slopes"), (len(TRAITS),))
+        for name, shape in shapes.items():
+            if np.shape(arrays[name]) != shape:
+                raise ResultError(f"damaged: {name!r} of the band must be {shape}, not {np.shape(arrays[name])}")
         return cls(
             runs=int(header["runs"]),
             names=tuple(header["names"]),
