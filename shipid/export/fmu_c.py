@@ -261,7 +261,7 @@ typedef enum { INSTANTIATED, INITIALIZING, STEPPING, TERMINATED } Phase;
 typedef struct {
     Model model;
     Phase phase;
-    double time;
+    double time, stop; /* the stop is that of the experiment, infinite where it has none */
     unsigned char set[NUM_REALS]; /* by the importer */
     char *name;
     fmi2CallbackFunctions call;
@@ -341,6 +341,7 @@ FMI2_EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, 
     }
     strcpy(self->name, name);
     Model_init(&self->model);
+    self->stop = INFINITY;
     return self;
 }
 
@@ -363,12 +364,13 @@ FMI2_STATUS FMI2(fmi2SetupExperiment)(fmi2Component c, fmi2Boolean known, fmi2Re
     Instance *self = (Instance *)c;
     (void)known;
     (void)tolerance;
-    (void)stops;
-    (void)stop;
     if (!self) return fmi2Error;
     if (self->phase != INSTANTIATED) return refuse(self, fmi2Error, "the start time is set before the initialisation");
     if (!isfinite(start)) return refuse(self, fmi2Error, "the start time is not finite");
+    if (stops && !(stop >= start))
+        return refuse(self, fmi2Error, "the stop time %g must not be before the start time %g", stop, start);
     self->time = start;
+    self->stop = stops ? stop : INFINITY;
     return fmi2OK;
 }
 
@@ -420,6 +422,7 @@ FMI2_STATUS FMI2(fmi2Reset)(fmi2Component c)
     memset(self->set, 0, sizeof self->set);
     self->phase = INSTANTIATED;
     self->time = 0;
+    self->stop = INFINITY;
     return fmi2OK;
 }
 
@@ -667,6 +670,8 @@ FMI2_STATUS FMI2(fmi2DoStep)(fmi2Component c, fmi2Real time, fmi2Real step, fmi2
     if (self->phase != STEPPING) return refuse(self, fmi2Error, "the initialisation is not over, or the simulation has ended");
     if (!isfinite(time) || !isfinite(step) || step < 0)
         return refuse(self, fmi2Discard, "time %g and step %g must be finite, the step not below 0", time, step);
+    if (time + step > self->stop + 1e-9 * fmax(fabs(self->stop), step))
+        return refuse(self, fmi2Error, "a step from %g to %g s goes beyond the stop time %g s", time, time + step, self->stop);
     if (step == 0) return fmi2OK;
     message = Model_step(&self->model, time, step);
     if (message) return refuse(self, fmi2Discard, "at %g s: %s", time, message);

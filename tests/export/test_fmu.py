@@ -160,6 +160,39 @@ def test_calls_out_of_order_and_states_of_others_are_refused(ship, tmp_path):
     run_c(ship, CALLS_OUT_OF_ORDER, tmp_path)
 
 
+BEYOND_THE_STOP = """
+#include "ship.c"
+#define NO(call) if ((call) != fmi2Error) return __LINE__
+#define YES(call) if ((call) != fmi2OK) return __LINE__
+int main(void)
+{
+    fmi2CallbackFunctions call = {0, 0, 0, 0, 0};
+    fmi2Component c = fmi2Instantiate("a", fmi2CoSimulation, guid, "", &call, 0, 0);
+    int k;
+    if (!c) return __LINE__;
+    NO(fmi2SetupExperiment(c, 0, 0, 3, 1, 2));
+    NO(fmi2SetupExperiment(c, 0, 0, 3, 1, NAN));
+    YES(fmi2SetupExperiment(c, 0, 0, 3, 1, 4));
+    YES(fmi2EnterInitializationMode(c));
+    YES(fmi2ExitInitializationMode(c));
+    for (k = 0; k < 10; ++k) YES(fmi2DoStep(c, 3 + 0.1 * k, 0.1, 0)); /* to 4, but for rounding */
+    NO(fmi2DoStep(c, 4, 0.1, 0));
+    NO(fmi2DoStep(c, 3.9, 0.2, 0));
+    YES(fmi2Reset(c));
+    YES(fmi2EnterInitializationMode(c));
+    YES(fmi2ExitInitializationMode(c));
+    YES(fmi2DoStep(c, 4, 0.1, 0)); /* no stop was set */
+    fmi2FreeInstance(c);
+    return 0;
+}
+"""
+
+
+def test_no_step_goes_beyond_the_stop_time(ship, tmp_path):
+    """As FMI 2.0 asks; before, the stop time was not looked at."""
+    run_c(ship, BEYOND_THE_STOP, tmp_path)
+
+
 WITHOUT_A_COMPONENT = """
 #include "path.c"
 #define NO(call) if ((call) == fmi2OK) return __LINE__
