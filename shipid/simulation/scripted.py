@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from typing import Annotated, Any
 
+import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
@@ -14,8 +16,11 @@ from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre
 from shipid.simulation.perform import perform
 from shipid.simulation.truth import Truth, simulate
+from shipid.units import plural
 from shipid.vessel.load import Vessel
 
+log = logging.getLogger(__name__)
+ACTUAL = "actual."  # begins the names of states of actuators
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 
 
@@ -53,7 +58,25 @@ def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
         frame = perform(vessel, _given(script, vessel), step=script.step, interval=script.interval)
     except ShipidError as error:
         raise DocumentError(error.message, file=file, path=error.path) from None
-    return frame.drop(columns=[column for column in frame if str(column).startswith("actual.")])
+    _tell_of_starts(frame)
+    return frame.drop(columns=[column for column in frame if str(column).startswith(ACTUAL)])
+
+
+def _tell_of_starts(frame: pd.DataFrame) -> None:
+    """Warn where an actuator has not reached its order in the first row: a reader of the log takes it for there."""
+    first = frame.groupby("run", sort=False).first()
+    lags = [column for column in map(str, frame) if column.startswith(ACTUAL)]
+    ordered = first[[column.removeprefix(ACTUAL) for column in lags]].to_numpy()
+    late = ~np.isclose(first[lags].to_numpy(), ordered, rtol=1e-3, atol=1e-6)
+    runs, commands = first.index[late.any(axis=1)], [lags[place] for place in np.flatnonzero(late.any(axis=0))]
+    if len(runs):
+        more = f" and {len(runs) - 1} more {plural(len(runs) - 1, 'run')}" if len(runs) > 1 else ""
+        named, be, them = ", ".join(commands), plural(len(commands), "is", "are"), plural(len(commands), "it", "them")
+        log.warning(
+            f"{runs[0]}{more}: in the first row {named.replace(ACTUAL, '')} {be} not yet where the order is, and who "
+            f"reads the log takes {them} for there: to identify or predict from it, give execute_at = 20 (s) in each "
+            "[[manoeuvre]]"
+        )
 
 
 def _given(script: Script, vessel: Vessel) -> list[Manoeuvre]:
