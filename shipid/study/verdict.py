@@ -117,7 +117,8 @@ def runs(count: int) -> str:
 
 def words(model: str) -> str:
     """Name a model inside a sentence; that without physics in quotes: `no physics is worse` would say that none is."""
-    return f'"{spoken(model)}"' if model == NO_MODEL else model
+    name, plus, method = model.partition(" + ")  # of a method beside the one that the study judges by
+    return f'"{spoken(name)}"{plus}{method}' if name == NO_MODEL else model
 
 
 def named(models: Iterable[str]) -> str:

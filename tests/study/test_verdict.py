@@ -85,6 +85,7 @@ def test_undecided_claims_keep_their_words_and_say_why() -> None:
 
 def test_many_names_are_cut_and_one_more_than_the_limit_is_not() -> None:
     assert words(NO_MODEL) == '"no physics"'
+    assert words(f"{NO_MODEL} + near") == '"no physics" + near'
     assert named([]) == ""
     assert named([NO_MODEL, "b"]) == '"no physics" and b'
     assert named("abcdef") == "a, b, c, d, e and f"
