@@ -145,7 +145,8 @@ class State:
     whose sign `columns` has turned. words : columns that hold words, with their first.
     commands : names of those of the vessel that the log is of, where it is known.
     turning : column that steers -> sign with which a positive value turns the ship to starboard, where that is seen.
-    astern : whether the ship goes astern nearly always.
+    astern : whether the ship goes astern nearly always. changed : columns of the dataset that seem to have another
+    unit or sign in a part of the log.
     position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
@@ -168,6 +169,7 @@ class State:
     commands: tuple[str, ...] = ()
     turning: dict[str, float] = field(default_factory=dict)
     astern: bool = False
+    changed: set[str] = field(default_factory=set)
     position: Complex | None = None
     psi: Array | None = None
     r: Array | None = None
@@ -176,8 +178,12 @@ class State:
 
     def effect(self, r: Array, order: Array) -> float:
         """Return the t value of the effect of an order (N,) on the yaw rate r (N,) [rad/s], in parts of usual turns."""
-        span = float(np.median(self.t[self.chosen.last] - self.t[self.chosen.first]))
-        return effect(self.t, r, order, PART * span)
+        return effect(self.t, r, order, self.part)
+
+    @property
+    def part(self) -> float:
+        """Duration [s] of the windows in which effects of orders are seen, a part of a usual turn."""
+        return PART * float(np.median(self.t[self.chosen.last] - self.t[self.chosen.first]))
 
     def command_of(self, name: str) -> str:
         """Return the command of the vessel whose component and signal the name of a column says; empty if none does.

@@ -17,6 +17,7 @@ from shipid.arguments import names_of, of_class, one_of, path_of
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
+from shipid.logs.guess.changes import ask_for_changes
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.clues import Finding, Question, State, Suggestion
 from shipid.logs.guess.commands import choose_commands, likely_unit
@@ -144,6 +145,7 @@ def guess(
     defects_of_rows(state, sniffed)
     find_stuck(state)
     defects_of_spikes(state)
+    ask_for_changes(state)
     defects_of_motion(state)
     left = reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)

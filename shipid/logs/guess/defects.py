@@ -28,7 +28,10 @@ HELD_SHARE, STAY = 0.2, 3.0  # of the rows; times the usual repeats in a row, fr
 TOGETHER = 0.5  # share of the steps of a held position that both of its columns make, at least
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
-CLEAR = 0.008  # rad: standard error of a heading that is off, at most, where the courses of the log show it
+CLEAR, ONE_WAY = (
+    0.008,
+    0.9,
+)  # rad, error of a heading that is off, at most; mean of directions, at most, of many courses
 NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
 STEPS_ABOUT = 5  # steps before and after a row, at least, whose median is usual there
 FARTHER = 2.0  # times the way from row to row that a ship would go in a hole of the clock, at least
@@ -220,7 +223,7 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
         repair = {"kind": "lever_arm", "x": round(off.real, 2), "y": round(off.imag, 2), "moves": "position"}
         state.find("lever arm", (), float(np.clip(abs(off) / (10 * error), 0.5, 0.95)), sentence, repair)
         return np.asarray(path + off * np.exp(1j * state.psi))
-    if float(np.sqrt(evidence.fit(seen[keep], ran[keep]).left)) > JITTER:
+    if not state.changed & {"u", "speed"} and float(np.sqrt(evidence.fit(seen[keep], ran[keep]).left)) > JITTER:
         far = float(np.sqrt(np.mean(np.abs(seen[keep] - scale * ran[keep]) ** 2)))
         current, share = _stream(seen[keep], ran[keep])
         if share > STREAM:
@@ -348,7 +351,7 @@ def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
     design = np.stack(columns, axis=1)
     keep = np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90)
     for _ in range(2):
-        if keep.sum() < 40:
+        if keep.sum() < 40 or abs(complex(np.mean(north[keep]))) > ONE_WAY:  # across one course a current is no less
             return 0.0, np.inf, 0j
         found = np.linalg.lstsq(design[keep], ran.imag[keep], rcond=None)[0]
         miss = np.abs(ran.imag - design @ found)

@@ -180,24 +180,37 @@ def effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
 
     t, r, order : (N,), r [rad/s]. duration : of the windows over which changes are compared [s].
     """
+    rows, design, change = answer(t, r, order, duration)
+    if len(rows) < 12 or np.ptp(order) == 0.0:
+        return 0.0
+    solution, errors, _ = solved(design, change)
+    return float(solution[0] / errors[0]) if 0.0 < errors[0] < np.inf else 0.0
+
+
+def answer(t: Array, r: Array, order: Array, duration: float) -> tuple[NDArray[np.intp], Array, Array]:
+    """Return first rows (W,), columns (W, 3) and left side (W,) of r' = a order + b r + c over windows."""
     chosen = windows(t, duration)
     thin = max(1, len(chosen.first) // 400)
     chosen = Windows(chosen.first[::thin], chosen.last[::thin])
-    if len(chosen.first) < 12 or np.ptp(order) == 0.0:
-        return 0.0
     width = max(1, round(duration / 2 / float(np.median(np.diff(t)))))
     smooth = [_boxcar(x, width) for x in (cumulative_integral(t, order), cumulative_integral(t, r), t, r)]
     *columns, change = (chosen.change(x).real for x in smooth)  # the equation holds for means, too
-    design = np.stack(columns, axis=1)
+    return chosen.first, np.stack(columns, axis=1), change
+
+
+def solved(design: Array, change: Array) -> tuple[Array, Array, float]:
+    """Return the solution (K,) by least squares, its standard errors, and the sum of squares left, inf if none is."""
     sizes = np.linalg.norm(design, axis=0)
+    none = np.zeros(len(sizes)), np.full(len(sizes), np.inf), np.inf
     if not np.all(sizes > 0):
-        return 0.0
+        return none
     solution, _, rank, _ = np.linalg.lstsq(design / sizes, change, rcond=None)
     if rank < design.shape[1]:
-        return 0.0
+        return none
     rest = change - design / sizes @ solution
-    spread = np.linalg.inv((design / sizes).T @ (design / sizes)) * float(rest @ rest) / max(1, len(rest) - 3)
-    return float(solution[0] / np.sqrt(spread[0, 0])) if spread[0, 0] > 0 else 0.0
+    left = float(rest @ rest)
+    spread = np.linalg.inv((design / sizes).T @ (design / sizes)) * left / max(1, len(rest) - len(sizes))
+    return solution / sizes, np.sqrt(np.diag(spread)) / sizes, left
 
 
 def follows(t: Array, r: Array, order: Array, duration: float) -> float:

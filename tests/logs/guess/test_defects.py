@@ -114,6 +114,14 @@ def test_a_heading_that_is_off_is_found_in_a_current_and_without_velocities(
         assert re.search(r"current of 0\.[67]\d? m/s", one.sentence), one.sentence
 
 
+def test_a_current_across_one_course_is_no_heading_that_is_off_on_all(tmp_path: Path) -> None:
+    t = np.arange(0.0, 900.0, 0.5)
+    psi = 0.35 * np.sin(t / 12)
+    place = np.cumsum(5.0 * np.exp(1j * psi) + 0.3j) * 0.5
+    log = {"time": t, "N": place.real, "E": place.imag, "psi": np.degrees(psi)}
+    assert "heading offset" not in guessed(tmp_path, pd.DataFrame(log).round(3)).kinds
+
+
 @pytest.mark.parametrize("angle", [-4.0, 0.0, 4.0])
 def test_a_heading_along_which_the_velocities_are_not_the_track_is_asked(angle: float, tmp_path: Path) -> None:
     """u and v were measured in the ship, so that they are right; a repair that turns them is none."""

@@ -1,0 +1,117 @@
+"""A unit or a sign that another part of a log has, as where files of two recorders were put together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipid.data.dataset import Array
+from shipid.logs.guess import evidence
+from shipid.logs.guess.clues import State
+from shipid.logs.guess.defects import when
+from shipid.logs.guess.evidence import Complex
+from shipid.physics.signals import is_command, signal_of, steers
+
+NODES, SPLITS = 120, 25  # places at which a part may begin or end
+LEAST = 0.05  # share of all motion that a part has, at least
+SEEN, BETTER = 0.005, 0.3  # share of the motion that one scale leaves, at least; of that what two leave, at most
+ALIKE, NOTHING = 1.4, 5e-4  # ratio of two scales, that are one; and that of a column that stands still
+CLEAR, TIMES = 8.0, 8.0  # t value of the effect of an order in each part, and ratio of the effects, at least
+HALF = 0.7  # share of what one effect leaves, that two leave, at most
+
+
+@dataclass(frozen=True)
+class Part:
+    """Windows from `first` until before `end`, and how many times the scale is there what it is elsewhere."""
+
+    first: int
+    end: int
+    ratio: float
+
+
+def ask_for_changes(state: State) -> None:
+    """Ask where the scale or the sign of velocities, a yaw rate or an angle that steers is another one in a part."""
+    if state.position is None or state.psi is None:
+        return
+    sources = {one.name: one.source for one in state.suggestions}
+    pairs: list[tuple[tuple[str, ...], str, Array | Complex, Array | Complex]] = []
+    if state.velocity is not None:
+        names = tuple(name for name in ("u", "v", "speed") if name in sources)
+        pairs.append((names, "track", state.position, state.velocity))
+    rates = [sources["r"]] if "r" in sources else state.called("r")[:1]
+    pairs += [(("r",), "change of the heading", state.psi, state.columns[name]) for name in rates]
+    for about, what, whole, rate in pairs:
+        named = [sources[name] for name in about if name in sources] or rates
+        part = other_part(state.chosen.change(whole), state.chosen.change(evidence.integral(state.t, rate)))
+        if part is not None:
+            middle = np.append((state.chosen.first + state.chosen.last) // 2, len(state.t))
+            first, end = int(middle[part.first]) if part.first else 0, int(middle[part.end])
+            columns = " and ".join(map(repr, named))
+            how = f"the {what} is {part.ratio:.3g} times as much, beside its integral, as elsewhere"
+            _ask(state, about, f"has {columns} another unit or sign {_from_to(state, first, end)}? There {how}")
+    for one in state.suggestions:
+        if is_command(one.name) and steers(signal_of(one.name)) and one.source in state.turning:
+            _ask_for_angle(state, one.name, one.source)
+
+
+def other_part(seen: Complex, ran: Complex) -> Part | None:
+    """Return the part of the windows in which seen = scale * ran has another scale than elsewhere; None if none has."""
+    if len(seen) < 40:
+        return None
+    nodes = np.unique(np.linspace(0, len(seen), NODES + 1).astype(int))
+    sums = np.real(np.conj(ran) * seen), np.abs(ran) ** 2, np.abs(seen) ** 2
+    cross, power, motion = (np.append(0.0, np.cumsum(one))[nodes] for one in sums)
+    total = float(motion[-1])
+    share = (motion[None, :] - motion[:, None]) / max(total, 1e-30)
+    of_part, of_rest = (power[None, :] - power[:, None]), power[-1] - (power[None, :] - power[:, None])
+    possible = (np.minimum(share, 1.0 - share) > LEAST) & (np.minimum(of_part, of_rest) > 0.0)
+    if not possible.any():
+        return None
+    inside = (cross[None, :] - cross[:, None]) / np.where(possible, of_part, 1.0)
+    outside = (cross[-1] - cross[None, :] + cross[:, None]) / np.where(possible, of_rest, 1.0)
+    explained = np.where(possible, inside**2 * of_part + outside**2 * of_rest, -np.inf)
+    first, end = np.unravel_index(int(np.argmax(explained)), explained.shape)
+    one, two = total - cross[-1] ** 2 / power[-1], total - float(explained[first, end])
+    if one < SEEN * total or two > BETTER * one:
+        return None
+    ratio = float(inside[first, end] / outside[first, end]) if outside[first, end] else 0.0
+    if not NOTHING < abs(ratio) < 1 / NOTHING or 1 / ALIKE < ratio < ALIKE:
+        return None
+    return Part(int(nodes[first]), int(nodes[end]), ratio)
+
+
+def _ask_for_angle(state: State, name: str, source: str) -> None:
+    """Ask where an angle turns the ship to the other side, or many times as fast, from some row on."""
+    r = state.r if state.r is not None else np.gradient(np.asarray(state.psi), state.t)
+    rows, design, change = evidence.answer(state.t, r, state.columns[source], state.part)
+    whole = evidence.solved(design, change)[2]
+    least, start, effects = HALF * whole, 0, np.ones(2)
+    for row in np.unique(np.linspace(0, len(rows), SPLITS + 2).astype(int))[1:-1]:
+        before = np.where(np.arange(len(rows)) < row, design[:, 0], 0.0)
+        apart = np.column_stack([before, design[:, 0] - before, design[:, 1:]])
+        found, errors, left = evidence.solved(apart, change)
+        if left < least and np.all(np.abs(found[:2]) > CLEAR * errors[:2]):
+            least, start, effects = left, int(rows[row]), found[:2]
+    ratio = float(effects[1] / effects[0])
+    if ratio > 0 and 1 / TIMES < ratio < TIMES:
+        return
+    how = "to the other side" if ratio < 0 else f"{ratio:.2g} times as fast"
+    words = f"has {source!r} another unit or sign {_from_to(state, start, len(state.t))}?"
+    _ask(state, (name,), f"{words} There its numbers turn the ship {how}")
+
+
+def _from_to(state: State, first: int, end: int) -> str:
+    """Words for the rows from `first` until before `end`."""
+    if state.joined:
+        return "in a part of the files"
+    begins, ends = (f"{when(state, float(state.t[row]))}" for row in (first, min(end, len(state.t) - 1)))
+    if end >= len(state.t):
+        return f"from {begins} on"
+    return f"until {ends}" if first == 0 else f"from {begins} to {ends}"
+
+
+def _ask(state: State, about: tuple[str, ...], words: str) -> None:
+    remedy = "Write the log in one unit, or cut it there, import the parts and join them (shipid data join)"
+    state.changed |= {*about}
+    state.ask(about, f"{words}. {remedy}")

@@ -1,0 +1,74 @@
+"""A unit or a sign that another part of a log has is asked, with its begin and how much it changes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.logs.guess.changes import other_part
+from shipid.logs.guess.columns import Guess, guess
+from tests.logs.simulated import as_bridge, si_log
+
+CLEAN = as_bridge(si_log()).round(4)
+END = float(CLEAN["time"].iloc[-1])
+
+
+def guessed(folder: Path, frame: pd.DataFrame) -> Guess:
+    frame.to_csv(folder / "log.csv", index=False)
+    return guess(folder / "log.csv")
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.7])
+@pytest.mark.parametrize(
+    ("columns", "factor"),
+    [
+        (("u", "v"), 3600 / 1852),  # knots from there on
+        (("r",), 60.0),  # deg/min
+        (("r",), -1.0),
+        (("rudder",), -1.0),
+        (("rudder",), np.pi / 180),
+    ],
+)
+def test_a_change_of_unit_or_sign_is_asked_with_its_time(
+    columns: tuple[str, ...], factor: float, share: float, tmp_path: Path
+) -> None:
+    after = CLEAN["time"] > share * END
+    result = guessed(
+        tmp_path, CLEAN.assign(**{name: CLEAN[name].where(~after, factor * CLEAN[name]) for name in columns})
+    )
+    asked = [one.sentence for one in result.questions if "another unit or sign" in one.sentence]
+    assert len(asked) == 1, asked
+    assert all(repr(name) in asked[0] for name in columns)
+    times = [float(text) for text in re.findall(r"t = ([\d.]+)", asked[0])]
+    assert min(abs(time - share * END) for time in times) < 0.05 * END, asked[0]
+
+
+@pytest.mark.parametrize("without", [[], ["u", "v"], ["r"]])
+def test_a_log_of_one_unit_is_not_asked(without: list[str], tmp_path: Path) -> None:
+    asked = [one.sentence for one in guessed(tmp_path, CLEAN.drop(columns=without)).questions]
+    assert not [sentence for sentence in asked if "another unit or sign" in sentence]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_part_with_another_scale_is_found_where_it_is(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    count, ratio = int(random.integers(60, 1500)), float(random.choice([-1.0, 0.01, 0.5, 2.0, 60.0]))
+    ran = random.normal(5, 2, count) * np.exp(1j * random.uniform(0, 7, count))
+    first, end = sorted(random.choice(np.arange(0, count, max(1, count // 20)), 2, replace=False))
+    inside = (np.arange(count) >= first) & (np.arange(count) < end)
+    seen = np.where(inside, ratio, 1.0) * ran + random.normal(0, 0.001, count)
+    part = other_part(seen, ran)
+    if np.sum(np.abs(seen[inside]) ** 2) < 0.1 * np.sum(np.abs(seen) ** 2) or inside.mean() > 0.9:
+        return
+    if np.sum(np.abs(seen[~inside]) ** 2) < 0.1 * np.sum(np.abs(seen) ** 2):
+        return
+    assert part is not None
+    found = np.zeros(count, dtype=bool)
+    found[part.first : part.end] = True
+    assert np.mean(found == inside) > 0.97
+    assert part.ratio == pytest.approx(ratio, rel=0.05)
+    assert other_part(ran + random.normal(0, 0.5, count), ran) is None
