@@ -6,10 +6,12 @@ import ast
 import hashlib
 import inspect
 import pickle
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+
+INSTALLED = ("site-packages", "dist-packages")
 
 
 @cache
@@ -35,10 +37,11 @@ def of_users(kind: type) -> bool:
     return kind.__module__.partition(".")[0] != "shipid"
 
 
-def users_code(kinds: Iterable[type]) -> str:
+@cache
+def users_code(kinds: tuple[type, ...]) -> str:
     """Digest (8 hex digits) of the files that classes of a user are in, and of what these import from beside them.
 
-    Classes of a notebook have none.
+    Classes of a notebook have none. As `code_digest`: the files as this process found them.
     """
     files: set[Path] = set()
     for kind in filter(of_users, kinds):
@@ -51,17 +54,21 @@ def users_code(kinds: Iterable[type]) -> str:
 def _with_imported(file: Path, depth: int) -> set[Path]:
     """A file and those from beside it that it imports, and that these import in turn.
 
-    Beside it is its folder, and those above it to the one that holds its package; `depth` folders above at least.
+    Beside it is its folder, and those above it to the one that holds its package; `depth` folders above at least. Of
+    installed packages only its own counts: the versions of others are noted elsewhere.
     """
+    depth = min(depth, len(file.parents) - 1)
     while (file.parents[depth] / "__init__.py").is_file():
         depth += 1
     top, files, left = file.parents[depth], set[Path](), {file}
+    whole = top / file.relative_to(top).parts[0] if top.name in INSTALLED else top
     while left:
         one = left.pop()
         if one.is_file() and one not in files:
             files.add(one)
             folders = [folder for folder in one.parents if folder.is_relative_to(top)]
-            left |= {place for name in _imported(one, top) for folder in folders for place in _places(folder, name)}
+            places = {place for name in _imported(one, top) for folder in folders for place in _places(folder, name)}
+            left |= {place for place in places if place.is_relative_to(whole)}
     return files
 
 
@@ -74,11 +81,14 @@ def _imported(file: Path, top: Path) -> Iterator[str]:
     here = file.relative_to(top).parts
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             above = here[: max(len(here) - node.level, 0)] if node.level else ()
             parts = [*above, *filter(None, [node.module])]
-            yield from (".".join([*parts, alias.name]) for alias in node.names)  # or a name in the module of `parts`
+            names = [".".join([*parts, alias.name]) for alias in node.names]  # or a name in the module of `parts`
+        else:
+            continue
+        yield from (name for name in names if name.partition(".")[0] != "shipid")
 
 
 def _places(folder: Path, name: str) -> Iterator[Path]:

@@ -626,8 +626,8 @@ def _there(
 ) -> tuple[dict[str, Any], Results | str]:
     """A unit on a machine of a cluster: what it was computed with, and the results."""
     plan, prepared, device, trials, holder, code = shared
-    sent = {way.name: code[way.name] for way in plan.methods if type(way.method).__module__ == "__main__"}
-    return session_on(device, {**plan.code, **sent}), _claimed(plan, prepared, unit, device, trials, holder)
+    imported = replace(plan, methods=tuple(way for way in plan.methods if type(way.method).__module__ != "__main__"))
+    return session_on(device, {**code, **imported.code}), _claimed(plan, prepared, unit, device, trials, holder)
 
 
 def _claimed(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path, holder: Holder) -> Results | str:

@@ -51,14 +51,45 @@ def test_what_a_method_of_a_user_imports_from_beside_it_is_part_of_its_code(tmp_
         place = tmp_path / name
         place.parent.mkdir(exist_ok=True)
         place.write_text(text, encoding="utf-8")
-    kind = type("Mine", (), {"__module__": "mine"})
+
+    def code() -> str:
+        return users_code((type("Mine", (), {"__module__": "mine"}),))
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("inspect.getfile", lambda _: str(tmp_path / "mine.py"))
-        before = users_code([kind])
+        before = code()
         for name, text in files.items():
             (tmp_path / name).write_text(f"{text}# another\n", encoding="utf-8")
-            assert (users_code([kind]) == before) == name.endswith("other.py"), name
+            assert (code() == before) == name.endswith("other.py"), name
             (tmp_path / name).write_text(text, encoding="utf-8")
-        assert users_code([kind]) == before
+        assert code() == before
+        (tmp_path / "shipid").mkdir()
+        (tmp_path / "shipid/__init__.py").write_text("x = 2")  # a copy of shipid has a digest of its own
+        (tmp_path / "laws.py").write_text(f"{files['laws.py']}    import shipid.x\n", encoding="utf-8")
+        with_it = code()
+        (tmp_path / "shipid/__init__.py").write_text("x = 3")
+        assert code() == with_it
         (tmp_path / "laws.py").write_text("def (", encoding="utf-8")
-        assert users_code([kind]) != before
+        assert code() != before
+
+
+def test_other_installed_packages_are_no_part_of_a_method(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They lie beside its package, and so does all that is installed: a walk over that took minutes."""
+    place = tmp_path / "site-packages"
+    for name, text in {
+        "mine/__init__.py": "import numpy, mine.law",
+        "mine/law.py": "x = 1",
+        "numpy.py": "x = 1",
+    }.items():
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        (place / name).write_text(text, encoding="utf-8")
+    monkeypatch.setattr("inspect.getfile", lambda _: str(place / "mine" / "__init__.py"))
+
+    def code() -> str:
+        return users_code((type("Mine", (), {"__module__": "mine"}),))
+
+    before = code()
+    (place / "numpy.py").write_text("x = 2", encoding="utf-8")
+    assert code() == before
+    (place / "mine/law.py").write_text("x = 2", encoding="utf-8")
+    assert code() != before
