@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Array
 from shipid.logs.amounts import UNIT_WORDS
 from shipid.logs.guess.evidence import Complex, Windows, effect
-from shipid.logs.guess.words import fits, how_much_says, is_order, may_be_measured, parts_of, side_of, units_in
+from shipid.logs.guess.words import (
+    fits,
+    how_much_says,
+    is_order,
+    may_be_measured,
+    parts_of,
+    shaft_unit,
+    side_of,
+    units_in,
+)
 from shipid.logs.mapping import UNITS
 from shipid.logs.repairs import INPUTS
 from shipid.physics.signals import SIGNALS, signal_of
@@ -102,7 +111,7 @@ def unit_of_another(name: str, meaning: str) -> str | None:
     if si not in UNITS or unit_in_name(name, si) is not None:
         return None
     last = re.split(r"[_ ]", name.strip())[-1]
-    said = units_in(name) or ([last] if last in ("kN", "kNm", "Nm", "kW") or last.lower() in ("rpm", "rps") else [])
+    said = units_in(name) or ([last] if last in ("kN", "kNm", "Nm", "kW") or shaft_unit(name) else [])
     for word in said:
         text = word.strip().lower()
         known = any(re.fullmatch(expected, text) for expected in UNIT_WORDS.values())

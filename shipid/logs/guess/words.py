@@ -11,6 +11,7 @@ import re
 import unicodedata
 from functools import cache
 
+from shipid.logs.amounts import UNIT_WORDS
 from shipid.physics.signals import SIGNALS
 
 PHRASES: dict[str, str] = {
@@ -139,8 +140,9 @@ PHRASES: dict[str, str] = {
         "angle, thruster azimuth, azimut, azimut winkel, gondel winkel, schottel winkel, asimut, asimut vinkel, "
         "alpha t, nozzle angle, thrust angle, thruster direction, pod azimuth, azimuth vinkel, azi dir, angle "
         "azimut, angle propulseur, angulo azimut, angolo azimut, ruderpropeller winkel, azimut hoek, azimuth "
-        "hoek, azimuth winkel, outboard, outboard angle, outboard steering angle, drive angle, stern drive "
-        "angle, sterndrive angle, jet angle, waterjet angle, asd, asd angle, z drive, z drive angle, zdrive angle"
+        "hoek, azimuth winkel, pod winkel, srp, srp angle, srp winkel, outboard, outboard angle, outboard steering "
+        "angle, drive angle, stern drive angle, sterndrive angle, jet angle, waterjet angle, asd, asd angle, z "
+        "drive, z drive angle, zdrive angle"
     ),
     "n": (
         "n, rpm, shaft, shaft rpm, shaft speed, prop rpm, propeller rpm, propeller speed, prop speed, engine rpm, "
@@ -350,7 +352,8 @@ WHOLE = dict.fromkeys(
 )
 WHOLE |= dict.fromkeys(("heckstrahler", "heckstrahlruder", "hekschroef", "hekkpropell"), ("stern", "thruster"))
 """Words that are cut into parts of another language."""
-SHAFT_UNITS = frozenset(("rpm", "1/min", "min-1", "u/min", "rps", "1/s", "rev/s", "tr/min"))
+_OF_SHAFT = re.compile(rf"{UNIT_WORDS['rpm']}|rps|rev/s")
+"""Units of a shaft speed, in lower case, that no other quantity has."""
 _EDGE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])")
 _AFTER = re.compile(r"(?:\s+/\s*|,\s*)([^\s,]{1,9})\s*$")
 NO_VALUE = re.compile(
@@ -412,6 +415,12 @@ def units_in(name: str) -> list[str]:
     name = name.translate(WIDE)
     after = _AFTER.search(name)
     return [*re.findall(r"[\[(]([^\])]*)[\])]", name), *([after.group(1).strip()] if after else [])]
+
+
+def shaft_unit(name: str) -> str:
+    """Return the unit of a shaft speed that a name has, set off or as its last word; empty where it has none."""
+    said = units_in(name) or re.split(r"[_ ]", name.translate(WIDE).strip())[-1:]
+    return next((unit for unit in said if _OF_SHAFT.fullmatch(unit.strip().lower())), "")
 
 
 def wind_kind(name: str) -> str:
@@ -565,9 +574,10 @@ def fits(name: str) -> dict[str, float]:
             meanings[meaning] = 0.9
             if meaning not in PHRASES:  # a row of the table that is new: `OTHERS` names it as no quantity
                 meanings.pop("", None)
-    if "thruster" in parts and {"bow", "stern"} & set(parts):  # of a tunnel: nothing that moves with the ship
-        if SHAFT_UNITS & {unit.strip().lower() for unit in units_in(name)}:
-            meanings = {"n": 1.0}
+    tunnel = "thruster" in parts and {"bow", "stern"} & set(parts)
+    if (tunnel or "alpha" in meanings) and shaft_unit(name):  # of a unit, in revolutions: its speed, not its angle
+        meanings = {"n": 1.0}
+    if tunnel:  # nothing that moves with the ship
         return {meaning: fit for meaning, fit in meanings.items() if meaning in ("", "n", "pitch", "side_force")}
     return meanings
 

@@ -89,6 +89,9 @@ def test_findings_are_kept_in_order(state: State) -> None:
         ("Vitesse [kn]", "speed", None),
         ("T_prop_kN", "n", "kN"),
         ("Roll, deg", "r", "deg"),
+        ("Ruder Bb U/min", "delta", "U/min"),
+        ("Azimut Bb min-1", "alpha", "min-1"),
+        ("Wendegeschw. 1/s", "r", None),
         ("speed", "speed", None),
     ],
 )
