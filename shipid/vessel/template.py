@@ -54,7 +54,8 @@ J_MOST, FASTEST = 1.5, 1e3  # largest J of a propeller's polynomial, as in the d
 SIMILAR = dict.fromkeys(
     ("block", "length / beam", "beam / draught", "block x beam / length"),
     ": for another ship, take a similar vessel and change it (`shipid vessel list`)",
-)  # remedy, by what is outside the formulae
+) | {"speed [m/s]": ": is it in m/s? For a faster craft, take a similar vessel and change it (`shipid vessel list`)"}
+# remedy, by what is outside the formulae
 LARGEST_SCREW, STRONG_PITCH = 10.5, 1.2  # m; P / D from which a larger screw is the likelier guess
 
 # Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51, 339-351: C_Dt, C_Dl of bow and stern, delta, kappa
@@ -190,9 +191,11 @@ def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
 def _remarks(given: Particulars) -> Iterator[str]:
     """The most important assumptions of the guess, one sentence each."""
     if given.scale is None and given.reduction != 1.0:
+        steered = "how fast rudder or azimuth turns"
+        sets = "fresh water and a smooth hull" if given.propulsor == "differential" else steered
         yield (
             f"{given.length:g} m counts as a model at a scale of {given.reduction:.3g}: give the scale by --scale; "
-            "it sets how fast rudder or azimuth turns"
+            f"it sets {sets}"
         )
     if given.length / given.beam < SHORTEST:
         yield (

@@ -234,7 +234,9 @@ def test_times_of_a_model_are_those_of_the_ship_over_root_scale() -> None:
     assert numbers[1]["constants.rho"] == 1000.0
     unsaid = first_guess(replace(model, scale=None), "s", "s.toml")
     assert unsaid.vessel.parameters == numbers[1]  # 160 m is what a model without a scale is taken for
-    assert any("--scale" in remark for remark in unsaid.remarks)
+    assert any("--scale; it sets how fast rudder or azimuth turns" in remark for remark in unsaid.remarks)
+    catamaran = first_guess(Particulars(2.0, 0.9, 0.2, 0.4, propulsor="differential"), "ship", "ship.toml")
+    assert any("--scale; it sets fresh water and a smooth hull" in remark for remark in catamaran.remarks)
 
 
 def test_what_is_known_is_taken() -> None:
@@ -287,7 +289,10 @@ def test_given_areas_and_type_are_taken() -> None:
         ({"draught": 2.0}, "beam / draught = 11.6"),
         ({"block": 1.2}, "block = 1.2"),
         ({"block": float("nan")}, "block = nan"),
-        ({"speed": 40.0}, "speed [m/s] = 40: the formulae hold for 0.1 to 15.9"),
+        (
+            {"speed": 40.0},
+            "speed [m/s] = 40: the formulae hold for 0.1 to 15.9: is it in m/s? For a faster craft, take",
+        ),
         ({"speed": 0.0}, "speed [m/s] = 0"),
         ({"lateral_area": 0.0}, "lateral area [m^2] = 0"),
         ({"propulsor": "azimut"}, "did you mean 'azimuth'?"),
