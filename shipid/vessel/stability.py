@@ -58,8 +58,9 @@ def growths(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> tuple[
         if not np.isfinite(slopes).all():
             return -np.inf, np.zeros(len(names))
         values, left, right = eig(slopes, left=True)
-        parts = np.abs(left * right)[turning].max(axis=0)
-        yaws = np.where(parts >= SHARE * np.abs((left.conj() * right).sum(axis=0)), values.real, -np.inf)
+        whole = np.maximum(np.abs((left.conj() * right).sum(axis=0)), np.finfo(float).tiny)
+        shares = np.abs(left * right)[turning].max(axis=0) / whole  # participation factors
+        yaws = np.where(shares >= min(SHARE, shares.max()), values.real, -np.inf)
         motion = np.zeros(len(names))
         motion[moving] = right[:, np.argmax(yaws)].real
         motion /= np.abs(motion / size).max()
