@@ -146,7 +146,7 @@ def manoeuvre(
     title, approached_by = done.standard.title, done.standard.manoeuvre
     with answering(as_json) as answer:
         answer.say(
-            f"{ship.name}: {title}, {approached(done.standard)}",
+            f"{ship.name}: {title}, {approached(done)}",
             title=title,
             approach=approached_by.approach,
             speed=done.standard.speed,

@@ -16,7 +16,7 @@ from shipid.measures.recognise import record_of
 from shipid.measures.record import Record
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import Levels, levels, rate_levels
-from shipid.physics.signals import steers
+from shipid.physics.signals import neutral, signal_of, steers
 from shipid.report.manoeuvre import ManoeuvreContent
 from shipid.simulation.approach import Controls, NotStraight
 from shipid.simulation.manoeuvre import Zigzag
@@ -134,13 +134,15 @@ def _within_stops(vessel: Vessel, columns: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
-def approached(chosen: Standard) -> str:
+def approached(measured: Measured) -> str:
     """The approach in words."""
-    n_rpm = chosen.manoeuvre.n_rpm
+    chosen = measured.standard
+    pitches = {neutral(name) for name in dynamics(measured.vessel).commands if signal_of(name) == "pitch"}
+    shaft = ", ".join([f"{chosen.manoeuvre.n_rpm:.4g} rpm", *(f"P/D {pitch:g} ordered" for pitch in pitches)])
     if chosen.manoeuvre.approach == "rest":
-        return f"from rest, {n_rpm:.4g} rpm"
+        return f"from rest, {shaft}"
     held = ", held on course by a helmsman" if chosen.manoeuvre.approach == "helmsman" else ""
-    return f"approach at {chosen.speed:.3g} m/s ({n_rpm:.4g} rpm){held}"
+    return f"approach at {chosen.speed:.3g} m/s ({shaft}){held}"
 
 
 def trials(vessel: Vessel, speed: float | None = None) -> tuple[list[dict[str, Any]], list[str]]:
@@ -183,7 +185,7 @@ def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent
         levels=pd.DataFrame({"helm": steady.helm, "rate": steady.rate}),
         provenance={
             "Vessel": f"{ship.name}, digest {ship.digest}",
-            "Approach": f"{approached(chosen)}, calm deep water, no wind",
+            "Approach": f"{approached(measured)}, calm deep water, no wind",
             "Simulation": f"steps of {chosen.step:g} s, rows of {chosen.interval:g} s",
             "shipid": __version__,
         },

@@ -4,7 +4,7 @@ import pytest
 from shipid.errors import ShipidError
 from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
 from shipid.units import DEGREE
-from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.template import Particulars, first_guess
 
 
@@ -38,13 +38,25 @@ def test_a_ship_that_does_not_go_straight_gets_a_helmsman():
     lame = load_vessel("gunnerus-28.9").with_values({"thruster.starboard.off": True})
     done = measure_standard(lame, "turning", (20,), duration=120.0)
     assert done.standard.manoeuvre.approach == "helmsman"
-    assert approached(done.standard).endswith("held on course by a helmsman")
+    assert approached(done).endswith("held on course by a helmsman")
     assert np.isfinite({row["measure"]: row["value"] for row in done.measures}["advance"])
     with pytest.raises(ShipidError, match="turns with the helm amidships"):
         measure_standard(lame, "turning", (20,), approach="steady")
     rest = measure_standard(lame, "turning", (20,), approach="rest", duration=60.0)
     assert rest.record.u[0] == 0
-    assert approached(rest.standard).startswith("from rest")
+    assert approached(rest).startswith("from rest")
+
+
+def test_the_pitch_that_is_ordered_is_said():
+    """P/D 0.8 of every ship, whatever her service pitch is; the stops of her gear may hold it at less."""
+    ship = first_guess(Particulars(100.0, 16.0, 6.0, 0.7, speed=7.0), "s", "s.toml").vessel
+    screw = {"kind": "controllable_pitch", "x": -48.0, "D_p": 3.9, "k_P": 0.4, "k_J": 0.42, "t_P": 0.2, "w_P0": 0.3}
+    screw["actuator"] = {"pitch": {"kind": "rate_limit", "rate": 0.1, "low": -0.7, "high": 0.7}}
+    ship = check_vessel({**ship.document, "thruster": {**ship.document["thruster"], "propeller": screw}}, "s.toml")
+    done = measure_standard(ship, "stop")
+    assert approached(done) == f"approach at 7 m/s ({done.standard.manoeuvre.n_rpm:.4g} rpm, P/D 0.8 ordered)"
+    fixed = ship.with_values({"thruster.propeller.actuator.pitch.high": 0.9})
+    assert measure_standard(fixed, "stop").standard.manoeuvre.n_rpm < done.standard.manoeuvre.n_rpm
 
 
 @pytest.mark.parametrize("length", [1.0, 1.5, 6.0, 30.0])
