@@ -223,7 +223,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     if unknown is not None:
         hint = f"is {base[unknown]:g}: scale is for a 0" if unknown in base else choices(unknown, base)
         raise DocumentError(f"{unknown!r}: {hint}", path=f"{BLOCK}.scale")
-    groups = _groups(settings, free, chosen)
+    groups = [without_zeros(group, settings, base) for group in _groups(settings, free, chosen)]
     scales = []
     for group in groups:
         if len({base[path] == 0 for path in group}) > 1:
@@ -319,6 +319,16 @@ def _groups(settings: Identify, free: list[str], chosen: Any) -> list[tuple[str,
     for path in free:
         groups.setdefault(of.get(path, path), []).append(path)
     return [tuple(group) for group in groups.values()]
+
+
+def without_zeros(group: Sequence[str], settings: Identify, base: Mapping[str, float]) -> tuple[str, ...]:
+    """A group without the numbers that are 0 and that patterns alone tie to others: times a factor they stay 0.
+
+    Those that the settings name in full stay, and are refused where others are not 0.
+    """
+    named = {*settings.scale, *settings.parameters, *(path for patterns in settings.together for path in patterns)}
+    kept = tuple(path for path in group if base[path] != 0 or path in named)
+    return kept if any(base[path] != 0 for path in kept) else group
 
 
 def overrides_of(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:

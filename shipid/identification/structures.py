@@ -22,7 +22,7 @@ from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.identification.inverse import equations
-from shipid.identification.settings import Identify
+from shipid.identification.settings import Identify, without_zeros
 from shipid.physics.signals import steers
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
@@ -281,7 +281,10 @@ def _settings(
     def translated(given: Mapping[str, Any]) -> dict[str, Any]:
         return {path: value for pattern, value in given.items() for path in kept([pattern]) if path in free}
 
-    groups = [[path for path in kept(group) if path in free] for group in settings.together]
+    tied = [[path for path in kept(group) if path in free] for group in settings.together]
+    groups = [list(without_zeros(group, settings, result.parameters)) for group in tied]
+    zeros = {path for group, left in zip(tied, groups, strict=True) for path in group if path not in left}
+    free = [path for path in free if path not in zeros]
     zero = begun == 0
     widths = np.where(zero, SHARE, np.hypot(OF_VALUE, SHARE * sizes / np.where(zero, 1.0, np.abs(begun))))
     update = {

@@ -71,6 +71,22 @@ def test_tied_paths_share_one_factor() -> None:
         unknowns(SHIP, Identify(parameters=pair, together=[pair, pair[:1]]))
 
 
+def test_zeros_of_a_table_that_is_tied_by_a_pattern_stay_zero() -> None:
+    """A side force at 0 and 180 deg is 0: one factor on the table leaves them, and was refused."""
+    table, zeros = "wind.C_Y.*", {"wind.C_Y.0", "wind.C_Y.18"}
+    free = unknowns(SHIP, Identify(parameters=[table], together=[[table]], prior={table: 0.3}))
+    (group,) = free.groups
+    assert set(group) == {path for path in SHIP.parameters if path.startswith("wind.C_Y.")} - zeros
+    assert free.prior.tolist() == [0.3]
+    assert free.centre.tolist() == [1.0]
+    twice = SHIP.parameters | free.values([2.0])
+    assert SHIP.with_values(free.values([2.0])).parameters == twice
+    assert twice["wind.C_Y.9"] == 2 * SHIP.parameters["wind.C_Y.9"]
+    named = ["wind.C_Y.0", "wind.C_Y.9"]
+    with pytest.raises(DocumentError, match="some are 0 and some are not"):
+        unknowns(SHIP, Identify(parameters=named, together=[named]))
+
+
 def test_overrides_belong_to_one_run() -> None:
     settings = Identify(parameters=[YAW], runs={"a": {"inertia": {"m": 7e5}, "environment": {"V_w": 3}}})
     assert overrides(settings, ["a", "b"], SHIP, ["V_w"]) == {"a": {MASS: 7e5, "environment.V_w": 3.0}, "b": {}}

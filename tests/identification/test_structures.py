@@ -101,6 +101,14 @@ def test_numbers_of_the_gear_of_a_replaced_rudder_stay_free() -> None:
         assert gear in unknowns(exchanged.vessel, exchanged.settings).paths
 
 
+def test_zeros_of_a_table_that_is_tied_by_a_pattern_stay_zero() -> None:
+    table = "wind.C_Y.*"
+    asked = Identify(parameters=["hull.*", table], together=[[table]], prior={table: 0.2})
+    exchanged = exchange(GUNNERUS, "mmg", log_of(GUNNERUS), log_of(GUNNERUS).runs, asked)
+    tied = next(group for group in unknowns(exchanged.vessel, exchanged.settings).groups if len(group) > 1)
+    assert tied == unknowns(GUNNERUS, asked.model_copy(update={"parameters": [table]})).groups[0]
+
+
 @pytest.mark.parametrize("name", list(STRUCTURES))
 def test_a_hull_in_the_bis_system_is_replaced(name: str) -> None:
     """It stayed beside the new one, whose coefficients all began at 0: its numbers were fixed in every structure."""
