@@ -200,8 +200,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
             raise DocumentError(message, path=error.path) from None
 
     selected = chosen(settings.parameters, "parameters")
-    named = {*settings.parameters, *settings.prior, *settings.bounds, *settings.scale}
-    asked = _without_dimensions(selected, named | {path for group in settings.together for path in group})
+    asked = _without_dimensions(selected, settings)
 
     def reached(pattern: str, key: str, among: Collection[str]) -> list[str]:
         paths = [path for path in chosen([pattern], key) if path in among]
@@ -264,13 +263,20 @@ def _left_out(vessel: Vessel, patterns: Sequence[str]) -> str:
     return ""
 
 
-def _without_dimensions(asked: Sequence[str], patterns: Collection[str]) -> list[str]:
-    """The paths without dimensions and constants, which are measured or known; with those that are written in full."""
-    known = {
+def dimensions_of(asked: Sequence[str], settings: Identify) -> set[str]:
+    """Dimensions and constants among paths that patterns select, which are measured or known; none written in full."""
+    named = {*settings.parameters, *settings.prior, *settings.bounds, *settings.scale}
+    named |= {path for group in settings.together for path in group}
+    return {
         path
         for path in asked
-        if path.rpartition(".")[2] in DIMENSIONS and ".actuator." not in path and path not in patterns
+        if path.rpartition(".")[2] in DIMENSIONS and ".actuator." not in path and path not in named
     }
+
+
+def _without_dimensions(asked: Sequence[str], settings: Identify) -> list[str]:
+    """The paths without dimensions and constants; DocumentError where there are no others."""
+    known = dimensions_of(asked, settings)
     if known == set(asked):
         message = f"selects dimensions and constants only: to fit them all the same, write {', '.join(sorted(known))}"
         raise DocumentError(message, path=f"{BLOCK}.parameters")
@@ -328,7 +334,7 @@ def without_zeros(group: Sequence[str], settings: Identify, base: Mapping[str, f
     """
     named = {*settings.scale, *settings.parameters, *(path for patterns in settings.together for path in patterns)}
     kept = tuple(path for path in group if base[path] != 0 or path in named)
-    return kept if any(base[path] != 0 for path in kept) else group
+    return kept if any(base[path] != 0 for path in kept) else tuple(group)
 
 
 def overrides_of(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError, choices
 from shipid.identification.inverse import equations
-from shipid.identification.settings import Identify, without_zeros
+from shipid.identification.settings import Identify, dimensions_of, without_zeros
 from shipid.physics.signals import steers
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
@@ -275,8 +275,9 @@ def _settings(
             and path != "hull.resistance.R_0" and path in result.parameters
         ]  # fmt: skip
 
-    fixed = set(kept(settings.fixed))
-    free = [path for path in kept(settings.parameters) if path not in fixed]
+    asked = kept(settings.parameters)
+    fixed = {*kept(settings.fixed), *dimensions_of(asked, settings)}
+    free = [path for path in asked if path not in fixed]
 
     def translated(given: Mapping[str, Any]) -> dict[str, Any]:
         return {path: value for pattern, value in given.items() for path in kept([pattern]) if path in free}

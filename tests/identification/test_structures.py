@@ -101,6 +101,19 @@ def test_numbers_of_the_gear_of_a_replaced_rudder_stay_free() -> None:
         assert gear in unknowns(exchanged.vessel, exchanged.settings).paths
 
 
+def test_no_pattern_frees_a_dimension() -> None:
+    """`wind.*` freed the length over all, which stays fixed in a fit of the hull as it is."""
+    zeros = [path for path, value in GUNNERUS.parameters.items() if path.startswith("wind.") and value == 0]
+    asked = Identify(parameters=["hull.*", "wind.*"], fixed=zeros)
+    exchanged = exchange(GUNNERUS, "mmg", log_of(GUNNERUS), log_of(GUNNERUS).runs, asked)
+    free = {path for path in exchanged.settings.parameters if path.startswith("wind.")}
+    assert free == {path for path in unknowns(GUNNERUS, asked).paths if path.startswith("wind.")}
+    assert "wind.L_oa" not in free
+    full = asked.model_copy(update={"parameters": [*asked.parameters, "wind.L_oa"]})
+    named = exchange(GUNNERUS, "mmg", log_of(GUNNERUS), log_of(GUNNERUS).runs, full)
+    assert "wind.L_oa" in named.settings.parameters
+
+
 def test_zeros_of_a_table_that_is_tied_by_a_pattern_stay_zero() -> None:
     table = "wind.C_Y.*"
     asked = Identify(parameters=["hull.*", table], together=[[table]], prior={table: 0.2})
