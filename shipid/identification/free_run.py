@@ -98,8 +98,12 @@ def free_runs(
 
 
 def _nothing_free(vessel: Vessel, overrides: Mapping[str, object]) -> dict[str, object]:
-    """Settings of a fit that is none: what is free plays no part in a free run, so one number that no run overrides."""
-    path = next(path for path in vessel.parameters if not any(key.endswith(f".{path}") for key in overrides))
+    """Settings of a fit that is none: what is free plays no part in a free run, so one number that no run overrides.
+
+    It is not 0, which would need a scale.
+    """
+    numbers = (path for path, value in vessel.parameters.items() if value != 0)
+    path = next(path for path in numbers if not any(key.endswith(f".{path}") for key in overrides))
     none: dict[str, object] = {"prior": {}, "bounds": {}, "scale": {}}
     return none | {"parameters": [path], "fixed": [], "together": [], "ranges": False}
 

@@ -114,3 +114,14 @@ def test_a_short_run_does_not_diverge_because_a_longer_one_is_in_company() -> No
     assert np.isfinite(alone["position"])
     for name in ("u", "v", "r", "position", "samples"):
         assert together[0][name] == pytest.approx(alone[name], rel=1e-9)
+
+
+def test_a_run_of_another_displacement_is_predicted() -> None:
+    """With mass and inertia set for a run, the next number of the vessel is an x_G of 0: the fit was refused for it."""
+    heavier = {name: 1.1 * SHIP.parameters[name] for name in ("inertia.m", "inertia.I_z")}
+    assert SHIP.parameters["inertia.x_G"] == 0
+    asked = SETTINGS.model_copy(update={"runs": {f"M01.{name}": value for name, value in heavier.items()}})
+    loaded = free_runs({"loaded": SHIP}, DATA, DATA.runs, asked).errors.set_index("run")
+    alone = free_runs({"loaded": SHIP.with_values(heavier)}, DATA, ["M01"], SETTINGS).errors.set_index("run")
+    assert loaded["v"]["M01"] == pytest.approx(alone["v"]["M01"], rel=1e-9)
+    assert loaded["v"]["M02"] < 1e-9 < loaded["v"]["M01"]
