@@ -632,7 +632,8 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
     }
 
     def refit(name: str, factor: float, start: Array) -> tuple[float, Array]:
-        limits = {**solution.settings.bounds, **held, name: (factor, factor)}
+        given = {path: ends for path, ends in solution.settings.bounds.items() if path not in {*held, name}}
+        limits = {**given, **held, name: (factor, factor)}  # later ones hold, and patterns may select the same
         changed = solution.settings.model_copy(update={"bounds": limits, "drop": None})
         begin = dict(zip(solution.paths, start.tolist(), strict=True))
         again = identify(solution.vessel, dataset, solution.runs, changed, start=begin)

@@ -32,7 +32,7 @@ from shipid.identification.outcome import (
     write_patch,
 )
 from shipid.identification.residuals import build, predict
-from shipid.identification.settings import Identify
+from shipid.identification.settings import Identify, unknowns
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.report.identification import estimates
@@ -456,6 +456,26 @@ def test_a_profile_keeps_the_ranges_of_the_other_factors(
     assert len(seen) > 2
     assert all(asked.ranges == identified.solution.settings.ranges for asked in seen)
     assert all(asked.bounds[FEW[0]][0] == asked.bounds[FEW[0]][1] for asked in seen)
+
+
+def test_a_profile_holds_its_factor_whatever_bounds_it_has(
+    identified: Identified, log: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its own bounds before those of a pattern took the place of the value held: the profile was flat, and open."""
+    bounds = {FEW[0]: (0.2, 5.0), "hull.*": (0.1, 10.0)}
+    solution = replace(identified.solution, settings=settings(bounds=bounds))
+    tried: list[tuple[float, float]] = []
+
+    def fitted(vessel: Vessel, _data: Dataset, _runs: object, asked: Identify, **_: object) -> Solution:
+        limits = unknowns(vessel, asked)
+        here = limits.paths.index(FEW[0])
+        tried.append((float(limits.low[here]), float(limits.high[here])))
+        return replace(solution, objective=solution.objective + 1e6)
+
+    monkeypatch.setattr(outcome, "identify", fitted)
+    outcome._profile(FEW[0], log, solution, identified.statistics)
+    assert tried
+    assert all(low == high for low, high in tried)
 
 
 def test_the_time_between_residuals_is_that_of_most_rows_whatever_the_order_of_the_runs() -> None:
