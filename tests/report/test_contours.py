@@ -52,6 +52,25 @@ def test_levels_are_round_and_inside():
     assert nice_levels(np.array([np.nan, 1.0, 2.0]), 5) == []
 
 
+def test_levels_of_small_values_beside_zeros_are_those_of_the_small_values():
+    small = np.geomspace(0.02, 0.5, 50)
+    assert nice_levels(np.concatenate([np.zeros(50), -small, small]), 5) == nice_levels(small, 5) != []
+
+
+def test_every_digit_of_a_level_occurs_once():
+    assert nice_levels(np.geomspace(0.9, 1.2, 50), 9) == [1.0]
+    assert nice_levels(np.geomspace(0.8, 14, 50), 9) == [1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0]
+
+
+@pytest.mark.parametrize("corner", [(0, 0), (0, 1), (1, 0), (1, 1)])
+def test_a_line_that_cuts_off_one_corner_is_drawn(corner):
+    values = np.zeros((2, 2))
+    values[corner] = 1.0
+    (piece,) = contour(np.array([0.0, 1.0]), np.array([0.0, 1.0]), values, 0.5)
+    ends = {tuple(np.abs(end - corner[::-1])) for end in piece[[0, -1]]}  # x is the column
+    assert ends == {(0.5, 0.0), (0.0, 0.5)}
+
+
 def test_smoothing_keeps_what_is_smooth_and_calms_what_is_not():
     rng = np.random.default_rng(3)
     flat = np.full((16, 9), 2.0)
