@@ -78,6 +78,15 @@ def test_the_typical_run_is_the_middle_one_and_neither_broken_nor_the_longest() 
     assert typical_runs(runs)[0] in ("b", "d")
 
 
+def test_each_kind_gives_a_typical_run_where_more_than_six_runs_are_there() -> None:
+    def runs(count: int) -> pd.DataFrame:
+        numbers = {"speed": 3.0, "rate": 0.05, "helm": 0.2, "whole": True, "sound": True, "duration": 60.0}
+        return pd.DataFrame({"kind": ["zigzag", "turning"] * (count // 2), **numbers}, index=list("abcdefgh"[:count]))
+
+    assert len(typical_runs(runs(6))) == 1
+    assert len(typical_runs(runs(8))) == 2
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_speeds_through_the_water_lack_a_steady_vector(seed: int) -> None:
     """Before, `study new` called such positions scattered, or the velocities wrong by a factor."""
@@ -91,6 +100,16 @@ def test_speeds_through_the_water_lack_a_steady_vector(seed: int) -> None:
     assert seen.stream is not None
     assert seen.stream[0] == pytest.approx(drift, abs=0.05)
     assert seen.stream[1] > 0.8
+
+
+def test_the_share_of_a_stream_is_that_of_the_squared_misfit() -> None:
+    rng, frame = np.random.default_rng(1), turning(T)
+    noise = rng.normal(0, 2.0, (2, len(T)))
+    moved = frame.assign(north=frame["north"] + 0.8 * T + noise[0], east=frame["east"] + noise[1])
+    seen = survey(as_dataset(moved)).stream
+    assert seen is not None
+    run, scatter = (0.8 * 10.0) ** 2, 4 * 2.0**2  # m^2 in 10 s: two positions, each 2 m off in both directions
+    assert seen[1] == pytest.approx(run / (run + scatter), abs=0.06)
 
 
 @pytest.mark.parametrize("seed", range(6))
