@@ -187,7 +187,8 @@ def _searched(
 ) -> tuple[Result, float]:
     """Result of the first search that converges (else of the best), and the objective at the initial factors.
 
-    A search that converges to an objective above that at the initial factors is followed by one from these.
+    A search that converges to an objective above that at the initial factors is followed by one from these. Inverse
+    dynamics are passed over where the runs are too short for them.
     """
     factors, point = _begun(problem, start)
     objective_start = evaluate(problem, factors, point).objective
@@ -201,7 +202,10 @@ def _searched(
                 value = evaluate(problem, begin, point)
                 return Result(begin, value.at, value.objective, before, "stopped"), objective_start
         elif way == "inverse":
-            begin = by_inverse_dynamics(problem, dataset)
+            try:
+                begin = by_inverse_dynamics(problem, dataset)
+            except DataError:  # runs too short for a regression
+                continue
         attempt = search(problem, begin, point, progress, before=before)
         before = attempt.iterations
         if result is None or attempt.status in ("ok", "stopped") or attempt.objective < result.objective:

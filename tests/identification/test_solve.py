@@ -471,6 +471,17 @@ def test_a_start_that_diverges_is_reported() -> None:
     assert "\n" not in solution.sentence
 
 
+@pytest.mark.parametrize("start", ["growing", "inverse"])
+def test_runs_too_short_for_inverse_dynamics_are_fitted_from_another_start(start: str) -> None:
+    """Eight rows: the start by inverse dynamics, also the next one after a fit that diverged, was an error of data."""
+    dataset = trials(SHIP, runs=2, steps=7)
+    assert identify(SHIP, dataset, dataset.runs, settings(start=start)).status == "ok"
+    wild = SHIP.with_values({FEW[3]: -50 * SHIP.parameters[FEW[3]]})
+    lost = identify(wild, dataset, dataset.runs, settings(start=start, parameters=[FEW[3]]))
+    assert lost.status == "diverged"
+    assert "take a smaller step" in lost.sentence
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [
