@@ -34,6 +34,7 @@ from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
 PARTS_OF_STEP = 8  # of three rows within such a part of a step a recorder keeps the first and the last
+FAR = 1000  # m: beyond it a recorder counts the integrated way anew
 GAP = 3.0  # steps: after a longer pause, see `after_pauses`, the past of a recorder begins anew
 
 
@@ -466,7 +467,7 @@ double {name}_factor(double miss, double level, int kind)
 {rates}
         kept[{n}] = last[{n}] + half * (last[{n + 2}] + kept[{n + 2}]);
         kept[{n + 1}] = last[{n + 1}] + half * (last[{n + 3}] + kept[{n + 3}]);
-{self._advanced(advance)}{go_filters}        if (self->count > 1 && t - self->t[(newest + {cap - 1}) % {cap}] < {step / PARTS_OF_STEP * (1 - 1e-6)!r})
+{self._near()}{self._advanced(advance)}{go_filters}        if (self->count > 1 && t - self->t[(newest + {cap - 1}) % {cap}] < {step / PARTS_OF_STEP * (1 - 1e-6)!r})
             --self->count; /* the newest row came so soon that this one replaces it */
     }} else {{
         self->first = 0;
@@ -523,6 +524,20 @@ double {name}_factor(double miss, double level, int kind)
             f"        kept[{i}] += (real)({turn} * floor(0.5 + ((double)last[{i}] - (double)kept[{i}]) / {turn}));"
             for i in angles
         )
+
+    def _near(self) -> str:
+        """C that counts the integrated way from the newest row, where it became long and the past is made of it."""
+        if self.model.physics.path != "velocity":
+            return ""
+        n, cap = len(self.row), self.capacity
+        return f"""        if (M(fabs)(kept[{n}]) > {FAR} || M(fabs)(kept[{n + 1}]) > {FAR}) {{ /* single precision would lose a row's way */
+            for (i = 0; i < self->count; ++i) {{
+                self->rows[(self->first + i) % {cap}][{n}] -= kept[{n}];
+                self->rows[(self->first + i) % {cap}][{n + 1}] -= kept[{n + 1}];
+            }}
+            kept[{n}] = kept[{n + 1}] = 0;
+        }}
+"""
 
     def _advanced(self, advance: str | None) -> str:
         """Actuators on their way to the orders of the last row."""

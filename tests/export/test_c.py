@@ -608,6 +608,37 @@ def test_single_precision_is_near(tmp_path):
     assert np.abs(computed - expected).max() < 1e-4 * np.abs(expected).max()
 
 
+def test_a_long_way_costs_single_precision_no_digits(tmp_path):
+    """The past by integrated velocities: after 48 h at 7 m/s a path of 61 m was 5 m elsewhere, in the same state."""
+    strange = drawn("path-drawn", 7, vessel="gunnerus-28.9")
+    corrector = strange.predictor.corrector
+    physics = Physics(variety()["gunnerus-28.9"], 3, 1.0, path="velocity")
+    log = log_of(physics.vessel, 16, np.random.default_rng(1), 1.0).frame
+    t = log["t"].to_numpy()[12:]
+    inputs = type(corrector.inputs)(corrector.inputs.commands, Memory(history=(1.0, 10.0), error=(10.0,)))
+    instants = Instants(sample(log, t), past_of(log, t, 10, 1.0, "velocity"))
+    table = inputs.table(physics, instants)
+    network = network_of(np.random.default_rng(2), list(table), table, 3, 2, False)
+    exported = model(Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}), {"u": (-9.0, 9.0)}))
+    files = predictor_files(exported, "odd", Precision(single=True))
+    size, loaded = _size_of_struct(files, tmp_path) + 64, library(files, tmp_path)
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+
+    def path_after(fast):
+        """Path where so many rows of 2 km/s came before those of 7 m/s."""
+        kept, path = np.zeros(size, dtype=np.uint8), np.zeros((3, 2), dtype=np.float32)
+        loaded.odd_init(pointer(kept))
+        for k in range(fast + 120):
+            given = {"u": 2000.0 if k < fast else 7.0, "psi": 0.4}
+            row = np.array([given.get(name, 1.5 if name.endswith(".n") else 0.0) for name in order], dtype=np.float32)
+            assert loaded.odd_record(pointer(kept), 0.1 * k, pointer(row)) == 0
+        assert loaded.odd_predict(pointer(kept), None, pointer(path)) == 0
+        return path
+
+    np.testing.assert_allclose(path_after(6000), path_after(0), rtol=0, atol=1e-3)
+
+
 def test_the_header_in_single_precision_warns_of_coordinates_of_a_map():
     """The path of a boat of 1.2 m was 6 cm off after 4 s at a northing of 7,034 km, and 1 um near the origin."""
     assert np.spacing(np.float32(7e6)) == 0.5
