@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.stats import chi2
 
-from shipid.data.kinematics import STATES, Noise, _move, _start, _transition, smooth
+from shipid.data.kinematics import STATES, Noise, _change, _move, _start, _transition, smooth
 from tests.logs.conftest import turning
 
 T = np.arange(0.0, 120.0, 1.0)
@@ -73,6 +73,18 @@ def test_the_transition_is_the_slope_of_the_motion(dt: float) -> None:
     for x in rng.uniform([-50, -50, -4, -2, -2, -0.2], [50, 50, 4, 9, 2, 0.2], (5, 6)):
         slopes = [(_move(x + 1e-5 * e, dt) - _move(x - 1e-5 * e, dt)) / 2e-5 for e in np.eye(6)]
         np.testing.assert_allclose(_transition(x, dt), np.transpose(slopes), atol=1e-6)
+
+
+@pytest.mark.parametrize("dt", [0.5, 5.0])
+def test_white_accelerations_move_a_ship_that_turns_as_on_the_heading_of_the_middle(dt: float) -> None:
+    rng, given = np.random.default_rng(6), noise(0.5, 0.01, 0.05, 0.003)
+    densities = np.diag([0.05, 0.05, 0.003]) ** 2
+    for x in rng.uniform([-50, -50, -4, -2, -2, -0.2], [50, 50, 4, 9, 2, 0.2], (5, 6)):
+        c, s = np.cos(x[2] + x[5] * dt / 2), np.sin(x[2] + x[5] * dt / 2)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        ways = [np.vstack([left * turn, np.eye(3)]) for left in np.linspace(0, dt, 2001)]  # what an impulse moves
+        added = np.trapezoid([way @ densities @ way.T for way in ways], dx=dt / 2000, axis=0)
+        np.testing.assert_allclose(_change(x, dt, given), added, rtol=1e-5, atol=1e-12)
 
 
 def by_least_squares(
