@@ -45,7 +45,9 @@ def identify(
         list[str] | None,
         typer.Option(help="unknown of each run, with =WIDTH if wanted: initial_state, current, heading_bias, ..."),
     ] = None,
-    horizon: Annotated[float | None, typer.Option(help="s of each prediction that is fitted; 0: whole runs")] = None,
+    horizon: Annotated[
+        float | None, typer.Option(help="s of each prediction that is fitted; 0: whole runs; default: 30")
+    ] = None,
     changes: Annotated[
         list[str] | None, typer.Option("--set", help="key=value: any other key of [identify], such as weights.u=0.05")
     ] = None,
@@ -302,7 +304,8 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     fitted = (
         f"{len(outcome.runs)} of {len(outcome.runs) + len(outcome.held_out)} runs, {len(solution.residuals)} residuals"
     )
-    status = {"status": solution.status, "runs": outcome.runs, "held_out": outcome.held_out}
+    status = {"status": solution.status, "sentence": solution.sentence, "residuals": len(solution.residuals)}
+    status |= {"runs": outcome.runs, "held_out": outcome.held_out}
     answer.say(f"{outcome.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s", **status)
     rows: list[list[str]] = [
         [
@@ -324,7 +327,8 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     none = outcome.estimates.loc[outcome.estimates["base"] == 0, "name"].tolist()
     answer.say(
         f"Factors are relative to the base, and so are errors and intervals, by {words[outcome.statistics.chosen]}."
-        + (f" The base has 0 for {listed(none)}: there they are relative to the scale." if none else "")
+        + (f" The base has 0 for {listed(none)}: there they are relative to the scale." if none else ""),
+        standard_errors_by=outcome.statistics.chosen,
     )
     answer.say("\n".join(f"  {sentence}" for sentence in outcome.unseen), unseen=outcome.unseen)
     _show_nuisances(outcome, answer)

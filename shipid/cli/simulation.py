@@ -105,7 +105,7 @@ def manoeuvre(
         list[float] | None,
         typer.Argument(
             help="helm in deg, of a zigzag also the execute heading; of a reverse-spiral the greatest rate in deg/s",
-            metavar="[ANGLES]...",
+            metavar="ANGLES",
         ),
     ] = None,
     speed: Annotated[

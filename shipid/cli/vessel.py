@@ -85,7 +85,9 @@ def vessel_new(
     tunnel_thruster: Annotated[bool, typer.Option("--tunnel-thruster", help="there is one at the bow")] = False,
     scale: Annotated[
         float | None,
-        typer.Option(help="of a model: ship length over model length; 1: a ship. Default: 160 m if below 10 m"),
+        typer.Option(
+            help="of a model: ship length over model length; 1: a ship; default: that of a ship of 160 m if below 10 m"
+        ),
     ] = None,
     density: Annotated[float | None, typer.Option(help="kg/m^3 of the water; default: sea, fresh for a model")] = None,
     ship_type: Annotated[str, typer.Option(help="for the wind: cargo, tanker, research, ...")] = "cargo",

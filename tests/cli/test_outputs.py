@@ -146,7 +146,7 @@ def test_numbers_are_finite(words: str, value: str) -> None:
             "manoeuvre otter turning --speed 1,5",
             "'--speed': '1,5' is no",
         ),
-        ("manoeuvre otter zigzag 20/20", "'[ANGLES]...': '20/20' is no"),
+        ("manoeuvre otter zigzag 20/20", "'ANGLES': '20/20' is no"),
         ("study run quick --workers two", "'--workers': 'two' is no"),
     ],
 )

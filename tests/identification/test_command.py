@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import tomllib
@@ -9,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
+from shipid.cli import app
 from shipid.cli import identify as command
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.errors import ShipidError
@@ -84,6 +87,17 @@ def test_spaces_after_commas_and_around_equals_signs_are_no_part_of_a_path(
     assert given["together"] == [[ONE, "hull.derivatives.N_uv"]]
     assert given["prior"] == {"hull.*": 0.5}
     assert given["weights"]["u"] == 0.05
+
+
+def test_programs_get_how_the_fit_ended_and_whose_errors_it_has(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the text says: the sentence, the residuals, and by what the standard errors are."""
+    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(command, "_look", lambda *_: None)
+    how = ("--parameters", ONE, "--horizon", "20", "--out", "b.toml", "--json")
+    said = json.loads(CliRunner().invoke(app, ["identify", "gunnerus-28.9", str(file), *how]).stdout)
+    written = tomllib.loads(Path("b.toml").read_text())["provenance"]
+    for key in ("status", "sentence", "residuals", "standard_errors_by"):
+        assert said[key] == written[key]
 
 
 MISTAKES = {
