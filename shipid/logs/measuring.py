@@ -16,7 +16,10 @@ from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.physics.signals import is_command, steers
 
-NO_HELM = "the log has no angle that steers, by which zigzags and turning circles are measured"
+NO_HELM = (
+    "the log has no angle that steers, by which zigzags and turning circles are measured, and the shafts are not "
+    "reversed, as in a stop"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +64,7 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
         kinds, why = kinds_of(record) if kind is None else ((kind,), "")
         if not kinds:
             helm = any(is_command(column) and steers(column) for column in columns)
-            left[name] = why if helm else f"{NO_HELM}; {why}"
+            left[name] = why if helm else NO_HELM
         for seen in kinds:
             result = MEASURES[seen](record)
             measures += [{"run": name, "kind": seen, **row} for row in measure_rows(result, length)]
