@@ -29,8 +29,8 @@ NOISE = {"position": 1.0, "heading_deg": 0.5, "acceleration": 0.05, "angular_acc
 QUESTIONS = (
     "Which point of the ship do positions and velocities belong to? If not the vessel's origin: a lever_arm.",
     "Are the commands orders or feedback? Are their names before the dot those of the vessel document?",
-    "Is the wind true or apparent (relative = true), 'from' or 'towards'?",
 )
+OF_WIND = "Is the wind true or apparent (relative = true), 'from' or 'towards'?"
 
 
 def draft_mapping(guess: Guess) -> str:
@@ -105,7 +105,8 @@ def _lines(values: dict[str, Any]) -> Iterator[str]:
 def _head(guess: Guess) -> Iterator[str]:
     yield f"# Drafted from {guess.file.name}. Check every line: a percentage says how sure it is, the rest why."
     yield from (f"# ? {question.sentence}" for question in guess.questions)
-    yield from (f"# ? {question}" for question in QUESTIONS)
+    wind = {"V_w", "beta_w"} & {suggestion.name for suggestion in guess.columns}
+    yield from (f"# ? {question}" for question in (*QUESTIONS, *([OF_WIND] if wind else [])))
     source = guess.source
     yield from _lines({"name": guess.file.stem or "log"})
     yield "\n[source]"

@@ -32,6 +32,13 @@ def test_the_draft_of_a_clean_log_imports_to_the_motion(tmp_path: Path) -> None:
     text = mapping.read_text()
     assert "99 %" in text
     assert "lever_arm" in text  # the questions that no log answers
+    assert "Is the wind" not in text  # which this log does not have
+
+
+def test_a_log_with_a_wind_is_asked_which(tmp_path: Path) -> None:
+    log = tmp_path / "trial.csv"
+    as_bridge(si_log()).assign(**{"Wind speed": 5.0, "Wind dir": 40.0}).to_csv(log, index=False)
+    assert "# ? Is the wind true or apparent" in untried(guess(log))
 
 
 def test_the_draft_mends_what_was_broken(tmp_path: Path) -> None:
