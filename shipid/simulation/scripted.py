@@ -13,7 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from shipid import document as documents
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.simulation.approach import Controls
-from shipid.simulation.manoeuvre import KINDS, Manoeuvre
+from shipid.simulation.log import run_names
+from shipid.simulation.manoeuvre import KINDS, Executed, Manoeuvre
 from shipid.simulation.perform import perform
 from shipid.simulation.truth import Truth, simulate
 from shipid.units import plural
@@ -55,15 +56,21 @@ def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
         if "manoeuvre" not in document:
             raise DocumentError("holds no manoeuvres: give a [truth], or [[manoeuvre]] blocks")
         script = documents.parse(Script, document, file)
-        frame = perform(vessel, _given(script, vessel), step=script.step, interval=script.interval)
+        manoeuvres = _given(script, vessel)
+        frame = perform(vessel, manoeuvres, step=script.step, interval=script.interval)
     except ShipidError as error:
         raise DocumentError(error.message, file=file, path=error.path) from None
-    _tell_of_starts(frame)
+    named = zip(manoeuvres, run_names(len(manoeuvres)), strict=True)
+    later = [one.name or name for one, name in named if isinstance(one, Executed) and one.approach != "rest"]
+    _tell_of_starts(frame[frame["run"].isin(later)])
     return frame.drop(columns=[column for column in frame if str(column).startswith(ACTUAL)])
 
 
 def _tell_of_starts(frame: pd.DataFrame) -> None:
-    """Warn where an actuator has not reached its order in the first row: a reader of the log takes it for there."""
+    """Warn where an actuator has not reached its order in the first row: a reader of the log takes it for there.
+
+    frame : runs that can begin with a straight run at the helm of the approach.
+    """
     first = frame.groupby("run", sort=False).first()
     lags = [column for column in map(str, frame) if column.startswith(ACTUAL)]
     ordered = first[[column.removeprefix(ACTUAL) for column in lags]].to_numpy()

@@ -58,7 +58,10 @@ def test_a_log_that_begins_with_an_order_is_told(tmp_path: Path, caplog: pytest.
     assert "execute_at = 20 (s)" in said
     caplog.clear()
     simulated(SHIP, written(tmp_path, GIVEN.replace("angle_deg", "execute_at = 10\nangle_deg")))
-    assert not caplog.messages
+    simulated(SHIP, written(tmp_path, GIVEN.replace("angle_deg", 'approach = "rest"\nangle_deg')))
+    turn = "actuators_at = 'rest'\norders = {n_rpm = 80, delta_deg = 10}\nduration = 20\n"
+    simulated(SHIP, written(tmp_path, f"[[manoeuvre]]\nkind = 'turning'\n{turn}"))
+    assert not caplog.messages, "these have no straight run that would mend it"
 
 
 def test_a_truth_draws_the_manoeuvres_of_another_vessel(tmp_path: Path) -> None:
