@@ -13,12 +13,12 @@ from shipid.logs.guess.defects import when
 from shipid.logs.guess.evidence import Complex
 from shipid.physics.signals import is_command, signal_of, steers
 
-NODES, SPLITS = 120, 25  # places at which a part may begin or end
+NODES, SPLITS = 120, 60  # places at which a part may begin or end
 LEAST = 0.05  # share of all motion that a part has, at least
 SEEN, BETTER = 0.005, 0.3  # share of the motion that one scale leaves, at least; of that what two leave, at most
 ALIKE, NOTHING = 1.4, 5e-4  # ratio of two scales, that are one; and that of a column that stands still
 CLEAR, TIMES = 8.0, 8.0  # t value of the effect of an order in each part, and ratio of the effects, at least
-HALF = 0.7  # share of what one effect leaves, that two leave, at most
+MOST_LEFT = 0.75  # share of what one effect leaves, that two leave, at most
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def ask_for_changes(state: State) -> None:
             how = f"the {what} is {part.ratio:.3g} times as much, beside its integral, as elsewhere"
             _ask(state, about, f"has {columns} another unit or sign {_from_to(state, first, end)}? There {how}")
     for one in state.suggestions:
-        if is_command(one.name) and steers(signal_of(one.name)) and one.source in state.turning:
+        if is_command(one.name) and steers(signal_of(one.name)):
             _ask_for_angle(state, one.name, one.source)
 
 
@@ -86,15 +86,16 @@ def _ask_for_angle(state: State, name: str, source: str) -> None:
     r = state.r if state.r is not None else np.gradient(np.asarray(state.psi), state.t)
     rows, design, change = evidence.answer(state.t, r, state.columns[source], state.part)
     whole = evidence.solved(design, change)[2]
-    least, start, effects = HALF * whole, 0, np.ones(2)
+    least, start, ratio = MOST_LEFT * whole, 0, 1.0
     for row in np.unique(np.linspace(0, len(rows), SPLITS + 2).astype(int))[1:-1]:
         before = np.where(np.arange(len(rows)) < row, design[:, 0], 0.0)
         apart = np.column_stack([before, design[:, 0] - before, design[:, 1:]])
         found, errors, left = evidence.solved(apart, change)
-        if left < least and np.all(np.abs(found[:2]) > CLEAR * errors[:2]):
-            least, start, effects = left, int(rows[row]), found[:2]
-    ratio = float(effects[1] / effects[0])
-    if ratio > 0 and 1 / TIMES < ratio < TIMES:
+        if left >= least or not np.all(np.abs(found[:2]) > CLEAR * errors[:2]):
+            continue
+        if not 1 / TIMES < found[1] / found[0] < TIMES:  # else the speed is another one
+            least, start, ratio = left, int(rows[row]), float(found[1] / found[0])
+    if start == 0:
         return
     how = "to the other side" if ratio < 0 else f"{ratio:.2g} times as fast"
     words = f"has {source!r} another unit or sign {_from_to(state, start, len(state.t))}?"

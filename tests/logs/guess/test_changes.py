@@ -22,7 +22,7 @@ def guessed(folder: Path, frame: pd.DataFrame) -> Guess:
     return guess(folder / "log.csv")
 
 
-@pytest.mark.parametrize("share", [0.2, 0.5, 0.7])
+@pytest.mark.parametrize("share", [0.2, 0.4, 0.5])
 @pytest.mark.parametrize(
     ("columns", "factor"),
     [
