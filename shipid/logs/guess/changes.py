@@ -17,7 +17,7 @@ NODES, SPLITS = 120, 60  # places at which a part may begin or end
 LEAST = 0.05  # share of all motion that a part has, at least
 SEEN, BETTER = 0.005, 0.3  # share of the motion that one scale leaves, at least; of that what two leave, at most
 ALIKE, NOTHING = 1.4, 5e-4  # ratio of two scales, that are one; and that of a column that stands still
-CLEAR, TIMES = 8.0, 8.0  # t value of the effect of an order in each part, and ratio of the effects, at least
+CLEAR, TIMES = 8.0, 20.0  # t value of the effect of an order in each part, and ratio of the effects, at least
 MOST_LEFT = 0.75  # share of what one effect leaves, that two leave, at most
 
 
