@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.clues import State, unit_of_another
 from shipid.logs.guess.words import fits, is_order, parts_of
 from shipid.logs.repairs import INPUTS
@@ -15,6 +16,7 @@ ALIKE = (
 )
 """Meanings of which a log needs one pair: what gives the position, what gives the velocity."""
 
+NEARLY_AS_FAST = 0.1  # share by which two clocks of seconds may go otherwise
 PARTNERS = {"speed": "course", "course": "speed"}
 """Meanings that take the place of u and v together alone."""
 
@@ -23,7 +25,10 @@ REMEDIES = {
     "315964800 + 604800 weeks + seconds, less 18 s by which GPS is ahead of UTC since 2017",
     "awd": "it may be the direction of the apparent wind from north: write the angle from the bow, less the heading",
     "blowing": "it may be a direction of the wind: map it to beta_w with direction = 'from' or 'towards'",
-    "telegraph": "it may be an order of the shaft: map it to a command .n with factor = rpm / its largest value",
+    **dict.fromkeys(
+        ("telegraph", "eot"),
+        "it may be an order of the shaft: map it to a command .n with factor = rpm / its largest value",
+    ),
 }
 """Word of a name that says no known quantity -> what the column may be, and what to do."""
 
@@ -41,6 +46,14 @@ def _reason(state: State, name: str, numbers: bool) -> str:
         return "it holds the numbers of the rows"
     meanings = sorted((scores := fits(name)), key=lambda meaning: -scores[meaning])
     if not meanings:
+        if is_clock(name) and np.all(np.diff(state.columns[name]) > 0):
+            rate = float(np.ptp(state.columns[name]) / np.ptp(state.t))
+            goes = (
+                f", which goes {rate:.5g} times as fast as that of the draft"
+                if abs(rate - 1.0) < NEARLY_AS_FAST
+                else ""
+            )
+            return f"it is another clock{goes}"
         remedy = next((REMEDIES[part] for part in parts_of(name) if part in REMEDIES), None)
         if remedy is not None:
             return remedy

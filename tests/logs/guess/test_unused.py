@@ -21,6 +21,8 @@ from tests.logs.simulated import as_bridge, si_log
         ("SOG", "u", "is read from 'u' and 'v'"),
         ("AWD [deg]", "noise", "write the angle from the bow"),
         ("Telegraph [%]", "noise", "map it to a command .n with factor"),
+        ("EOT", "noise", "map it to a command .n with factor"),
+        ("GPS time", "clock", "it is another clock, which goes 0.997 times as fast as that of the draft"),
         ("Wind blowing towards [deg]", "noise", "map it to beta_w with direction"),
         ("Wind speed [Bft]", "noise", "its unit Bft does not fit wind speed"),
         ("GPS Week", "noise", "315964800 + 604800 weeks + seconds, less 18 s"),
@@ -30,6 +32,7 @@ from tests.logs.simulated import as_bridge, si_log
 def test_a_column_that_is_not_used_says_why(name: str, values: str, message: str, tmp_path: Path) -> None:
     log = as_bridge(si_log())
     drawn = {"noise": np.random.default_rng(1).normal(size=len(log)), "number": np.arange(len(log))}
+    drawn["clock"] = 3600.0 + 0.997 * log["time"]
     added = drawn.get(values, log.get(values))
     file = tmp_path / "log.csv"
     log.assign(**{name: added}).to_csv(file, index=False)
