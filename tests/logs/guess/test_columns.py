@@ -427,3 +427,14 @@ def test_roll_and_pitch_that_are_exchanged_are_asked(exchanged: bool, tmp_path: 
     as_bridge(log).assign(**dict(zip(names, angles.values(), strict=True))).to_csv(file, index=False)
     asked = [question.sentence for question in guess(file).questions if "phi" in question.about]
     assert [sentence.partition("?")[0] for sentence in asked] == ["are 'roll' and 'pitch' exchanged"] * exchanged
+
+
+def test_a_clock_in_bursts_is_named(tmp_path: Path) -> None:
+    """It was said that 1,000 rows were too few."""
+    row = np.arange(1000)
+    turn = 0.5 * np.sin(row / 60)
+    way = np.cumsum(np.exp(1j * turn))
+    log = {"time": row // 5 + 0.003 * (row % 5), "north": way.real, "east": way.imag, "psi": np.degrees(turn)}
+    pd.DataFrame(log).round(4).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=r"'time' comes in bursts: most steps are 0\.003 s, their mean is 0\.2 s"):
+        guess(tmp_path / "log.csv")
