@@ -369,6 +369,22 @@ def copies(dataset: Dataset, runs: Iterable[str], others: Collection[str]) -> di
     return found
 
 
+def repeated(dataset: Dataset, runs: Iterable[str]) -> dict[str, str]:
+    """Runs, and the one of those before them with their motion in most rows, as in `copies`."""
+    whole = {run: _motion(pd.concat(parts)) for run, parts in pieces_by_run(dataset).items()}
+    names = list(runs)
+    sizes = [len(whole[name].keys) for name in names]
+    owner = np.repeat(np.arange(len(names)), sizes)
+    keys = np.concatenate([whole[name].keys for name in names] or [np.empty(0, np.uint64)])
+    _, first, place = np.unique(keys, return_index=True, return_inverse=True)
+    before = np.bincount(owner, owner[first][place] < owner, len(names)) / np.maximum(sizes, 1)
+    found: dict[str, str] = {}
+    for k in np.flatnonzero(before >= OVERLAP):  # of few runs: the others need no comparison one by one
+        share, other = max((_alike(whole[names[k]], whole[name]), name) for name in names[:k])
+        found |= {names[k]: other} if share >= OVERLAP else {}
+    return found
+
+
 def _within(mine: _Motion, other: _Motion, shared: bool) -> float:
     """Share of the rows of a run that another run has, too: the same instants of one clock, or the same motion."""
     if shared:

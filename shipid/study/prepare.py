@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.causal import causal_columns
-from shipid.data.checks import copies
+from shipid.data.checks import copies, repeated
 from shipid.data.dataset import Dataset, kept_rows, outside_spans, pieces, read_dataset
 from shipid.data.windows import (
     Instants,
@@ -246,13 +246,25 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
 
 
 def _copied(dataset: Dataset, rest: Windows, test: Windows) -> list[str]:
-    """A sentence on test runs whose motion is that of runs that train; none where there are none."""
-    same = copies(dataset, test.spans, rest.spans)
-    if not same:
-        return []
-    pairs = ", ".join(f"{run!r} as {other!r}" for run, other in same.items())
+    """Sentences on runs that move as others: test runs as runs that train, and each among themselves."""
+    found = (
+        (
+            copies(dataset, test.spans, rest.spans),
+            "test runs that move as runs that train do ({}): their errors say nothing of new runs: leave out copies",
+        ),
+        (
+            repeated(dataset, test.spans),
+            "test runs that move as other test runs do ({}): each counts as a manoeuvre of its own, so intervals are "
+            "too narrow: leave out copies",
+        ),
+        (
+            repeated(dataset, rest.spans),
+            "runs that train and move as others that train do ({}): N_D counts each, and validation and bands judge by "
+            "runs whose copies trained: leave out copies",
+        ),
+    )
     return [
-        f"test runs that move as runs that train do ({pairs}): their errors say nothing of new runs: leave out copies"
+        words.format(", ".join(f"{run!r} as {other!r}" for run, other in same.items())) for same, words in found if same
     ]
 
 

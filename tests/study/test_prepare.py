@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise, product
@@ -449,7 +450,26 @@ def test_a_test_run_that_is_a_copy_of_one_that_trains_is_named(
         assert note.startswith(f"test runs that move as runs that train do ({test!r} as {other!r}): ")
     for test in ("b", "f"):
         plan, dataset = recorded(twice, split={"test": [test]}, prediction={"ahead": 5.0})
-        assert not [words for words in prepare(plan, dataset).notes if "copies" in words]
+        assert not [words for words in prepare(plan, dataset).notes if words.startswith("test runs that move")]
+
+
+def test_copies_among_test_runs_and_among_runs_that_train_are_named(
+    recorded: Callable[..., tuple[Plan, Dataset]],
+) -> None:
+    """Nothing was said of a test of one manoeuvre that counted as five, nor of a copy that validates what it trains."""
+    log = weaving()
+    again = [
+        log.frame[log.frame["run"] == "a"].assign(run=f"again {k}", t=lambda rows, k=k: rows["t"] + 1e4 * k)
+        for k in (1, 2)
+    ]
+    thrice = Dataset(pd.concat([log.frame, *again], ignore_index=True), {**log.metadata, "clock": "run"})
+    plan, dataset = recorded(thrice, split={"test": ["a", "c", "again 2", "again 1"]}, prediction={"ahead": 5.0})
+    (note,) = (words for words in prepare(plan, dataset).notes if "copies" in words)
+    assert re.match(r"test runs that move as other test runs do \('again .' as '(a|again .)', 'again .' as ", note)
+    assert "intervals are too narrow" in note
+    plan, dataset = recorded(thrice, split={"test": ["b", "c"]}, prediction={"ahead": 5.0})
+    (note,) = (words for words in prepare(plan, dataset).notes if "copies" in words)
+    assert note.startswith("runs that train and move as others that train do ('again 1' as 'a', 'again 2' as ")
 
 
 def test_a_ship_at_rest_is_no_copy(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
