@@ -483,6 +483,11 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
     for place in range(len(names)):
         if twice := same_file(names[: place + 1]):
             raise DocumentError(f"two conditions are called {twice}", file=file, path=f"condition.{place}.name")
+    for path, values in repeat.items():
+        again = [value for place, value in enumerate(values) if value in values[:place]]
+        if again:
+            message = f"{again[0]!r} is there twice: give each value once, equal studies are no more evidence than one"
+            raise DocumentError(message, file=file, path=f"repeat.{path}")
     bare = {key: value for key, value in plan.document.items() if key not in OF_PARTS}
     turns = [dict(zip(repeat, values, strict=True)) for values in product(*repeat.values())]
     parts: dict[str, Part] = {}
