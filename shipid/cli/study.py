@@ -252,6 +252,8 @@ def study_rotate(
         answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
         answer.rows("turns", over, table(heads, rows))
         answer.say(f"constant u, v, r: {digits(naive)} m", naive=naive)
+        if words := rotate.copied(plan, dataset):
+            answer.say(words, copied=words)
         if saw := plan.saw(wanted):
             answer.say(
                 f"{', '.join(saw)}: numbers set from runs that test here, A and H are not those of new runs", saw=saw

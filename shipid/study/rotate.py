@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from shipid import document as documents
+from shipid.data.checks import repeated
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
 from shipid.files import make_folder, read_table, sweep, write_table, write_text
@@ -47,6 +48,14 @@ def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
         message = f"only {chosen.pop()!r} matches: take turns with two or more of {', '.join(runs)}"
         raise DocumentError(message, path="--tests")
     return [run for run in runs if run in chosen]
+
+
+def copied(plan: Plan, dataset: Dataset) -> str:
+    """Say which runs move as others do, so that a turn tests a run that trains; empty where none does."""
+    same = repeated(dataset, all_windows(plan, dataset).spans)
+    pairs = ", ".join(f"{run!r} as {other!r}" for run, other in same.items())
+    words = f"runs that move as others do ({pairs}): where one tests the other trains, so its errors say nothing of new"
+    return f"{words} runs: leave out copies" if same else ""
 
 
 def rotate(

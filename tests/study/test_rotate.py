@@ -17,7 +17,7 @@ from shipid.errors import DocumentError
 from shipid.study import rotate as rotate_module
 from shipid.study.plan import Plan
 from shipid.study.prepare import prepare
-from shipid.study.rotate import rotate, spread, turn_findings, turns
+from shipid.study.rotate import copied, rotate, spread, turn_findings, turns
 from shipid.study.run import run_unit
 from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
@@ -66,6 +66,19 @@ def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Pl
         assert (turn["N_D"] == 5).all()
         for name in ("A", "H"):
             np.testing.assert_allclose(turn[name], [row[name] for row in rows], rtol=1e-12)
+
+
+def test_copies_of_runs_are_named_before_their_errors_are_believed(
+    recorded: Callable[..., tuple[Plan, Dataset]],
+) -> None:
+    """Of two copies one trained while the other tested: errors of millimetres, without a word."""
+    log = weaving()
+    copy = log.frame[log.frame["run"] == "a"].assign(run="again", t=lambda rows: rows["t"] + 1e4)
+    twice = Dataset(pd.concat([log.frame, copy], ignore_index=True), {**log.metadata, "clock": "run"})
+    plan, dataset = recorded(twice, split={"test": ["f"]}, prediction={"ahead": 5.0})
+    assert copied(plan, dataset).startswith("runs that move as others do ('again' as 'a'): where one tests")
+    plan, dataset = recorded(log, split={"test": ["f"]}, prediction={"ahead": 5.0})
+    assert not copied(plan, dataset)
 
 
 @pytest.mark.parametrize("after", [3, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2, 4))])
