@@ -11,7 +11,8 @@ precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B, of 
               itself, so its residuals show less than its errors. One number scales B so that it is right in the median
               direction where errors are independent; t has Satterthwaite's degrees of freedom (of CR2). In a direction
               that one run alone decides it has no residuals: there errors count as in the others on average. To be
-              trusted from 4 degrees of freedom on (Tipton).
+              trusted from 4 degrees of freedom on (Tipton), in the median of the factors that data rather than priors
+              decide.
     blocks    the sandwich form with clusters that are stretches of a run, each much longer than the correlation time
               of the residuals. For few runs; it does not account for a current or a bias that lasts a whole run.
 
@@ -455,10 +456,12 @@ def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: s
     scale, alone = _scale(parts, np.array(scores))
     influences = -np.array(scores) @ root.T * scale
     spread_of_data = influences.T @ influences + root @ alone @ root.T
-    matrix = spread_of_data + (basis.inverse * basis.prior) @ basis.inverse
+    of_prior = (basis.inverse * basis.prior) @ basis.inverse
+    matrix = spread_of_data + of_prior
     free = np.array([_satterthwaite(parts, row) for row in root])
     freedom = np.maximum(_freedom(np.diag(matrix), np.diag(spread_of_data) ** 2 / free), 1.0)
-    typical = float(np.median(freedom))
+    by_data = np.diag(spread_of_data) >= np.diag(of_prior)  # a prior has any number of degrees of freedom
+    typical = float(np.median(freedom[by_data] if by_data.any() else freedom))
     trusted = bool(typical >= LEAST_FREEDOM)
     reason = f"{len(parts)} {what}, worth {typical:.1f} degrees of freedom"
     if not trusted:

@@ -55,6 +55,20 @@ def test_which_form_is_chosen() -> None:
     assert "mislead" in statistics(few).covariances["sandwich"].reason
 
 
+@pytest.mark.parametrize("runs", [1, 3])
+def test_factors_that_priors_alone_hold_lend_no_trust(runs: int) -> None:
+    """Four that the data do not see made the sandwich of three runs trusted, and of one run: without a warning."""
+    error, names = noise(np.random.default_rng(0), runs, 400, 0.8), labels(runs, 400)
+    jacobian = design(runs, 400, 7) * np.where(np.arange(7) < 3, 1.0, 1e-6)
+    widths = np.full(7, 0.3)
+    few = statistics(fitted(jacobian[:, :3], error, *names, prior_widths=widths[:3]))
+    more = statistics(fitted(jacobian, error, *names, prior_widths=widths))
+    assert not more.covariances["sandwich"].trusted
+    assert more.chosen == few.chosen
+    np.testing.assert_allclose(more.high[:3] - more.low[:3], few.high - few.low, rtol=1e-3)
+    np.testing.assert_allclose(more.errors[3:], widths[3:], rtol=1e-3)
+
+
 def test_runs_too_short_for_stretches_are_not_called_stretches() -> None:
     """Residuals that remember 30 samples would need stretches of 300; the runs have 100 and stay whole."""
     short = statistics(fitted(design(3, 100, 3), noise(np.random.default_rng(0), 3, 100, 0.95), *labels(3, 100)))
