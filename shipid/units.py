@@ -33,6 +33,13 @@ def decimals_for(value: float, digits: int) -> int:
     return max(digits - 1 - math.floor(math.log10(abs(value))), 0) if value else digits - 1
 
 
+def interval_text(low: float, high: float, between: str = " ... ") -> str:
+    """Both ends of an interval with the same decimals: those that give half its width two digits, six at most."""
+    half = (high - low) / 2
+    places = min(decimals_for(half, 2), 6) if math.isfinite(half) else 0
+    return f"{low:z.{places}f}{between}{high:z.{places}f}"
+
+
 def percent(share: float, decimals: int = 0, *, signed: bool = False) -> str:
     """A share as text, with a space before the sign as after any number (ISO 80000-1): 0.284 is 28 %."""
     return f"{100 * share:{'+' if signed else ''}.{decimals}f} %"

@@ -10,7 +10,7 @@ import pytest
 
 import shipid
 from shipid.logs.mapping import UNITS
-from shipid.units import DEGREE, KNOT, MINUTE, RPM, decimals_for, length_text, percent
+from shipid.units import DEGREE, KNOT, MINUTE, RPM, decimals_for, interval_text, length_text, percent
 
 
 @pytest.mark.parametrize(
@@ -58,3 +58,20 @@ def test_there_is_one_way_to_write_percent() -> None:
     """A format such as .0% joins the sign to its number."""
     for file in Path(shipid.__file__).parent.rglob("*.py"):
         assert not re.search(r":[+.\d]*%\}", file.read_text()), file
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "shown"),
+    [
+        (0.681, 1.4, "0.68 ... 1.40"),
+        (1.02548, 1.03594, "1.0255 ... 1.0359"),
+        (-9.281, -1.1, "-9.3 ... -1.1"),
+        (-0.004, 5.2, "0.0 ... 5.2"),
+        (1450.2, 2210.0, "1450 ... 2210"),
+        (1.0, 1.0 + 1e-9, "1.000000 ... 1.000000"),
+        (1.0, 1.0, "1.0 ... 1.0"),
+        (-float("inf"), float("inf"), "-inf ... inf"),
+    ],
+)
+def test_both_ends_of_an_interval_have_the_decimals_of_its_width(low: float, high: float, shown: str) -> None:
+    assert interval_text(low, high) == shown

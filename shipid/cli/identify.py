@@ -14,7 +14,7 @@ from shipid.cli.completion import files
 from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
 from shipid.cli.terminal import digits, ended_by, iterations, steps, table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import percent, plural
+from shipid.units import interval_text, percent, plural
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
@@ -205,7 +205,7 @@ def _show_structures(compared: Compared, answer: Answer) -> None:
             row["structure"],
             str(row["numbers"]),
             *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"], row["more"])),
-            f"{row['low']:.3g} ... {row['high']:.3g}" if row["low"] == row["low"] else "-",
+            interval_text(row["low"], row["high"]) if row["low"] == row["low"] else "-",
             digits(row["test"]),
             row["note"],
         ]
@@ -240,7 +240,7 @@ def _show_structures(compared: Compared, answer: Answer) -> None:
 
 
 def _with_interval(row: Any) -> str:
-    within = f" ({row['low']:.3g} ... {row['high']:.3g})" if row["low"] == row["low"] else ""
+    within = f" ({interval_text(row['low'], row['high'])})" if row["low"] == row["low"] else ""
     return f"{digits(row['value'])}{within}"
 
 
@@ -313,7 +313,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
             row["unit"],
             *(f"{row[name]:.4g}" for name in ("base", "value", "factor")),
             *(
-                (f"{row['factor_error']:.4g}", f"{row['factor_low']:.3g} ... {row['factor_high']:.3g}")
+                (f"{row['factor_error']:.4g}", interval_text(row["factor_low"], row["factor_high"]))
                 if row["factor_error"] < float("inf")
                 else ("-", "none")
             ),
@@ -346,7 +346,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     compared = [
         [
             *(row["manoeuvre"], row["measure"], digits(row["before"]), digits(row["after"])),
-            *([f"{digits(row['low'])} ... {digits(row['high'])}"] if banded else []),
+            *([interval_text(row["low"], row["high"]) if row["low"] == row["low"] else "-"] if banded else []),
             *(row["unit"], row["note"]),
         ]
         for row in outcome.manoeuvres.to_dict("records")

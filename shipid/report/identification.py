@@ -21,6 +21,7 @@ from shipid.report.section import Section
 from shipid.report.structures import group_table
 from shipid.report.tables import Cell, Table, decimals, figure, text
 from shipid.report.wording import bound, counted, listed, number, scientific
+from shipid.units import interval_text
 
 ROW, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
 WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [px]
@@ -168,7 +169,7 @@ def _span(frame: pd.DataFrame) -> tuple[float, float]:
 
 
 def _hover(row: Mapping[Any, Any]) -> str:
-    interval = f"{row['factor_low']:.3g} ... {row['factor_high']:.3g}"
+    interval = interval_text(row["factor_low"], row["factor_high"])
     words = [f"<b>{label(str(row['path']))}</b> x {row['factor']:.4g}, 95 % {interval}"]
     return "<br>".join([*words, *wrap(label(str(row["reason"])), 70)])
 
@@ -192,7 +193,7 @@ def numbers(content: IdentificationContent) -> Table:
 def _interval(low: float, high: float) -> Cell:
     if not np.isfinite(high - low):
         return Cell("none", tables.MISSING)
-    return Cell(f"{low:.3g} … {high:.3g}".replace("-", "−"), float(low))
+    return Cell(interval_text(low, high, " … ").replace("-", "−"), float(low))
 
 
 def unseen(content: IdentificationContent) -> Table | None:

@@ -170,7 +170,7 @@ def test_tables_keep_the_order_and_say_why_numbers_are_missing() -> None:
     assert table.rows[1][-1].text == "before: no"
     rows = identification.numbers(content()).rows
     assert rows[1][0].text == "hull.N_r (with hull.N_v)"
-    assert [row[6].text for row in rows] == ["1 … 1.2", "0.6 … 1", "none"]
+    assert [row[6].text for row in rows] == ["1.00 … 1.20", "0.60 … 1.00", "none"]
 
 
 def test_what_was_not_asked_for_is_left_out(tmp_path: Path) -> None:
