@@ -100,7 +100,9 @@ def data_import(
         shown = table(["repair", "column", "count", "what was done"], rows)
         answer.rows("repairs", repairs, shown if repairs else None)
         counts = {"rows": len(dataset.frame), "runs": len(dataset.runs)}
-        answer.say(f"{counts['rows']} rows in {counts['runs']} runs -> {file}", file=file, **counts)
+        answer.say(
+            f"{counts['rows']} rows in {counts['runs']} {plural(counts['runs'], 'run')} -> {file}", file=file, **counts
+        )
 
 
 def _draft(
@@ -196,7 +198,9 @@ def data_join(
     with answering(as_json) as answer:
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
         counts = {"rows": len(joined.frame), "runs": len(joined.runs)}
-        answer.say(f"{counts['rows']} rows in {counts['runs']} runs -> {file}", file=file, **counts)
+        answer.say(
+            f"{counts['rows']} rows in {counts['runs']} {plural(counts['runs'], 'run')} -> {file}", file=file, **counts
+        )
 
 
 @app.command("check")
@@ -277,7 +281,7 @@ def data_measures(
         shown = table(["run", "not measured, because"], result.left.items())
         answer.rows("left", left, shown if left else None)
         measured = result.measures["run"].nunique() if measures else 0
-        answer.say(f"{measured} runs measured, {len(left)} not")
+        answer.say(f"{measured} {plural(measured, 'run')} measured, {len(left)} not")
         if csv is not None:
             write_table(csv, result.measures)
             answer.say(f"measures -> {csv}", csv=csv)

@@ -12,6 +12,7 @@ from shipid.cli.completion import bundled_or_file
 from shipid.cli.options import Changes, VesselName, command_line, parsed, stem
 from shipid.cli.terminal import criterion_table, measure_table, table
 from shipid.errors import DocumentError, ShipidError
+from shipid.units import plural
 
 
 def simulate(
@@ -61,7 +62,11 @@ def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> 
         write_table(out, dataset.frame)
     with answering(as_json) as answer:
         counts = {"runs": len(dataset.runs), "rows": len(dataset.frame)}
-        answer.say(f"{ship.name}: {counts['runs']} runs, {counts['rows']} rows -> {out}", file=out, **counts)
+        answer.say(
+            f"{ship.name}: {counts['runs']} {plural(counts['runs'], 'run')}, {counts['rows']} rows -> {out}",
+            file=out,
+            **counts,
+        )
 
 
 def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_json: bool) -> None:
@@ -88,7 +93,9 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     file = write_dataset(dataset, out or Path(f"{plan.name}.parquet"))
     with answering(as_json) as answer:
         counts = {"runs": len(dataset.runs), "rows": len(dataset.frame)}
-        answer.say(f"{counts['runs']} runs, {counts['rows']} rows -> {file}", file=file, **counts)
+        answer.say(
+            f"{counts['runs']} {plural(counts['runs'], 'run')}, {counts['rows']} rows -> {file}", file=file, **counts
+        )
         answer.say("least / mean / greatest at the instants of prediction:")
         heads = ["set", *(f"{quantity} [{unit}]" for quantity, unit in units.items())]
         answer.rows("envelope", ranges, table(heads, rows))

@@ -19,7 +19,7 @@ from shipid.metrics import share_of, shares_by_run
 from shipid.predictor import NO_BAND
 from shipid.report.wording import listed
 from shipid.study.results import Results
-from shipid.study.verdict import metres, named, span
+from shipid.study.verdict import metres, named, runs, span
 from shipid.units import percent
 
 Array = np.ndarray
@@ -133,7 +133,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
 
         for name in np.unique(kind):
             chosen, known = kind == name, bands.kinds.get(str(name), 0)
-            few = "" if bands.promises(level, str(name)) else f"{known} runs of this kind calibrated the band: too few"
+            few = "" if bands.promises(level, str(name)) else f"{runs(known)} of this kind calibrated the band: too few"
             few = NEW_KIND if bands.kinds and not known else few
             add("kind", str(name), chosen, held[chosen], float(radius[chosen].mean()), few)
         for place in range(SPEEDS):

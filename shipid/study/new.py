@@ -24,6 +24,7 @@ from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.physics import assumed, check_columns
+from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
 from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
 from shipid.simulation.approach import Controls, service_speed
 from shipid.simulation.manoeuvre import order_keys
@@ -311,12 +312,19 @@ def _question(vessels: Mapping[str, Vessel], dataset: Dataset, seen: Survey, hor
     name = next(iter(vessels.values())).name
     yield Choice("question", f"How well can {name} be predicted {horizon:g} s ahead, with how many runs?")
     counts = Counter(seen.runs["kind"])
-    kinds = ", ".join(f"{count} {plural(count, kind)}" for kind, count in counts.most_common())
+    kinds = ", ".join(_of_kind(count, kind) for kind, count in counts.most_common())
     low, high = seen.runs["duration"].min(), seen.runs["duration"].max()
     slow, fast = seen.runs["speed"].min(), seen.runs["speed"].max()
     text = f"{len(seen.runs)} runs ({kinds}) of {low:.0f} to {high:.0f} s at {slow:.2g} to {fast:.2g} m/s"
     wind = "" if "V_w" in dataset.frame else ", wind not measured"
     yield Choice("description", f"{text}, {len(dataset.frame)} rows{wind}", "what the log holds")
+
+
+def _of_kind(count: int, kind: str) -> str:
+    """Return `3 zigzags`, `9 random runs`, `1 run of coasting`."""
+    if kind in (LOW_SPEED, COASTING):
+        return f"{count} {plural(count, 'run')} of {kind}"
+    return f"{count} {plural(count, f'{kind} run' if kind == RANDOM else kind)}"
 
 
 def _measured(vessels: Mapping[str, Vessel], dataset: Dataset) -> str:
@@ -397,7 +405,7 @@ def _why_test(runs: pd.DataFrame, tests: Sequence[str]) -> str:
         run = runs.loc[name]
         alike = int((runs["kind"] == run["kind"]).sum())
         words.append(
-            f"{name!r} is in the middle of {alike} {run['kind']}s: {run['speed']:.2g} m/s, "
+            f"{name!r} is in the middle of {_of_kind(alike, str(run['kind']))}: {run['speed']:.2g} m/s, "
             f"{np.degrees(run['rate']):.2g} deg/s, {run['duration']:.0f} s"
         )
     return f"{'; '.join(words)}. Never look at them while you choose models. More tests make surer answers"

@@ -21,7 +21,7 @@ from tests.logs.simulated import as_bridge, si_log
 def test_data_import_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = output_of("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv")
-    assert "41 rows in 1 runs -> plain.parquet" in text
+    assert "41 rows in 1 run -> plain.parquet" in text
     assert read_dataset("plain.parquet").runs == ["good"]
     output_of("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv", "--out", "deep/other.parquet")
     assert "10 of 10 checks passed" in output_of("data", "check", "deep/other.parquet")

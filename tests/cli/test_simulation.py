@@ -28,7 +28,7 @@ def test_manoeuvre_measures_what_it_writes(tmp_path: Path, monkeypatch: pytest.M
     assert table.loc["execute heading", "value"] == pytest.approx(10)
     assert f"{table.loc['overshoot 1', 'value']:.3g}" in text
     text = output_of("data", "measures", "z.parquet", "--length", 28.9, "--csv", "again.csv")
-    assert "1 runs measured, 0 not" in text
+    assert "1 run measured, 0 not" in text
     again = pd.read_csv("again.csv").set_index("measure")
     pd.testing.assert_series_equal(again["value"], table["value"])
 
@@ -68,7 +68,7 @@ def test_simulate_writes_a_log_of_a_vessel(tmp_path: Path, monkeypatch: pytest.M
     run = '[[manoeuvre]]\nkind = "zigzag"\nn_rpm = 80\nangle_deg = 20\nexecute_heading_deg = 20\nduration = 200\n'
     Path("runs.toml").write_text("step = 0.5\n" + run)
     text = output_of("simulate", "mariner", "--manoeuvres", "runs.toml", "--out", "log.csv")
-    assert "1 runs, 201 rows -> log.csv" in text
+    assert "1 run, 201 rows -> log.csv" in text
     output_of("simulate", "mariner", "--manoeuvres", "runs.toml", "--out", "log.parquet")
     log = pd.read_csv("log.csv")
     np.testing.assert_allclose(log["psi"], read_dataset(Path("log.parquet")).frame["psi"], rtol=1e-12)

@@ -27,6 +27,7 @@ from shipid.study.new import (
     SHARE_OF_RUN,
     _ahead,
     _degraded,
+    _of_kind,
     _turning,
     draft_study,
     family_names,
@@ -376,6 +377,20 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
     assert truth is not None
     assert truth.duration >= plan.study.prediction.horizon * plan.study.prediction.step
     assert max(plan.study.grid.N_D) == truth.manoeuvres - plan.study.split.test  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("count", "kind", "said"),
+    [
+        (3, "zigzag", "3 zigzags"),
+        (1, "speed run", "1 speed run"),
+        (9, "random", "9 random runs"),
+        (2, "manoeuvring at low speed", "2 runs of manoeuvring at low speed"),
+        (1, "coasting", "1 run of coasting"),
+    ],
+)
+def test_kinds_of_runs_are_counted_in_words(count: int, kind: str, said: str) -> None:
+    assert _of_kind(count, kind) == said
 
 
 @pytest.mark.parametrize(("name", "said"), [("gunnerus-28.9-6dof", True), ("gunnerus-28.9", False)])
