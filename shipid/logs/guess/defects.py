@@ -312,7 +312,7 @@ def _heading_offset(state: State) -> None:
     angle, error, current = _off_on_all_courses(state)
     if error < CLEAR:
         why = f"on all courses the way leaves the heading by {np.degrees(angle):+.1f} deg (+- {np.degrees(error):.1f})"
-        why += f", beside a steady current of {abs(current):.2g} m/s: heading off, or wind"
+        why += f", beside a steady current of {abs(current):.2g} m/s: heading off, positions in turned axes, or wind"
     elif state.body is None:
         return
     else:
@@ -334,8 +334,8 @@ def _heading_offset(state: State) -> None:
 def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
     """How far the heading is off [rad], its standard error, and a steady current, north + i east [m/s].
 
-    Over each window the way across the heading is off * (way along it) + arm * (turn) + (current across): a sway in
-    turns, an antenna and a late heading are an arm.
+    Over each window the way across the heading is tan(off) * (way along it) + arm * (turn) + (current across): a sway
+    in turns, an antenna and a late heading are an arm.
     """
     assert state.psi is not None
     assert state.position is not None
@@ -360,7 +360,8 @@ def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
     others = [np.concatenate(parts[:i] + parts[i + 1 :]) for i in range(len(parts))]
     without = [np.linalg.lstsq(design[rows], ran.imag[rows], rcond=None)[0][0] for rows in others]
     error = float(np.std(without)) * np.sqrt(len(without) - 1)  # of the jackknife
-    return float(found[0]), error, complex(found[2], found[3])
+    off = float(np.arctan(found[0]))
+    return off, error, complex(found[2], found[3]) * np.cos(off) * np.exp(1j * off)
 
 
 def _times(state: State, rows: NDArray[np.intp]) -> str:

@@ -98,7 +98,7 @@ def in_a_current(frame: pd.DataFrame, north: float, east: float) -> pd.DataFrame
     return frame.assign(**moved, u=frame["u"] + c * north + s * east, v=frame["v"] + c * east - s * north)
 
 
-@pytest.mark.parametrize("angle", [-5.0, -3.0, 0.0, 3.0, 5.0])
+@pytest.mark.parametrize("angle", [-5.0, -3.0, 0.0, 3.0, 5.0, 30.0])
 @pytest.mark.parametrize("velocities", [True, False])
 def test_a_heading_that_is_off_is_found_in_a_current_and_without_velocities(
     angle: float, velocities: bool, tmp_path: Path
