@@ -98,8 +98,7 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
     """
     folder = path_of("folder", folder)
     store.stored_plan(folder)
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise ResultError("is a folder that this user may not write into: copy it, and name the copy", file=folder)
+    store.check_writable(folder)
     with Claims(folder) as claims, claims.alone(PAGES):
         return _write(folder, say)
 

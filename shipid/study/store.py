@@ -78,8 +78,15 @@ def open_folder(folder: Path, plan: Plan) -> None:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
     if _provenance(folder)["digest"] != plan.digest:
         raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
+    check_writable(folder)
     _mend(folder, plan)
     sweep_run(folder)
+
+
+def check_writable(folder: Path) -> None:
+    """Raise ResultError for the folder of a run that this user may read alone."""
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise ResultError("is a folder that this user may not write into: copy it, and name the copy", file=folder)
 
 
 def check_place(folder: Path, plan: Plan) -> None:

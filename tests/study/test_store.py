@@ -28,6 +28,17 @@ def test_a_folder_opens_again_for_the_same_study_alone(tmp_path: Path) -> None:
         store.open_folder(tmp_path / "run", other)
 
 
+def test_a_folder_of_another_user_is_named_before_anything_is_computed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that went on there said `claims: Permission denied`."""
+    plan = tiny_plan(tmp_path)
+    store.open_folder(tmp_path / "run", plan)
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with pytest.raises(ResultError, match=r"run: is a folder that this user may not write into: copy it"):
+        store.open_folder(tmp_path / "run", plan)
+
+
 def test_a_folder_of_other_things_is_left_alone(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path)
     (tmp_path / "full").mkdir()
