@@ -10,7 +10,6 @@ import numpy as np
 from casadi import SX
 
 from shipid.data.dataset import FORGOTTEN, RARE
-from shipid.errors import ShipidError
 from shipid.export.band import COLUMNS
 from shipid.export.blocks import Block, Formula, Precision, c_functions
 from shipid.export.c import (
@@ -238,7 +237,7 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
         """The source."""
         model, name, names = self.model, self.name, self.model.layout
         blocks: list[Block] = [model.graph]
-        advance = _advance(model.vessel) if names.reached else None
+        advance = _advance(model.vessel) if model.vessel is not None and names.reached else None
         filters = self.filters
         filtering = None if filters is None else _filter(filters, names.parameters)
         blocks += [block for block in (advance, filtering, model.radii, model.band) if block is not None]
@@ -541,9 +540,10 @@ double {name}_factor(double miss, double level, int kind)
 
     def _advanced(self, advance: str | None) -> str:
         """Actuators on their way to the orders of the last row."""
-        if advance is None:
+        vessel = self.model.vessel
+        if advance is None or vessel is None:
             return ""
-        orders = Equations(_must(self.model.vessel)).model.commands
+        orders = Equations(vessel).model.commands
         given = ", ".join(f"last[{self.row.index(key)}]" for key in orders)
         return f"""        {{
             const real dt = (real)(t - self->t[newest]);
@@ -720,19 +720,13 @@ int main(void)
 """
 
 
-def _must(vessel: Vessel | None) -> Vessel:
-    if vessel is None:
-        raise ShipidError("the predictor has no vessel")
-    return vessel
-
-
 def _whole(values: Sequence[int]) -> str:
     return ", ".join(str(int(value)) for value in values) or "0"
 
 
-def _advance(vessel: Vessel | None) -> Formula:
+def _advance(vessel: Vessel) -> Formula:
     """(memory, commands, parameters, dt) -> memory after dt; state and weather do not count for actuators."""
-    model = Equations(_must(vessel)).model
+    model = Equations(vessel).model
     memory, commands = SX.sym("memory", len(model.memory)), SX.sym("commands", len(model.commands))
     parameters, dt = SX.sym("parameters", len(model.parameters)), SX.sym("dt")
     still = SX.zeros(len(model.state) + len(model.hidden)), SX.zeros(len(model.environment))
