@@ -122,6 +122,12 @@ def test_a_current_across_one_course_is_no_heading_that_is_off_on_all(tmp_path: 
     assert "heading offset" not in guessed(tmp_path, pd.DataFrame(log).round(3)).kinds
 
 
+@pytest.mark.parametrize("delay", [-2.5, 2.5])
+def test_positions_that_are_late_do_not_jump_at_an_end_of_the_log(delay: float, tmp_path: Path) -> None:
+    kinds = guessed(tmp_path, late(CLEAN, ["N", "E"], delay).iloc[6:-6]).kinds
+    assert kinds == {"late position" if delay > 0 else "late velocity"}
+
+
 @pytest.mark.parametrize("angle", [-4.0, 0.0, 4.0])
 def test_a_heading_along_which_the_velocities_are_not_the_track_is_asked(angle: float, tmp_path: Path) -> None:
     """u and v were measured in the ship, so that they are right; a repair that turns them is none."""
