@@ -216,9 +216,11 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
         _find_late(state, "position", "velocity", delay, by_delay)
         instants = state.t - delay
         moved = [np.interp(instants, state.t, part) for part in (path.real, path.imag)]
-        speeds = np.gradient(path, state.t)[[0, -1]]  # beyond the ends, where a path that stood still would be a jump
-        before, after = np.minimum(instants - state.t[0], 0.0), np.maximum(instants - state.t[-1], 0.0)
-        return np.asarray(moved[0] + 1j * moved[1] + before * speeds[0] + after * speeds[1])
+        late = np.asarray(moved[0] + 1j * moved[1])
+        known = np.flatnonzero((instants >= state.t[0]) & (instants <= state.t[-1]))[[0, -1]]
+        for row, beyond in ((known[0], slice(None, known[0])), (known[1], slice(known[1], None))):
+            late[beyond] = late[row] + state.position[beyond] - state.position[row]  # or a path that stands still jumps
+        return late
     if abs(off) > max(ARM, 5 * error):
         sentence = (
             f"positions are of a point {off.real:+.1f} m forward and {off.imag:+.1f} m to starboard of the velocities'"
