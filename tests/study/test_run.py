@@ -27,7 +27,7 @@ from shipid.study import run, seals, store
 from shipid.study.check import check_folder
 from shipid.study.claims import Claims
 from shipid.study.contents import write_pages
-from shipid.study.plan import read_plan
+from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.results import provenance_words, read_results
 from shipid.study.rotate import kept_folder
@@ -107,14 +107,21 @@ def test_a_method_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch
     file = tmp_path / "mine.py"
     file.write_text("from shipid.hybrid.path_drawn import PathDrawn\n\n\nclass Mine(PathDrawn):\n    pass\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setitem(METHODS, "mine", importlib.import_module("mine").Mine)
-    method = {"name": "own", "kind": "mine", "trials": 1, "units": 8, "terms": 4}
-    plan, folder = tiny_plan(tmp_path, {"method": [method], "grid.N_D": [4]}), tmp_path / "run"
+    module, folder = importlib.import_module("mine"), tmp_path / "run"
+
+    def planned() -> Plan:
+        monkeypatch.setitem(METHODS, "mine", module.Mine)
+        method = {"name": "own", "kind": "mine", "trials": 1, "units": 8, "terms": 4}
+        return tiny_plan(tmp_path, {"method": [method], "grid.N_D": [4]})
+
+    plan = planned()
     run_here(plan, folder)
     dataset = read_dataset(folder / store.DATASET)
     kept = kept_folder(tmp_path / "rows.csv", plan, dataset)
     assert not any("otherwise" in event.text for event in events_here(plan, folder))
     file.write_text(file.read_text() + "\n")
+    importlib.reload(module)
+    plan = planned()
     notes = [event.text for event in events_here(plan, folder) if event.kind == "note"]
     assert any("earlier results were computed otherwise: code of the method.own was" in note for note in notes)
     assert "code of the method.own" in provenance_words(read_results(folder))["computed in parts"]
