@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -320,6 +321,7 @@ def _best(
             quarter = abs(same) >= abs(mirrored) and abs(np.angle(same)) > np.pi / 4  # an acceleration looks like that
             cost = (misfit + 0.003 + 0.1 * quarter) / (spread + 0.01) / (0.3 + score) / (0.3 + named)
             cost *= 0.6 if unit == (written or "deg") else 1.0
+            cost *= 2.0 if on_globe and abs(same) < abs(mirrored) else 1.0  # there headings are those of a compass
             cost *= 1.0 if rated is None else 0.02 + rated.get(heading, 1.0)
             if best is None or cost < best.cost:
                 best = Pose(north, east, heading, unit, on_globe, same, mirrored, cost)
@@ -334,11 +336,12 @@ def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: l
     named = [name for name in headings if name in state.free()]
     places = list(rated) if len(rated) > 2 and state.numbered else free
     angles = list(rated) if rated and state.numbered else free
-    wide = [(a, b, False, 0.3) for i, a in enumerate(places) for b in places[i + 1 :]]
-    wide += [(a, b, True, 0.3) for a in free for b in free if a != b and _may_be_globe(state, a, b)]
+    globe = [(a, b) for a in free for b in free if a != b and _may_be_globe(state, a, b)]
+    wide = [(a, b, False, 0.3) for a, b in combinations(places, 2) if not {(a, b), (b, a)} & {*globe}]
+    wide += [(a, b, True, 0.3) for a, b in globe]
     best = _best(state, [*pairs, *wide], list(dict.fromkeys([*named, *angles])), 150, rated if state.numbered else None)
     if best is None or (best.misfit > POOR and places is not free):
-        wide = [(a, b, False, 0.3) for i, a in enumerate(free) for b in free[i + 1 :]]
+        wide = [(a, b, False, 0.3) for a, b in combinations(free, 2)]
         best = _best(state, wide, free, 150)
     if best is not None and state.numbered:
         rivals = [name for name in angles if name not in (best.north, best.east, best.heading)]

@@ -68,3 +68,8 @@ def quiet(drawn: Drawn) -> bool:
 def test_raw_folders_are_read_or_it_says_why_not(seed: int, tmp_path: Path) -> None:
     verdict = judge_raw(raw_stranger(seed, tmp_path / "raw", RUNS))
     assert verdict.word == RAW[seed], verdict.reasons
+
+
+def test_degrees_of_a_log_without_names_are_no_metres(tmp_path: Path) -> None:
+    """A noisy track of a boat at 54 N fitted a little better as metres, at 0.015 mm/s, and u came from it."""
+    assert judge(draw(710115, tmp_path / "logs")).word == "right"
