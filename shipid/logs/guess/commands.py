@@ -20,6 +20,7 @@ SCREW = SIGNALS["n"].component  # of a shaft speed or pitch without a side: that
 FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
 ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
 FASTEST = 200.0  # rev/s: no shaft is faster, not that of a small craft that turns within a length, either
+QUICK = 50.0  # rev/s: few screws are as fast, and per cent of a shaft speed are such numbers
 TOGETHER = 0.2  # of the range of a column: how far twin rudders are apart
 TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 USUAL = np.radians(20.0)  # rudder angle of a usual turn
@@ -306,8 +307,8 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
             sentence = f"{name!r}, up to {top:.4g} {written}, is the speed of an engine: is there a gear?"
             state.ask(("n",), f"{sentence} Write factor = 1 / its ratio")
         return written, 0.9, why, {}
-    if top <= 130.0 and off[by_motion] < NEAR and by_motion == "rpm":
-        state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: rpm, or per cent of a shaft speed?")
+    if top <= 130.0 and off[by_motion] < NEAR and (by_motion == "rpm" or top > QUICK):
+        state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: {by_motion}, or per cent of a shaft speed?")
     if off[by_motion] > NEAR or not np.isfinite(off[by_motion]):
         unit = likely_unit(state, name, "n")
         state.ask(("n",), f"in which unit is {name!r}, up to {top:.4g}? {unit} is a guess")

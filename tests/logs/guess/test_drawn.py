@@ -73,3 +73,7 @@ def test_raw_folders_are_read_or_it_says_why_not(seed: int, tmp_path: Path) -> N
 def test_degrees_of_a_log_without_names_are_no_metres(tmp_path: Path) -> None:
     """A noisy track of a boat at 54 N fitted a little better as metres, at 0.015 mm/s, and u came from it."""
     assert judge(draw(710115, tmp_path / "logs")).word == "right"
+
+
+def test_a_shaft_of_112_rev_a_second_may_be_in_per_cent(tmp_path: Path) -> None:
+    assert judge(draw(720081, tmp_path / "logs")).word == "right"
