@@ -224,7 +224,12 @@ def test_the_legend_holds_what_its_view_draws(simulation, tmp_path):
             "--window-size=1280,9000",
         ]
         command = [browser, *options, f"--user-data-dir={tmp_path}/{name}", "--dump-dom", file.as_uri()]
-        drawn = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+        for _ in range(10):  # on a busy machine the browser may write the page before its figures are drawn
+            drawn = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+            if drawn.count("js-plotly-plot") == len(re.findall(r'class="plot\b', page)):
+                break
+        else:
+            pytest.fail("no figures were drawn")
         assert bool(re.search(r'<li><button[^>]* data-key="iso"', drawn)) == shown, name
         assert bool(re.search(r'<li hidden=""><button[^>]* data-key="iso"', drawn)) != shown, name
 
