@@ -363,31 +363,32 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
     if (records) NOTE(0)
   }}
   for (long k = 0, record = 0; k < steps; ++k) {{
-  const int due = k + 1 == (record + 1) * every;
-  record += due;
-  EACH_GROUP(end) {{
-    V *x = states[j], *m = memories[j], *tau = taus[j], *saved1 = known[j], all = K(0);
-    const U *components[{max(1, len(widths))}];
-    {drawn}
-    if (k == 0 || k < lengths[2])
-      for (int i = 0; i < {n}; ++i) all += tau[i] = *AT(extra, k * {n} + i);
-    if (k == 0 || k < lengths[0] || k < lengths[1]) {{
-      V c[{max(1, nc)}], e[{max(1, ne)}];
-      for (int i = 0; i < {nc}; ++i) all += c[i] = *AT(commands, NOW(0, k) * {nc} + i);
-      for (int i = 0; i < {ne}; ++i) all += e[i] = *AT(environment, NOW(1, k) * {ne} + i);
-      stage1(c, e, saved0, saved1);
+    const int due = k + 1 == (record + 1) * every;
+    record += due;
+    EACH_GROUP(end) {{
+      V *x = states[j], *m = memories[j], *tau = taus[j], *saved1 = known[j], all = K(0);
+      const U *components[{max(1, len(widths))}];
+      {drawn}
+      if (k == 0 || k < lengths[2])
+        for (int i = 0; i < {n}; ++i) all += tau[i] = *AT(extra, k * {n} + i);
+      if (k == 0 || k < lengths[0] || k < lengths[1]) {{
+        V c[{max(1, nc)}], e[{max(1, ne)}];
+        for (int i = 0; i < {nc}; ++i) all += c[i] = *AT(commands, NOW(0, k) * {nc} + i);
+        for (int i = 0; i < {ne}; ++i) all += e[i] = *AT(environment, NOW(1, k) * {ne} + i);
+        stage1(c, e, saved0, saved1);
+      }}
+      {self.one_step()}
+      for (int i = 0; i < {nx}; ++i) all += x[i];
+      for (int i = 0; i < {nm}; ++i) all += m[i];
+      for (int i = {n}; i < {2 * n}; ++i) greatest[j] = v_max(v_fabs(x[i]), greatest[j]);
+      greatest[j] += 0 * all;
+      if (due && records) NOTE(record)
+      if (due && goal) {{
+        const U *there = goal + 2 * (g * num_records + record - 1);
+        distance[j] += measured(ROW(0) - there[0], ROW(1) - there[1], samples - g * W, &notes, tally);
+      }}
     }}
-    {self.one_step()}
-    for (int i = 0; i < {nx}; ++i) all += x[i];
-    for (int i = 0; i < {nm}; ++i) all += m[i];
-    for (int i = {n}; i < {2 * n}; ++i) greatest[j] = v_max(v_fabs(x[i]), greatest[j]);
-    greatest[j] += 0 * all;
-    if (due && records) NOTE(record)
-    if (due && goal) {{
-      const U *there = goal + 2 * (g * num_records + record - 1);
-      distance[j] += measured(ROW(0) - there[0], ROW(1) - there[1], samples - g * W, &notes, tally);
-    }}
-  }} }}
+  }}
   EACH_GROUP(end) {{
     if (goal) *AT(sums, 0) = distance[j];
     *AT(worst, 0) = greatest[j];

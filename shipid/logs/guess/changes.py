@@ -106,7 +106,7 @@ def _from_to(state: State, first: int, end: int) -> str:
     """Words for the rows from `first` until before `end`."""
     if state.joined:
         return "in a part of the files"
-    begins, ends = (f"{when(state, float(state.t[row]))}" for row in (first, min(end, len(state.t) - 1)))
+    begins, ends = (when(state, float(state.t[row])) for row in (first, min(end, len(state.t) - 1)))
     if end >= len(state.t):
         return f"from {begins} on"
     return f"until {ends}" if first == 0 else f"from {begins} to {ends}"
