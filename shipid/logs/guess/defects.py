@@ -28,10 +28,8 @@ HELD_SHARE, STAY = 0.2, 3.0  # of the rows; times the usual repeats in a row, fr
 TOGETHER = 0.5  # share of the steps of a held position that both of its columns make, at least
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
-CLEAR, ONE_WAY = (
-    0.008,
-    0.9,
-)  # rad, error of a heading that is off, at most; mean of directions, at most, of many courses
+CLEAR = 0.008  # rad: standard error of a heading that is off, at most
+ONE_WAY = 0.9  # length of the mean of all directions, at most, of a ship on many courses
 NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
 STEPS_ABOUT = 5  # steps before and after a row, at least, whose median is usual there
 FARTHER = 2.0  # times the way from row to row that a ship would go in a hole of the clock, at least
@@ -328,7 +326,7 @@ def _heading_offset(state: State) -> None:
         # median of arg(u + i v), where a ship has no drift angle
         drift = np.angle(-state.body[rows] if state.astern else state.body[rows])
         angle = float(np.median(drift))
-        error = float(np.median(np.abs(drift - angle))) / 2
+        error = float(np.median(np.abs(drift - angle))) / 2  # so that the limit below is 1.5 of this scatter
         why = f"in straight runs the course leaves the heading by {np.degrees(angle):+.1f} deg"
         why += ": heading off, or wind and current"
     if np.pi / 4 > abs(angle) > max(OFFSET, 3 * error):  # one of more is a drift, or the zero of the heading

@@ -333,10 +333,8 @@ def spikes(values: Array) -> NDArray[np.bool_]:
     """
     result = _spikes(values, values)
     for turn in TURNS:
-        if (
-            result.any() and 0.9 * turn < np.ptp(values) and _may_be_angle(values, turn)
-        ):  # an angle that crosses its 0 for a row?
-            result &= _spikes(np.unwrap(values, period=turn), values)
+        if result.any() and 0.9 * turn < np.ptp(values) and _may_be_angle(values, turn):
+            result &= _spikes(np.unwrap(values, period=turn), values)  # an angle that crosses its 0 for a row?
     return result
 
 
