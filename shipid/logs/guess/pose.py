@@ -337,12 +337,14 @@ def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: l
     places = list(rated) if len(rated) > 2 and state.numbered else free
     angles = list(rated) if rated and state.numbered else free
     globe = [(a, b) for a in free for b in free if a != b and _may_be_globe(state, a, b)]
-    wide = [(a, b, False, 0.3) for a, b in combinations(places, 2) if not {(a, b), (b, a)} & {*globe}]
-    wide += [(a, b, True, 0.3) for a, b in globe]
+
+    def on_plane(names: list[str]) -> list[tuple[str, str, bool, float]]:
+        return [(a, b, False, 0.3) for a, b in combinations(names, 2) if not {(a, b), (b, a)} & {*globe}]
+
+    wide = [*on_plane(places), *((a, b, True, 0.3) for a, b in globe)]
     best = _best(state, [*pairs, *wide], list(dict.fromkeys([*named, *angles])), 150, rated if state.numbered else None)
     if best is None or (best.misfit > POOR and places is not free):
-        wide = [(a, b, False, 0.3) for a, b in combinations(free, 2)]
-        best = _best(state, wide, free, 150)
+        best = _best(state, on_plane(free), free, 150)
     if best is not None and state.numbered:
         rivals = [name for name in angles if name not in (best.north, best.east, best.heading)]
         other = _best(state, [(best.north, best.east, best.on_globe, 0.3)], rivals, 150)
