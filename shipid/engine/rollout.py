@@ -19,7 +19,7 @@ from shipid.engine.integrate import Array, Batch, Job, Method
 from shipid.errors import DataError, ShipidError, choices
 from shipid.metrics import position_error, tally
 from shipid.physics.helm import Helmsman
-from shipid.physics.signals import is_command, row_of
+from shipid.physics.signals import ACTUAL, is_command, row_of
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
@@ -250,7 +250,7 @@ def prepared(
 
 def channels(model: Dynamics) -> tuple[str, ...]:
     """Names of all channels that a rollout can record: states, states of terms, actuator states (`actual.port.n`)."""
-    return (*model.state, *model.hidden, *(f"actual.{name}" for name in model.memory))
+    return (*model.state, *model.hidden, *(f"{ACTUAL}{name}" for name in model.memory))
 
 
 def places(kept: Sequence[str], names: Sequence[str], vessel: Vessel) -> tuple[int, ...]:

@@ -12,7 +12,7 @@ from shipid.export.blocks import Block, Precision, c_functions
 from shipid.export.c import NEARBY, Files, array_of, comment, source_head, tables_of_names
 from shipid.export.equations import Equations
 from shipid.physics.grammar import AXES
-from shipid.physics.signals import SIGNALS, row_of, signal_of
+from shipid.physics.signals import ACTUAL, SIGNALS, row_of, signal_of
 from shipid.simulation.log import column_of
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
@@ -42,7 +42,7 @@ class VesselParts:
         """Names of the entries of each argument."""
         model = self.equations.model
         return {
-            "carry": (*model.state, *model.hidden, *(f"actual.{name}" for name in model.memory)),
+            "carry": (*model.state, *model.hidden, *(f"{ACTUAL}{name}" for name in model.memory)),
             "commands": model.commands,
             "environment": model.environment,
             "loads": tuple(AXES[axis] for axis in self.vessel.axes),

@@ -27,7 +27,7 @@ from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.fmu_c import Variable, predictor_wrapper, vessel_wrapper
 from shipid.export.model import Model
 from shipid.files import whole
-from shipid.physics.signals import SIGNALS, neutral
+from shipid.physics.signals import ACTUAL, SIGNALS, neutral
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
@@ -73,7 +73,7 @@ def vessel_unit(vessel: Vessel, name: str, method: Method) -> Packed:
     largest = round(LARGEST_STEP * min(1.0, ((vessel.length or 30.0) / 30.0) ** 0.5), 4)
     variables = []
     for key in groups["carry"]:
-        order, lags = key.removeprefix("actual."), key.startswith("actual.")
+        order, lags = key.removeprefix(ACTUAL), key.startswith(ACTUAL)
         text = described(order)
         text = f"reached: {text}; begins at its order, within its stops, unless a start value is set" if lags else text
         variables.append(Variable(key, "output", "continuous", parts.unit("carry", key), text, 0.0, lags))

@@ -16,6 +16,7 @@ from shipid.engine.integrate import Method as Integrator
 from shipid.engine.rollout import Distances, Trajectories, distances, rollout
 from shipid.errors import DataError, ShipidError
 from shipid.observer import COLUMNS, Observer, bank, observed_start
+from shipid.physics.signals import ACTUAL
 from shipid.simulation.log import LEANING, aboard, column_of, horizontal
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -111,9 +112,9 @@ class Physics:
         names = () if self.vessel is None else tuple(dynamics(self.vessel).memory)
         if not names:
             return {}
-        kept = ("north", "east", *(f"actual.{name}" for name in names))
+        kept = ("north", "east", *(f"{ACTUAL}{name}" for name in names))
         result, _ = self._rollout(instants, kept, None, "cpu")
-        return {name: result[f"actual.{name}"][:, 0] for name in names}
+        return {name: result[f"{ACTUAL}{name}"][:, 0] for name in names}
 
     def gradient(
         self, instants: Instants, future: Array, names: Sequence[str], parameters: Array | None = None

@@ -29,6 +29,7 @@ from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, choices
 from shipid.identification.settings import SIGNALS
+from shipid.physics.signals import ACTUAL
 from shipid.simulation.approach import FROUDE, Controls, NotStraight
 from shipid.simulation.log import aboard, horizontal
 from shipid.simulation.manoeuvre import Approached, Excitation
@@ -256,7 +257,7 @@ def _cut(vessel: Vessel, log: pd.DataFrame, steps: int, every: int) -> _Cut:
     still = np.zeros(len(log))
     return _Cut(
         {name: columns.get(name, still)[rows[0]] for name in (*model.state, *model.hidden)},
-        {name: columns[f"actual.{name}"][rows[0]] for name in model.memory},
+        {name: columns[f"{ACTUAL}{name}"][rows[0]] for name in model.memory},
         {name: columns[name][rows] for name in model.commands},
         {name: columns.get(name, still)[rows] for name in model.environment},
         np.array(runs),

@@ -14,6 +14,8 @@ from typing import Literal
 from shipid.units import DEGREE, RPM
 
 Role = Literal["motion", "command", "output", "environment", "derived"]
+ACTUAL = "actual."
+"""Begins the name of a state of an actuator, `actual.port.n`: what the order `port.n` has reached."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import Unit, course_keeping
-from shipid.physics.signals import is_shaft, neutral, steers
+from shipid.physics.signals import ACTUAL, is_shaft, neutral, steers
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
@@ -301,7 +301,7 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
         for name in names:
             state[name][moving] = path[name][-1, 0]
         for name, values in memory.items():
-            values[moving] = path[f"actual.{name}"][-1, 0]
+            values[moving] = path[f"{ACTUAL}{name}"][-1, 0]
         moving = moving[unsettled]  # steady samples are frozen: no result may depend on the other samples
         if not len(moving):
             if not held:

@@ -16,7 +16,7 @@ from shipid.measures.recognise import record_of
 from shipid.measures.record import Record
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import Levels, levels, rate_levels
-from shipid.physics.signals import neutral, signal_of, steers
+from shipid.physics.signals import ACTUAL, neutral, signal_of, steers
 from shipid.report.manoeuvre import ManoeuvreContent
 from shipid.simulation.approach import Controls, NotStraight
 from shipid.simulation.manoeuvre import Zigzag
@@ -104,7 +104,7 @@ def measure_all(
                 raise
             continue
         break
-    log = log[[column for column in log if not str(column).startswith("actual.")]]
+    log = log[[column for column in log if not str(column).startswith(ACTUAL)]]
     return [
         _read(vessel, one, log[log["run"] == run.name].reset_index(drop=True))
         for one, run in zip(chosen, runs, strict=True)

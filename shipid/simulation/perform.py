@@ -17,7 +17,7 @@ from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.helm import Helmsman
-from shipid.physics.signals import measurable
+from shipid.physics.signals import ACTUAL, measurable
 from shipid.simulation.approach import Controls, steady
 from shipid.simulation.log import logged, run_names
 from shipid.simulation.manoeuvre import Approached, Manoeuvre
@@ -171,7 +171,7 @@ def _together(
         memory=memory,
         helmsman=helmsman,
         components=batch.seas,
-        keep=None if helmsman else (*model.state, *(f"actual.{name}" for name in model.memory)),
+        keep=None if helmsman else (*model.state, *(f"{ACTUAL}{name}" for name in model.memory)),
         **how,
     )
     if path.diverged.any():
@@ -191,7 +191,7 @@ def _together(
         shown = _of_records(tuple(model.outputs), outputs_of, vessel, model, path, commands, felt, steps)
         log |= {name: shown[name] for name in outputs}
     lagged = (name for name in model.memory if not name.startswith(f"{HELM}."))
-    log |= {f"actual.{name}": path[f"actual.{name}"][:, 0] for name in lagged}
+    log |= {f"{ACTUAL}{name}": path[f"{ACTUAL}{name}"][:, 0] for name in lagged}
     return log | {name: felt[name] for name in measurable(felt)}
 
 
@@ -274,7 +274,7 @@ def _of_records(
     records, samples = path.states.shape[0], path.states.shape[2]
     still = np.zeros((records, samples))
     states = [path[name][:, 0] if name in path.names else still for name in (*model.state, *model.hidden)]
-    memory = [path[f"actual.{name}"][:, 0] for name in model.memory]
+    memory = [path[f"{ACTUAL}{name}"][:, 0] for name in model.memory]
     given = [commands[name][steps] for name in model.commands]
     felt = [still + weather[name] for name in model.environment]
     inputs = (np.array(part).reshape(len(part), records * samples) for part in (states, memory, given, felt))

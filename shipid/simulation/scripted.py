@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from shipid import document as documents
 from shipid.errors import DocumentError, ShipidError, choices
+from shipid.physics.signals import ACTUAL
 from shipid.simulation.approach import Controls
 from shipid.simulation.log import run_names
 from shipid.simulation.manoeuvre import KINDS, Executed, Manoeuvre
@@ -21,7 +22,6 @@ from shipid.units import plural
 from shipid.vessel.load import Vessel
 
 log = logging.getLogger(__name__)
-ACTUAL = "actual."  # begins the names of states of actuators
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 
 

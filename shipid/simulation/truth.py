@@ -13,7 +13,7 @@ from shipid.arguments import of_class, steps_in
 from shipid.checked import Checked
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, choices
-from shipid.physics.signals import is_output, measurable
+from shipid.physics.signals import ACTUAL, is_output, measurable
 from shipid.simulation import gusts
 from shipid.simulation.approach import Controls
 from shipid.simulation.draw import Draw, limits
@@ -201,7 +201,7 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
         )
     except ShipidError as error:
         raise DocumentError(error.message, path="truth") from None
-    frame = frame.drop(columns=[name for name in frame if str(name).startswith("actual.")])
+    frame = frame.drop(columns=[name for name in frame if str(name).startswith(ACTUAL)])
     return measure(frame, truth.sensors, truth.interval, truth.seed) if truth.sensors else frame
 
 

@@ -55,7 +55,7 @@ SIMILAR = dict.fromkeys(
     ("block", "length / beam", "beam / draught", "block x beam / length"),
     ": for another ship, take a similar vessel and change it (`shipid vessel list`)",
 ) | {"speed [m/s]": ": is it in m/s? For a faster craft, take a similar vessel and change it (`shipid vessel list`)"}
-# remedy, by what is outside the formulae
+"""What is outside the formulae -> remedy."""
 LARGEST_SCREW, STRONG_PITCH = 10.5, 1.2  # m; P / D from which a larger screw is the likelier guess
 
 # Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51, 339-351: C_Dt, C_Dl of bow and stern, delta, kappa
