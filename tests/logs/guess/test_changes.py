@@ -55,20 +55,18 @@ def test_a_log_of_one_unit_is_not_asked(without: list[str], tmp_path: Path) -> N
 
 @pytest.mark.parametrize("seed", range(20))
 def test_the_part_with_another_scale_is_found_where_it_is(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    count, ratio = int(random.integers(60, 1500)), float(random.choice([-1.0, 0.01, 0.5, 2.0, 60.0]))
-    ran = random.normal(5, 2, count) * np.exp(1j * random.uniform(0, 7, count))
-    first, end = sorted(random.choice(np.arange(0, count, max(1, count // 20)), 2, replace=False))
-    inside = (np.arange(count) >= first) & (np.arange(count) < end)
-    seen = np.where(inside, ratio, 1.0) * ran + random.normal(0, 0.001, count)
+    random, shares = np.random.default_rng(seed), np.zeros(2)
+    while shares.min() < 0.1:  # of the motion, in the part and outside: a smaller part is not to be seen
+        count, ratio = int(random.integers(60, 1500)), float(random.choice([-1.0, 0.01, 0.5, 2.0, 60.0]))
+        ran = random.normal(5, 2, count) * np.exp(1j * random.uniform(0, 7, count))
+        first, end = sorted(random.choice(np.arange(count // 20, 0.95 * count, count // 20), 2, replace=False))
+        inside = (np.arange(count) >= first) & (np.arange(count) < end)
+        seen = np.where(inside, ratio, 1.0) * ran + random.normal(0, 0.001, count)
+        shares = np.bincount(inside, np.abs(seen) ** 2, 2) / np.sum(np.abs(seen) ** 2)
     part = other_part(seen, ran)
-    if np.sum(np.abs(seen[inside]) ** 2) < 0.1 * np.sum(np.abs(seen) ** 2) or inside.mean() > 0.9:
-        return
-    if np.sum(np.abs(seen[~inside]) ** 2) < 0.1 * np.sum(np.abs(seen) ** 2):
-        return
     assert part is not None
     found = np.zeros(count, dtype=bool)
     found[part.first : part.end] = True
     assert np.mean(found == inside) > 0.97
-    assert part.ratio == pytest.approx(ratio, rel=0.05)
+    assert part.ratio == pytest.approx(ratio, rel=0.1)  # parts begin and end at a node of 120
     assert other_part(ran + random.normal(0, 0.5, count), ran) is None
