@@ -64,6 +64,7 @@ SPIKE = 300.0  # standard deviations: a measurement as far off is a fault of the
 FADES = (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, 1e6)  # x sqrt(L / g): between which `tune_observer` chooses
 YAW = 3.0  # change of the moment, x I_z g / L, over that of the force, x m g
 LONGEST = 0.6  # x sqrt(L / g): by longer steps of the filters the midpoint rule takes its own error for a force
+MOST_PARTS = 1000  # steps of the filters between two rows
 PAUSE = 6.0  # x sqrt(L / g): after a longer time without rows what the physics did is worse than to begin anew
 ROUNDING = 1e-5  # of a step: so much longer than the longest it is still one
 CALM = 1e-6  # m/s: keeps the direction of no wind defined
@@ -420,7 +421,7 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
     It begins anew after a pause in the rows of more than 6 sqrt(L / g), as the recorder of exported C does. Wind that
     is not measured is zero. `calls` is how many calls of this size are to come in all: for many it pays to
     compile. Raises DocumentError for a vessel that is not of three degrees of freedom, ShipidError for a command that
-    the dataset lacks.
+    the dataset lacks, DataError for rows hours apart.
     """
     of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     filters, frame = bank(vessel, settings), dataset.frame
@@ -434,6 +435,7 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
         for _, rows in stretches(dataset)
         for part in np.split(rows, np.flatnonzero(after_pauses(table["t"][rows], filters.pause)))
     ]
+    _check_intervals(dataset, filters, places)
     longest = max(map(len, places))
     zero = np.zeros(len(frame))
     commands, weather = (
@@ -475,6 +477,15 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
     columns["observer.test"] = np.where(given, squares, 0.0).sum(axis=1) / np.maximum(given.sum(axis=1), 1)
     columns[AGE] = age
     return Estimates(columns, innovation, spread, weights)
+
+
+def _check_intervals(dataset: Dataset, filters: Bank, places: Sequence[NDArray[np.intp]]) -> None:
+    """DataError where rows that are no pause lie so far apart that the filters would take all day between them."""
+    t = dataset.frame["t"].to_numpy()
+    apart = max((float(np.max(np.diff(t[rows]), initial=0.0)) for rows in places), default=0.0)
+    if apart > MOST_PARTS * filters.longest:
+        limit = f"for {filters.vessel.name} at most {MOST_PARTS * filters.longest:.3g} s apart"
+        raise DataError(f"rows are up to {apart:.3g} s apart: the observer takes rows {limit}")
 
 
 def _divided(

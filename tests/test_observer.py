@@ -22,7 +22,7 @@ from shipid.data.windows import Instants, Windows, cut_windows, from_frame
 from shipid.engine import samples
 from shipid.engine.native import compiler
 from shipid.engine.rollout import rollout
-from shipid.errors import DocumentError
+from shipid.errors import DataError, DocumentError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
@@ -234,6 +234,13 @@ def test_rows_far_apart_make_no_force_of_an_order() -> None:
     assert seen["observer.test"][settled].max() < 0.1  # by one step from row to row: 1.4
     assert np.abs(seen["observer.u"] - log["u"])[settled].max() < 0.003  # 0.016 m/s
     assert np.abs(seen["observer.Y"][settled]).max() < 1e-4  # 5e-4 m/s^2
+
+
+def test_rows_hours_apart_are_refused() -> None:
+    rows = calm().data.frame.query("run == 'M000'")
+    hourly = Dataset(rows.assign(t=3600.0 * np.arange(len(rows))), calm().data.metadata)
+    with pytest.raises(DataError, match=r"^rows are up to 3.6e\+03 s apart: .* .* at most 1.03e\+03 s apart$"):
+        observe(load_vessel("gunnerus-28.9"), hourly)
 
 
 def test_runs_together_are_runs_alone() -> None:

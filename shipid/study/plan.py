@@ -498,6 +498,10 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
             mine: dict[str, Any] = {} if condition is None else condition.set
             part = build_plan(_changed(bare, mine, f"condition.{place}.set", file), file, known, plan.sources or None)
             part = build_plan(_changed(part.document, turn, "repeat", file), file, known, plan.sources or None)
+            twin = next((other for other, done in parts.items() if done.plan.study == part.study), None)
+            if twin is not None:
+                message = f"{name} has the settings of {twin}: equal studies are no more evidence than one"
+                raise DocumentError(message, file=file, path=f"condition.{place}.set" if conditions else "repeat")
             whole: dict[str, Any] = {"repeat": {}, "condition": []}
             parts[name] = Part(
                 condition.name if condition else "", replace(part, changes={**plan.changes, **whole, **mine, **turn})

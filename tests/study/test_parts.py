@@ -122,6 +122,11 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "a name that is no file": ({"condition": [{"name": "a/b"}]}, "condition.a/b.name", "pattern"),
     "no value": ({"repeat": {"seed": []}}, "repeat.seed", "must have 1 or more entries"),
     "a world twice": ({"repeat": {"seed": [0, 1, 0]}}, "repeat.seed", "0 is there twice: give each value once"),
+    "equal conditions": (
+        {"condition": [{"name": "a"}, {"name": "b", "set": {"prediction.commands": "held"}}]},
+        "condition.b.set",
+        "b has the settings of a",
+    ),
     "an unknown block": ({"repeat": {"sead": [1]}}, "repeat.sead", "did you mean 'seed'"),
     "a part of parts": ({"repeat": {"repeat.seed": [1]}}, "repeat.repeat.seed", "no such block"),
     "a path into a number": ({"repeat": {"truth.seed.x": [1]}}, "repeat.truth.seed.x", "truth.seed is no table"),

@@ -11,7 +11,8 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.defects import when
 from shipid.logs.guess.evidence import Complex
-from shipid.physics.signals import is_command, signal_of, steers
+from shipid.logs.mapping import to_si
+from shipid.physics.signals import is_command, is_shaft, signal_of, steers
 
 NODES, SPLITS = 120, 60  # places at which a part may begin or end
 LEAST = 0.05  # share of all motion that a part has, at least
@@ -19,6 +20,9 @@ SEEN, BETTER = 0.005, 0.3  # share of the motion that one scale leaves, at least
 ALIKE, NOTHING = 1.4, 5e-4  # ratio of two scales, that are one; and that of a column that stands still
 CLEAR, TIMES = 8.0, 20.0  # t value of the effect of an order in each part, and ratio of the effects, at least
 MOST_LEFT = 0.75  # share of what one effect leaves, that two leave, at most
+UNDER_WAY = 0.2  # of the median speed: of a slower ship, her way says little of the shaft
+OF_UNITS = 1.25  # times that the ratio of two parts is off that of two units of a shaft speed, at most
+APART = 0.2  # of the logarithm of that ratio: how far revolutions over a metre scatter in each part, at most
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,8 @@ def ask_for_changes(state: State) -> None:
     for one in state.suggestions:
         if is_command(one.name) and steers(signal_of(one.name)):
             _ask_for_angle(state, one.name, one.source)
+        elif is_command(one.name) and is_shaft(one.name):
+            _ask_for_shaft(state, one.name, one.source)
 
 
 def other_part(seen: Complex, ran: Complex) -> Part | None:
@@ -100,6 +106,37 @@ def _ask_for_angle(state: State, name: str, source: str) -> None:
     how = "to the other side" if ratio < 0 else f"{ratio:.2g} times as fast"
     words = f"has {source!r} another unit or sign {_from_to(state, start, len(state.t))}?"
     _ask(state, (name,), f"{words} There its numbers turn the ship {how}")
+
+
+def _ask_for_shaft(state: State, name: str, source: str) -> None:
+    """Ask where a shaft turns some 6, 10 or 60 times as fast for the same speed of the ship, from some row on."""
+    way = np.abs(state.chosen.change(np.asarray(state.position)))
+    turns = np.abs(state.chosen.change(evidence.integral(state.t, state.columns[source])))
+    driven = np.flatnonzero((way > UNDER_WAY * np.median(way)) & (turns > 0.0))
+    if len(driven) < SPLITS:
+        return
+    a_metre = np.log(turns[driven] / way[driven])
+    before, after = split(a_metre)
+    ratio = float(np.exp(np.median(a_metre[after]) - np.median(a_metre[before])))
+    units = [to_si(unit, "propeller.n") for unit in ("rpm", "rad/s", "rev/s")]
+    if not any(1 / OF_UNITS < ratio * one / other < OF_UNITS for one in units for other in units if one != other):
+        return
+    left = np.concatenate([np.abs(a_metre[part] - np.median(a_metre[part])) for part in (before, after)])
+    if np.mean(left) < APART * abs(np.log(ratio)):
+        start = int((state.chosen.first + state.chosen.last)[driven[after.start]]) // 2
+        words = f"has {source!r} another unit or sign {_from_to(state, start, len(state.t))}?"
+        _ask(state, (name,), f"{words} There its numbers are {ratio:.2g} times as many for the same way of the ship")
+
+
+def split(values: Array) -> tuple[slice, slice]:
+    """Return the two parts of values (N,) whose medians leave the least absolute deviations; each has LEAST of them."""
+    places = np.linspace(LEAST * len(values), (1 - LEAST) * len(values), SPLITS).astype(int)
+    left = [
+        sum(float(np.sum(np.abs(part - np.median(part)))) for part in (values[:place], values[place:]))
+        for place in places
+    ]
+    best = int(places[int(np.argmin(left))])
+    return slice(0, best), slice(best, len(values))
 
 
 def _from_to(state: State, first: int, end: int) -> str:

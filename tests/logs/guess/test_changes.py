@@ -31,6 +31,8 @@ def guessed(folder: Path, frame: pd.DataFrame) -> Guess:
         (("r",), -1.0),
         (("rudder",), -1.0),
         (("rudder",), np.pi / 180),
+        (("rpm",), 1 / 60),  # rev/s
+        (("rpm",), np.pi / 30),
     ],
 )
 def test_a_change_of_unit_or_sign_is_asked_with_its_time(
