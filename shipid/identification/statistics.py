@@ -3,8 +3,9 @@
 A weighted least-squares fit with residuals e (m,) and sensitivities J (m, n) has A = J^T J + Lambda, Lambda the
 precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B, of what they assume:
 
-    fisher    B = sum over signals of s^2 J_s^T J_s      errors independent from sample to sample; s^2 is the level of
-              each signal as the residuals show it, not as declared. To be trusted where residuals are white.
+    fisher    B = sum over signals of s^2 J_s^T R_s J_s    s^2 is the level of each signal as the residuals show it, not
+              as declared; R_s, the correlation in time of a first-order process, is 1 where residuals are white. To be
+              trusted there. A run that is too short for `blocks` has this form, whatever its residuals are.
     sandwich  B = sum over clusters of (J_g^T A_g e_g)(...)^T     anything within a cluster, independent clusters.
               A cluster is a run: process noise, model error and colour within it are allowed. A_g = (I - H_gg)^(-1)
               gives the estimates without that run (CR3, the jackknife): a run that decides much draws the estimates to
@@ -383,19 +384,49 @@ def _covariances(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]
 
 
 def fisher(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covariance:
-    """Covariance for errors that are independent from sample to sample, with one level for each signal."""
+    """Covariance for errors of each signal that have one level, and are correlated in time as its residuals are."""
     labels = np.array(fit.signals)
     parts, freedoms = [], []
     for name, colour in colours.items():
-        influence = fit.jacobian[labels == name] @ basis.inverse
-        parts.append(colour.level**2 * (influence.T @ influence))
-        freedoms.append(colour.freedom)
+        part, freedom = _of_signal(fit, basis, labels == name, colour)
+        parts.append(part)
+        freedoms.append(freedom)
     matrix = sum(parts) + (basis.inverse * basis.prior) @ basis.inverse
     total = np.diag(matrix)
     squares = sum(np.diag(part) ** 2 / freedom for part, freedom in zip(parts, freedoms, strict=True))
     coloured = [name for name, colour in colours.items() if not colour.white]
     reason = "residuals are white" if not coloured else f"residuals of {', '.join(coloured)} are correlated in time"
+    reason += "; the errors count as a first-order process" * bool(coloured)
     return Covariance("fisher", matrix, _freedom(total, np.asarray(squares)), not coloured, reason)
+
+
+def _of_signal(fit: LinearFit, basis: _Basis, rows: NDArray[np.bool_], colour: Whiteness) -> tuple[Array, float]:
+    """Covariance (n, n) that the errors of one signal make, and the degrees of freedom of their level.
+
+    Errors k samples apart have the correlation a^k of a first-order process with the integrated correlation time of the
+    residuals, R. With H = J A^-1 J^T the residuals have the mean square s^2 tr(R - H R), so the level s is larger than
+    theirs, and (tr (R - H R))^2 / tr (R - H R)^2 degrees of freedom.
+    """
+    jacobian, a = fit.jacobian[rows], 0.0 if colour.white else (colour.memory - 1) / (colour.memory + 1)
+    runs = [np.flatnonzero(fit.clusters[rows] == run) for run in np.unique(fit.clusters[rows])]
+    smooth, power = jacobian.copy(), 0.0
+    for run in runs if a else []:
+        smooth[run] = _correlated(jacobian[run], a)
+        power += float(len(run) + 2 * (a ** (2 * np.arange(1, len(run)))) @ np.arange(len(run) - 1, 0, -1))
+    taken = basis.inverse @ (jacobian.T @ smooth)
+    left = max(colour.freedom + float(np.sum(jacobian @ basis.inverse * jacobian) - np.trace(taken)), 1.0)
+    squares = power - 2 * float(np.sum((smooth @ basis.inverse) * smooth)) + float(np.sum(taken * taken.T))
+    freedom = max(left**2 / squares, 1.0) if a and squares > 0 else colour.freedom
+    level = colour.level**2 * colour.freedom / left
+    return level * (basis.inverse @ jacobian.T @ smooth @ basis.inverse), freedom
+
+
+def _correlated(values: Array, a: float) -> Array:
+    """R values (N, n) of the correlation R_ij = a^|i - j|, (N, n)."""
+    size = len(values)
+    row = a ** np.minimum(np.arange(2 * size), 2 * size - np.arange(2 * size))
+    spectrum = np.fft.rfft(row)[:, None] * np.fft.rfft(values, 2 * size, axis=0)
+    return np.asarray(np.fft.irfft(spectrum, 2 * size, axis=0)[:size])
 
 
 def declared_error(fit: LinearFit, path: str) -> float:

@@ -31,7 +31,7 @@ def one(phi: float = 0.0, seed: int = 3, **more: object) -> LinearFit:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("runs", "samples", "phi"), [(20, 40, 0.0), (8, 60, 0.8), (4, 200, 0.8)])
+@pytest.mark.parametrize(("runs", "samples", "phi"), [(20, 40, 0.0), (8, 60, 0.8), (4, 200, 0.8), (1, 150, 0.8)])
 def test_intervals_cover_in_white_and_coloured_noise(runs: int, samples: int, phi: float) -> None:
     """200 replicates: 95 % on average within 92..98, no parameter below 90."""
     jacobian, (clusters, signals) = design(runs, samples, COUNT), labels(runs, samples)
@@ -87,6 +87,25 @@ def test_fisher_is_the_textbook_formula() -> None:
     np.testing.assert_allclose(estimates.matrix, expected, rtol=1e-9)
     np.testing.assert_allclose(estimates.freedom, freedom)
     np.testing.assert_allclose(statistics(fit).information, np.linalg.inv(expected), rtol=1e-9)
+
+
+@pytest.mark.parametrize("runs", [1, 3])
+def test_fisher_counts_the_correlation_of_the_residuals(runs: int) -> None:
+    """One signal: s^2 J^+ R J^+^T with the error level of residuals (1 - H) e of errors with the correlations R."""
+    jacobian, error = design(runs, 120, 3)[:: len(SIGNALS)], noise(np.random.default_rng(0), runs, 120, 0.8)
+    clusters = np.repeat(np.arange(runs), 120)
+    fit = fitted(jacobian, error[: len(jacobian)], clusters, ("u",) * len(jacobian))
+    estimates = statistics(fit)
+    memory = estimates.whiteness["u"].memory
+    apart = np.abs(np.subtract.outer(np.arange(len(jacobian)), np.arange(len(jacobian))))
+    correlation = ((memory - 1) / (memory + 1)) ** apart * (clusters[:, None] == clusters)
+    inverse = np.linalg.pinv(jacobian)
+    left = (np.eye(len(jacobian)) - jacobian @ inverse) @ correlation
+    level = fit.residuals @ fit.residuals / np.trace(left)
+    form = estimates.covariances["fisher"]
+    np.testing.assert_allclose(form.matrix, level * inverse @ correlation @ inverse.T, rtol=1e-9)
+    np.testing.assert_allclose(form.freedom, np.trace(left) ** 2 / np.trace(left @ left), rtol=1e-9)
+    assert not form.trusted
 
 
 def test_sandwich_is_the_jackknife_over_runs() -> None:
