@@ -205,3 +205,12 @@ def test_every_key_of_a_repair_is_in_its_row(kind: str) -> None:
     common = {"kind", "reason", "enabled"}
     assert common <= named(text)
     assert not keys(REPAIRS[kind][0]) - common - named(row)
+
+
+def test_the_tables_to_add_to_are_there() -> None:
+    text = re.sub(r"```.*?```", "", page("extending"), flags=re.DOTALL)
+    code = "\n".join(file.read_text(encoding="utf-8") for file in (DOCS.parent / "shipid").rglob("*.py"))
+    tables = set(re.findall(r"`([A-Z][A-Z_]+[A-Z])`", text))
+    missing = {table for table in tables if not re.search(rf"^ *{table}\b[^\n]* = ", code, re.MULTILINE)}
+    assert tables
+    assert not missing
