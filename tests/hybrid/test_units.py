@@ -35,7 +35,14 @@ def test_even_units_do_not_feel_the_mirror_and_odd_ones_change_sign(table):
     assert np.abs(odd).max() > 0.01
     plain, _ = replace(units, reflection=None).parts(here)
     np.testing.assert_allclose(even[:, 1:] + odd, plain[:, 1:], atol=1e-12)  # halves of the same units
-    assert np.abs(np.corrcoef([*units.weight, units.offset])[-1, :-1]).max() < 0.9  # drawn apart from the weights
+
+
+def test_weights_and_offsets_are_drawn_apart_with_the_scales_of_their_inputs(table):
+    units = Seen.of(table, mirror=False).draw({**POINT, "offset": 0.7}, 4000, 0)
+    scale = [POINT["command_scale" if name.startswith("port") else "motion_scale"] for name in units.normaliser.names]
+    drawn = np.vstack([units.weight, units.offset])
+    np.testing.assert_allclose(drawn.std(axis=1), [*(1 / np.array(scale)), 0.7], rtol=0.05)
+    np.testing.assert_allclose(np.corrcoef(drawn), np.eye(len(drawn)), atol=0.06)
 
 
 def test_without_a_mirror_there_is_one_kind_of_unit(table):
