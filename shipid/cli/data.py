@@ -11,7 +11,7 @@ import typer
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import beginning, bundled_or_file, files
 from shipid.cli.options import MappingName
-from shipid.cli.outputs import check_output
+from shipid.cli.outputs import check_ending, check_output
 from shipid.cli.terminal import criterion_table, measure_table, reading, table
 from shipid.errors import ShipidError
 from shipid.units import percent, plural
@@ -83,8 +83,7 @@ def data_import(
     from shipid.logs.importing import import_log
     from shipid.logs.mapping import read_mapping
 
-    if out is not None and out.suffix != ".parquet":
-        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
+    check_ending(out, ".parquet")
     declared = read_mapping(mapping)
     source = log or fetch(mapping)
     out = out or Path(f"{Path(mapping).stem}.parquet")
@@ -187,8 +186,7 @@ def data_join(
     from shipid.data.dataset import read_dataset, write_dataset
     from shipid.logs.joining import join
 
-    if out.suffix != ".parquet":
-        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
+    check_ending(out, ".parquet")
     places = [os.path.realpath(file) for file in datasets]
     twice = next((file for file, place in zip(datasets, places, strict=True) if places.count(place) > 1), None)
     if twice is not None:
@@ -222,8 +220,7 @@ def data_check(
     from shipid.data.checks import check_dataset
     from shipid.data.dataset import read_dataset
 
-    if html is not None and html.suffix != ".html":
-        raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
+    check_ending(html, ".html")
     log = read_dataset(dataset)
     checks = check_dataset(log)
     if vessel is not None:

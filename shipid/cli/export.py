@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from shipid.cli.options import Adaptive, Kind, check_band, command_line
-from shipid.errors import ShipidError
+from shipid.cli.outputs import check_ending
 
 
 def export(
@@ -63,8 +63,7 @@ def aboard(
     from shipid.study.aboard import play, summary, write
 
     check_band(level, kind, adaptive)
-    if html is not None and html.suffix != ".html":
-        raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
+    check_ending(html, ".html")
     played = play(predictor, log, mapping, every, level=level, kind=kind, rate=adaptive)
     if out is not None:
         write(played, out)

@@ -12,6 +12,7 @@ import typer
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import files
 from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
+from shipid.cli.outputs import check_ending
 from shipid.cli.terminal import digits, ended_by, iterations, steps, table
 from shipid.errors import DocumentError, ShipidError
 from shipid.units import interval_text, percent, plural
@@ -101,8 +102,7 @@ def identify(
         raise ShipidError(f"{band:g}: must be between 0 and 1, such as 0.9", path="--band")
     file = out or Path(f"{stem(vessel)}-{'structure' if structures else 'identified'}.toml")
     check_new(file, "vessel" if structures else "patch")
-    if html is not None and html.suffix != ".html":
-        raise ShipidError("a page is an HTML file: let the name end in .html", file=html)
+    check_ending(html, ".html")
     given: dict[str, Any] = {
         "parameters": parameters and _paths(parameters),
         "fixed": fixed and _paths(fixed),

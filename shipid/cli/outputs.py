@@ -17,6 +17,8 @@ from shipid.interrupts import recognised
 
 OUTPUTS = ("out", "csv", "html", "log", "save")
 """Names of options that say what to write."""
+ENDINGS = {".parquet": "a dataset is a Parquet file", ".html": "a page is an HTML file"}
+"""Ending -> what is written to such a file."""
 RESULTS = ("study.toml", "provenance.json")
 """Files that a folder of results has."""
 NO_NUMBER = {
@@ -81,6 +83,12 @@ def check_output(file: Path, read: Iterable[Path], option: str) -> None:
     if file.is_file() and (results := results_of(file)) is not None:
         message = f"belongs to the results in {results}, and would be written over: name another file to write"
         raise ShipidError(message, file=file, path=option)
+
+
+def check_ending(file: Path | None, ending: str) -> None:
+    """Raise ShipidError for the name of a dataset or page that does not end so; None: nothing is written."""
+    if file is not None and file.suffix != ending:
+        raise ShipidError(f"{ENDINGS[ending]}: let the name end in {ending}", file=file)
 
 
 def results_of(file: Path) -> Path | None:

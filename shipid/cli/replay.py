@@ -10,6 +10,7 @@ import typer
 from shipid.cli.answer import Json, answering
 from shipid.cli.completion import files
 from shipid.cli.options import VesselName, command_line, stem
+from shipid.cli.outputs import check_ending
 from shipid.cli.terminal import digits, table
 from shipid.errors import ShipidError
 
@@ -46,8 +47,7 @@ def replay(
     from shipid.vessel.load import load_vessel
 
     file = out or Path(f"{stem(vessel)}-replay.html")
-    if file.suffix != ".html":
-        raise ShipidError("a page is an HTML file: let the name end in .html", file=file)
+    check_ending(file, ".html")
     if not step > 0:
         raise ShipidError(f"{step:g} s must be positive", path="--step")
     if csv is not None:

@@ -10,6 +10,7 @@ import typer
 from shipid.cli.answer import Json, answering
 from shipid.cli.completion import bundled_or_file
 from shipid.cli.options import Changes, VesselName, command_line, parsed, stem
+from shipid.cli.outputs import check_ending
 from shipid.cli.terminal import criterion_table, measure_table, table
 from shipid.errors import DocumentError, ShipidError
 from shipid.units import plural
@@ -76,8 +77,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     from shipid.study.plan import read_plan
     from shipid.study.prepare import obtain, partition, runs_by_amount
 
-    if out is not None and out.suffix != ".parquet":
-        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=out)
+    check_ending(out, ".parquet")
     plan = read_plan(study, parsed(changes))
     if plan.truth is None:
         raise DocumentError("has no [truth]: its runs are recorded, so there is nothing to simulate", file=plan.file)
@@ -140,10 +140,8 @@ def manoeuvre(
     from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
     from shipid.vessel.load import load_vessel
 
-    if log is not None and log.suffix != ".parquet":
-        raise ShipidError("a dataset is a Parquet file: let the name end in .parquet", file=log)
-    if out is not None and out.suffix != ".html":
-        raise ShipidError("a page is an HTML file: let the name end in .html", file=out)
+    check_ending(log, ".parquet")
+    check_ending(out, ".html")
     if csv is not None:
         check_table(csv)
     ship = load_vessel(vessel)

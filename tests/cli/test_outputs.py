@@ -59,6 +59,26 @@ def test_what_is_read_is_not_written(words: str, there: Path) -> None:
     assert {file.name: file.read_bytes() for file in there.iterdir()} == before
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "data import gunnerus-2022 --out a.csv",
+        "data join log.parquet b.parquet --out a.csv",
+        "simulate quick --out a.csv",
+        "manoeuvre mariner zigzag 10 10 --log a.csv",
+        "manoeuvre mariner zigzag 10 10 --out a.htm",
+        "data check log.parquet --html a.htm",
+        "aboard log.parquet --predictor a.npz --html a.htm",
+        "identify mariner log.parquet --html a.htm",
+        "replay mariner log.parquet --out a.htm",
+    ],
+)
+def test_a_dataset_or_page_of_another_ending_is_refused_before_anything_is_read(words: str) -> None:
+    what = "a dataset is a Parquet file" if "a.csv" in words else "a page is an HTML file"
+    file, ending = ("a.csv", ".parquet") if "a.csv" in words else ("a.htm", ".html")
+    assert ended(*words.split()) == (1, "", f"error: {file}: {what}: let the name end in {ending}\n")
+
+
 @pytest.mark.usefixtures("there")
 def test_what_cannot_be_written_is_refused_before_anything_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     status, _, error = ended("manoeuvre", "./ship.toml", "zigzag", "20", "20", "--out", "ship.toml/new/a.html")
