@@ -27,7 +27,7 @@ from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched
-from shipid.hybrid.stepping import Stepper, TrueSteps, free, stepped_paths, true_steps
+from shipid.hybrid.stepping import Stepper, TrueSteps, free, stepped_paths, true_motion, true_steps
 from shipid.hybrid.trials import best_of, fit_each, ridge_trial, ridges_of, row_of, used
 from shipid.hybrid.units import solve, taken
 
@@ -262,10 +262,8 @@ def _true_table(task: Task, name: str, steps: TrueSteps, delays: int) -> dict[st
         instants = windows.instants(known=True, hidden=task.hidden.get(name))
         stepper, missed = Stepper(case.physics, instants), []
         for k in range(windows.horizon):
-            motion = {key: before[key][delays + k] for key in MOTIONS}
-            motion["psi"] = windows.columns["psi"] if k == 0 else windows.states["psi"][k - 1]
             after = np.stack([windows.states[key][k] for key in MOTIONS], axis=1)
-            missed.append((after - free(case.physics, stepper.at(k, motion))) / windows.step)
+            missed.append((after - free(case.physics, stepper.at(k, true_motion(windows, k)))) / windows.step)
         for axis, key in enumerate(MISSED):
             past = _missed_before(case.physics, instants, delays)[axis]
             before[key] = np.concatenate([past, np.stack([step[:, axis] for step in missed])])

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.windows import Instants
+from shipid.data.windows import Instants, Windows
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
@@ -146,15 +146,16 @@ def true_steps(task: Task, name: str) -> TrueSteps:
     if not windows.states:
         raise DataError("the method learns from the true velocities over the horizon: these windows hold none")
     stepper = Stepper(physics, windows.instants(known=True, hidden=task.hidden.get(name)))
-    before = [
-        {key: windows.columns[key] if k == 0 else windows.states[key][k - 1] for key in (*MOTIONS, "psi")}
-        for k in range(windows.horizon)
-    ]
     chosen = _first_of_each_moment(task)
     number, window = np.divmod(chosen, len(windows))
-    at = joined([stepper.at(k, motion) for k, motion in enumerate(before)]).select(chosen)
+    at = joined([stepper.at(k, true_motion(windows, k)) for k in range(windows.horizon)]).select(chosen)
     after = np.stack([windows.states[key].ravel()[chosen] for key in MOTIONS], axis=1)
     return TrueSteps(at, free(physics, at), after, window, number, physics.step)
+
+
+def true_motion(windows: Windows, k: int) -> dict[str, Array]:
+    """True u, v, r [m/s, rad/s] and psi [rad] (S,) at the start of step k = 0..T-1 of each window."""
+    return {key: windows.columns[key] if k == 0 else windows.states[key][k - 1] for key in (*MOTIONS, "psi")}
 
 
 def _first_of_each_moment(task: Task) -> Index:

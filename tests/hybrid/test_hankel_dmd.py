@@ -1,10 +1,13 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.hybrid.hankel_dmd import HankelDMD, delayed
+from shipid.hybrid.hankel_dmd import HankelDMD, _true_table, delayed
+from shipid.hybrid.stepping import true_steps
 from tests.hybrid.worlds import FINE, fitted, ship, world
 
 AGO = 4.0  # s
@@ -37,6 +40,25 @@ def test_a_delay_names_how_many_steps_ago():
         **{"past-1.u": 8.0, "past-2.u": 7.0, "port.past-1.n": 6.0, "port.past-2.n": 5.0},
         **{"missed.past-1.v": 4.0, "missed.past-2.v": 3.0},
     }
+
+
+def test_what_the_physics_missed_before_is_what_it_missed_in_the_steps_before():
+    """Also in wind, which a ship feels by her heading at the start of each step."""
+    here = world(ship(), ship(), runs=2, seconds=30, past=3, known=True)
+    wind = {"V_w": np.full(len(here.train), 12.0), "beta_w": np.full(len(here.train), 1.0)}
+    past = {name: np.tile(values, (here.train.num_past, 1)) for name, values in wind.items()}
+    windows = replace(here.train, columns=here.train.columns | wind, past=here.train.past | past)
+    task = replace(here.task(), windows=windows)
+    steps = true_steps(task, "physics")
+    table = _true_table(task, "physics", steps, 2)
+    runs, t = windows.run[steps.window], windows.t[steps.window] + steps.number
+    moments = {(run, round(float(moment))): i for i, (run, moment) in enumerate(zip(runs, t, strict=True))}
+    after = [(moments[run, moment - ago], i, ago) for (run, moment), i in moments.items() for ago in (1, 2)
+             if (run, moment - ago) in moments]  # fmt: skip
+    assert len(after) > 80
+    for first, then, ago in after:
+        found = [table[f"missed.past-{ago}.{name}"][then] for name in "uvr"]
+        np.testing.assert_allclose(found, steps.missing[first], rtol=0, atol=1e-9)
 
 
 def test_every_delay_is_tried_however_few_the_trials():
