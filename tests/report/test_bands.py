@@ -58,6 +58,8 @@ def test_it_says_what_was_held(banded: ReportContent) -> None:
     assert NASTY in groups.takeaway
     assert groups.takeaway.startswith("Bands hold least at ")
     assert "60 % of the paths" in groups.takeaway
+    notes = [row[-1].text for row in groups.rows if row[1].text == "manoeuvre"]
+    assert notes == ["2 runs of this kind calibrated the band: too few"]
     assert "--kind" not in groups.takeaway, "too few runs of this kind: it has no band"
     table = bands.table(banded)
     assert table is not None
