@@ -35,11 +35,11 @@ def _itself(value: float, _: Mapping[str, float], __: float | None) -> float:
     return value
 
 
-def _over(path: str, sign: float = -1.0) -> Callable[[float, Mapping[str, float], float | None], float | None]:
-    """Value over another number of the vessel."""
+def _over(path: str) -> Callable[[float, Mapping[str, float], float | None], float | None]:
+    """Minus a value over another number of the vessel: the derivatives of added mass are negative."""
 
     def ratio(value: float, numbers: Mapping[str, float], _: float | None) -> float | None:
-        return sign * value / numbers[path] if numbers.get(path) else None
+        return -value / numbers[path] if numbers.get(path) else None
 
     return ratio
 
@@ -85,12 +85,16 @@ KINDS = (
 """Kinds of numbers with the ranges that ships have."""
 
 
+def _kind(path: str) -> Kind | None:
+    return next((one for one in KINDS if re.fullmatch(one.pattern, path)), None)
+
+
 def within(vessel: Vessel, path: str) -> tuple[float, float]:
     """Least and greatest factor on a number with which it stays in the range that ships have, the base included.
 
     The other numbers are those of the vessel. Infinite where no range is known.
     """
-    kind = next((one for one in KINDS if re.fullmatch(one.pattern, path)), None)
+    kind = _kind(path)
     base, numbers = vessel.parameters[path], vessel.parameters
     if kind is None or base == 0:
         return -math.inf, math.inf
@@ -131,7 +135,7 @@ def outside(vessel: Vessel, values: Mapping[str, float]) -> set[str]:
 
 def _judged(vessel: Vessel, path: str, numbers: Mapping[str, float]) -> tuple[Kind, float] | None:
     """Kind of a number and its ratio; None where no range is known."""
-    kind = next((one for one in KINDS if re.fullmatch(one.pattern, path)), None)
+    kind = _kind(path)
     ratio = kind.ratio(numbers[path], numbers, vessel.length) if kind is not None else None
     return None if kind is None or ratio is None else (kind, ratio)
 
@@ -149,14 +153,10 @@ def verdict(vessel: Vessel, path: str, values: Mapping[str, float]) -> str:
         return ""
     kind, ratio = seen
     sentence = f"{path} = {numbers[path]:.4g}: {kind.words} is {ratio:.3g}"
-    usual = f"of ships {_number(kind.low)} to {_number(kind.high)}" if math.isfinite(kind.low) else "of ships below 0"
+    usual = f"of ships {kind.low:g} to {kind.high:g}" if math.isfinite(kind.low) else "of ships below 0"
     if not kind.low <= ratio <= kind.high:
         return f"{sentence}, {usual}: no ship has that; hold it, or give it a prior"
     width = kind.high - kind.low
     if math.isfinite(width) and min(ratio - kind.low, kind.high - ratio) < NEAR * width:
         return f"{sentence}, at the end of the range {usual}"
     return ""
-
-
-def _number(value: float) -> str:
-    return f"{value:g}"
