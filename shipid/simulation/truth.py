@@ -79,9 +79,7 @@ class Truth(Checked, BaseModel):
         if self.duration < self.interval:
             raise ValueError(f"duration {self.duration:g} s holds no interval of {self.interval:g} s")
         for name in ("wind_speed", "current_speed"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise ValueError(f"{name} has low > high: give [low, high], not [{low:g}, {high:g}]")
+            limits(name, getattr(self, name))
         for name, value in self.environment.items():
             limits(f"environment.{name}", value)
         return self
