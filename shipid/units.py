@@ -1,6 +1,7 @@
-"""Factors from common units to SI: value in SI = value * factor; the acceleration of gravity; digits of numbers."""
+"""Factors from common units to SI: value in SI = value * factor; gravity; how numbers, counts and lists are worded."""
 
 import math
+from collections.abc import Sequence
 
 RPM = 1.0 / 60.0
 """Revolutions per second in one revolution per minute."""
@@ -33,6 +34,11 @@ def decimals_for(value: float, digits: int) -> int:
     return max(digits - 1 - math.floor(math.log10(abs(value))), 0) if value else digits - 1
 
 
+def digits(value: float, most: int = 3, sign: str = "") -> str:
+    """Format with so many significant digits, but never round digits before the decimal point."""
+    return f"{value:{sign}.0f}" if abs(value) >= 10**most else f"{value:{sign}.{most}g}"
+
+
 def interval_text(low: float, high: float, between: str = " ... ") -> str:
     """Both ends of an interval with the same decimals: those that give half its width two digits, six at most."""
     half = (high - low) / 2
@@ -48,3 +54,8 @@ def percent(share: float, decimals: int = 0, *, signed: bool = False) -> str:
 def plural(count: int, one: str, many: str | None = None) -> str:
     """Return the word for so many: `one` for 1, else `many`, which by default is `one` with an s."""
     return one if count == 1 else f"{one}s" if many is None else many
+
+
+def listed(names: Sequence[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -10,7 +10,7 @@ import pytest
 
 import shipid
 from shipid.logs.mapping import UNITS
-from shipid.units import DEGREE, KNOT, MINUTE, RPM, decimals_for, interval_text, length_text, percent
+from shipid.units import DEGREE, KNOT, MINUTE, RPM, decimals_for, digits, interval_text, length_text, listed, percent
 
 
 @pytest.mark.parametrize(
@@ -75,3 +75,13 @@ def test_there_is_one_way_to_write_percent() -> None:
 )
 def test_both_ends_of_an_interval_have_the_decimals_of_its_width(low: float, high: float, shown: str) -> None:
     assert interval_text(low, high) == shown
+
+
+def test_names_are_listed_as_in_a_sentence() -> None:
+    assert [listed(list("abc")[:count]) for count in range(4)] == ["", "a", "a and b", "a, b and c"]
+
+
+def test_digits_before_the_point_are_never_rounded() -> None:
+    values = (0.012345, 12.345, 999.4, 1234.5, -4321.0)
+    assert [digits(value) for value in values] == ["0.0123", "12.3", "999", "1234", "-4321"]
+    assert digits(12.345, 2, "+") == "+12"

@@ -15,7 +15,7 @@ from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
 from shipid.cli.outputs import check_ending
 from shipid.cli.terminal import digits, ended_by, iterations, steps, table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import interval_text, percent, plural
+from shipid.units import interval_text, listed, percent, plural
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
@@ -297,7 +297,6 @@ def _show_nuisances(outcome: Identified, answer: Answer) -> None:
 
 def _show_identified(outcome: Identified, answer: Answer) -> None:
     """Print estimates, what is not identified, free runs, manoeuvres, manoeuvres to run next, and warnings."""
-    from shipid.identification.collinearity import listed
     from shipid.identification.sides import HEADS, shown
 
     solution = outcome.solution

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.document import short_names
-from shipid.identification.collinearity import digits, listed
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import evaluate
 from shipid.identification.late_fit import OUTSIDE
@@ -18,7 +17,7 @@ from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, Statistics, statistics
 from shipid.logs.repairs import HeadingOffset, LeverArm, move_origin, turn_heading
-from shipid.units import percent
+from shipid.units import digits, listed, percent
 
 Array = NDArray[np.float64]
 AHEAD, ABEAM = ("antenna.x", "antenna.y")  # unknowns beside the factors, in lengths of the ship

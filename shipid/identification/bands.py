@@ -21,10 +21,10 @@ from scipy.special import stdtrit
 
 from shipid.document import short_names
 from shipid.errors import DataError, ShipidError
-from shipid.identification.collinearity import digits, listed
 from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution
 from shipid.identification.statistics import Statistics
+from shipid.units import digits, listed
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]

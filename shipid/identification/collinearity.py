@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.document import short_names
+from shipid.units import digits, listed
 
 Array = NDArray[np.float64]
 
@@ -47,16 +48,6 @@ class Combination:
             return f"{self.names[0]} has no effect on these data"
         moves = [f"{digits(10 * w, 2, '+')} % of {name}" for w, name in zip(self.weights, self.names, strict=True)]
         return f"only {listed(self.names)} together; {' with '.join(moves)} has no effect on these data"
-
-
-def digits(value: float, most: int = 3, sign: str = "") -> str:
-    """Format with so many significant digits, but never round digits before the decimal point."""
-    return f"{value:{sign}.0f}" if abs(value) >= 10**most else f"{value:{sign}.{most}g}"
-
-
-def listed(names: Sequence[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def combinations(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, ...]:

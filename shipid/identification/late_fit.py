@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset, pieces
 from shipid.document import short_names
-from shipid.identification.collinearity import digits
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import evaluate
 from shipid.identification.late import COARSE, interval_of
@@ -18,6 +17,7 @@ from shipid.identification.residuals import build
 from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution
 from shipid.identification.statistics import Statistics
+from shipid.units import digits
 from shipid.vessel.dynamics import dynamics
 
 Array = NDArray[np.float64]

@@ -25,7 +25,6 @@ from shipid.files import write_new
 from shipid.identification import design
 from shipid.identification.antenna import antenna_fit
 from shipid.identification.bands import LONG, Measure, bands, check_level, refusal
-from shipid.identification.collinearity import digits, listed
 from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs, unfelt
 from shipid.identification.late_fit import late_fit
@@ -46,7 +45,7 @@ from shipid.identification.statistics import (
 from shipid.identification.unstable import grows, growth_in
 from shipid.interrupts import uninterrupted
 from shipid.simulation.measured import measure_standard
-from shipid.units import percent, plural
+from shipid.units import digits, listed, percent, plural
 from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel

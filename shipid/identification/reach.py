@@ -10,9 +10,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
-from shipid.identification.collinearity import listed
 from shipid.physics.signals import steers
-from shipid.units import DEGREE
+from shipid.units import DEGREE, listed
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 

@@ -40,8 +40,9 @@ from scipy.special import chdtrc, stdtrit
 
 from shipid.document import short_names
 from shipid.errors import ShipidError
-from shipid.identification.collinearity import Combination, combinations, digits, listed
+from shipid.identification.collinearity import Combination, combinations
 from shipid.identification.covariance import inverted
+from shipid.units import digits, listed
 
 if TYPE_CHECKING:
     from shipid.identification.solve import Solution

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shipid.data.dataset import Dataset
-from shipid.identification.collinearity import digits
+from shipid.units import digits
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.stability import growth

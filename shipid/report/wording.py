@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 
+from shipid import units
 from shipid.units import decimals_of, plural
 
 CONSTANT = "constant u, v, r"
@@ -81,7 +82,7 @@ def distance(value: float) -> str:
 def listed(names: Sequence[str], limit: int = 4) -> str:
     """Join as `a, b and c`; what exceeds the limit is counted."""
     shown = [*names] if len(names) <= limit else [*names[: limit - 1], f"{len(names) - limit + 1} more"]
-    return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}" if shown else "none"
+    return units.listed(shown) or "none"
 
 
 def bound(text: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.identification.collinearity import MOST_COLLINEAR, combinations, listed
+from shipid.identification.collinearity import MOST_COLLINEAR, combinations
 
 RNG = np.random.default_rng(0)
 FREE = np.linalg.qr(RNG.normal(size=(200, 6)))[0]
@@ -77,6 +77,5 @@ def test_columns_at_right_angles_have_no_set_and_each_silent_one_has_one() -> No
 
 
 def test_a_pair_is_named_in_one_sentence() -> None:
-    assert [listed(list("abc")[:count]) for count in (1, 2, 3)] == ["a", "a and b", "a, b and c"]
     (pair,) = combinations(correlated(0.9999) * [1.0, 2.0], ["hull.Y_v", "hull.Y_ur"])
     assert pair.sentence() == "only Y_v and Y_ur together; +10 % of Y_v with -5 % of Y_ur has no effect on these data"
