@@ -44,6 +44,8 @@ def test_each_part_has_a_tenth_to_spare(name: str, words: str, near: float, far:
     assert " and " not in sentence
     little = Reach(drift=0.5, rate=0.01, helm=0.5, speed=2.0)
     assert beyond("a turn", Reach(drift=1.4, rate=0.029, helm=1.4, speed=2.0), little) == ""
+    sentence = beyond("a turn", Reach(drift=1.6, rate=0.031, helm=1.6, speed=2.0), little)
+    assert sentence == "a turn reaches 2 deg of drift, r L / U of 0.03 and 2 deg of helm; the data reach 0, 0.01 and 0"
 
 
 def test_a_ship_at_rest_has_no_drift() -> None:

@@ -7,6 +7,7 @@ import pytest
 from scipy.special import elliprd
 
 from shipid.vessel.regressions import (
+    K_T_TERMS,
     correlation_allowance,
     form_factor,
     friction,
@@ -114,6 +115,16 @@ def test_the_series_is_near_the_screw_of_kvlcc2() -> None:
     """P / D = 0.721: K_T = 0.2931 - 0.2753 J - 0.1385 J^2 (Yasukawa and Yoshimura 2015), another area ratio."""
     J = np.linspace(0, 0.6, 7)
     assert thrust_coefficient(J, 0.721) == pytest.approx(0.2931 - 0.2753 * J - 0.1385 * J**2, abs=0.025)
+
+
+def test_the_table_of_the_series_adds_up() -> None:
+    """Sums over the printed table, compared with it term by term once: small terms hide in the tests above."""
+    c, *powers = np.array(K_T_TERMS).T
+    assert len(c) == 39
+    assert np.abs(c).sum() == pytest.approx(2.3598490919, rel=1e-9)
+    assert c @ (powers[0] + 10 * powers[1] + 100 * powers[2] + 1000 * powers[3]) == pytest.approx(
+        18.3911023657, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("pitch", [0.4, 0.8, 1.0, 1.2, 1.5])
