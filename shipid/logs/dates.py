@@ -175,6 +175,7 @@ def time_texts(parts: list[Array]) -> pd.Series[Any]:
     second = rest[0] if rest else np.zeros(len(hour))
     known = _all_whole([hour, minute, np.floor(second)], [(0, 23), (0, 59), (0, 60)])
     micros = np.round(1e6 * (3600.0 * hour + 60.0 * minute + second)[known]).astype(np.int64)
+    micros = np.minimum(micros, int(1e6 * DAY) - 1)  # 24:00:00 is no time of day
     texts = pd.Series([None] * len(hour), dtype=object)
     whole = micros // 1_000_000
     numbers = zip(whole // 3600, whole // 60 % 60, whole % 60, micros % 1_000_000, strict=True)

@@ -9,7 +9,7 @@ import pytest
 
 from shipid.errors import DataError, DocumentError
 from shipid.logs import dates
-from shipid.logs.dates import date_of, moment_of, seconds, span_of
+from shipid.logs.dates import date_of, date_texts, dated, moment_of, seconds, span_of, time_texts
 from shipid.logs.guess.sniff import sniff
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.conftest import T, mapping_with
@@ -172,6 +172,31 @@ def test_date_and_time_in_two_columns(day: str, time: str, log: pd.DataFrame, tm
     mapping.write_text(mapping.read_text().replace('unit = "date"\n', ""))
     with pytest.raises(DocumentError, match=r"clock\.date: .*write unit = 'date'"):
         read_mapping(mapping)
+
+
+def test_dates_in_columns_of_numbers() -> None:
+    """What is no month, day or whole number is no date; two digits of a year are of 1969 to 2068."""
+    year, month, day = [2024.0, 24.0, 68.0, 69.0, 2024.0, 2024.0, 2024.0, 2024.0], [12.0] * 8, [31.0] * 8
+    month[4], day[5], day[6], year[7] = 13.0, 32.0, 1.5, np.nan
+    texts = date_texts([np.array(one) for one in (year, month, day)])
+    assert texts.tolist() == ["2024-12-31", "2024-12-31", "2068-12-31", "1969-12-31", *[None] * 4]
+    of_year = date_texts([np.array([2024.0, 2024.0, 2024.0]), np.array([1.0, 366.0, 367.0])])
+    assert of_year.tolist() == ["2024-001", "2024-366", None]
+
+
+def test_times_of_day_in_columns_of_numbers() -> None:
+    """A leap second is the first of the next minute; hour 24, minute 60 and second 61 are none."""
+    hour, minute, second = [23.0, 0.0, 24.0, 0.0, 0.0], [59.0, 7.0, 0.0, 60.0, 0.0], [59.25, 60.0, 0.0, 0.0, 61.0]
+    texts = time_texts([np.array(one) for one in (hour, minute, second)])
+    assert texts.tolist() == ["23:59:59.250000", "00:08:00.000000", None, None, None]
+    assert time_texts([np.array([8.0]), np.array([5.0])]).tolist() == ["08:05:00.000000"]
+
+
+def test_a_second_that_rounds_to_midnight_keeps_its_date() -> None:
+    """It was 24:00:00, which no date has: the row had no time."""
+    days = date_texts([np.array([2024.0, 2024.0]), np.array([5.0, 5.0]), np.array([14.0, 15.0])])
+    times = time_texts([np.array([23.0, 0.0]), np.array([59.0, 0.0]), np.array([59.9999999, 0.1])])
+    assert np.diff(seconds(dated(days, times))) == pytest.approx([0.1], abs=2e-6)
 
 
 def test_times_of_day_that_go_back_are_of_the_next_day() -> None:
