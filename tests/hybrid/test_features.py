@@ -19,6 +19,7 @@ from shipid.hybrid.features import (
     steps_of,
 )
 from shipid.hybrid.physics import Physics
+from shipid.observer import Observer
 from shipid.physics.signals import mirror_sign
 from shipid.vessel.load import load_vessel
 from tests.study.test_commands import weaving
@@ -163,6 +164,17 @@ def test_estimates_of_the_observer_are_in_body_axes():
     assert set(table) == set(by_hand)
     for name, values in by_hand.items():
         np.testing.assert_allclose(table[name], values, atol=1e-12, err_msg=name)
+
+
+def test_estimates_are_inputs_where_method_and_physics_both_have_the_observer(columns):
+    known = {
+        f"observer.{name}": np.zeros(50) for name in ("u", "v", "r", "X", "Y", "N", "current_north", "current_east")
+    }
+    instants, physics = Instants(columns, estimates=known), Physics(SHIP, 5, 1.0)
+    observed = replace(physics, observer=Observer())
+    for memory, one in ((Memory(observer=True), physics), (Memory(), observed)):
+        assert Inputs(COMMANDS, memory).of_physics(one, instants) == {}
+    assert Inputs(COMMANDS, Memory(observer=True)).of_physics(observed, instants).keys() == estimates(instants).keys()
 
 
 def test_a_past_that_is_missing_is_one_line(past):
