@@ -199,16 +199,17 @@ def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
     aside = {*plan.aside, *plan.saw(tests)}
     mine = frame[(frame["method"] == plan.judged) & ~frame["family"].isin(aside)]
     good, bad = claims.accurate, claims.inaccurate
-    H = mine[mine["status"] == "ok"].pivot_table(index="test", columns=["family", "seed"], values="H")
-    if any(name not in H.columns.get_level_values(0) for name in (good, bad, NO_MODEL)):
+    mine = mine.assign(model=mine["family"].where(mine["family"].isin([good, bad]), mine["foundation"]))
+    H = mine[mine["status"] == "ok"].pivot_table(index="test", columns=["model", "seed"], values="H")
+    models = list(dict.fromkeys(H.columns.get_level_values(0)))
+    if any(name not in models for name in (good, bad, NO_MODEL)):
         return []
     H = H.dropna()
-    A = mine.pivot_table(index="test", columns="family", values="A").loc[H.index]
+    A = mine.pivot_table(index="test", columns="model", values="A").loc[H.index].dropna(axis=1)
     if len(H) < 2:
         return []
-    families = list(dict.fromkeys(H.columns.get_level_values(0)))
-    errors = {name: H[name].to_numpy(dtype=float).T[None] for name in families}
-    alone = {name: A[name].to_numpy(dtype=float) for name in (good, bad)}
+    errors = {name: H[name].to_numpy(dtype=float).T[None] for name in models}
+    alone = {str(name): values.to_numpy(dtype=float) for name, values in A.items()}
     table = ErrorTable((1,), np.ones(len(H)), alone, errors)
     steps = {name: values[0].mean(axis=0)[None] for name, values in errors.items()}
     steps |= {f"{name} alone": values[None] for name, values in alone.items()}

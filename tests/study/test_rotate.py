@@ -19,6 +19,7 @@ from shipid.study.plan import Plan
 from shipid.study.prepare import prepare
 from shipid.study.rotate import copied, rotate, spread, turn_findings, turns
 from shipid.study.run import run_unit
+from shipid.study.verdict import Finding
 from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
 
@@ -238,6 +239,22 @@ def test_families_of_several_members_and_models_without_any_result(claimed: Plan
     two = frame.assign(foundation=frame["foundation"] + "-2", H=frame["H"] + 1.0)
     assert "bad 6.00 m -> 3.02 m" in turn_findings(pd.concat([frame, two]), claimed)[0]["evidence"]
     assert turn_findings(frame[frame["foundation"] != "good"], claimed) == []
+
+
+def test_no_physics_is_compared_with_every_member_of_a_family_and_with_its_physics_alone(claimed: Plan) -> None:
+    """As in a run. `none` has 33 m in the mean, the members 1 and 49 m, or 60 m alone: their mean would hide it."""
+    frame = many()
+    frame["H"] += 30.0 * (frame["foundation"] == "none")
+
+    def judged(H: float, A: float) -> Finding:
+        good = frame[frame["foundation"] == "good"].assign(family="wide", A=1.0, H=1.0)
+        wide = [good.assign(foundation="wide-1"), good.assign(foundation="wide-2", A=A, H=H)]
+        return turn_findings(pd.concat([frame, *wide]), claimed)[3]
+
+    worst = {'"no physics"': judged(H=1.0, A=1.0), "wide-2": judged(H=49.0, A=1.0), "wide-2 alone": judged(1.0, 60.0)}
+    for name, one in worst.items():
+        assert one["evidence"].startswith(f"worst over the horizon, physics alone included: {name}; ")
+        assert (one["verdict"] == "refuted") == name.startswith("wide")
 
 
 def test_a_run_without_windows_takes_no_turn(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
