@@ -155,7 +155,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
     Means over the models at the largest N_D that has bands, without families whose numbers were set from test runs.
     """
     level, frame = results.plan.level, coverage_frame(results)
-    mine = frame[frame["level"].eq(level) & ~frame["family"].isin(results.plan.saw(results.test.spans))]
+    mine = frame[frame["level"].eq(level) & ~frame["family"].isin(results.saw_test)]
     if mine.empty:
         refused = refused_frame(results).groupby("reason", sort=False)["model"]
         reasons = {str(reason).removeprefix(NO_BAND): named(map(str, models)) for reason, models in refused}

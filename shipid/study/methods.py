@@ -15,7 +15,7 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.evidence import contrasts, mean_errors, over_worlds, training_error
 from shipid.study.results import Results
 
-EVERY = "with physics"  # all families but `none`
+EVERY = "with physics"  # all families but `none` and those that saw the test runs
 LEAST = 3  # worlds from which an interval over worlds is given
 COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
@@ -28,8 +28,9 @@ COLUMNS = [
 def compare_methods(results: Results) -> pd.DataFrame:
     """Compare the methods of a run: a row per family, N_D and method, in the columns of `compared`.
 
-    The family `with physics` is the mean over all families but `none`. The difference is that to the method by which
-    the study judges. To choose the lowest H of a test chooses by the test: the interval does not count that.
+    The family `with physics` is the mean over all families but `none` and those that saw the test runs. The difference
+    is that to the method by which the study judges. To choose the lowest H of a test chooses by the test: the interval
+    does not count that.
 
     Raises ShipidError for results that are none.
     """
@@ -48,18 +49,20 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
     """A row per cell, as `compared` takes it.
 
     Columns: condition, world, foundation, family, method, N_D, seed, status, H, H_90, end (mean error at the end of the
-    horizon) [m], seconds (core-seconds), trials, trained (whether the method learns), and `sums`, `counts`: test run ->
-    sum over its windows of the mean error over the horizon [m], and number of windows. Without a result the errors are
-    not numbers.
+    horizon) [m], seconds (core-seconds), trials, trained (whether the method learns), saw_test (whether the numbers of
+    the family rest on test runs), and `sums`, `counts`: test run -> sum over its windows of the mean error over the
+    horizon [m], and number of windows. Without a result the errors are not numbers.
     """
     learns = {way.name: way.method.compensates for way in results.plan.methods}
     runs, place = np.unique(results.test.run, return_inverse=True)
+    saw = results.saw_test
     counts = {str(run): int(count) for run, count in zip(runs, np.bincount(place), strict=True)}
     rows = []
     for row in results.rows:
         kept = {name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")}
         kept |= {"condition": condition, "world": world, "end": np.nan, "sums": {}, "counts": counts}
         kept |= {"seconds": row["seconds"], "trials": len(row["trials"]), "trained": learns[row["method"]]}
+        kept["saw_test"] = row["family"] in saw
         if row["cell"] in results.paths:
             error = position_error(results.paths[row["cell"]], results.test.future)
             sums = np.bincount(place, over_time(error))
@@ -80,9 +83,9 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     drawn together, and what another training would give is in it. `better` counts test runs with a lower error.
     `least`, `greatest`: the difference by world; `world_low`, `world_high`: Student's 95 % interval over worlds, from
     three on. The family `with physics` is all of
-    them but `none`.
+    them but `none` and those that saw the test runs.
     """
-    frames = [cells, cells[cells["family"] != NO_MODEL].assign(family=EVERY)]
+    frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=EVERY)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
     rows = []
     for (condition, family, N_D), group in every.groupby(["condition", "family", "N_D"], sort=False):

@@ -123,7 +123,13 @@ class Results:
     @property
     def aside(self) -> set[str]:
         """Families that are shown, but that no claim and no sentence of the answer counts."""
-        return {*self.plan.aside, *self.plan.saw(self.test.spans)}
+        return {*self.plan.aside, *self.saw_test}
+
+    @property
+    def saw_test(self) -> set[str]:
+        """Families whose numbers rest on test runs: those that the claims set aside, or that name such a run."""
+        claims = self.plan.claims
+        return {*(claims.aside if claims else ()), *self.plan.saw(self.test.spans)}
 
     @property
     def missing(self) -> str:

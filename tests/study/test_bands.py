@@ -24,6 +24,7 @@ from shipid.study.compare import compare_bands
 from shipid.study.findings import findings
 from shipid.study.plan import Plan, read_plan
 from shipid.study.results import Results, border, read_results
+from shipid.study.schema import Claims
 from shipid.study.verdict import metres
 from shipid.units import percent
 from tests.study.test_commands import weaving
@@ -172,6 +173,17 @@ def test_a_family_that_saw_the_test_is_not_in_the_mean(results: Results, monkeyp
     mean = f"held {percent(rest['coverage'].mean())} of the whole test paths (mean of {len(rest)} models"
     assert len(rest) > 1
     assert mean in bands.answer(results)[0][0]
+
+
+def test_a_family_that_the_claims_set_aside_is_not_in_the_mean(results: Results) -> None:
+    frame = bands.coverage_frame(results)
+    top = frame[(frame["N_D"] == frame["N_D"].max()) & (frame["level"] == results.plan.level)]
+    tuned = "wrong"
+    claims = Claims(aside=[tuned])
+    apart = replace(results, plan=replace(results.plan, study=results.plan.study.model_copy(update={"claims": claims})))
+    rest = top[top["family"] != tuned]
+    assert 0 < len(rest) < len(top)
+    assert f"(mean of {len(rest)} models" in bands.answer(apart)[0][0]
 
 
 def test_a_kind_that_no_run_of_calibration_has_is_promised_nothing(results: Results) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 import shipid
 from shipid.study.methods import COLUMNS, EVERY, compared
+from shipid.study.schema import Claims
 
 
 def cells(
@@ -33,7 +35,7 @@ def cells(
                     rows.append(
                         {"condition": "", "world": str(world), "foundation": f"{family}-{member}", "family": family,
                          "method": method, "N_D": 10, "seed": world, "status": "ok", "H": H, "H_90": 2 * H,
-                         "end": 1.5 * H, "seconds": 3.0, "trials": 4, "trained": False,
+                         "end": 1.5 * H, "seconds": 3.0, "trials": 4, "trained": False, "saw_test": False,
                          "sums": sums, "counts": counts, **more}
                     )  # fmt: skip
     return pd.DataFrame(rows)
@@ -60,6 +62,15 @@ def test_the_difference_is_that_of_the_means() -> None:
     assert row(compared(cells(np.random.default_rng(0), 0.5, worlds=4), "drawn")).world_low < 0.6
 
 
+def test_a_family_that_saw_the_test_is_shown_and_not_in_the_mean() -> None:
+    made = cells(np.random.default_rng(0), 0.5)
+    tuned = made[made.family.eq("moderate")].assign(family="tuned", H=lambda rows: 0.1 * rows.H, saw_test=True)
+    table = compared(pd.concat([made, tuned], ignore_index=True), "drawn")
+    for key in ("H", "H_low", "difference", "cells", "missing"):
+        assert getattr(row(table), key) == getattr(row(compared(made, "drawn")), key)
+    assert pytest.approx(0.1 * row(table).H) == row(table, family="tuned").H
+
+
 def test_the_interval_of_H_holds_H_and_needs_five_runs() -> None:
     rng = np.random.default_rng(5)
     table = compared(cells(rng, 0.5), "drawn")
@@ -82,6 +93,16 @@ def test_methods_of_a_run_on_the_disk(tiny_run: Path) -> None:
         mean = part.groupby("N_D")["H"].mean()
         pd.testing.assert_series_equal(table[table.family == family].set_index("N_D")["H"], mean, check_names=False)
     assert (table.difference.abs() == 0).all(), "one method, the one that the study judges by"
+
+
+def test_the_mean_over_physics_is_without_families_that_the_claims_set_aside(tiny_run: Path) -> None:
+    results = shipid.read_results(tiny_run)
+    study = results.plan.study.model_copy(update={"claims": Claims(aside=["wrong"])})
+    apart = replace(results, plan=replace(results.plan, study=study))
+    for one, families in ((results, ["right", "wrong"]), (apart, ["right"])):
+        table, cells = shipid.compare_methods(one), results.cells
+        mean = cells[cells.family.isin(families)].groupby("N_D")["H"].mean()
+        pd.testing.assert_series_equal(table[table.family == EVERY].set_index("N_D")["H"], mean, check_names=False)
 
 
 @pytest.mark.slow
