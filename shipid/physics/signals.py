@@ -321,7 +321,8 @@ def is_output(name: str) -> bool:
 def _is_of_component(name: str, role: Role) -> bool:
     component, dot, signal = name.partition(".")
     row = SIGNALS.get(signal)
-    return bool(dot) and row is not None and row.role == role and component.isidentifier() and component.isascii()
+    is_name = component.replace("-", "_").isidentifier() and component.isascii()
+    return bool(dot) and row is not None and row.role == role and is_name
 
 
 def is_shaft(command: str) -> bool:

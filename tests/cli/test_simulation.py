@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import read_dataset
+from shipid.document import bundled
 from shipid.errors import ShipidError
 from tests.cli.running import ended, output_of
 
@@ -75,3 +76,12 @@ def test_simulate_writes_a_log_of_a_vessel(tmp_path: Path, monkeypatch: pytest.M
     assert np.abs(log["psi"]).max() > np.radians(20)
     with pytest.raises(ShipidError, match="changes a study"):
         output_of("simulate", "mariner", "--manoeuvres", "runs.toml", "--set", "step=1")
+
+
+def test_a_dataset_holds_a_thruster_with_a_hyphen_in_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = bundled("models")["mariner"].read_text().replace("[thruster.rudder", "[thruster.stern-rudder")
+    Path("ship.toml").write_text(text)
+    Path("runs.toml").write_text('[[manoeuvre]]\nkind = "zigzag"\nn_rpm = 80\nduration = 100\n')
+    output_of("simulate", "ship.toml", "--manoeuvres", "runs.toml", "--out", "log.parquet")
+    assert read_dataset(Path("log.parquet")).commands == ["propeller.n", "stern-rudder.delta"]

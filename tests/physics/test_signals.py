@@ -67,6 +67,7 @@ def test_commands_are_recognised_by_their_last_name() -> None:
     [
         ("port.n", True),
         ("p_2.alpha", True),
+        ("bow-thruster.n", True),
         ("n", False),
         ("port.u", False),
         ("2.n", False),
