@@ -29,7 +29,7 @@ INPUTS = ("state", "memory", "commands", "environment", "parameters")
 LAST = {"rates": "tau_extra", "advance": "dt", "sum": "component"}  # input of each function beside those of all
 PLANE, HEAVE = (0, 1, 5), 2
 CORIOLIS = {"full": PLANE, "mmg": (0, 1), "none": ()}  # axes on which added mass turns with the ship by formula
-HELM = "helm"  # prefix of the states of a helmsman
+HELM = "(helm)"  # prefix of the states of a helmsman: no thruster has such a name
 UNROLL_UP_TO = 32  # components: beyond it a sum is mapped, not written out
 
 

@@ -17,7 +17,7 @@ from shipid.simulation.approach import (
     thrust_sharing,
 )
 from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.template import Particulars, first_guess
 from tests.conftest import PATCHED
 
@@ -209,6 +209,18 @@ def test_a_helmsman_holds_what_does_not_go_straight(key: str, changes: dict[str,
         assert 0.001 < max(map(abs, helm.values())) < 0.3
     alone = steady(controls, np.array(n[:1]), held=True, **how)  # type: ignore[arg-type]
     assert alone.state["u"][0] == approach.state["u"][0]  # whatever the company
+
+
+def test_a_rudder_that_is_called_helm_is_held_like_any_other() -> None:
+    """Its actuator began at 0 and not at the angle that holds the course."""
+    tanker = load_vessel("kvlcc2-l7").with_values({"hull.mmg.N_u": 4e-4})
+    screw, rudder = tanker.document["thruster"].values()
+    ship = check_vessel({**tanker.document, "thruster": {"propeller": screw, "helm": rudder}}, "renamed.toml")
+    one, other = (
+        steady(Controls.of(v), np.array([10.229]), step=0.1, method="rk4", engine="casadi", held=True)
+        for v in (tanker, ship)
+    )
+    assert other.memory["helm.delta"] == one.memory["rudder.delta"] != 0
 
 
 def test_a_slow_ship_is_held_until_she_is_on_course() -> None:
