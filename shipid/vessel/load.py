@@ -22,7 +22,7 @@ from shipid.files import open_file
 from shipid.physics import TERMS
 from shipid.physics.grammar import AXES, MOTIONS
 from shipid.physics.inertia import mass
-from shipid.physics.signals import row_of
+from shipid.physics.signals import ACTUAL, row_of
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import Binding, bindings, units
 from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, contradiction, first_of, out_of_range
@@ -369,7 +369,9 @@ def _check_behind(vessel: Vessel) -> None:
         for name in behind(TERMS[key]):
             giving = [other.rsplit(".", 1)[-1] for other, kind, _ in terms if name in TERMS[kind].gives]
             if block[BEHIND] not in giving:
-                message = f"{block[BEHIND]!r} gives no {name}: {choices(block[BEHIND], giving)}"
+                off = [other.rsplit(".", 1)[-1] for other, _, _ in term_blocks(vessel.document, off=True)]
+                remedy = "it is off" if block[BEHIND] in off else choices(block[BEHIND], giving)
+                message = f"{block[BEHIND]!r} gives no {name}: {remedy}"
                 raise DocumentError(message, file=vessel.file, path=f"{path}.{BEHIND}")
 
 
@@ -424,6 +426,9 @@ def _check_component(path: str, group: str, block: Any, file: str) -> None:
     name = path.partition(".")[2]
     if name and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
         raise DocumentError(f"{name!r} is no name for a {group}: use letters, digits, _ and -", file=file, path=group)
+    if f"{name}." == ACTUAL:
+        message = f"{name!r} is no name for a {group}: with it begin columns of what actuators have reached"
+        raise DocumentError(message, file=file, path=path)
     if not isinstance(block, Mapping):
         raise DocumentError(f"{block!r}: must be a table with a `kind`", file=file, path=path)
     kind, valid = block.get("kind"), kinds(group)
