@@ -189,11 +189,16 @@ def digest(document: Any) -> str:
 
 
 def merge(under: Document, over: Document) -> Document:
-    """A new document: tables of both are merged; any other value in `over` replaces that in `under`."""
+    """A new document: tables of both are merged; any other value in `over` replaces that in `under`.
+
+    So does a table of another `kind`: the keys of one kind are not those of another.
+    """
     result = dict(under)
     for key, value in over.items():
         below = result.get(key)
-        result[key] = merge(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
+        tables = isinstance(below, dict) and isinstance(value, dict)
+        alike = tables and value.get("kind") in (None, below.get("kind"))
+        result[key] = merge(below, value) if alike else value
     return result
 
 
