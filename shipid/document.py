@@ -196,9 +196,9 @@ def merge(under: Document, over: Document) -> Document:
     result = dict(under)
     for key, value in over.items():
         below = result.get(key)
-        tables = isinstance(below, dict) and isinstance(value, dict)
-        alike = tables and value.get("kind") in (None, below.get("kind"))
-        result[key] = merge(below, value) if alike else value
+        if isinstance(below, dict) and isinstance(value, dict) and value.get("kind") in (None, below.get("kind")):
+            value = merge(below, value)
+        result[key] = value
     return result
 
 
