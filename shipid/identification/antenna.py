@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset
 from shipid.document import short_names
 from shipid.identification.covariance import inverted
-from shipid.identification.fit import evaluate
 from shipid.identification.late_fit import OUTSIDE
-from shipid.identification.residuals import build
 from shipid.identification.settings import unknowns
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solve import Solution, by_log, identify
 from shipid.identification.statistics import LinearFit, Statistics, statistics
 from shipid.logs.repairs import HeadingOffset, LeverArm, move_origin, turn_heading
 from shipid.units import digits, listed, percent
@@ -81,8 +79,9 @@ def stepped(
     at : [m] from where the log has been moved to the origin.
     """
     free = ~(solution.held | solution.at_bound)
-    slopes = [_residuals(solution, _to_origin(dataset, *arm)) for arm in ((ARM * length, 0.0), (0.0, ARM * length))]
-    added = np.array([(slope - solution.residuals) / ARM for slope in slopes if slope is not None]).T
+    arms = ((ARM * length, 0.0), (0.0, ARM * length))
+    changes = [by_log(solution, dataset, _to_origin(dataset, *arm)) for arm in arms]
+    added = np.array([change / ARM for change in changes if change is not None]).T
     if added.shape != (len(solution.residuals), 2) or len(added) <= free.sum() + 2:
         return None
     J = np.hstack([solution.jacobian[:, free], added])
@@ -108,11 +107,11 @@ def stepped(
 def turned(solution: Solution, dataset: Dataset) -> float:
     """Share of the squares of the residuals that a heading which is off takes away, by one step of Gauss-Newton."""
     free = ~(solution.held | solution.at_bound)
-    slope = _residuals(solution, _turned(dataset, OFF))
+    change = by_log(solution, dataset, _turned(dataset, OFF))
     total = float(solution.residuals @ solution.residuals)
-    if slope is None or not total > 0:
+    if change is None or not total > 0:
         return 0.0
-    added = (slope - solution.residuals) / OFF
+    added = change / OFF
     J = np.column_stack([solution.jacobian[:, free], added])
     inverse = inverted(J.T @ J + np.diag(np.append(solution.prior_widths[free], np.inf) ** -2.0))[0]
     left = solution.residuals - J @ (inverse[:, -1] * float(added @ solution.residuals))
@@ -135,14 +134,6 @@ def _to_origin(dataset: Dataset, x: float, y: float) -> Dataset:
     """The log of a point (x, y) [m], moved to the origin."""
     rows = move_origin(dataset.frame, LeverArm(kind="lever_arm", reason="a trial", x=x, y=y)).rows
     return replace(dataset, frame=rows)
-
-
-def _residuals(solution: Solution, dataset: Dataset) -> Array | None:
-    """Residuals (m,) of the fit with another log; None where they diverge."""
-    problem = build(solution.vessel, dataset, solution.runs, solution.settings)
-    at = evaluate(problem, solution.factors, solution.point).at
-    residuals = at.marginal(solution.settings.linear_from, solution.within)[0]
-    return residuals if residuals.shape == solution.residuals.shape and np.isfinite(residuals).all() else None
 
 
 def antenna_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:

@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset, pieces
 from shipid.document import short_names
 from shipid.identification.covariance import inverted
-from shipid.identification.fit import evaluate
 from shipid.identification.late import COARSE, interval_of
-from shipid.identification.residuals import build
 from shipid.identification.settings import unknowns
-from shipid.identification.solve import Solution
+from shipid.identification.solve import Solution, by_log
 from shipid.identification.statistics import Statistics
 from shipid.units import digits
 from shipid.vessel.dynamics import dynamics
@@ -53,13 +51,11 @@ def lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
     between = interval_of(dataset, solution.runs)
     if settings.step > COARSE * between:
         return None
-    problem = build(solution.vessel, _earlier(dataset), solution.runs, settings)
-    at = evaluate(problem, solution.factors, solution.point).at
-    shifted = at.marginal(settings.linear_from, solution.within)[0]
-    if shifted.shape != solution.residuals.shape or not np.isfinite(shifted).all():
+    change = by_log(solution, dataset, _earlier(dataset))
+    if change is None:
         return None
     free = ~(solution.held | solution.at_bound)
-    J, change = solution.jacobian[:, free], shifted - solution.residuals
+    J = solution.jacobian[:, free]
     inverse = inverted(J.T @ J + np.diag(1 / solution.prior_widths[free] ** 2))[0]
     moved = -inverse @ (J.T @ change)
     left = change + J @ moved  # what no factor makes up for

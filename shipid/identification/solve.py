@@ -15,7 +15,7 @@ from shipid.errors import DataError, DocumentError, choices
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
 from shipid.identification.late import COARSE, interval_of
-from shipid.identification.residuals import Problem, build
+from shipid.identification.residuals import Problem, build, predict
 from shipid.identification.settings import BLOCK, Identify, columns_of
 from shipid.identification.start import by_inverse_dynamics, grown
 from shipid.identification.statistics import LinearFit, whiteness
@@ -134,6 +134,26 @@ def identify(
         solution = replace(solution, seconds=solution.seconds + before.seconds)
     problem = build(vessel, dataset, runs, solution.settings)  # both objectives with the same deviations
     return replace(solution, objective_start=evaluate(problem, *_begun(problem, start)).objective)
+
+
+def by_log(solution: Solution, dataset: Dataset, other: Dataset) -> Array | None:
+    """Change (m,) of the residuals from the log of a fit to another one, as a column of the Jacobian.
+
+    None where a prediction diverges, or the other log has other rows. With the Huber loss every change counts alike:
+    one that only residuals within the threshold make looks as if the fit became better.
+    """
+    point = solution.point
+    here, there = (
+        predict(
+            build(solution.vessel, log, solution.runs, solution.settings), solution.factors, point.nuisances, point.away
+        )
+        for log in (dataset, other)
+    )
+    if there.r.shape != here.r.shape or not np.isfinite(there.r).all():
+        return None
+    with_change = replace(here, by_factor=np.column_stack([here.by_factor, there.r - here.r]))
+    jacobian = with_change.marginal(solution.settings.linear_from, solution.within)[1]
+    return np.asarray(jacobian[:, -1])
 
 
 def _discounted(solution: Solution) -> tuple[Identify, dict[str, float]]:

@@ -82,6 +82,17 @@ def test_sound_logs_and_those_whose_antenna_is_estimated_are_not_blamed(seed: in
     assert sentence(mended, ahead) == ""
 
 
+@pytest.mark.parametrize(("x", "times"), [(0.0, 0.3), (0.3, 1.0)])
+def test_huber_moves_no_antenna(x: float, times: float) -> None:
+    """It drew the antenna to the trial point at 0.1 lengths, for only residuals within the threshold moved."""
+    log = log_of(3, x)
+    weights = {name: times * deviation for name, deviation in NOISE.items()}
+    seen = antenna(fitted(log, loss="huber", weights=weights), log)
+    assert seen is not None
+    assert seen.x / LENGTH == pytest.approx(x, abs=0.02)
+    assert seen.shown == (x > 0)
+
+
 def test_a_ship_that_never_turns_shows_no_antenna() -> None:
     log = log_of(1, 0.3)
     straight = changed(log, r=np.zeros(len(log.frame)))
