@@ -180,8 +180,8 @@ def _predict_from(name: str, horizon: int, num_parameters: int, at: Mapping[str,
     double path[2 * {horizon}];
 {declared}    int k;
     {own if num_parameters else ""}
-    self->status = {name}_record(kept, t, self->values);
-    if (self->status) return self->status == {name}_TIME ? "time does not go on" : "an input is not finite";
+    k = {name}_record(kept, t, self->values); /* refused: status and alarm stay those of the path that is there */
+    if (k) return k == {name}_TIME ? "time does not go on" : "an input is not finite";
     self->status = {call};
     for (k = 0; k < {horizon}; ++k) {{
         self->values[{at["x[1]"]} + k] = path[2 * k];

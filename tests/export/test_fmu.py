@@ -267,6 +267,34 @@ int main(void)
 """
 
 
+REFUSED_ROW = """
+#include "path.c"
+int main(void)
+{
+    const fmi2ValueReference first = 0, u = 3, instant = NUM_REALS_BEFORE;
+    const double fast = 9; /* limits: 0 to 8 m/s */
+    double at = 0;
+    fmi2Integer status = 0;
+    fmi2Boolean alarm = 0;
+    fmi2CallbackFunctions call = {0, 0, 0, 0, 0};
+    fmi2Component c = fmi2Instantiate("a", fmi2CoSimulation, guid, "", &call, 0, 0);
+    if (!c || fmi2EnterInitializationMode(c) || fmi2SetReal(c, &u, 1, &fast) || fmi2ExitInitializationMode(c)) return 1;
+    if (fmi2DoStep(c, 5, 1, 0) || fmi2DoStep(c, 4, 1, 0) != fmi2Discard) return 2;
+    if (fmi2GetReal(c, &instant, 1, &at) || fmi2GetInteger(c, &first, 1, &status)) return 3;
+    if (fmi2GetBoolean(c, &first, 1, &alarm)) return 4;
+    fmi2FreeInstance(c);
+    return at > 4.9 && alarm && status == path_OUTSIDE ? 0 : 5;
+}
+"""
+
+
+def test_a_row_that_is_refused_leaves_the_alarm_of_the_path_that_is_there(predictor, aboard, tmp_path):
+    """Before, the alarm of a path outside of the training was gone after a row whose time did not go on."""
+    places = {variable.name: place for place, variable in enumerate(predictor_unit(model(predictor), "path").variables)}
+    assert places["u"] == 3
+    run_c(aboard, REFUSED_ROW.replace("NUM_REALS_BEFORE", str(places["instant"])), tmp_path)
+
+
 def test_no_component_and_damaged_states_are_refused(aboard, tmp_path):
     """Before, both ended the tool: damaged bytes gave the recorder places in the past that it does not have."""
     run_c(aboard, WITHOUT_A_COMPONENT, tmp_path)
