@@ -116,6 +116,7 @@ def _draft(
     guessed = guess(log, names, load_vessel(vessel) if vessel else None, frame)
     file = out or Path(f"{guessed.file.resolve().stem}.toml")
     check_new(file, "mapping")
+    check_output(file, [], "--out")
     text = draft_mapping(guessed)
     write_new(with_schema(text, file, "mapping"), file)
     columns = [
@@ -154,7 +155,7 @@ def data_segment(
     as_json: Json = False,
 ) -> None:
     """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
-    from shipid.files import write_new
+    from shipid.files import check_new, write_new
     from shipid.logs.catalogue import fetch
     from shipid.logs.guess.draft import moment, segment_log, segments_text
     from shipid.logs.mapping import read_mapping
@@ -162,9 +163,12 @@ def data_segment(
     declared = read_mapping(mapping)
     if declared.source.runs is not None or declared.parts is not None:
         raise ShipidError("says where runs begin ([source] runs or [parts]): nothing is to be cut", file=mapping)
+    file = out or Path(f"{Path(mapping).stem}-segments.toml")
+    check_new(file, "mapping")
+    check_output(file, [], "--out")
     unit = declared.clock.unit
     segments = segment_log(declared, log or fetch(mapping))
-    file = write_new(segments_text(segments, unit), out or Path(f"{Path(mapping).stem}-segments.toml"))
+    write_new(segments_text(segments, unit), file)
     with answering(as_json) as answer:
         answer.rows(
             "segments",

@@ -12,7 +12,7 @@ import typer
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import files
 from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
-from shipid.cli.outputs import check_ending
+from shipid.cli.outputs import check_ending, check_output
 from shipid.cli.terminal import digits, ended_by, iterations, steps, table
 from shipid.errors import DocumentError, ShipidError
 from shipid.units import interval_text, listed, percent, plural
@@ -103,6 +103,7 @@ def identify(
     file = out or Path(f"{stem(vessel)}-{'structure' if structures else 'identified'}.toml")
     check_new(file, "vessel" if structures else "patch")
     check_ending(html, ".html")
+    check_output(file, [], "--out")
     given: dict[str, Any] = {
         "parameters": parameters and _paths(parameters),
         "fixed": fixed and _paths(fixed),

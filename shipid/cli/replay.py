@@ -10,7 +10,7 @@ import typer
 from shipid.cli.answer import Json, answering
 from shipid.cli.completion import files
 from shipid.cli.options import VesselName, command_line, stem
-from shipid.cli.outputs import check_ending
+from shipid.cli.outputs import check_ending, check_output
 from shipid.cli.terminal import digits, table
 from shipid.errors import ShipidError
 
@@ -48,6 +48,7 @@ def replay(
 
     file = out or Path(f"{stem(vessel)}-replay.html")
     check_ending(file, ".html")
+    check_output(file, [], "--out")
     if not step > 0:
         raise ShipidError(f"{step:g} s must be positive", path="--step")
     if csv is not None:

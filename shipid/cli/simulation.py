@@ -10,7 +10,7 @@ import typer
 from shipid.cli.answer import Json, answering
 from shipid.cli.completion import bundled_or_file
 from shipid.cli.options import Changes, VesselName, command_line, parsed, stem
-from shipid.cli.outputs import check_ending
+from shipid.cli.outputs import check_ending, check_output
 from shipid.cli.terminal import criterion_table, measure_table, table
 from shipid.errors import DocumentError, ShipidError
 from shipid.units import plural
@@ -53,6 +53,7 @@ def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> 
     from shipid.vessel.load import load_vessel
 
     check_table(out)
+    check_output(out, [], "--out")
     ship = load_vessel(vessel)
     dataset = Dataset(
         simulated(ship, manoeuvres), {"vessel": vessel, "source": "simulated", "clock": "run", "flags": []}
@@ -81,6 +82,8 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     plan = read_plan(study, parsed(changes))
     if plan.truth is None:
         raise DocumentError("has no [truth]: its runs are recorded, so there is nothing to simulate", file=plan.file)
+    file = out or Path(f"{plan.name}.parquet")
+    check_output(file, plan.inputs, "--out")
     dataset = obtain(plan)
     pool, test, _ = partition(plan, dataset)
     rows_of_sets = envelope(pool, test, runs_by_amount(plan, pool), dataset.commands)
@@ -90,7 +93,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
         [str(name), *(_limits(part[part["quantity"] == quantity]) for quantity in units)]
         for name, part in ranges.groupby("set", sort=False)
     ]
-    file = write_dataset(dataset, out or Path(f"{plan.name}.parquet"))
+    write_dataset(dataset, file)
     with answering(as_json) as answer:
         counts = {"runs": len(dataset.runs), "rows": len(dataset.frame)}
         answer.say(
@@ -141,7 +144,9 @@ def manoeuvre(
     from shipid.vessel.load import load_vessel
 
     check_ending(log, ".parquet")
+    out = out or Path(f"{stem(vessel)}-{name}.html")
     check_ending(out, ".html")
+    check_output(out, [], "--out")
     if csv is not None:
         check_table(csv)
     ship = load_vessel(vessel)
@@ -168,5 +173,5 @@ def manoeuvre(
             source = {"clock": "run", "flags": [], "source": f"simulated: {ship.name}, {title}"}
             answer.say(f"log -> {write_dataset(Dataset(done.frame, source), log)}", log=log)
         content = manoeuvre_content(done, command_line())
-        page = write_manoeuvre(content, out or Path(f"{stem(vessel)}-{name}.html"))
+        page = write_manoeuvre(content, out)
         answer.say(f"page -> {page}", page=page)

@@ -63,6 +63,7 @@ def study_new(
 
     file = out or Path(f"{stem(data or vessel[0])}-study.toml")
     check_new(file, "study")
+    check_output(file, [], "--out")
     draft = draft_study(vessel, data, file)
     write_new(with_schema(draft.text, file, "study"), file, "study")
     with answering(as_json) as answer:

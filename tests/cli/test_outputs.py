@@ -92,6 +92,32 @@ def test_what_cannot_be_written_is_refused_before_anything_is_computed(monkeypat
     check_output(Path("new/a.html"), [], "--out")
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "manoeuvre ./ship.toml zigzag 20 20",
+        "replay ./ship.toml log.parquet",
+        "identify ./ship.toml log.parquet --parameters hull.abkowitz.N_r",
+        "simulate quick",
+        "simulate ./ship.toml --manoeuvres quick",
+        "study new --vessel ./ship.toml",
+        "data segment plain.toml good.csv",
+        "data import --guess good.csv",
+    ],
+)
+def test_what_is_written_by_default_is_refused_as_early(
+    words: str, there: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("plain.toml", "good.csv"):
+        shutil.copy(Path(__file__).parents[1] / "bad" / "logs" / name, there)
+    monkeypatch.setattr(os, "access", lambda folder, _: Path(folder) != there)
+    before = sorted(there.iterdir())
+    status, output, error = ended(*words.split())
+    assert (status, output) == (1, "")
+    assert "--out: is in a folder that this user may not write into: name another place to write" in error
+    assert sorted(there.iterdir()) == before
+
+
 @pytest.mark.usefixtures("there")
 def test_an_import_does_not_replace_the_log() -> None:
     """The default name is that of the mapping, and a draft has the name of its log."""
