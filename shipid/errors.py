@@ -87,14 +87,15 @@ def _legible(text: str) -> str:
 def choices(value: object, valid: Iterable[str], limit: int = 12) -> str:
     """Hint for an invalid name: `did you mean 'x'?`, or the first `limit` valid names.
 
-    A letter that looks like another one, or like nothing, is named.
+    The same name in other capitals is the closest. A letter that looks like another one, or like nothing, is named.
     """
     names = sorted(valid)
     odd = next((sign for sign in str(value) if _seems_another(sign) and not any(sign in name for name in names)), None)
     if odd is not None:
         plain = "".join(" " if _seems_another(sign) else sign for sign in str(value))
         return f"its '{visible(odd)}' is {unicodedata.name(odd, 'no letter')}: {choices(plain, names, limit)}"
-    close = get_close_matches(str(value), names, n=1)
+    same = [name for name in names if name.casefold() == str(value).casefold()]
+    close = same or get_close_matches(str(value), names, n=1)
     if close:
         return f"did you mean {close[0]!r}?"
     shown = ", ".join(names[:limit]) + (", ..." if len(names) > limit else "")

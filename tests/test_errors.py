@@ -38,6 +38,8 @@ def test_errors_come_home_from_workers(error: type[ShipidError]) -> None:
 
 def test_choices_suggest_what_is_close() -> None:
     assert choices("derivativs", ["derivatives", "crossflow"]) == "did you mean 'derivatives'?"
+    assert choices("KIND", ["behind", "kind"]) == "did you mean 'kind'?"
+    assert choices("X_h", ["X_hh", "x_H"]) == "did you mean 'x_H'?"
 
 
 @pytest.mark.parametrize(
