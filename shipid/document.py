@@ -123,9 +123,11 @@ def _wrong_line(text: str, message: str) -> str:
         return ""
     line = lines[int(place[1]) - 1].strip()
     shown = line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
+    if "\r" in line:
+        return f": {shown!r}: its lines end as on old Macs: save it with ends of line of Unix or Windows"
     if re.search(r"=\s*[-+]?\d+,\d", line):
         return f": {shown!r}: write decimals with a point"
-    if "\\" in line:
+    if re.match("Unescaped|Invalid hex|Escaped", message):
         return f": {shown!r}: write / in a path, or the text in single quotes"
     return f": {shown!r}"
 
@@ -476,7 +478,7 @@ def _models(model: Any, location: tuple[int | str, ...]) -> list[Any]:
                 field = kind.model_fields.get(str(part))
                 inner += _alternatives(field.annotation) if field else []
             elif get_args(kind):
-                inner += _alternatives(get_args(kind)[-1])
+                inner += _alternatives([one for one in get_args(kind) if one is not ...][-1])
         kinds = inner or _of_kind(kinds, part) or kinds  # the name of a union member is no key
     return [kind for kind in kinds if hasattr(kind, "model_fields")]
 

@@ -149,6 +149,9 @@ def test_read_refuses_what_is_no_document(tmp_path: Path) -> None:
     [
         ("x_G = -3,4", r"'x_G = -3,4': write decimals with a point"),
         (r'dataset = "C:\logs\a.parquet"', r"write / in a path, or the text in single quotes"),
+        (r'dataset = "C:\users\a.parquet"', r"write / in a path, or the text in single quotes"),
+        (r'a = "not \"known\""', r"Cannot overwrite a value \(at line 2, column 20\): [^:]*$"),
+        ("x_G = 3\ry_G = 1\r", r"'x_G = 3.*': its lines end as on old Macs: save it with ends of line of"),
         ("name = Ada", r"\(at line 2, column 8\): 'name = Ada'$"),
     ],
 )
@@ -183,6 +186,7 @@ class Outer(BaseModel):
     model_config = ConfigDict(extra="forbid")
     inner: Inner
     rows: list[Inner] = []
+    runs: tuple[Inner, ...] = ()
 
 
 @pytest.mark.parametrize(
@@ -193,6 +197,7 @@ class Outer(BaseModel):
         ({"inner": {}}, "top.inner.speed", "missing"),
         ({"inner": {"speed": -1}}, "top.inner.speed", "-1: must be above 0"),
         ({"inner": {"speed": 1}, "rows": [{"speed": 1, "sped": 2}]}, "top.rows.0.sped", "did you mean 'speed'?"),
+        ({"inner": {"speed": 1}, "runs": [{"speed": 1, "sped": 2}]}, "top.runs.0.sped", "did you mean 'speed'?"),
         ({"inner": 5}, "top.inner", "5: "),
     ],
 )
