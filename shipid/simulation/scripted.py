@@ -11,6 +11,7 @@ import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from shipid import document as documents
+from shipid.capacity import too_much
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.signals import ACTUAL
 from shipid.simulation.approach import Controls
@@ -19,10 +20,12 @@ from shipid.simulation.manoeuvre import KINDS, Executed, Manoeuvre
 from shipid.simulation.perform import perform
 from shipid.simulation.truth import Truth, simulate
 from shipid.units import plural
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 log = logging.getLogger(__name__)
 Positive = Annotated[FiniteFloat, Field(gt=0)]
+LONGEST = 1e6  # s of a run, as in a study
 
 
 class Script(BaseModel):
@@ -52,11 +55,14 @@ def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
     try:
         if isinstance(truth, Mapping):
             drawn = {key: value for key, value in truth.items() if key != "set"} | {"vessel": vessel.key}
-            return simulate(documents.parse(Truth, drawn, file, "truth"), vessel)
+            declared: Truth = documents.parse(Truth, drawn, file, "truth")
+            _check_size(vessel, declared.manoeuvres, declared.length, declared.step, "truth.")
+            return simulate(declared, vessel)
         if "manoeuvre" not in document:
             raise DocumentError("holds no manoeuvres: give a [truth], or [[manoeuvre]] blocks")
         script = documents.parse(Script, document, file)
         manoeuvres = _given(script, vessel)
+        _check_size(vessel, len(manoeuvres), max(one.length for one in manoeuvres), script.step)
         frame = perform(vessel, manoeuvres, step=script.step, interval=script.interval)
     except ShipidError as error:
         raise DocumentError(error.message, file=file, path=error.path) from None
@@ -64,6 +70,15 @@ def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
     later = [one.name or name for one, name in named if isinstance(one, Executed) and one.approach != "rest"]
     _tell_of_starts(frame[frame["run"].isin(later)])
     return frame.drop(columns=[column for column in frame if str(column).startswith(ACTUAL)])
+
+
+def _check_size(vessel: Vessel, count: int, length: float, step: float, within: str = "") -> None:
+    """Raise DocumentError for runs, of `length` and `step` [s], that no machine would end or that exceed this one."""
+    if length > LONGEST:
+        raise DocumentError(f"a run of {length:g} s: at most {LONGEST:g} s", path=f"{within}manoeuvre")
+    commands = len(dynamics(vessel).commands)
+    if fault := too_much(count * length / step * 2 * commands):
+        raise DocumentError(f"{step:g} s: {count} {plural(count, 'run')} of {length:g} s {fault}", path=f"{within}step")
 
 
 def _tell_of_starts(frame: pd.DataFrame) -> None:

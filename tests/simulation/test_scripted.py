@@ -95,6 +95,8 @@ start_speed = [4.0, 6.0]
         (GIVEN.replace("heading_deg = 10", "heading_deg = 200"), "manoeuvre.1.execute_heading_deg", "at most 180"),
         (GIVEN.replace("step = 0.5", "step = -1"), "step", "must be above 0"),
         (GIVEN.replace("step = 0.5", "stride = 1"), "stride", "unknown key"),
+        (GIVEN.replace("duration = 40", "duration = 4e7"), "manoeuvre", "a run of 4e\\+07 s: at most 1e\\+06 s"),
+        (GIVEN.replace("step = 0.5", "step = 1e-12"), "step", "1e-12 s: 2 runs of 60 s take .* GiB of memory"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_performed_is_one_line(text: str, path: str | None, message: str, tmp_path: Path) -> None:
