@@ -79,6 +79,10 @@ _BY_UNIT: dict[str, Range] = {
     "-": _at_most(lambda _: 100.0, "without unit, at most 100"),
     **dict.fromkeys(("prime", "bis"), _at_most(lambda _: 100.0, "without unit, at most 100 (is it written in 1e-5?)")),
 }
+_BY_NAME: dict[str, Range] = {
+    "D_p": _at_most(lambda s: 0.3 * s.L, "a diameter of at most 0.3 ship lengths, in m"),
+    "A_R": _at_most(lambda s: 0.05 * s.L**2, "a rudder of at most 0.05 squares of the ship length, in m^2"),
+}
 _ADDED: dict[str, Range] = {
     "kg": _at_most(lambda s: 20 * s.m, "at most 20 times the mass"),
     "kg m": _at_most(lambda s: 20 * s.m * s.L, "at most 20 times mass times length"),
@@ -122,7 +126,7 @@ def contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> t
     """Dotted path of the first number that contradicts another one, and a sentence; None where none does.
 
     A rudder that is `behind` a screw is aft of it and on its side; its force on the hull acts where the rudder is, aft
-    or forward, and so does the flow across it; steering gear of this size is not so fast or slow; a block coefficient
+    or forward, and so does the flow across it; steering gear of this size is not so fast or slow; a ship is longer than broad, and broader than deep; a block coefficient
     is one; shares are below 1; a unit is on the side of its name; wind drives a ship where it goes; a ship at rest
     stays upright, and displaces her mass.
     """
@@ -137,9 +141,13 @@ def contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> 
 
 
 def _contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    block = (document.get("particulars") or {}).get("C_b")
+    sizes = document.get("particulars") or {}
+    block = sizes.get("C_b")
     if block is not None and not LEAST_BLOCK <= block <= 1:
         yield "particulars.C_b", f"{block:g}: expected a block coefficient of {LEAST_BLOCK:g} to 1"
+    for less, more, words in (("B", "L_pp", "beam below the length"), ("T", "B", "draught below the beam")):
+        if {less, more} <= sizes.keys() and sizes[less] >= sizes[more]:
+            yield f"particulars.{less}", f"{sizes[less]:g} m: expected a {words}, {more} = {sizes[more]:g} m"
     length = _size(document, values).L
     time = (length / GRAVITY) ** 0.5
     for path, value in values.items():
@@ -246,7 +254,8 @@ def _judged(
 def _range(path: str, unit: str) -> Range | None:
     if path in _NAMED:
         return _NAMED[path]
-    return (_ADDED if path.startswith("added_mass.") else _BY_UNIT).get(unit)
+    name = path.rpartition(".")[2]
+    return _BY_NAME[name] if name in _BY_NAME else (_ADDED if path.startswith("added_mass.") else _BY_UNIT).get(unit)
 
 
 def _size(document: Mapping[str, Any], values: Mapping[str, float]) -> Size:
