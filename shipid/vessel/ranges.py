@@ -127,8 +127,8 @@ def contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> t
 
     A rudder that is `behind` a screw is aft of it and on its side; its force on the hull acts where the rudder is, aft
     or forward, and so does the flow across it; steering gear of this size is not so fast or slow; a ship is longer
-    than broad, and broader than deep; a block coefficient is one; shares are below 1; a unit is on the side of its name; wind drives a ship where it goes; a ship at rest
-    stays upright, and displaces her mass.
+    than broad, and broader than deep; a block coefficient is one; shares are below 1; a unit is on the side of its
+    name; wind drives a ship where it goes; a ship at rest stays upright, and displaces her mass.
     """
     first = next(iter(contradictions(document, values).items()), None)
     return None if first is None else (first[0], f"{first[1]}; {_remedy(first[0])}")
