@@ -67,7 +67,9 @@ def _download(name: str, url: str, sha256: str, file: str | None) -> Path:
         raise DataError(message, file=url, path="source.sha256") from None
     except OSError as error:  # requests' errors are OSErrors too, without a number
         if error.errno or isinstance(error, PermissionError):
-            message = f"no log can be kept there ({error.strerror or 'Permission denied'}): set XDG_CACHE_HOME to another "
-            raise DataError(f"{message}folder, or {FOLDER_VARIABLE} to one that holds the log", file=cache) from None
+            message = (
+                f"no log can be kept there ({error.strerror or 'Permission denied'}): set XDG_CACHE_HOME to a folder "
+            )
+            raise DataError(f"{message}that can, or {FOLDER_VARIABLE} to one with the log", file=cache) from None
         message = f"cannot be downloaded ({type(error).__name__}): go online, or set {FOLDER_VARIABLE} to a folder "
         raise DataError(f"{message}that holds {file or 'the log'}", file=url) from None

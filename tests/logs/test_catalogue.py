@@ -1,7 +1,7 @@
 """Public sets: from the data folder with their checksum, or one line that says what to do. Nothing is downloaded."""
 
-import hashlib
 import errno
+import hashlib
 from pathlib import Path
 
 import pooch
@@ -45,7 +45,7 @@ def test_absent_and_changed_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     [
         (requests.ConnectionError("no route"), "go online"),
         (requests.HTTPError("404"), "set SHIPID_DATA"),
-        (PermissionError("Pooch could not create data cache folder"), "set XDG_CACHE_HOME to another folder"),
+        (PermissionError("Pooch could not create data cache folder"), "set XDG_CACHE_HOME to a folder that can"),
         (OSError(errno.ENOSPC, "No space left on device"), r"\(No space left on device\): set XDG_CACHE_HOME"),
         (ValueError("SHA256 hash of downloaded file does not match"), "is not the published file"),
     ],
