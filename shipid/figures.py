@@ -238,6 +238,8 @@ def _completed(cells: pd.DataFrame) -> pd.DataFrame:
     """Give a table of cells the columns that it lacks."""
     if lacking := [name for name in ("model", "N_D", "H") if name not in cells]:
         raise ShipidError(f"lacks the columns {', '.join(lacking)}", path="cells")
+    if twice := cells.columns[cells.columns.duplicated()].tolist():
+        raise ShipidError(f"the column {twice[0]} appears twice", path="cells")
     for name in [name for name in ("N_D", "H", "A") if name in cells and len(cells)]:
         column = cells[name]
         if not pd.api.types.is_numeric_dtype(column) or pd.api.types.is_complex_dtype(column):

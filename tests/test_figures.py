@@ -95,6 +95,8 @@ def test_what_holds_nothing_to_draw_is_one_sentence() -> None:
         figures.gain("results/quick")  # type: ignore[arg-type]
     with pytest.raises(ShipidError, match="cells: the table has no rows"):
         figures.gain(cells[:0])
+    with pytest.raises(ShipidError, match="cells: the column H appears twice"):
+        figures.gain(pd.concat([cells, cells[["H"]]], axis=1))
     with pytest.raises(ShipidError, match="cells: the column H must hold numbers, not str"):
         figures.gain(cells.astype({"H": "str"}))
     with pytest.raises(ShipidError, match="cells: the column H must hold numbers, not complex128"):
