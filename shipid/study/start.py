@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from shipid.arguments import path_of
 from shipid.errors import ShipidError
 from shipid.study.contents import share_pages
 from shipid.study.plan import read_plan
@@ -69,7 +70,7 @@ def events(
     last event is that folder.
     """
     plan = read_plan(study, set)
-    folder = plan.folder if out is None else Path(out)
+    folder = plan.folder if out is None else path_of("out", out)
     log.debug("study %s, digest %s, folder %s", plan.name, plan.digest, folder)
     yield from run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
 

@@ -46,6 +46,8 @@ def test_a_mistake_is_an_error_of_shipid() -> None:
         run("quik")
     with pytest.raises(ShipidError, match=r"grid\.M_D"):
         next(events(TINY, {"grid.M_D": [4]}))
+    with pytest.raises(ShipidError, match="out must be a path, a text or a Path, not 3"):
+        next(events(TINY, out=3))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("H", "words"), [(12.3456, "12.346"), (0.05, "0.050"), (0.0002, "0.0002")])
