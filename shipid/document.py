@@ -149,8 +149,8 @@ def loads(text: str, file: Path | str | None = None) -> Document:
 def check_values(document: Any, file: Path | str | None) -> None:
     """Raise DocumentError for a value that no document may hold, with its dotted path.
 
-    That is None, a date, a number beyond 1e24 or below 1e-100, an integer beyond 1e15, a control character, and deep
-    nesting.
+    That is None, a date, an object of Python that TOML has not, a number beyond 1e24 or below 1e-100, an integer beyond
+    1e15, a control character, and deep nesting.
     """
     waiting: list[tuple[str, int, Any]] = [("", 0, document)]
     while waiting:
@@ -170,6 +170,8 @@ def check_values(document: Any, file: Path | str | None) -> None:
             fault = "None: no value; leave the key out where there is none"
         elif isinstance(value, date | time):
             fault = f"{value}: a date, where none is used: write text in quotes"
+        elif not isinstance(value, str | int | float | complex):
+            fault = f"{value!r}: a {type(value).__name__}: give a number, a text, true or false, a list or a table"
         elif isinstance(value, int) and abs(value) > MOST_INTEGER:
             fault = f"an integer of {value.bit_length() * 0.30103:.0f} digits: at most {MOST_INTEGER:.0e}"
         elif isinstance(value, float) and MOST_NUMBER < abs(value) < float("inf"):

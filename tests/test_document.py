@@ -4,6 +4,7 @@ import copy
 import random
 import re
 import shutil
+from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -315,6 +316,14 @@ def test_values_that_no_document_holds(text: str, remedy: str, tmp_path: Path) -
     line = str(caught.value)
     assert remedy.replace("\\\\", "\\") in line
     assert line.isprintable()
+
+
+@pytest.mark.parametrize("value", [Decimal(3), {1}, b"x", object])
+def test_objects_that_toml_has_not(value: Any) -> None:
+    with pytest.raises(
+        DocumentError, match=r"^a\.1: .*: a \w+: give a number, a text, true or false, a list or a table$"
+    ):
+        documents.check_values({"a": [1, value]}, None)
 
 
 @pytest.mark.parametrize("value", ["inf", "-0.0", "1e24", "1e-100", "999999999999999", '"a\\n\\tb"', "[[[1]]]", "true"])
