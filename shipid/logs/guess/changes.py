@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
@@ -21,7 +22,10 @@ ALIKE, NOTHING = 1.4, 5e-4  # ratio of two scales, that are one; and that of a c
 CLEAR, TIMES = 8.0, 20.0  # t value of the effect of an order in each part, and ratio of the effects, at least
 MOST_LEFT = 0.75  # share of what one effect leaves, that two leave, at most
 UNDER_WAY = 0.2  # of the median speed: of a slower ship, her way says little of the shaft
-OF_UNITS = 1.25  # times that the ratio of two parts is off that of two units of a shaft speed, at most
+SHAFTS = [np.log(to_si(unit, "propeller.n")) for unit in ("rpm", "rad/s", "rev/s")]
+OF_UNITS = [one - other for one in SHAFTS for other in SHAFTS if one != other]  # logarithms of ratios of two units
+NEAR, ROUGHLY = np.log(1.25), np.log(2.0)  # how far a step is off one at most, and what is seen less well
+RUNNING = 0.2  # of the usual speed of the shaft in a part: of less, a step says little
 APART = 0.2  # of the logarithm of that ratio: how far revolutions over a metre scatter in each part, at most
 
 
@@ -109,34 +113,48 @@ def _ask_for_angle(state: State, name: str, source: str) -> None:
 
 
 def _ask_for_shaft(state: State, name: str, source: str) -> None:
-    """Ask where a shaft turns some 6, 10 or 60 times as fast for the same speed of the ship, from some row on."""
+    """Ask where the numbers of a shaft are at once some 6, 10 or 60 times as many, for the same way of the ship.
+
+    A ship that coasts or turns on the spot has another number of turns a metre, too, but her shaft has no such step.
+    """
+    size = np.abs(state.columns[source])
     way = np.abs(state.chosen.change(np.asarray(state.position)))
     turns = np.abs(state.chosen.change(evidence.integral(state.t, state.columns[source])))
     driven = np.flatnonzero((way > UNDER_WAY * np.median(way)) & (turns > 0.0))
     if len(driven) < SPLITS:
         return
-    a_metre = np.log(turns[driven] / way[driven])
-    before, after = split(a_metre)
-    ratio = float(np.exp(np.median(a_metre[after]) - np.median(a_metre[before])))
-    units = [to_si(unit, "propeller.n") for unit in ("rpm", "rad/s", "rev/s")]
-    if not any(1 / OF_UNITS < ratio * one / other < OF_UNITS for one in units for other in units if one != other):
-        return
-    left = np.concatenate([np.abs(a_metre[part] - np.median(a_metre[part])) for part in (before, after)])
-    if np.mean(left) < APART * abs(np.log(ratio)):
-        start = int((state.chosen.first + state.chosen.last)[driven[after.start]]) // 2
+    first, a_metre = state.chosen.first[driven], np.log(turns[driven] / way[driven])
+    broken = np.diff(state.t) > evidence.GAP * np.median(np.diff(state.t))
+    least, start, more = APART, 0, 0.0
+    for row in _steps(size, broken):
+        before = first < row
+        if not LEAST < np.mean(before) < 1 - LEAST:
+            continue
+        usual, level = (np.array([np.median(of[part]) for part in (before, ~before)]) for of in (size[first], a_metre))
+        here = usual if broken[row - 1] else size[row - 1 : row + 1]
+        if usual.min() == 0.0 or np.any(here < RUNNING * usual):
+            continue
+        change, step = level[1] - level[0], np.log(here[1] / here[0])
+        of_units = min(OF_UNITS, key=lambda one: abs(change - one))
+        near = (NEAR, ROUGHLY) if broken[row - 1] else (ROUGHLY, NEAR)
+        left = float(np.mean(np.abs(a_metre - np.where(before, *level)))) / max(abs(change), 1e-9)
+        if left < least and abs(change - of_units) < near[0] and abs(step - of_units) < near[1]:
+            least, start, more = left, row, float(np.exp(change))
+    if start:
         words = f"has {source!r} another unit or sign {_from_to(state, start, len(state.t))}?"
-        _ask(state, (name,), f"{words} There its numbers are {ratio:.2g} times as many for the same way of the ship")
+        _ask(state, (name,), f"{words} There its numbers are {more:.2g} times as many for the same way of the ship")
 
 
-def split(values: Array) -> tuple[slice, slice]:
-    """Return the two parts of values (N,) whose medians leave the least absolute deviations; each has LEAST of them."""
-    places = np.linspace(LEAST * len(values), (1 - LEAST) * len(values), SPLITS).astype(int)
-    left = [
-        sum(float(np.sum(np.abs(part - np.median(part)))) for part in (values[:place], values[place:]))
-        for place in places
-    ]
-    best = int(places[int(np.argmin(left))])
-    return slice(0, best), slice(best, len(values))
+def _steps(size: Array, broken: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return rows (K,) whose numbers may be the first of another unit.
+
+    The largest steps from row to row, `SPLITS` at most, and as many rows behind a pause of the clock.
+    """
+    low, high = np.minimum(size[:-1], size[1:]), np.maximum(size[:-1], size[1:])
+    leaps = np.flatnonzero(~broken & (low > 0.0) & (high > np.exp(min(map(abs, OF_UNITS)) - NEAR) * low))
+    leaps = leaps[np.argsort(-(low * high)[leaps], kind="stable")][:SPLITS]
+    breaks = np.flatnonzero(broken)
+    return 1 + np.union1d(leaps, breaks[:: max(1, len(breaks) // SPLITS)])
 
 
 def _from_to(state: State, first: int, end: int) -> str:

@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.logs.guess.changes import other_part
+from shipid.data.dataset import cumulative_integral
+from shipid.logs.guess.changes import ask_for_changes, other_part
 from shipid.logs.guess.columns import Guess, guess
-from tests.logs.simulated import as_bridge, si_log
+from tests.logs.simulated import as_bridge, si_log, state_of
 
 CLEAN = as_bridge(si_log()).round(4)
 END = float(CLEAN["time"].iloc[-1])
@@ -72,3 +73,24 @@ def test_the_part_with_another_scale_is_found_where_it_is(seed: int) -> None:
     assert np.mean(found == inside) > 0.97
     assert part.ratio == pytest.approx(ratio, rel=0.1)  # parts begin and end at a node of 120
     assert other_part(ran + random.normal(0, 0.5, count), ran) is None
+
+
+def shaft_asked(t: np.ndarray, speed: np.ndarray, rpm: np.ndarray) -> list[str]:
+    """What is asked about a shaft (N,) of a ship with this speed (N,) [m/s]."""
+    state = state_of({"rpm": rpm}, t)
+    state.position, state.psi = cumulative_integral(t, speed) + 0j, np.zeros(len(t))
+    state.suggest("propeller.n", "rpm", "rpm", 0.9, "by its name")
+    ask_for_changes(state)
+    return [one.sentence for one in state.questions]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_shaft_that_windmills_or_a_ship_on_the_spot_has_no_other_unit(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    t = np.arange(0.0, 1200.0, 1.0)
+    after = np.clip(t - random.uniform(300, 800), 0.0, np.inf)
+    speed = 5.0 / (1.0 + after / random.uniform(100, 600))
+    coasts = 20.0 * speed * (1.0 - random.uniform(0.75, 0.9) * np.clip(after / random.uniform(8, 25), 0.0, 1.0))
+    assert not shaft_asked(t, speed, coasts + random.normal(0, 0.3, len(t)))
+    spot = 1.0 + 4.0 * np.exp(-after / 60)
+    assert not shaft_asked(t, spot, 100.0 + random.normal(0, 0.3, len(t)) + random.uniform(0, 60) * (after > 0))
