@@ -35,6 +35,7 @@ SHARES = {
 ASTERN = -0.5  # mean cosine of an azimuth angle, at most, that points aft
 GEARED = 5.0  # rev/s: an engine that is faster usually has a gear
 UNDER_WAY, NEARLY_ALWAYS = 0.3, 0.9  # of the usual way in a window; share of these windows
+RUNS = 0.5  # of the larger speeds of a shaft: one that is slower may not drive the ship
 NEAR = 15.0  # times from that: a unit further off is doubted
 
 
@@ -321,16 +322,19 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
 
 
 def _off_advance(state: State, values: Array, unit: str) -> float:
-    """Return how many times the way in a turn of the shaft, in turning radii, is off that of a usual ship."""
-    if state.psi is None or state.position is None:
+    """Return how many times the way in a turn of the shaft, in turning radii, is off that of a usual ship.
+
+    Of the windows in which the shaft runs: a ship that drifts, coasts or lies at anchor says nothing of its unit.
+    """
+    if state.psi is None or np.abs(values).max() * to_si(unit, "propeller.n") > FASTEST:
         return np.inf
-    span = state.t[state.chosen.last] - state.t[state.chosen.first]
-    speed = float(np.median(np.abs(state.chosen.change(state.position)) / span))
-    rate = float(np.percentile(np.abs(state.chosen.change(state.psi).real) / span, 90)) / _hard_over(state)
-    shaft, top = (float(f(np.abs(values))) * to_si(unit, "propeller.n") for f in (np.median, np.max))
-    if not (speed > 0 and rate > 0 and shaft > 0) or top > FASTEST:
+    shaft = np.abs(values[(state.chosen.first + state.chosen.last) // 2]) * to_si(unit, "propeller.n")
+    runs = shaft > RUNS * np.percentile(shaft, 95)
+    turned = state.chosen.change(state.psi).real / (state.t[state.chosen.last] - state.t[state.chosen.first])
+    rate = float(np.percentile(np.abs(turned[runs]), 90)) / _hard_over(state) if runs.any() else 0.0
+    if rate == 0.0:
         return np.inf
-    ratio = speed / shaft / (speed / rate) / ADVANCE
+    ratio = rate / float(np.median(shaft[runs])) / ADVANCE
     return max(ratio, 1.0 / ratio)
 
 

@@ -119,6 +119,16 @@ def test_the_unit_of_a_shaft(name: str, values: np.ndarray, unit: str, asked: bo
     assert {finding.kind for finding in state.findings} == kinds
 
 
+@pytest.mark.parametrize("idle", [0.0, 0.01])
+@pytest.mark.parametrize("name", ["shaft [rpm]", "shaft speed"])
+def test_a_shaft_that_hardly_turns_for_most_of_the_log_keeps_its_unit(name: str, idle: float) -> None:
+    """A ship that drifts, coasts or is in port: her rpm were read as rev/s, 60 times too fast, or asked."""
+    state = chosen({"rudder": RUDDER, name: np.where(T < 0.6 * T[-1], idle * RPM, RPM)})
+    assert described(state)["propeller.n"][:2] == (name, "rpm")
+    assert not state.findings
+    assert not state.questions
+
+
 @pytest.mark.parametrize("name", ["shaft [rpm]", "shaft speed"])
 def test_the_shaft_of_a_craft_that_turns_within_her_length(name: str) -> None:
     """She turns as far in one turn of the shaft as ships in many: up to 1000 rpm were read as 60,000 rpm."""
