@@ -281,6 +281,7 @@ def _thousands(rows: list[list[str]], decimal: str) -> str | None:
     1,800 alone may be 1.8: it is 1800 where another number has a decimal point.
     """
     held = {cell for row in rows for cell in row if re.fullmatch(r"[+-]?\d[\d.,'’ \u00a0\u202f]*", cell)}
+    held = {cell for cell in held if not re.fullmatch(DAY_OF, cell)}
     whole = any(re.fullmatch(rf"[+-]?\d+{re.escape(decimal)}(\d{{1,2}}|\d{{4,}})", cell) for cell in held)
     for mark in GROUPS:
         cells = [cell for cell in held if mark in cell]

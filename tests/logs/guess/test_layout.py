@@ -273,6 +273,20 @@ def test_marks_of_thousands_are_read(decimal: str, mark: str, separator: str, di
     np.testing.assert_allclose(sniffed.columns["lat"], table["lat"])
 
 
+def test_marks_of_thousands_are_read_beside_dates_with_points(tmp_path: Path) -> None:
+    """A column of 15.03.2024 made 6.021.344,96 no number."""
+    north = np.round(6_021_344.96 + 1.5 * T, 2)
+    days = pd.Timestamp("2024-03-15 23:59:00") + pd.to_timedelta(TABLE["time"], unit="s")
+    written = [f"{one:,.2f}".translate(str.maketrans(",.", ".,")) for one in north]
+    table = TABLE.assign(N=written).drop(columns="time")
+    table.insert(0, "Datum", days.dt.strftime("%d.%m.%Y"))
+    table.insert(1, "Uhrzeit", days.dt.strftime("%H:%M:%S,%f"))
+    table.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=",")
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.form["thousands"] == "."
+    np.testing.assert_allclose(sniffed.columns["N"], north)
+
+
 @pytest.mark.parametrize("decimal", [".", ","])
 def test_three_decimals_are_no_groups(decimal: str, tmp_path: Path) -> None:
     """1,800 is 1.8 where nothing in the log says that it is 1800."""
