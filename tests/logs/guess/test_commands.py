@@ -123,7 +123,7 @@ def test_the_unit_of_a_shaft(name: str, values: np.ndarray, unit: str, asked: bo
 @pytest.mark.parametrize("name", ["shaft [rpm]", "shaft speed"])
 def test_a_shaft_that_hardly_turns_for_most_of_the_log_keeps_its_unit(name: str, idle: float) -> None:
     """A ship that drifts, coasts or is in port: her rpm were read as rev/s, 60 times too fast, or asked."""
-    state = chosen({"rudder": RUDDER, name: np.where(T < 0.6 * T[-1], idle * RPM, RPM)})
+    state = chosen({"rudder": RUDDER, name: np.where(0.6 * T[-1] > T, idle * RPM, RPM)})
     assert described(state)["propeller.n"][:2] == (name, "rpm")
     assert not state.findings
     assert not state.questions
