@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipid.data.dataset import Dataset
-from shipid.identification.late import CONSIDERABLE, between_rows, late_commands
+from shipid.identification.late import CONSIDERABLE, between_rows, held_over_steps, late_commands
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import variety
@@ -57,3 +57,15 @@ def test_at_the_rows_and_in_the_middle_between_them() -> None:
         else:
             mean = (values[1] + values[2]) / 2
             np.testing.assert_allclose(later[name].mean(), mean, atol=1e-12)
+
+
+def test_an_order_within_a_step_counts_from_the_step_that_begins_nearest() -> None:
+    """A command without an actuator has its mean over the step."""
+    t = np.array([0.0, 1.4, 2.6])
+    for ship, by_hand in ((variety()["actuators"], [1.0, 2.0, 2.0, 4.0]), (SHIP, [1.0, 1.6, 2.8, 4.0])):
+        commands = dynamics(ship).commands
+        assert set(dynamics(ship).memory) == (set() if ship is SHIP else set(commands))
+        rows = {name: np.array([1.0, 2.0, 4.0]) for name in commands}
+        held = held_over_steps(ship, {"t": t, **rows}, np.arange(4.0), 1.0)
+        for name in commands:
+            np.testing.assert_allclose(held[name], by_hand, atol=1e-12, err_msg=name)
