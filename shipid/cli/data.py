@@ -113,6 +113,8 @@ def _draft(
     from shipid.schemas import with_schema
     from shipid.vessel.load import load_vessel
 
+    if out is not None:
+        check_new(out, "mapping")
     guessed = guess(log, names, load_vessel(vessel) if vessel else None, frame)
     file = out or Path(f"{guessed.file.resolve().stem}.toml")
     check_new(file, "mapping")

@@ -72,6 +72,16 @@ def test_data_fetch_from_the_folder(shared_data: Path, monkeypatch: pytest.Monke
     assert shared_data in file.parents
 
 
+def test_a_draft_that_is_there_is_refused_before_another_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("shipid.logs.guess.columns.guess", None)
+    (tmp_path / "a.toml").write_text("mine")
+    status, _, error = ended("data", "import", "--guess", BAD / "logs" / "good.csv", "--out", tmp_path / "a.toml")
+    assert (status, (tmp_path / "a.toml").read_text()) == (1, "mine")
+    assert "a.toml: exists already and is not written over" in error
+
+
 def test_the_frames_of_the_command_are_those_of_the_draft() -> None:
     """They are written twice: the help of the command does not load the draft."""
     declared, _ = get_args(get_type_hints(data_import)["frame"])
