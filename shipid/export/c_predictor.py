@@ -27,7 +27,7 @@ from shipid.export.equations import Equations
 from shipid.export.model import Model
 from shipid.export.turns import SAME_TURN, Turned, turned
 from shipid.hybrid.bands import FEWEST, LEVELS, Bands
-from shipid.observer import DIVERGED, LOW, MEASURED, ROUNDING, STATES, Bank, bank, filter_function, sizes
+from shipid.observer import DIVERGED, LOW, MEASURED, MOST_PARTS, ROUNDING, STATES, Bank, bank, filter_function, sizes
 from shipid.physics.signals import SIGNALS
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
@@ -451,7 +451,7 @@ double {name}_factor(double miss, double level, int kind)
     if (self->count && !(t > self->t[newest])) return {name}_TIME;
     if (self->count) {{
         const double apart = t - self->t[newest];
-        if (!(apart <= {RARE!r} * self->least)) {{
+        if (!(apart <= {RARE!r} * self->least){self._too_long()}) {{
 {self._anew()}
         }}
         if (self->least > 0) self->least *= {FORGOTTEN!r};
@@ -496,6 +496,10 @@ double {name}_factor(double miss, double level, int kind)
         """Whether observer, actuators and angles go on over pauses after which the past begins anew."""
         return self._pause > GAP * self.model.physics.step
 
+    def _too_long(self) -> str:
+        """C: whether the observer would take too many steps between two rows, as of a clock in microseconds."""
+        return "" if self.filters is None else f" || apart > {MOST_PARTS * float(self.filters.longest)!r}"
+
     def _anew(self) -> str:
         """C of what begins anew after a pause."""
         lines = [f"            if (apart > {self._pause!r}) self->count = 0;"]
@@ -505,10 +509,12 @@ double {name}_factor(double miss, double level, int kind)
 
     def _after_pauses(self) -> str:
         """What begins anew after pauses, in words."""
+        filters = self.filters
+        always = "" if filters is None else f" After {MOST_PARTS * filters.longest:.4g} s all does, pause or not."
         if not self._goes_on:
-            return f"After one of more than {self._pause:g} s the past begins anew."
+            return f"After one of more than {self._pause:g} s the past begins anew.{always}"
         past = f"After one of more than {GAP * self.model.physics.step:g} s the past begins anew"
-        return f"{past}, of more than {self._pause:.4g} s observer, actuators and angles, too."
+        return f"{past}, of more than {self._pause:.4g} s observer, actuators and angles, too.{always}"
 
     @property
     def _reached(self) -> list[int]:

@@ -27,7 +27,7 @@ from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import MOTIONS, Memory
 from shipid.hybrid.physics import Physics
-from shipid.observer import AGE, LONGEST, Observer, bank, observe
+from shipid.observer import AGE, LONGEST, MOST_PARTS, Observer, bank, observe
 from shipid.predictor import Predictor
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
@@ -396,6 +396,27 @@ def test_after_a_pause_an_observer_begins_anew_aboard_and_in_python(step, tmp_pa
             assert loaded.odd_predict(pointer(kept), None, pointer(path)) == (OUTSIDE if t[i] - begun[i] < 3 else 0)
             np.testing.assert_allclose(path, expected[:, i], rtol=0, atol=1e-9)
     assert 5 < anew.sum() < 30
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_an_observer_begins_anew_after_rows_as_far_apart_as_python_refuses(single, tmp_path):
+    """Before, a row took 5 min with a clock in microseconds, and none ended with one in nanoseconds."""
+    vessel, settings = variety()["gunnerus-28.9"], Observer(waves=(0.0,), change=(1.0,))
+    real = np.float32 if single else np.float64
+    physics = Physics(vessel, 5, 1.0, "rk4", settings)
+    exported = model(Predictor(physics, "alone", Unchanged({}), {"u": (-99.0, 99.0)}, run_up=3.0))
+    files = predictor_files(exported, "odd", Precision(single))
+    limit = MOST_PARTS * bank(vessel, settings).longest
+    assert f"After {limit:.4g} s all does, pause or not." in files.texts["odd.h"]
+    kept, loaded = np.zeros(_size_of_struct(files, tmp_path) + 64, dtype=np.uint8), library(files, tmp_path)
+    loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    row, path = np.zeros(len(exported.layout.now), real), np.zeros((5, 2), real)
+    for apart, result in ((0.99 * limit, 0), (1.01 * limit, OUTSIDE), (1e6, OUTSIDE), (1e9, OUTSIDE)):
+        loaded.odd_init(pointer(kept))
+        for i in range(4):
+            assert loaded.odd_record(pointer(kept), i * apart, pointer(row)) == 0
+        assert loaded.odd_predict(pointer(kept), None, pointer(path)) == result
+        assert np.isfinite(path).all()
 
 
 def test_the_past_begins_anew_before_the_observer_does(tmp_path):
