@@ -60,6 +60,7 @@ LEAST_FREEDOM = 4.0  # degrees of freedom under which t misleads (Tipton 2015)
 WHITE = 0.05  # probability under which whiteness is rejected
 LITTLE = 1.1  # integrated correlation time, in samples, that makes no difference: 5 % of a standard error
 MOST_LAGS, LEAST_ROWS = 10, 5  # lags that whiteness looks at; fewest rows of a run for that
+QUARTERS = 4  # stretches of a run whose means show what is too slow and too weak for these lags
 ALONE = 0.95  # of the variance of a factor under independent errors: one run decides it
 BLOCK = 10.0  # length of a block in integrated correlation times
 CONTRARY = 3.0  # standard deviations between a prior and the data that are no chance
@@ -116,7 +117,7 @@ class LinearFit:
 class Whiteness:
     """Autocorrelation of the residuals of one signal.
 
-    probability : p-value of the Ljung-Box test of whiteness, its statistics summed over runs.
+    probability : p-value of whiteness, by Ljung-Box over short lags and by the means over quarters of runs.
     memory : integrated correlation time in samples, 1 for white residuals. samples : number of residuals.
     level : standard deviation over the declared one. freedom : degrees of freedom of that level.
     """
@@ -330,10 +331,11 @@ def whiteness(fit: LinearFit, leverage: Array | None = None) -> dict[str, Whiten
 
 
 def _colour(runs: Sequence[Array]) -> tuple[float, float]:
-    """Probability (Ljung-Box, the statistics of independent runs added) and integrated correlation time (samples).
+    """Probability that residuals are white, and their integrated correlation time (samples).
 
-    The time is 1 + 2 sum rho_k over the pooled correlations up to the first pair that is no longer positive (Geyer,
-    Statistical Science 7 (1992) 473).
+    The probability is the smaller one of two tests, times two: Ljung-Box, the statistics of independent runs added, and
+    that of `_slow`. The time is 1 + 2 sum rho_k over the pooled correlations up to the first pair that is no longer
+    positive (Geyer, Statistical Science 7 (1992) 473); where `_slow` alone finds them correlated, at least its ratio.
     """
     statistic, freedom = 0.0, 0
     for run in runs:
@@ -348,7 +350,27 @@ def _colour(runs: Sequence[Array]) -> tuple[float, float]:
     rho = autocorrelation(runs)
     sums = rho[1:-1:2] + rho[2::2]
     until = int(np.argmax(sums <= 0)) if (sums <= 0).any() else len(sums)
-    return float(chdtrc(freedom, statistic)), float(max(1 + 2 * sums[:until].sum(), 1.0))
+    fast, memory = float(chdtrc(freedom, statistic)), float(max(1 + 2 * sums[:until].sum(), 1.0))
+    slow, ratio = _slow(runs)
+    return min(2 * min(fast, slow), 1.0), max(memory, ratio) if slow < WHITE / 2 <= fast else memory
+
+
+def _slow(runs: Sequence[Array]) -> tuple[float, float]:
+    """Probability under white residuals of means over quarters of runs as large as these, and their variance ratio.
+
+    The ratio is the variance of such a mean over that of white residuals: 1 + 2 sum (1 - k / n) rho_k for n rows. So a
+    small drift counts that no single correlation shows.
+    """
+    quarters = [
+        (float(part.sum()) ** 2 / len(part), float(run @ run) / len(run))
+        for run in runs
+        if len(run) >= QUARTERS * LEAST_ROWS and run.any()
+        for part in np.array_split(run, QUARTERS)
+    ]
+    if not quarters:
+        return 1.0, 1.0
+    total = sum(square / level for square, level in quarters)
+    return float(chdtrc(len(quarters), total)), total / len(quarters)
 
 
 def autocorrelation(runs: Sequence[Array]) -> Array:

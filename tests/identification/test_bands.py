@@ -36,7 +36,7 @@ def linear(vessel: Vessel) -> Mapping[str, float]:
 
 def judged(seed: int) -> tuple[Solution, Statistics]:
     data = noisy(trials(SHIP, runs=5, steps=40), seed)
-    solution = identify(SHIP, data, data.runs, settings())
+    solution = identify(SHIP, data, data.runs, settings(nuisance=["initial_state"]))
     return solution, statistics(LinearFit.of(solution))
 
 

@@ -214,8 +214,11 @@ def test_levels_and_memory_are_measured() -> None:
     assert not any(colour.white for colour in coloured.values())
 
 
-def test_whiteness_is_that_of_ljung_and_box() -> None:
-    """Q = n (n + 2) sum r_k^2 / (n - k) is chi squared; of several runs the sums are added."""
+def test_whiteness_is_that_of_ljung_and_box_and_of_means_over_quarters() -> None:
+    """Q = n (n + 2) sum r_k^2 / (n - k) is chi squared, of several runs the sums are added; so are means over quarters.
+
+    The smaller probability counts, times two for two tests.
+    """
     expected, freedom, runs = 0.0, 0, (37, 60)
     errors = [np.random.default_rng(n).normal(size=n) for n in runs]
     for error in errors:
@@ -225,7 +228,22 @@ def test_whiteness_is_that_of_ljung_and_box() -> None:
         freedom += lags
     clusters = np.repeat([0, 1], runs)
     fit = LinearFit(("p",), np.ones(1), np.concatenate(errors), np.ones((97, 1)), clusters, ("u",) * 97)
-    assert whiteness(fit)["u"].probability == pytest.approx(stats.chi2.sf(expected, freedom))
+    drifts = sum(float(part.sum() ** 2 / len(part) / np.mean(e**2)) for e in errors for part in np.array_split(e, 4))
+    both = stats.chi2.sf(expected, freedom), stats.chi2.sf(drifts, 8)
+    assert whiteness(fit)["u"].probability == pytest.approx(min(2 * min(both), 1.0))
+
+
+@pytest.mark.parametrize(("share", "least", "most"), [(0.0, 0.0, 0.08), (0.04, 0.5, 1.0), (0.1, 0.9, 1.0)])
+def test_a_slow_drift_in_noise_is_seen(share: float, least: float, most: float) -> None:
+    """Unmeasured gusts under sensor noise: six runs of 100 rows, correlated over 100 rows, passed for white."""
+    rng, found = np.random.default_rng(0), 0
+    clusters, signals = np.repeat(np.arange(6), 100), ("u",) * 600
+    for _ in range(100):
+        slow = noise(rng, 6, 100, 0.98).reshape(6, 3, 100)[:, 2].ravel()
+        error = np.sqrt(1 - share) * rng.normal(size=600) + np.sqrt(share) * slow
+        fit = LinearFit(("p",), np.ones(1), error, np.ones((600, 1)), clusters, signals)
+        found += not whiteness(fit)["u"].white
+    assert least <= found / 100 <= most
 
 
 def test_autocorrelation_is_the_mean_product_of_all_pairs() -> None:
