@@ -22,6 +22,7 @@ WINDOW, STEPS, MOST = 10.0, 4, 1500  # s; steps and windows
 FALSE_STEP = np.radians(20.0)  # of a heading between two rows
 FEW = 30  # values: fewer may be round by chance
 HOLE = 3.0  # times the usual step
+WILD, RARE = 5.0, 0.03  # times the larger rates, and share of the windows at most: then it is no turn of a ship
 LIVELY = 0.1  # of the larger changes over a window: in one of less nothing happens
 NEAR_TURN, NEIGHBOURS = 0.6, 9  # of a turn, that many steps together make when they lead across 360
 
@@ -188,14 +189,22 @@ def effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
 
 
 def answer(t: Array, r: Array, order: Array, duration: float) -> tuple[NDArray[np.intp], Array, Array]:
-    """Return first rows (W,), columns (W, 3) and left side (W,) of r' = a order + b r + c over windows."""
+    """Return first rows (W,), columns (W, 3) and left side (W,) of r' = a order + b r + c over windows.
+
+    Without those in which the rate is far from all else: a heading that stood still jumps when it goes on.
+    """
     chosen = windows(t, duration)
     thin = max(1, len(chosen.first) // 400)
     chosen = Windows(chosen.first[::thin], chosen.last[::thin])
     width = max(1, round(duration / 2 / float(np.median(np.diff(t)))))
     smooth = [_boxcar(x, width) for x in (cumulative_integral(t, order), cumulative_integral(t, r), t, r)]
     *columns, change = (chosen.change(x).real for x in smooth)  # the equation holds for means, too
-    return chosen.first, np.stack(columns, axis=1), change
+    design = np.stack(columns, axis=1)
+    wild = np.zeros(len(change), dtype=bool)
+    for one in (change, design[:, 1]) if len(change) else ():
+        wild |= np.abs(one) > WILD * np.percentile(np.abs(one), 95)
+    tame = ~wild | (np.sum(wild) > RARE * len(wild))
+    return chosen.first[tame], design[tame], change[tame]
 
 
 def solved(design: Array, change: Array) -> tuple[Array, Array, float]:
