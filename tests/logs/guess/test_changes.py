@@ -78,7 +78,7 @@ def test_the_part_with_another_scale_is_found_where_it_is(seed: int) -> None:
 def shaft_asked(t: np.ndarray, speed: np.ndarray, rpm: np.ndarray) -> list[str]:
     """What is asked about a shaft (N,) of a ship with this speed (N,) [m/s]."""
     state = state_of({"rpm": rpm}, t)
-    state.position, state.psi = cumulative_integral(t, speed) + 0j, np.zeros(len(t))
+    state.position, state.psi = np.asarray(cumulative_integral(t, speed), dtype=np.complex128), np.zeros(len(t))
     state.suggest("propeller.n", "rpm", "rpm", 0.9, "by its name")
     ask_for_changes(state)
     return [one.sentence for one in state.questions]
