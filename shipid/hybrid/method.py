@@ -202,13 +202,21 @@ TRIAL = ("number", "params", "value", "epochs", "seconds", "state")  # keys of t
 def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
     """Fit every foundation of a task; DataError where a method that somebody wrote gives something else.
 
-    ShipidError where it ends the process: what runs it would else be taken for killed.
+    ShipidError where it ends the process, for what runs it would else be taken for killed, and where the code of the
+    user makes a mistake.
     """
     name, shape = type(method).__name__, task.windows.future.shape
     try:
         given = method.fit(task)
     except SystemExit as error:
         raise ShipidError(f"{name}.fit {ended(error, type(method))}") from None
+    except (ShipidError, MemoryError):
+        raise
+    except Exception as error:
+        place = place_of(error, type(method))
+        if not place:
+            raise
+        raise ShipidError(f"{name}.fit: {type(error).__name__}: {error}{place}") from error
     if not isinstance(given, Mapping):
         raise DataError(f"{name}.fit must return a table, foundation -> Fitted, not {type(given).__name__}")
     for case in task.cases:

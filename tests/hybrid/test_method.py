@@ -150,6 +150,15 @@ def test_a_method_that_ends_the_process_is_named(words: list[Any]) -> None:
         fit_all(Mine(), task())
 
 
+def test_a_mistake_in_the_code_of_a_user_has_its_file_and_line() -> None:
+    class Mine(Method):
+        def fit(self, given: Task) -> dict[str, Fitted]:
+            return {"right": given.targets["left"]}
+
+    with pytest.raises(ShipidError, match=rf"^Mine\.fit: KeyError: 'left' in {re.escape(__file__)}, line \d+$"):
+        fit_all(Mine(), task())
+
+
 @pytest.mark.parametrize("kind", METHODS)
 def test_every_listed_method_is_whole(kind: str) -> None:
     assert not METHODS[kind].__abstractmethods__
