@@ -16,12 +16,12 @@ from shipid.physics.signals import SIGNALS
 
 PHRASES: dict[str, str] = {
     "latitude": (
-        "lat, phi gps, latitude, breite, breitengrad, bredde, breddegrad, latitud, latitudine, geogr breite, "
-        "breedtegraad, breedte, geogr bredde, ligne latitude, latitude gps"
+        "lat, lati, plat, phi gps, latitude, breite, breitengrad, bredde, breddegrad, latitud, latitudine, "
+        "geogr breite, breedtegraad, breedte, geogr bredde, ligne latitude, latitude gps"
     ),
     "longitude": (
-        "lon, lambda gps, lambda, long, lng, longitude, laenge, laengengrad, lengde, lengdegrad, longitud, "
-        "longitudine, geogr laenge, lengtegraad, geogr lengde, longitude gps"
+        "lon, longi, plon, lambda gps, lambda, long, lng, longitude, laenge, laengengrad, lengde, lengdegrad, "
+        "longitud, longitudine, geogr laenge, lengtegraad, geogr lengde, longitude gps"
     ),
     "north": (
         "x north, y north, "
@@ -224,7 +224,7 @@ WIND_WORDS = {
 """Parts that say which wind a column has. `twa` does not: it is the true wind, from the bow."""
 SOURCES = frozenset(
     (
-        "attitude header orientation pose quat quaternion twist "
+        "attitude field header msg orientation pose quat quaternion twist "
         "act actual answer apparent ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga "
         "gnss gpgga gprmc gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos "
         "posicion posisjon position raw rel response rtk sensor ship signal sim standort t the true val value vessel "

@@ -99,6 +99,10 @@ def test_parts(name: str, parts: tuple[str, ...]) -> None:
         ("Pod Stb Winkel", "alpha"),
         ("T_prop", "thrust"),
         ("T_LEFT_N", "thrust"),
+        ("field.pose.pose.position.x", "x"),  # as `rostopic echo -p` names it
+        ("field.twist.twist.angular.z", "r"),
+        ("LATI", "latitude"),
+        ("LONGI", "longitude"),
     ],
 )
 def test_the_best_meaning(name: str, meaning: str) -> None:
