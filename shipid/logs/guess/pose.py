@@ -185,7 +185,7 @@ def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
     if best.on_globe:
         raise DataError("latitude and longitude have no other frame: leave it out", file=file, path="--frame")
     clockwise, mirror_like = frame in ("ned", "enu"), abs(best.mirrored) > abs(best.same)
-    if mirror_like != (frame == "enu"):
+    if best.misfit <= POOR and mirror_like != (frame == "enu"):
         others = ["enu"] if mirror_like else [name for name in get_args(Frame) if name != "enu"]
         words = f"the ship does not move as in {frame}: {best.north!r}, {best.east!r}, {best.heading!r} fit"
         raise DataError(f"{words} {' or '.join(others)}", file=file, path="--frame")

@@ -397,6 +397,20 @@ def test_a_quaternion_is_the_heading(names: str, frame: Frame, tmp_path: Path) -
     assert dataset.frame["v"].to_numpy() == pytest.approx(LOG["v"].to_numpy(), abs=1e-3)
 
 
+@pytest.mark.parametrize("ahead", [0.3, 0.45, 0.5, 0.6])
+def test_a_given_frame_is_taken_where_a_ship_that_goes_astern_does_not_show_it(ahead: float, tmp_path: Path) -> None:
+    """Ahead and astern by turns, the course says little of the heading; another frame was said to fit."""
+    way = np.where(np.arange(len(LOG)) < ahead * len(LOG), 1.0, -1.0)
+    place = np.append(0, np.cumsum(way[1:] * np.diff(LOG["north"] + 1j * LOG["east"])))
+    log = BRIDGE.drop(columns=["psi", "N", "E"]).assign(x=place.imag, y=place.real, u=way * LOG["u"], v=way * LOG["v"])
+    for letter, values in quaternion(np.pi / 2 - LOG["psi"].to_numpy()).items():
+        log[f"orientation.{letter}"] = values.round(6)
+    log.to_csv(tmp_path / "log.csv", index=False)
+    result = guess(tmp_path / "log.csv", frame="ros")
+    assert [one.source for one in result.columns if one.name in ("north", "east")] == ["y", "x"]
+    assert "agree badly" in asked(result)
+
+
 @pytest.mark.parametrize(
     ("row", "said"), [([0.0, 0.0, 0.0, 0.0], "row 6, clock.max_gap"), ([0.0, 0.0, 1.0, 1.0], "size 1.414 in row 6")]
 )
