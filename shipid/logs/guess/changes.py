@@ -20,6 +20,7 @@ LEAST = 0.05  # share of all motion that a part has, at least
 SEEN, BETTER = 0.005, 0.3  # share of the motion that one scale leaves, at least; of that what two leave, at most
 ALIKE, NOTHING = 1.4, 5e-4  # ratio of two scales, that are one; and that of a column that stands still
 CLEAR, TIMES = 8.0, 20.0  # t value of the effect of an order in each part, and ratio of the effects, at least
+MAKES_WAY = 0.4  # of the larger speeds, at least: an angle steers
 MOST_LEFT = 0.75  # share of what one effect leaves, that two leave, at most
 UNDER_WAY = 0.2  # of the median speed: of a slower ship, her way says little of the shaft
 SHAFTS = [np.log(to_si(unit, "propeller.n")) for unit in ("rpm", "rad/s", "rev/s")]
@@ -95,6 +96,10 @@ def _ask_for_angle(state: State, name: str, source: str) -> None:
     """Ask where an angle turns the ship to the other side, or many times as fast, from some row on."""
     r = state.r if state.r is not None else np.gradient(np.asarray(state.psi), state.t)
     rows, design, change = evidence.answer(state.t, r, state.columns[source], state.part)
+    seen = state.chosen
+    speed = np.abs(seen.change(np.asarray(state.position))) / (state.t[seen.last] - state.t[seen.first])
+    makes_way = np.interp(rows, seen.first, speed) > MAKES_WAY * np.percentile(speed, 90)  # else thrust turns her
+    rows, design, change = rows[makes_way], design[makes_way], change[makes_way]
     whole = evidence.solved(design, change)[2]
     least, start, ratio = MOST_LEFT * whole, 0, 1.0
     for row in np.unique(np.linspace(0, len(rows), SPLITS + 2).astype(int))[1:-1]:

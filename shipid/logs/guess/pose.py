@@ -190,9 +190,13 @@ def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
         words = f"the ship does not move as in {frame}: {best.north!r}, {best.east!r}, {best.heading!r} fit"
         raise DataError(f"{words} {' or '.join(others)}", file=file, path="--frame")
     given = replace(best, settled=f"--frame {frame}", counts=1 if clockwise else -1)
-    if frame == "ned":
-        return given
-    return _y_is_west(given, given.settled) if frame == "zup" else _x_is_east(given, given.settled)
+    if frame != "ned":
+        given = _y_is_west(given, given.settled) if frame == "zup" else _x_is_east(given, given.settled)
+    if best.misfit > POOR:  # a ship that drifts or goes astern: her track says nothing of the zero
+        turn = {"zup": 1.0, "ros": 1j}.get(frame, 0.0)
+        size = complex(1.0 - best.misfit)
+        given = replace(given, same=size if clockwise else 0j, mirrored=size * turn)
+    return given
 
 
 def _by_course(state: State, best: Pose) -> Pose:

@@ -409,6 +409,10 @@ def test_a_given_frame_is_taken_where_a_ship_that_goes_astern_does_not_show_it(a
     result = guess(tmp_path / "log.csv", frame="ros")
     assert [one.source for one in result.columns if one.name in ("north", "east")] == ["y", "x"]
     assert "agree badly" in asked(result)
+    mapping = write_new(draft_mapping(result), tmp_path / "draft.toml")
+    dataset = import_log(read_mapping(mapping).model_copy(update={"segment": ()}), tmp_path / "log.csv")
+    assert turned(dataset).max() < 1e-5
+    assert dataset.frame["u"].to_numpy() == pytest.approx(way * LOG["u"].to_numpy(), abs=1e-3)
 
 
 @pytest.mark.parametrize(
