@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -110,7 +111,19 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
         if signal == "delta" and side:
             component = f"{side}_rudder"
         state.suggest(_command(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+    _ask_if_opposite(state)
     return azimuth
+
+
+def _ask_if_opposite(state: State) -> None:
+    """Ask where the angles of port and of starboard are seen to turn the ship to opposite sides."""
+    angles = [one for one in state.suggestions if is_command(one.name) and one.source in state.turning]
+    for port, starboard in product(angles, angles):
+        sides = state.side_of(port.source), state.side_of(starboard.source)
+        same = signal_of(port.name) == signal_of(starboard.name) and sides == ("port", "starboard")
+        if same and state.turning[port.source] != state.turning[starboard.source]:
+            count = f"{port.source!r} and {starboard.source!r} are seen to turn the ship to opposite sides"
+            state.ask((port.name, starboard.name), f"{count}: do they count so, or is the sign of one wrong?")
 
 
 def _ask_for_share(state: State, name: str, signal: str) -> bool:
