@@ -395,6 +395,7 @@ def _lagged(run: Array) -> Array:
 
 def _covariances(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[Kind, Covariance]:
     """The Fisher and sandwich forms, and the block form if neither is trusted."""
+    colours = _felt(fit, basis, colours)
     result: dict[Kind, Covariance] = {"fisher": fisher(fit, basis, colours)}
     result["sandwich"] = sandwich(fit, basis, fit.clusters, "sandwich", "runs")
     if not any(covariance.trusted for covariance in result.values()):
@@ -404,6 +405,19 @@ def _covariances(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]
             what = f"runs, too short to be cut into {what}"
         result["blocks"] = sandwich(fit, basis, clusters, "blocks", what)
     return result
+
+
+def _felt(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[str, Whiteness]:
+    """Whiteness by signal; white where its correlation changes no standard error, as the yaw rate of straight runs."""
+    labels, effect = np.array(fit.signals), (fit.jacobian @ basis.inverse) ** 2
+    parts = {name: colour.level**2 * effect[labels == name].sum(axis=0) for name, colour in colours.items()}
+    most = (LITTLE - 1) * np.sum(list(parts.values()), axis=0)
+    return {
+        name: colour
+        if colour.white or np.any(parts[name] * (colour.memory - 1) > most)
+        else replace(colour, probability=1.0, memory=1.0)
+        for name, colour in colours.items()
+    }
 
 
 def fisher(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covariance:

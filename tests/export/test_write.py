@@ -91,7 +91,7 @@ def test_a_vessel_has_no_networks(tmp_path):
     ("vessel", "integrator", "message"),
     [
         (None, "rk5", "integrator 'rk5' is not known"),
-        (None, "RK4", "integrator 'RK4' is not known: valid: euler, rk4"),
+        (None, "RK4", "integrator 'RK4' is not known: did you mean 'rk4'"),
         ("mariner", "rk4", "vessel must be a Vessel, as of `load_vessel`, not 'mariner'"),
     ],
 )

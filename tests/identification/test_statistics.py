@@ -55,6 +55,19 @@ def test_which_form_is_chosen() -> None:
     assert "mislead" in statistics(few).covariances["sandwich"].reason
 
 
+def test_residuals_of_a_signal_that_says_nothing_of_a_factor_do_not_count() -> None:
+    """The yaw rate of straight runs: its drift made a fit by two runs doubtful."""
+    of_r = np.array(NAMES) == "r"
+    error = np.where(
+        of_r, noise(np.random.default_rng(1), RUNS, SAMPLES, 0.95), noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0)
+    )
+    jacobian = np.where(of_r[:, None], 0.0, JACOBIAN)
+    fit = fitted(jacobian, error, CLUSTERS, NAMES)
+    assert not whiteness(fit)["r"].white
+    assert statistics(fit).chosen == "fisher"
+    assert statistics(fitted(JACOBIAN, error, CLUSTERS, NAMES)).chosen == "sandwich"
+
+
 @pytest.mark.parametrize("runs", [1, 3])
 def test_factors_that_priors_alone_hold_lend_no_trust(runs: int) -> None:
     """Four that the data do not see made the sandwich of three runs trusted, and of one run: without a warning."""

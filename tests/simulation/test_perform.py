@@ -235,7 +235,7 @@ def test_a_zigzag_in_waves_still_turns_at_the_execute_heading() -> None:
         ({"step": 0}, "step must be a number above 0 and finite, not 0"),
         ({"step": np.nan}, "step must be a number above 0 and finite, not nan"),
         ({"duration": -5.0}, "duration must be a number above 0 and finite, not -5"),
-        ({"method": "RK4"}, "method 'RK4' is not known: valid: euler, rk4"),
+        ({"method": "RK4"}, "method 'RK4' is not known: did you mean 'rk4'"),
         ({"outputs": ["port.thrus"]}, r"outputs 'port\.thrus' is not known: did you mean 'port\.thrust'\?"),
         ({"environment": {"V_w": "3"}}, "environment 'V_w' must be an array of numbers, not str"),
     ],
