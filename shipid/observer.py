@@ -64,7 +64,7 @@ SPIKE = 300.0  # standard deviations: a measurement as far off is a fault of the
 FADES = (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, 1e6)  # x sqrt(L / g): between which `tune_observer` chooses
 YAW = 3.0  # change of the moment, x I_z g / L, over that of the force, x m g
 LONGEST = 0.6  # x sqrt(L / g): by longer steps of the filters the midpoint rule takes its own error for a force
-MOST_PARTS = 1000  # steps of the filters between two rows
+MOST_PARTS = 1000  # steps of the filters between two rows: rows further apart are a clock in a wrong unit
 PAUSE = 6.0  # x sqrt(L / g): after a longer time without rows what the physics did is worse than to begin anew
 ROUNDING = 1e-5  # of a step: so much longer than the longest it is still one
 CALM = 1e-6  # m/s: keeps the direction of no wind defined
@@ -484,8 +484,8 @@ def _check_intervals(dataset: Dataset, filters: Bank, places: Sequence[NDArray[n
     t = dataset.frame["t"].to_numpy()
     apart = max((float(np.max(np.diff(t[rows]), initial=0.0)) for rows in places), default=0.0)
     if apart > MOST_PARTS * filters.longest:
-        limit = f"for {filters.vessel.name} at most {MOST_PARTS * filters.longest:.3g} s apart"
-        raise DataError(f"rows are up to {apart:.3g} s apart: the observer takes rows {limit}")
+        limit = f"the observer takes rows of {filters.vessel.name} at most {MOST_PARTS * filters.longest:.3g} s apart"
+        raise DataError(f"rows are up to {apart:.3g} s apart: {limit}; is the unit of the clock right?", path="t")
 
 
 def _divided(
