@@ -18,14 +18,13 @@ from shipid.simulation.approach import Controls
 from shipid.simulation.log import run_names
 from shipid.simulation.manoeuvre import KINDS, Executed, Manoeuvre
 from shipid.simulation.perform import perform
-from shipid.simulation.truth import Truth, simulate
+from shipid.simulation.truth import LONGEST, Truth, simulate
 from shipid.units import plural
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 log = logging.getLogger(__name__)
 Positive = Annotated[FiniteFloat, Field(gt=0)]
-LONGEST = 1e6  # s of a run, as in a study
 
 
 class Script(BaseModel):
@@ -56,13 +55,13 @@ def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
         if isinstance(truth, Mapping):
             drawn = {key: value for key, value in truth.items() if key != "set"} | {"vessel": vessel.key}
             declared: Truth = documents.parse(Truth, drawn, file, "truth")
-            _check_size(vessel, declared.manoeuvres, declared.length, declared.step, "truth.")
+            _check_size(vessel, declared.manoeuvres, declared.length, declared.step, "truth.duration")
             return simulate(declared, vessel)
         if "manoeuvre" not in document:
             raise DocumentError("holds no manoeuvres: give a [truth], or [[manoeuvre]] blocks")
         script = documents.parse(Script, document, file)
         manoeuvres = _given(script, vessel)
-        _check_size(vessel, len(manoeuvres), max(one.length for one in manoeuvres), script.step)
+        _check_size(vessel, len(manoeuvres), max(one.length for one in manoeuvres), script.step, "manoeuvre")
         frame = perform(vessel, manoeuvres, step=script.step, interval=script.interval)
     except ShipidError as error:
         raise DocumentError(error.message, file=file, path=error.path) from None
@@ -72,13 +71,16 @@ def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
     return frame.drop(columns=[column for column in frame if str(column).startswith(ACTUAL)])
 
 
-def _check_size(vessel: Vessel, count: int, length: float, step: float, within: str = "") -> None:
-    """Raise DocumentError for runs, of `length` and `step` [s], that no machine would end or that exceed this one."""
+def _check_size(vessel: Vessel, count: int, length: float, step: float, path: str) -> None:
+    """Raise DocumentError for runs, of `length` and `step` [s], that no machine would end or that exceed this one.
+
+    path : of what makes them long; the step is in the same block, or beside it.
+    """
     if length > LONGEST:
-        raise DocumentError(f"a run of {length:g} s: at most {LONGEST:g} s", path=f"{within}manoeuvre")
-    commands = len(dynamics(vessel).commands)
-    if fault := too_much(count * length / step * 2 * commands):
-        raise DocumentError(f"{step:g} s: {count} {plural(count, 'run')} of {length:g} s {fault}", path=f"{within}step")
+        raise DocumentError(f"a run of {length:g} s: at most {LONGEST:g} s, make it shorter", path=path)
+    if fault := too_much(count * length / step * 2 * len(dynamics(vessel).commands)):
+        words = f"{step:g} s: {count} {plural(count, 'run')} of {length:g} s {fault}"
+        raise DocumentError(words, path=f"{path.rpartition('.')[0]}.step".removeprefix("."))
 
 
 def _tell_of_starts(frame: pd.DataFrame) -> None:

@@ -32,6 +32,7 @@ Array = np.ndarray
 NotNegative = tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, Field(ge=0)]]
 MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies of a vessel's tables
 WEATHER = ("V_w", "beta_w", "V_c", "beta_c")  # drawn from wind_speed, current_speed, and directions from anywhere
+LONGEST = 1e6  # s of a run: a longer one is a slip of unit or exponent
 MOVED = ("n_rpm", "alpha_deg", "start_speed", "actuators_at")  # keys of a manoeuvre
 
 

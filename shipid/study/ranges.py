@@ -14,6 +14,7 @@ from shipid import document as documents
 from shipid.capacity import too_much
 from shipid.document import Document
 from shipid.errors import DocumentError
+from shipid.simulation.truth import LONGEST
 
 UNUSUAL = "unusual"
 """Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
@@ -21,8 +22,8 @@ MOST_SEED = 2**32 - 1  # of the generators of several libraries
 LONGEST_NAME = 200  # characters of the file of a cell: file systems allow 255
 
 RANGES: dict[str, tuple[float, float, str]] = {
-    "truth.duration": (0.0, 1e6, "s"),
-    "truth.run_up": (0.0, 1e6, "s"),
+    "truth.duration": (0.0, LONGEST, "s"),
+    "truth.run_up": (0.0, LONGEST, "s"),
     "truth.step": (1e-4, 60.0, "s"),
     "truth.interval": (1e-4, 3600.0, "s"),
     "truth.wind_speed.*": (0.0, 100.0, "m/s"),
@@ -35,7 +36,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
     "truth.manoeuvre.*n_rpm.*": (-1e5, 1e5, "rpm"),
     "truth.manoeuvre.*start_speed": (-60.0, 60.0, "m/s"),
     "truth.manoeuvre.*start_speed.*": (-60.0, 60.0, "m/s"),
-    "truth.manoeuvre.*_time": (0.0, 1e6, "s"),
+    "truth.manoeuvre.*_time": (0.0, LONGEST, "s"),
     "prediction.ahead": (0.0, 1e5, "s"),
     "prediction.step": (1e-3, 3600.0, "s"),
     "prediction.interval": (1e-3, 1e5, "s"),

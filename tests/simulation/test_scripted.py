@@ -64,9 +64,7 @@ def test_a_log_that_begins_with_an_order_is_told(tmp_path: Path, caplog: pytest.
     assert not caplog.messages, "these have no straight run that would mend it"
 
 
-def test_a_truth_draws_the_manoeuvres_of_another_vessel(tmp_path: Path) -> None:
-    """The vessel that it names, and what it sets of it, are left out."""
-    text = """
+DRAWN = """
 [truth]
 vessel = "gunnerus-28.9"
 set = {"hull.derivatives.N_r" = 1.0}
@@ -78,7 +76,11 @@ n_rpm = [60.0, 80.0]
 delta_deg = [-20.0, 20.0]
 start_speed = [4.0, 6.0]
 """
-    frame = simulated(SHIP, written(tmp_path, text))
+
+
+def test_a_truth_draws_the_manoeuvres_of_another_vessel(tmp_path: Path) -> None:
+    """The vessel that it names, and what it sets of it, are left out."""
+    frame = simulated(SHIP, written(tmp_path, DRAWN))
     block = {"n_rpm": [60.0, 80.0], "delta_deg": [-20.0, 20.0], "start_speed": [4.0, 6.0]}
     truth = Truth(vessel="mariner", manoeuvres=2, duration=20.0, step=0.5, manoeuvre=[block])  # type: ignore[list-item]
     pd.testing.assert_frame_equal(frame, simulate(truth, SHIP))
@@ -96,6 +98,7 @@ start_speed = [4.0, 6.0]
         (GIVEN.replace("step = 0.5", "step = -1"), "step", "must be above 0"),
         (GIVEN.replace("step = 0.5", "stride = 1"), "stride", "unknown key"),
         (GIVEN.replace("duration = 40", "duration = 4e7"), "manoeuvre", "a run of 4e\\+07 s: at most 1e\\+06 s"),
+        (DRAWN.replace("duration = 20.0", "duration = 4e7"), "truth.duration", "a run of 4e\\+07 s: at most"),
         (GIVEN.replace("step = 0.5", "step = 1e-12"), "step", "1e-12 s: 2 runs of 60 s take .* GiB of memory"),
     ],
 )  # fmt: skip
