@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pandas as pd
@@ -397,17 +398,22 @@ def test_a_quaternion_is_the_heading(names: str, frame: Frame, tmp_path: Path) -
     assert dataset.frame["v"].to_numpy() == pytest.approx(LOG["v"].to_numpy(), abs=1e-3)
 
 
+@pytest.mark.parametrize("frame", get_args(Frame))
 @pytest.mark.parametrize("ahead", [0.3, 0.45, 0.5, 0.6])
-def test_a_given_frame_is_taken_where_a_ship_that_goes_astern_does_not_show_it(ahead: float, tmp_path: Path) -> None:
+def test_a_given_frame_is_taken_where_a_ship_that_goes_astern_does_not_show_it(
+    ahead: float, frame: Frame, tmp_path: Path
+) -> None:
     """Ahead and astern by turns, the course says little of the heading; another frame was said to fit."""
     way = np.where(np.arange(len(LOG)) < ahead * len(LOG), 1.0, -1.0)
     place = np.append(0, np.cumsum(way[1:] * np.diff(LOG["north"] + 1j * LOG["east"])))
-    log = BRIDGE.drop(columns=["psi", "N", "E"]).assign(x=place.imag, y=place.real, u=way * LOG["u"], v=way * LOG["v"])
-    for letter, values in quaternion(np.pi / 2 - LOG["psi"].to_numpy()).items():
-        log[f"orientation.{letter}"] = values.round(6)
+    psi, east_first = LOG["psi"].to_numpy(), frame in ("enu", "ros")
+    log = BRIDGE.drop(columns=["psi", "N", "E"]).assign(u=way * LOG["u"], v=way * LOG["v"])
+    log["x"], log["y"] = (place.imag, place.real) if east_first else (place.real, place.imag)
+    log["y"] *= -1.0 if frame == "zup" else 1.0
+    log["psi"] = {"ros": np.pi / 2 - psi, "zup": -psi}.get(frame, psi)
     log.to_csv(tmp_path / "log.csv", index=False)
-    result = guess(tmp_path / "log.csv", frame="ros")
-    assert [one.source for one in result.columns if one.name in ("north", "east")] == ["y", "x"]
+    result = guess(tmp_path / "log.csv", frame=frame)
+    assert [one.source for one in result.columns if one.name in ("north", "east")] == list("yx" if east_first else "xy")
     assert "agree badly" in asked(result)
     mapping = write_new(draft_mapping(result), tmp_path / "draft.toml")
     dataset = import_log(read_mapping(mapping).model_copy(update={"segment": ()}), tmp_path / "log.csv")
