@@ -94,3 +94,23 @@ def test_a_shaft_that_windmills_or_a_ship_on_the_spot_has_no_other_unit(seed: in
     assert not shaft_asked(t, speed, coasts + random.normal(0, 0.3, len(t)))
     spot = 1.0 + 4.0 * np.exp(-after / 60)
     assert not shaft_asked(t, spot, 100.0 + random.normal(0, 0.3, len(t)) + random.uniform(0, 60) * (after > 0))
+
+
+@pytest.mark.parametrize("slow", [True, False])
+@pytest.mark.parametrize("seed", range(5))
+def test_an_angle_that_turns_the_ship_otherwise_is_asked_under_way_alone(seed: int, slow: bool) -> None:
+    """In station keeping thrust turns her, to any side."""
+    random, t = np.random.default_rng(seed), np.arange(0.0, 2400.0, 1.0)
+    first = t < random.uniform(1000, 1400)
+    angle = np.repeat(random.uniform(-0.5, 0.5, 60), 40)
+    r = np.zeros(len(t))
+    for row in range(1, len(t)):
+        r[row] = 0.95 * r[row - 1] - (0.002 if first[row] else -0.002) * angle[row - 1] + random.normal(0, 2e-5)
+    state = state_of({"azimuth": angle}, t)
+    state.psi, state.r = cumulative_integral(t, r), r
+    speed = np.where(first, 5.0, 0.3 if slow else 5.0)
+    state.position = np.cumsum(speed * np.exp(1j * state.psi)) + random.normal(0, 0.3, len(t))
+    state.suggest("thruster.alpha", "azimuth", "rad", 0.9, "by its name")
+    ask_for_changes(state)
+    asked = [one.sentence for one in state.questions if "turn the ship to the other side" in one.sentence]
+    assert len(asked) == (not slow)
