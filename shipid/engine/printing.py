@@ -154,7 +154,7 @@ class _Printer:
             self.lines[-1].append(lookup.place(axis, self.use(x, self.last), on, part))
         ordinate, slope, *bends = texts[size:]
         rows = self.kept(*lookup.table(f"table{k}", axis, ordinate, slope, bends[: part - 1]))
-        terms = [lookup.value(axis, rows, part), *(self.values[i].text for i in table.ramps[part - 1 :])]
+        terms = [lookup.value(axis, rows), *(self.values[i].text for i in table.ramps[part - 1 :])]
         self.lines[-1].append(self.dialect.assignment.format(f"a{k}", " + ".join(terms)))
         return _Value(f"a{k}", self.last)
 

@@ -1,10 +1,10 @@
 """Tables in the equations: piecewise linear functions, found in a CasADi function and looked up by vectors of C.
 
 `shipid.physics.wind.interpolate` writes a table as a sum of ramps, which every engine can compute and differentiate:
-y_0 + b_0 (x - k_0) + sum_i (b_i - b_(i-1)) max(x - k_i, 0). That is three operations for each knot. A processor that
-permutes vectors (AVX-512) finds the interval of x once for all tables with the same knots. Then ordinate and slope come
-from one instruction for each 16 intervals (32 in single precision). The values are those of the ramps to rounding.
-This needs knots that are evenly apart; with others the ramps are as fast.
+y_0 + b_0 (x - k_0) + sum_i (b_i - b_(i-1)) max(x - k_i, 0). That is three operations for each knot. In C the interval
+of x is found once for all tables with the same knots. Then ordinate and slope are read: lane by lane, or, where a
+processor permutes vectors (AVX-512), by one instruction for each 16 intervals (32 in single precision). The values are
+those of the ramps to rounding. This needs knots that are evenly apart; with others the ramps are as fast.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -42,16 +43,87 @@ class Table:
 
 @dataclass(frozen=True)
 class Lookup:
-    """C that looks up tables in vectors of `lanes` numbers, which instructions `vpermt2{packed}` permute.
+    """C that looks up tables in vectors of `lanes` numbers, lane by lane: the processor has no gather that is faster.
 
-    Ordinates of a table, then slopes, lie in an even number of vectors each: a permutation picks from two.
+    A table lies in memory as pairs of ordinate and slope.
     """
 
     lanes: int
-    packed: str
+
+    apart: ClassVar = (2, "1")  # numbers from one ordinate to the next, and from an ordinate to its slope
 
     def head(self) -> str:
         """C functions. `v_place` gives the interval of x, and how far x is in it, in widths of an interval."""
+        further, slope = self.apart
+        return f"""{self.found()}
+static inline V v_place(V x, V first, V scale, int count, M *place) {{
+  V along = (x - first) * scale, whole = v_min(v_max(along - K(0.5), K(0)), K(count - 1)) + K(ROUND);
+  *place = (M)whole - (M)K(ROUND);
+  return along - (whole - K(ROUND));
+}}
+static void v_table(V *table, REAL width, REAL y, REAL slope, const REAL *bends, int count, int rows) {{
+  REAL *number = (REAL *)table;
+  for (int i = 0; i < rows * W / 2; ++i) {{
+    number[{further} * i] = y;
+    number[{further} * i + {slope}] = slope * width;
+    if (i < count - 1) {{ y += slope * width; slope += bends[i]; }}
+  }}
+}}
+"""
+
+    def found(self) -> str:
+        """C of `v_value`: the value of a table so far `along` the interval at `place`."""
+        return """
+static inline V v_value(const V *table, int rows, M place, V along) {
+  const REAL *pairs = (const REAL *)table;
+  V y, slope;
+  M at = place + place;
+  for (int i = 0; i < W; ++i) { y[i] = pairs[at[i]]; slope[i] = pairs[at[i] + 1]; }
+  return y + along * slope;
+}
+"""
+
+    def axis(self, name: str, first: str, last: str, size: int) -> tuple[str, list[str]]:
+        """C of an axis of so many knots, and what is saved of it: the first knot, and one over an interval."""
+        return f"V {name}[] = {{ {first}, K({size - 1}) / ({last} - {first}) }};", [f"{name}[0]", f"{name}[1]"]
+
+    def table(self, name: str, axis: str, ordinate: str, slope: str, bends: Sequence[str]) -> tuple[str, list[str]]:
+        """C that lays out a table on an axis, and what is saved of it."""
+        size, rows = len(bends) + 1, self.rows(len(bends) + 1)
+        line = f"const REAL bends_{name}[] = {{ {', '.join(f'({bend})[0]' for bend in bends)} }}; V {name}[{rows}]; "
+        line += f"v_table({name}, 1 / {axis}[1][0], ({ordinate})[0], ({slope})[0], bends_{name}, {size}, {rows});"
+        return line, [f"{name}[{i}]" for i in range(rows)]
+
+    def place(self, name: str, x: str, axis: Sequence[str], size: int) -> str:
+        """C that finds `x` on an axis, of which this was saved."""
+        return f"M at_{name}; const V {name} = v_place({x}, {', '.join(axis)}, {size}, &at_{name});"
+
+    def value(self, place: str, table: Sequence[str]) -> str:
+        """C: the value of a table, of which this was saved."""
+        return f"v_value(&{table[0]}, {len(table)}, at_{place}, {place})"
+
+    def part(self, size: int) -> int:
+        """How many of so many intervals to look up; the others are left to ramps."""
+        return size
+
+    def rows(self, size: int) -> int:
+        """Vectors that hold a table of so many intervals."""
+        return -(-2 * size // self.lanes)
+
+
+@dataclass(frozen=True)
+class Permuted(Lookup):
+    """C that looks up all lanes at once, by the instructions `vpermt2{packed}` (AVX-512): each picks from two vectors.
+
+    Ordinates of a table, then slopes, lie in an even number of vectors each.
+    """
+
+    packed: str
+
+    apart: ClassVar = (1, "rows * W / 2")
+
+    def found(self) -> str:
+        """C of `v_value`: the value of a table so far `along` the interval at `place`."""
         return f"""
 static inline V v_found(const V *table, M place, int rows) {{
   V all = K(0);
@@ -62,51 +134,19 @@ static inline V v_found(const V *table, M place, int rows) {{
   }}
   return all;
 }}
-static inline V v_place(V x, V first, V scale, int count, M *place) {{
-  V along = (x - first) * scale, whole = v_min(v_max(along - K(0.5), K(0)), K(count - 1)) + K(ROUND);
-  *place = (M)whole - (M)K(ROUND);
-  return along - (whole - K(ROUND));
-}}
-static void v_table(V *table, REAL width, REAL y, REAL slope, const REAL *bends, int count, int rows) {{
-  for (int i = 0; i < rows * W; ++i) {{
-    table[i / W][i % W] = y;
-    table[rows + i / W][i % W] = slope * width;
-    if (i < count - 1) {{ y += slope * width; slope += bends[i]; }}
-  }}
+static inline V v_value(const V *table, int rows, M place, V along) {{
+  return v_found(table, place, rows / 2) + along * v_found(table + rows / 2, place, rows / 2);
 }}
 """
 
-    def axis(self, name: str, first: str, last: str, size: int) -> tuple[str, list[str]]:
-        """C of an axis of so many knots, and what is saved of it: the first knot, and one over an interval."""
-        return f"V {name}[] = {{ {first}, K({size - 1}) / ({last} - {first}) }};", [f"{name}[0]", f"{name}[1]"]
-
-    def table(self, name: str, axis: str, ordinate: str, slope: str, bends: Sequence[str]) -> tuple[str, list[str]]:
-        """C that lays out a table on an axis, and what is saved of it."""
-        size, rows = len(bends) + 1, self.rows(len(bends) + 1)
-        line = (
-            f"const REAL bends_{name}[] = {{ {', '.join(f'({bend})[0]' for bend in bends)} }}; V {name}[{2 * rows}]; "
-        )
-        line += f"v_table({name}, 1 / {axis}[1][0], ({ordinate})[0], ({slope})[0], bends_{name}, {size}, {rows});"
-        return line, [f"{name}[{i}]" for i in range(2 * rows)]
-
-    def place(self, name: str, x: str, axis: Sequence[str], size: int) -> str:
-        """C that finds `x` on an axis, of which this was saved."""
-        return f"M at_{name}; const V {name} = v_place({x}, {', '.join(axis)}, {size}, &at_{name});"
-
-    def value(self, place: str, table: Sequence[str], size: int) -> str:
-        """C: the value of a table of so many knots, of which this was saved."""
-        rows = self.rows(size)
-        ordinate, slope = (f"v_found(&{table[first]}, at_{place}, {rows})" for first in (0, rows))
-        return f"({ordinate} + {place} * {slope})"
-
     def part(self, size: int) -> int:
-        """How many of so many intervals to look up: a few beyond those of whole permutations are left to ramps."""
+        """A few intervals beyond those of whole permutations are left to ramps."""
         beyond = size % (2 * self.lanes)
         return size - beyond if beyond <= FEW and beyond < size else size
 
     def rows(self, size: int) -> int:
-        """Vectors for so many numbers."""
-        return 2 * -(-size // (2 * self.lanes))
+        """Vectors that hold a table of so many intervals."""
+        return 4 * -(-size // (2 * self.lanes))
 
 
 @lru_cache(maxsize=64)

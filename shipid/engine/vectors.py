@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.engine.tables import Lookup
+from shipid.engine.tables import Lookup, Permuted
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,10 @@ class Target:
 
     @property
     def lookup(self) -> Lookup | None:
-        """How tables are looked up; None where no instruction picks from two vectors (that came with AVX-512)."""
-        return Lookup(self.lanes, self.precision.packed) if self.lanes * self.precision.bits == 512 else None
+        """How tables are looked up; None without the written-out functions."""
+        if self.lanes * self.precision.bits == 512:
+            return Permuted(self.lanes, self.precision.packed)
+        return Lookup(self.lanes) if self.fused else None
 
 
 _ONE, _TWO = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"), ("pow", "atan2")

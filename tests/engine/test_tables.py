@@ -13,7 +13,8 @@ import pytest
 from shipid.engine import native
 from shipid.engine.integrate import Batch, Job
 from shipid.engine.native import compiler, run_native, run_single, target
-from shipid.engine.tables import LEAST, even_tables, find_tables
+from shipid.engine.tables import LEAST, Lookup, even_tables, find_tables
+from shipid.engine.vectors import Target
 from shipid.physics.wind import interpolate
 from shipid.vessel import dynamics as module
 from shipid.vessel.dynamics import Dynamics, dynamics
@@ -61,13 +62,18 @@ def with_tables(size: int) -> Dynamics:
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+@pytest.mark.parametrize("way", ["of this processor", "lane by lane"])
 @pytest.mark.parametrize("size", [LEAST + 1, 16, 17, 18, 19, 33, 34, 50])
-def test_a_lookup_has_the_values_of_the_ramps(size: int, libraries_kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lookup_has_the_values_of_the_ramps(
+    size: int, way: str, libraries_kept: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Knots evenly apart, and others: at knots, between and beyond them, and where there is no number."""
+    if way == "lane by lane" and target().lookup is not None:
+        monkeypatch.setattr(Target, "lookup", property(lambda wanted: Lookup(wanted.lanes)))
     monkeypatch.setenv("XDG_CACHE_HOME", str(libraries_kept))
     monkeypatch.setattr(native, "OPTIONS", QUICK)
     rng, model = np.random.default_rng(size), with_tables(size)
-    even, other = (np.linspace(*np.sort(rng.uniform(-5, 5, 2)), size) for _ in range(2))
+    even, other = (np.linspace(low, high, size) for low, high in np.sort(rng.uniform(-5, 5, (2, 2))))
     almost = even + np.where(np.arange(size) == size // 2, 1e-6, 0)
     parameters = np.ones((4, len(SHIP.parameters)))
     for variant, knots in zip(parameters, (even, other, almost, np.sort(rng.uniform(-3, 4, size))), strict=True):
@@ -93,11 +99,11 @@ def test_a_lookup_has_the_values_of_the_ramps(size: int, libraries_kept: Path, m
         assert np.isnan(run_native(model, nothing, job)[0][1, :, :, :4]).all()
 
 
-@pytest.mark.skipif(compiler() is None or target().lookup is None, reason="no instruction that picks from two vectors")
+@pytest.mark.skipif(compiler() is None or target().lookup is None, reason="sin and cos are not written out")
 def test_the_source_of_a_ship_with_tables_looks_them_up() -> None:
     model = dynamics(SHIP)
     tables = even_tables(native._rates(model), np.array([list(SHIP.parameters.values())]))
     source = native._Source(model, 1.0, "euler", target(), tables).text()
     assert len(tables) == 3
-    assert source.count("v_found(&") == 6
+    assert source.count("v_value(&") == 3
     assert source.count("v_place(a") == 1
