@@ -253,6 +253,10 @@ typedef struct {
 #define FMI2_EXPORT
 #endif
 #define FMI2_STATUS FMI2_EXPORT fmi2Status
+
+#ifdef __cplusplus
+extern "C" { /* names as in C */
+#endif
 """
 
 
@@ -522,7 +526,7 @@ FMI2_STATUS FMI2(fmi2SetString)(fmi2Component c, const fmi2ValueReference vr[], 
 
 /* A state is what changes: the model, the phase, the time, and which variables the importer has set; and of which FMU. */
 typedef struct {
-    char guid[sizeof guid];
+    char unit[sizeof guid];
     Model model;
     Phase phase;
     double time;
@@ -532,7 +536,7 @@ typedef struct {
 
 static int is_ours(const Kept *kept)
 {
-    return kept && !memcmp(kept->guid, guid, sizeof guid);
+    return kept && !memcmp(kept->unit, guid, sizeof guid);
 }
 
 /* A number of the bytes of a state, which is another one where they are damaged (FNV-1a of 32 bits). */
@@ -552,7 +556,7 @@ FMI2_STATUS FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state)
     if (!self) return fmi2Error;
     if (!kept) kept = (Kept *)get_memory(&self->call, sizeof *kept);
     if (!kept) return refuse(self, fmi2Error, "there is no memory for a state");
-    memcpy(kept->guid, guid, sizeof guid);
+    memcpy(kept->unit, guid, sizeof guid);
     kept->model = self->model;
     kept->phase = self->phase;
     kept->time = self->time;
@@ -723,4 +727,8 @@ FMI2_STATUS FMI2(fmi2GetStringStatus)(fmi2Component c, const fmi2StatusKind kind
     (void)value;
     return refuse((Instance *)c, fmi2Discard, "status %d is not kept", (int)kind);
 }
+
+#ifdef __cplusplus
+}
+#endif
 """

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
 import logging
 import os
 import platform
 import re
 import resource
+import shutil
 import subprocess
 import sys
 import time
@@ -307,6 +309,23 @@ def test_the_sources_compile_without_a_warning(aboard, tmp_path):
         command = [compiler(), *FLAGS, *more, "-c", "path.c", "-o", "path.o"]
         result = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True)
         assert result.returncode == 0, result.stderr[:1000]
+
+
+@pytest.mark.parametrize("program", ["g++", "clang++"])
+def test_a_compiler_of_cplusplus_takes_the_sources(program, ship, aboard, tmp_path):
+    """Before, g++ refused a member that has the name of a variable, and a tool would have found no function by its name."""
+    if shutil.which(program) is None:
+        pytest.skip(f"no {program}")
+    for unit in (ship, aboard):
+        with zipfile.ZipFile(unit) as archive:
+            archive.extractall(tmp_path)
+        command = [program, "-x", "c++", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-shared", "-fPIC"]
+        command += [f"{unit.stem}.c", "-o", "unit.so"]
+        result = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr[:1000]
+        version = ctypes.CDLL(str(tmp_path / "sources" / "unit.so")).fmi2GetVersion
+        version.restype = ctypes.c_char_p
+        assert version() == b"2.0"
 
 
 STEPS_OF_NO_LENGTH = """
