@@ -271,6 +271,14 @@ def part_of(arrays: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarr
     return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
 
 
+def entries_of(header: Mapping[str, Any], name: str) -> list[Any]:
+    """A list in the header of a saved method; ResultError where it is none or empty."""
+    entries = header[name]
+    if not isinstance(entries, list) or not entries:
+        raise ResultError("must be a list with one entry or more", path=name)
+    return entries
+
+
 def _plain(value: Any) -> Any:
     """Content of JSON: mappings, lists and scalars of Python."""
     if isinstance(value, Mapping):

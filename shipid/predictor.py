@@ -35,7 +35,7 @@ Array = np.ndarray
 FORMAT = 4
 DIVISORS = ("std", "spread", "deviation")  # last words of the names of arrays by which inputs or traits are divided
 BANDS = "bands."  # before the names of arrays of a band in a saved predictor
-MOST_STEPS = 100_000  # of a horizon
+MOST_STEPS = 100_000  # of a horizon and of a past
 NAMES = ("commands", "names", "modules")  # keys of lists of names in the headers of correctors and bands
 
 
@@ -152,7 +152,7 @@ class Predictor:
                 f"the method was trained with this input, and the instants lack it{place_of(error, home)}",
                 path=str(error.args[0]),
             ) from error
-        except (ValueError, TypeError, IndexError) as error:
+        except (ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
             raise DataError(
                 f"the method {self.method!r} and the instants do not fit together ({error}){place_of(error, home)}"
             ) from error
@@ -364,7 +364,7 @@ class Predictor:
         try:
             known = _Header.model_validate(header)
             vessel, bands = header["vessel"], header.get("bands")
-            return cls(
+            loaded = cls(
                 physics=Physics(
                     None if vessel is None else check_vessel(vessel["document"], vessel["file"]),
                     known.horizon,
@@ -382,6 +382,9 @@ class Predictor:
                 bands=None if bands is None else Bands.from_arrays(bands, band),
                 run_up=known.run_up,
             )
+            if not 0 <= loaded.past <= MOST_STEPS:
+                raise ResultError(f"damaged: a past of {loaded.past} steps: 0 to {MOST_STEPS}")
+            return loaded
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None
         except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError, ShipidError):

@@ -153,7 +153,7 @@ def forest(known: Known, corrector: ForestCorrector) -> Value:
 
 def recurrent(known: Known, corrector: RecurrentCorrector) -> Value:
     """Path of the physics plus the mean of gated recurrent networks."""
-    graph, names = known.graph, known.names
+    graph = known.graph
     outputs = []
     for network in corrector.networks:
         reader = network.reader
@@ -172,7 +172,6 @@ def recurrent(known: Known, corrector: RecurrentCorrector) -> Value:
                 formula("even_odd", [("one", one), ("two", two)], (one + half * two) / 2), output, other
             )
         outputs.append(output)
-    assert names.num_past >= max(network.reader.steps for network in corrector.networks)
     return _plus(known, outputs, [network.basis for network in corrector.networks])
 
 
@@ -182,7 +181,7 @@ def _signals(known: Known, wanted: Sequence[str], commands: tuple[str, ...], ste
     row = SX.sym("row", len(names))
     table = feature_table(dict(zip(names, ca.vertsplit(row), strict=True)), commands)
     block = formula("signals", [("row", row)], [table[name] for name in wanted])
-    first = known.names.num_past - steps
+    first = known.names.before(steps)
     rows = known.graph.pack(known.rows("past", names, first, steps), known.of("now", names))
     return known.graph.map(block, [rows], [], steps + 1)
 
@@ -464,7 +463,7 @@ def hankel(known: Known, corrector: HankelCorrector) -> Value:
     law, names, graph = corrector.law, known.names, known.graph
     physical = known.physics.vessel is not None
     kept = [*MOTIONS, *law.commands, *(MISSED if physical else ())]
-    first = names.num_past - law.delays
+    first = names.before(law.delays)
     rows = [known.of("past", (*MOTIONS, *law.commands), first + k) for k in range(law.delays)]
     if physical:
         missed = _missed_before(known, first, law.delays)

@@ -41,6 +41,12 @@ class Layout:
     parameters: tuple[str, ...]
     commands: tuple[str, ...]
 
+    def before(self, steps: int) -> int:
+        """Row of the past so many steps before the instant; IndexError where the past is shorter."""
+        if steps > self.num_past:
+            raise IndexError(f"{steps} steps of the past are taken, of {self.num_past}")
+        return self.num_past - steps
+
     @property
     def sizes(self) -> dict[str, int]:
         """Entries of each input."""
@@ -260,7 +266,7 @@ class Known:
         """x, y, u, v, r of `shipid.hybrid.features.past_error`."""
         graph, physics = self.graph, self.physics
         steps = steps_of(seconds, physics.step)
-        first = self.names.num_past - steps
+        first = self.names.before(steps)
         known = past_records(self, first, steps)
         carry, then = SX.sym("carry", self.equations.num_carry), SX.sym("then", 3)
         now = SX.sym("now", 4)
@@ -402,7 +408,7 @@ def _history(names: Layout, groups: SX_of, inputs: Inputs, step: float) -> dict[
     now = dict(zip(names.now, ca.vertsplit(groups["now"]), strict=True))
 
     def before(name: str, seconds: float) -> SX:
-        row = names.num_past - steps_of(seconds, step)
+        row = names.before(steps_of(seconds, step))
         return groups["past"][row * len(names.past) + names.past.index(name)]
 
     for seconds in inputs.memory.history:

@@ -77,8 +77,13 @@ class Model:
     @cached_property
     def graph(self) -> Graph:
         """(now, reached, past, planned, estimates, parameters) -> path (T, 2), row by row."""
-        known = Known(self.physics, self.layout)
-        path = CORRECTORS[type(self.predictor.corrector)].path(known, self.predictor.corrector)
+        known, corrector = Known(self.physics, self.layout), self.predictor.corrector
+        try:
+            path = CORRECTORS[type(corrector)].path(known, corrector)
+        except (LookupError, ValueError, TypeError, AttributeError, RuntimeError, AssertionError) as error:
+            raise ShipidError(
+                f"the parts of the method {self.predictor.method!r} do not fit together ({error}): its file is damaged"
+            ) from error
         graph = known.graph.finish(path)
         count = num_numbers(graph) + (0 if self.band is None else num_numbers(self.band))
         if count > MOST_NUMBERS:

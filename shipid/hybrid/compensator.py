@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
+from shipid.files import entries_of
 from shipid.hybrid.features import Inputs, rows_of
 from shipid.hybrid.physics import Physics
 
@@ -181,7 +182,7 @@ class Compensator:
         """Rebuild from `header()` and `arrays()`; raises ResultError where a part is missing or shapes do not fit."""
         try:
             networks = []
-            for i, entry in enumerate(header["networks"]):
+            for i, entry in enumerate(entries_of(header, "networks")):
                 features = {k: tuple(v) for k, v in entry["features"].items()}
                 layers = tuple((arrays[f"{i}.weight.{j}"], arrays[f"{i}.bias.{j}"]) for j in range(entry["layers"]))
                 normaliser = Normaliser(tuple(features), arrays[f"{i}.mean"], arrays[f"{i}.std"])

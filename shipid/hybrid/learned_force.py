@@ -75,6 +75,9 @@ class ForceCorrector:
             raise ResultError("missing in the saved force", path=missing)
         if len({arrays[name].shape for name in (*HIDDEN, *OUTPUT)}) != 1:
             raise ResultError("the lists of the saved force differ in length", path=BLOCK)
+        several = next((name for name in (*SCALES, *LIMITS) if arrays[name].shape != (1,)), None)
+        if several is not None:
+            raise ResultError("must be one number in a list", path=several)
         return cls({name: arrays[name] for name in names}, dict(header["hyperparameters"]))
 
 

@@ -18,7 +18,7 @@ from pydantic import PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
-from shipid.files import part_of
+from shipid.files import entries_of, part_of
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
@@ -93,7 +93,7 @@ class OneStepCorrector:
     def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
         """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
         heads = []
-        for i, entry in enumerate(header["units"]):
+        for i, entry in enumerate(entries_of(header, "units")):
             parts = part_of(arrays, f"{i}.")
             head = Head(Units.from_arrays(entry, parts), taken(parts, "surge"), taken(parts, "sway_yaw"))
             count = len(head.units.offset)

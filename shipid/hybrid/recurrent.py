@@ -22,7 +22,7 @@ from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError
-from shipid.files import part_of
+from shipid.files import entries_of, part_of
 from shipid.hybrid.compensator import Normaliser, unflatten
 from shipid.hybrid.features import Inputs, Memory, feature_table, steps_of
 from shipid.hybrid.method import Fitted, Index, Task, shared_tables
@@ -99,6 +99,18 @@ class GatedNetwork:
             outputs = (outputs + half * self._outputs(self.reader.mirrored(seen))) / 2
         return np.tensordot(self.basis, unflatten(outputs), 1)
 
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shape of each array, by those of `W_h` and `W_2`, the names and the basis."""
+        units, hidden = self.layers["W_h"].shape[-1], self.layers["W_2"].shape[-1]
+        d, e, outputs = len(self.reader.past.names), len(self.reader.now.names), 2 * self.basis.shape[-1]
+        shapes: dict[str, tuple[int, ...]] = {
+            "W_i": (3 * units, d), "b_i": (3 * units,), "W_h": (3 * units, units), "b_h": (3 * units,),
+            "W_1": (hidden, units + e), "c_1": (hidden,), "W_2": (outputs, hidden), "c_2": (outputs,),
+            "basis": (len(self.basis), outputs // 2),
+            **{f"past.{name}": (d,) for name in ("mean", "std")}, **{f"now.{name}": (e,) for name in ("mean", "std")},
+        }  # fmt: skip
+        return shapes if self.reader.mirrors is None else shapes | {"past.mirror": (d, d), "now.mirror": (e, e)}
+
     def _outputs(self, seen: Sequences) -> Array:
         layers = self.layers
         hidden = np.zeros((len(seen.now), layers["W_h"].shape[1]))
@@ -167,18 +179,21 @@ class RecurrentCorrector:
     def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
         """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
         networks = []
-        for i, entry in enumerate(header["networks"]):
+        for i, entry in enumerate(entries_of(header, "networks")):
             parts = part_of(arrays, f"{i}.")
+            if not all(isinstance(name, str) for name in (*entry["past"], *entry["now"])):
+                raise ResultError("past and now must be lists of texts", path=f"networks.{i}")
             past, now = (
                 Normaliser(tuple(entry[key]), taken(parts, f"{key}.mean"), taken(parts, f"{key}.std"))
                 for key in ("past", "now")
             )
             mirrors = (taken(parts, "past.mirror"), taken(parts, "now.mirror")) if entry["mirror"] else None
             layers = {name: taken(parts, name) for name in LAYERS}
-            if layers["W_i"].shape[1] != len(past.names) or layers["W_2"].shape[1] != len(layers["c_1"]):
-                raise ResultError("the arrays of the saved network do not fit together", path=f"{i}.W_i")
-            reader = Reader(past, now, mirrors, int(entry["steps"]))
-            networks.append(GatedNetwork(reader, layers, taken(parts, "basis")))
+            network = GatedNetwork(Reader(past, now, mirrors, int(entry["steps"])), layers, taken(parts, "basis"))
+            wrong = next((name for name, shape in network.shapes().items() if parts[name].shape != shape), None)
+            if wrong is not None:
+                raise ResultError("the arrays of the saved network do not fit together", path=f"{i}.{wrong}")
+            networks.append(network)
         inputs, hyperparameters = Inputs.from_header(header["inputs"]), dict(header["hyperparameters"])
         return cls(inputs, float(header["past"]), tuple(networks), hyperparameters)
 

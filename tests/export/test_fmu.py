@@ -313,7 +313,7 @@ def test_the_sources_compile_without_a_warning(aboard, tmp_path):
 
 @pytest.mark.parametrize("program", ["g++", "clang++"])
 def test_a_compiler_of_cplusplus_takes_the_sources(program, ship, aboard, tmp_path):
-    """Before, g++ refused a member that has the name of a variable, and a tool would have found no function by its name."""
+    """Before, g++ refused a member with the name of a variable, and no tool would have found a function by its name."""
     if shutil.which(program) is None:
         pytest.skip(f"no {program}")
     for unit in (ship, aboard):

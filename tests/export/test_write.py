@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
@@ -12,6 +13,7 @@ from shipid.export.c import c_name
 from shipid.export.fmu import predictor_unit, vessel_unit
 from shipid.export.model import model
 from shipid.export.write import TARGETS, export_predictor, export_vessel
+from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.methods import METHODS
@@ -119,3 +121,38 @@ def test_a_method_without_a_counterpart_is_named_with_those_that_have_one(simple
     ) as one:
         predictor.export("c", tmp_path / "out")
     assert "linear," not in str(one.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "place", "value", "message"),
+    [
+        ("path-drawn", "networks", [], "networks: must be a list with one entry or more"),
+        ("recurrent", "networks", {}, "networks: must be a list with one entry or more"),
+        ("one-step", "units", {}, "units: must be a list with one entry or more"),
+        ("recurrent", "networks.0.now", [3], "networks.0: past and now must be lists of texts"),
+        ("recurrent", "0.b_h", np.zeros(14), "0.b_h: the arrays of the saved network do not fit together"),
+        ("recurrent", "networks.0.steps", 10**9, "'recurrent' do not fit together .1000000000 steps of the past"),
+        ("learned-force", "N_max", np.array(1.0), "N_max: must be one number in a list"),
+        ("hankel-dmd", "past", 1e18, "damaged: a past of 1?[0-9]* steps: 0 to 100000"),
+        ("hankel-dmd", "past", -30.0, "damaged: a past of -[0-9]* steps: 0 to 100000"),
+        ("hankel-dmd", "delays", 1, "'hankel-dmd' do not fit together .'past-2.u'"),
+        ("path-drawn", "inputs.memory.history", [1e-300], "'path-drawn' do not fit together"),
+    ],
+)
+def test_a_damaged_predictor_is_one_line(kind, place, value, message, tmp_path):
+    """Before, these could be read, and were tracebacks, or no end, at the prediction or the export."""
+    file = drawn(kind, 3, count=4, vessel="mariner").predictor.save(tmp_path / "sound.npz")
+    arrays = read_arrays(file)
+    header = json.loads(str(arrays["header"]))
+    *way, last = place.split(".")
+    if place in arrays:
+        arrays[place] = value
+    else:
+        part = header["corrector"]
+        for key in way:
+            part = part[int(key) if isinstance(part, list) else key]
+        part[last] = value
+    write_arrays(file, {**arrays, "header": np.array(json.dumps(header))})
+    with pytest.raises(ShipidError, match=message) as caught:
+        Predictor.load(file).export("c", tmp_path / "out")
+    assert "\n" not in str(caught.value)
