@@ -425,7 +425,8 @@ def _check_component(path: str, group: str, block: Any, file: str) -> None:
     """Check a block by the model of its kind, so that errors have the path and names of the file."""
     name = path.partition(".")[2]
     if name and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
-        raise DocumentError(f"{name!r} is no name for a {group}: use letters, digits, _ and -", file=file, path=group)
+        remedy = "use letters from a to z, digits, _ and -, a letter first"
+        raise DocumentError(f"{name!r} is no name for a {group}: {remedy}", file=file, path=group)
     if f"{name}." == ACTUAL:
         message = f"{name!r} is no name for a {group}: with it begin columns of what actuators have reached"
         raise DocumentError(message, file=file, path=path)

@@ -48,7 +48,7 @@ BROKEN = {
     "five-degrees-of-freedom": ("dof", "3, 4 or 6"),
     "six-degrees-without-inertia": ("inertia.I_x", "missing: 6 degrees of freedom need it"),
     "two-components-of-one-name": ("thruster.wind", "choose another"),
-    "dot-in-a-name": ("thruster", "use letters, digits, _ and -"),
+    "dot-in-a-name": ("thruster", "use letters from a to z, digits, _ and -, a letter first"),
     "thruster-called-actual": ("thruster.actual", "columns of what actuators have reached"),
     "thruster-is-a-number": ("thruster.stern", "must be a table with a `kind`"),
     "off-is-a-word": ("thruster.stern.off", "must be true or false"),
