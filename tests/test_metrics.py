@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 import torch
+from scipy.stats import spearmanr
 
 from shipid import metrics
 from shipid.errors import ShipidError
@@ -105,8 +106,16 @@ def test_roughness_by_hand():
     circle = 50.0 * np.stack([np.sin(angle), 1 - np.cos(angle)], axis=-1)[:, None, :]
     assert metrics.roughness(circle) == pytest.approx(0.5**2 / 50.0, rel=1e-4)
     assert metrics.roughness(np.concatenate([zigzag, np.zeros_like(zigzag)], axis=1)) == pytest.approx(1.0)
+    assert metrics.roughness(zigzag[:3]) == pytest.approx(2.0)
     with pytest.raises(ValueError, match="3 steps or more"):
         metrics.roughness(zigzag[:2])
+
+
+def test_a_long_run_counts_as_much_as_a_short_one():
+    held = np.array([True, False, True, True, False])
+    run = np.array(["b", "b", "a", "b", "b"])
+    np.testing.assert_array_equal(metrics.shares_by_run(held, run), [1.0, 0.5])
+    assert metrics.share_of(held, run) == 0.75
 
 
 def test_errors_by_axis_bound_the_distance(paths):
@@ -123,6 +132,8 @@ def test_rank_correlation_knows_order_alone():
     assert metrics.rank_correlation(x, np.array([1.0, 3.0, 2.0, 4.0])) == pytest.approx(0.8)  # 1 - 6 x 2 / (4 x 15)
     assert metrics.rank_correlation(np.array([1.0, 1.0, 2.0]), np.array([3.0, 3.0, 8.0])) == pytest.approx(1.0)
     assert metrics.rank_correlation(x, np.ones(4)) == 0.0
+    first, second = np.random.default_rng(0).integers(0, 4, (2, 30)).astype(float)
+    assert metrics.rank_correlation(first, second) == pytest.approx(spearmanr(first, second).statistic)
 
 
 def test_a_tally_has_every_error_in_its_bin() -> None:
@@ -137,6 +148,13 @@ def test_a_tally_has_every_error_in_its_bin() -> None:
 
 def test_tallies_of_no_member_have_no_quantile() -> None:
     assert tally_quantile(np.zeros((0, BINS), dtype=np.uint32), 0.9).shape == (0,)
+
+
+def test_tallies_of_any_shape_have_the_quantile_of_each() -> None:
+    errors = np.random.default_rng(0).gamma(2.0, 3.0, (2, 3, 50))
+    counts = np.array([[tally(one) for one in row] for row in errors])
+    quantiles = [[float(tally_quantile(one, 0.9)) for one in row] for row in counts]
+    np.testing.assert_array_equal(tally_quantile(counts, 0.9), quantiles)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])

@@ -82,6 +82,9 @@ def test_too_few_runs_are_one_sentence() -> None:
     mixed = replace(bands, kinds={"zigzag": 4, "turning": 18})  # enough runs, and too few of one kind
     mixed.region(made_.paths, made_.columns, 1.0, 0.8, kind="zigzag")
     mixed.region(made_.paths, made_.columns, 1.0, 0.9, kind="turning")
+    many = replace(bands, runs=99)
+    assert many.promises(0.99)
+    many.region(made_.paths, made_.columns, 1.0, 0.99)
     with pytest.raises(DataError, match=r"needs 9 runs or more of the kind 'zigzag' to calibrate it: there are 4"):
         mixed.region(made_.paths, made_.columns, 1.0, 0.9, kind="zigzag")
     for kind in ("spiral", ["zigzag"], np.array(["zigzag", "turning"])):
@@ -132,6 +135,12 @@ def test_tracks_are_unit_vectors_even_at_rest() -> None:
     np.testing.assert_array_equal(ahead[:, 2], np.tile([1.0, 0.0], (HORIZON, 1)))
 
 
+def test_a_track_at_a_step_leads_from_the_position_before_to_the_one_after() -> None:
+    """And at the end from the last but one to the last."""
+    corner = np.array([[3.0, 0.0], [3.0, 4.0], [0.0, 4.0]])[:, None]
+    np.testing.assert_allclose(track(corner)[:, 0], [[0.6, 0.8], [-0.6, 0.8], [-1.0, 0.0]], atol=1e-12)
+
+
 def test_the_nearest_point_is_the_nearest() -> None:
     rng = np.random.default_rng(3)
     points, centres = rng.normal(1e4, 1.0, (40, 3)), rng.normal(1e4, 1.0, (7, 3))
@@ -151,6 +160,8 @@ def test_levels_between_those_of_the_table() -> None:
     table = LEVELS**2
     assert at_level(table, 0.9) == pytest.approx(0.81)
     assert at_level(table, 0.905) == pytest.approx((0.81 + 0.91**2) / 2)
+    assert at_level(table, 0.985) == pytest.approx((0.98**2 + 0.99**2) / 2)
+    assert at_level(table, 0.99) == pytest.approx(0.99**2)
     assert at_level(table, 0.005) == pytest.approx(table[0] / 2)
 
 
@@ -176,6 +187,11 @@ def test_the_factor_of_an_adaptive_band_grows_with_misses_and_begins_at_one() ->
     table = -np.log1p(-LEVELS)
     state = adaptive(0.9, 0.1)
     assert factor(state, table) == pytest.approx(1.0)
+    for level in (0.2, 0.905, 0.98):
+        between = factor(state._replace(miss=1 - level), table)
+        assert between == pytest.approx(at_level(table, level) / at_level(table, 0.9))
+    assert adapted(state, True).miss == pytest.approx(0.1 - 0.1 * 0.9)
+    assert adapted(state, False, 4).miss == pytest.approx(0.1 + 0.1 * 0.1 / 4)
     factors = []
     for _ in range(20):
         state = adapted(state, True)
@@ -219,3 +235,7 @@ def test_a_steady_turn_has_no_slip_and_no_change(step: float) -> None:
     np.testing.assert_allclose(np.exp(length[1]) - 0.02, 4.0 * step * HORIZON * 3)  # straight ahead
     (slow,) = traits(paths[:, 2:], {"r": r[2:] / 2}, step, np.zeros(1), 1.0)  # it turns more than it would
     assert slow[3] == pytest.approx(slow[1] / 2)
+    (fast,) = traits(paths[:, 2:], {"r": r[2:] * 1.5}, step, np.zeros(1), 1.0)  # it turns less than it would
+    assert fast[3] == pytest.approx(fast[1] / 2)
+    (twice,) = traits(paths[:, 1:2], {"r": r[1:2]}, step, np.zeros(1), 2 * step)
+    assert np.exp(twice[0]) - 0.02 == pytest.approx(2.0 * HORIZON * 3)  # over the length of an average path

@@ -11,6 +11,7 @@ from shipid.hybrid.calibration import (
     PRIOR,
     _alike,
     _fitted,
+    _floored,
     _from_training,
     _rising,
     _runs,
@@ -133,6 +134,19 @@ def test_strange_errors_give_finite_bands(error: float) -> None:
     assert bands is not None
     region = bands.region(np.zeros_like(errors), still, 1.0, 0.7)
     assert np.isfinite(region.radius).all()
+
+
+def test_small_errors_early_in_the_horizon_do_not_decide() -> None:
+    """No scale is below 5 % of the greatest one, along and across each for itself."""
+    scale = np.array([[0.0, 0.001], [0.01, 0.05], [0.5, 0.2], [2.0, 0.1]])
+    np.testing.assert_allclose(_floored(scale), [[0.1, 0.01], [0.1, 0.05], [0.5, 0.2], [2.0, 0.1]])
+
+
+def test_the_length_of_an_average_path_is_by_runs() -> None:
+    drawn, bands = made(2)
+    ends = np.concatenate([np.zeros((1, len(drawn.run), 2)), drawn.paths[[2, 5, 7]]])  # thirds of 8 steps
+    long = np.hypot(*np.diff(ends, axis=0).transpose(2, 0, 1)).sum(axis=0)
+    assert bands.length == pytest.approx(np.mean([long[drawn.run == one].mean() for one in np.unique(drawn.run)]))
 
 
 @pytest.mark.parametrize("circle", [True, False])
