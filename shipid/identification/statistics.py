@@ -143,7 +143,7 @@ class Whiteness:
 class Covariance:
     """One form of covariance: matrix (n, n) of the factors, degrees of freedom (n,), whether to trust it, and why.
 
-    influences : (clusters, n) change of the estimate by each cluster; None for the Fisher form.
+    clusters : number of runs or stretches that count as independent; 0 for the Fisher form, which has none.
     """
 
     kind: Kind
@@ -151,7 +151,7 @@ class Covariance:
     freedom: Array
     trusted: bool
     reason: str
-    influences: Array | None = None
+    clusters: int = 0
 
     @property
     def errors(self) -> Array:
@@ -248,7 +248,7 @@ def statistics(fit: LinearFit) -> Statistics:
 def _last(covariances: Mapping[Kind, Covariance]) -> Kind:
     """Form to report if none is trusted: `blocks`, but `fisher` for a single block, whose scores sum to 0."""
     blocks = covariances.get("blocks")
-    return "blocks" if blocks is None or blocks.influences is None or len(blocks.influences) > 1 else "fisher"
+    return "blocks" if blocks is None or blocks.clusters > 1 else "fisher"
 
 
 def _nothing(fit: LinearFit) -> Statistics:
@@ -522,7 +522,7 @@ def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: s
         parts.append((values, grown, axes))
         scores.append((grown * (left.T @ fit.residuals[rows])) @ axes)  # root^T J_g^T A_g e_g
     scale, alone = _scale(parts, np.array(scores))
-    influences = -np.array(scores) @ root.T * scale
+    influences = np.array(scores) @ root.T * scale  # change of the estimate without each cluster
     spread_of_data = influences.T @ influences + root @ alone @ root.T
     of_prior = (basis.inverse * basis.prior) @ basis.inverse
     matrix = spread_of_data + of_prior
@@ -534,7 +534,7 @@ def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: s
     reason = f"{len(parts)} {what}, worth {typical:.1f} degrees of freedom"
     if not trusted:
         reason += f"; under {LEAST_FREEDOM:g} the intervals mislead"
-    return Covariance(kind, matrix, freedom, trusted, reason, influences)
+    return Covariance(kind, matrix, freedom, trusted, reason, len(parts))
 
 
 def _root(matrix: Array) -> Array:

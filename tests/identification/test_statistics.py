@@ -225,6 +225,12 @@ def test_levels_and_memory_are_measured() -> None:
     coloured = statistics(one(0.8)).whiteness
     assert np.mean([colour.memory for colour in coloured.values()]) == pytest.approx(9, rel=0.25)
     assert not any(colour.white for colour in coloured.values())
+    fit = one(0.8)
+    of_u = np.array(fit.signals) == "u"
+    rho = autocorrelation([fit.residuals[of_u & (fit.clusters == run)] for run in np.unique(fit.clusters)])
+    pairs = [rho[k] + rho[k + 1] for k in range(1, len(rho) - 1, 2)]
+    until = next(k for k, pair in enumerate(pairs) if pair <= 0)
+    assert coloured["u"].memory == pytest.approx(1 + 2 * sum(pairs[:until]))
 
 
 def test_whiteness_is_that_of_ljung_and_box_and_of_means_over_quarters() -> None:
