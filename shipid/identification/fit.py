@@ -393,10 +393,20 @@ def _steps(problem: Problem, at: Prediction, threshold: float) -> tuple[list[Arr
         rows = at.rows(run)
         A, xi = at.unknown(run, rows, root)
         slope = A.T @ f[rows] + xi
-        step = -np.linalg.solve(A.T @ A + np.eye(len(xi)), slope)
-        steps.append(np.asarray(step, dtype=float))
+        step = _ridge(A, f[rows], xi)
+        steps.append(step)
         fall[run] = -slope @ step
     return steps, fall
+
+
+def _ridge(A: Array, f: Array, xi: Array) -> Array:
+    """Step (k,) to the least |f + A step|^2 + |xi + step|^2; A : (m, k). f : (m,). xi : (k,)."""
+    unit = np.eye(len(xi))
+    try:
+        return np.asarray(-np.linalg.solve(A.T @ A + unit, A.T @ f + xi), dtype=float)
+    except np.linalg.LinAlgError:  # a small yaw grows so much that rounding loses the unit matrix beside A^T A
+        scale, step, _ = _gauss_newton(np.vstack([A, unit]), np.concatenate([f, xi]))
+        return -step / scale
 
 
 def _moved(problem: Problem, at: Prediction, steps: list[Array], share: Array) -> tuple[Array, Array]:

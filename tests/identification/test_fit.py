@@ -62,6 +62,17 @@ def test_the_unknowns_of_the_runs_are_where_they_are_best() -> None:
         assert again.objective == pytest.approx(best.objective, rel=1e-8)
 
 
+@pytest.mark.parametrize("growing", [-1.0, -2.0, -3.0])
+def test_a_straight_run_of_a_ship_whose_yaw_would_grow_has_a_best_start(growing: float) -> None:
+    """Nothing disturbs it, but the derivatives to its initial yaw rate grow beyond 10^9."""
+    data = trials(SHIP, runs=1, steps=120)
+    still = np.zeros(len(data.frame))
+    straight = changed(data, u=still + 3.0, **dict.fromkeys(("v", "r", "port.alpha", "starboard.alpha"), still))
+    task = build(SHIP, straight, straight.runs, Identify(parameters=PATHS, horizon=0, nuisance=["initial_state"]))
+    costs = [evaluate(task, np.array([1.0, 1.0, factor]), origin(task)).objective for factor in (1.0, growing)]
+    assert costs[1] == pytest.approx(costs[0], rel=1e-6)
+
+
 def test_rows_that_scipy_sees_do_not_grow_with_the_log() -> None:
     task = problem()
     value = evaluate(task, np.ones(3), origin(task))
