@@ -27,6 +27,7 @@ from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.outline import ship_outline
+from shipid.vessel.schema import term_blocks
 
 TRIALS: tuple[tuple[str, tuple[float, ...]], ...] = (("turning", (35,)), ("zigzag", (10, 10)), ("zigzag", (20, 20)))
 """Standard manoeuvres [deg] that have criteria."""
@@ -120,7 +121,19 @@ def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
     judged = criteria(chosen.kind, measures, length, calm=True)
     if chosen.manoeuvre.approach == "rest":
         judged = [replace(one, met=None, note=FROM_REST) for one in judged]
+    elif chosen.kind == "stop":
+        judged = [replace(one, note="; ".join(filter(None, [_thrust_astern(vessel), one.note]))) for one in judged]
     return Measured(vessel, chosen, frame, record, measure_rows(measures, length), criterion_rows(judged))
+
+
+def _thrust_astern(vessel: Vessel) -> str:
+    """Which screws push astern by the polynomial of ahead, which was not measured there; empty if none does."""
+    ahead = [
+        path
+        for path, key, block in term_blocks(vessel.document)
+        if key == "thruster.propeller" and "K_T_astern" not in block
+    ]
+    return f"thrust astern of {', '.join(ahead)} is extrapolated: K_T is for ahead, give K_T_astern" if ahead else ""
 
 
 def _within_stops(vessel: Vessel, columns: Mapping[str, Any]) -> dict[str, Any]:

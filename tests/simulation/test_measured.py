@@ -34,6 +34,18 @@ def test_the_page_of_a_stop_ends_with_the_stop():
     assert len(done.frame) > len(log)
 
 
+def test_a_stop_says_where_the_thrust_astern_is_extrapolated():
+    """A K_T of ahead at J < 0 promises a ferry of 112 m a stop in 1.7 lengths: the verdict says what it rests on."""
+    ship = first_guess(Particulars(112.0, 20.3, 4.6, 0.58, speed=9.5, shafts=2), "f", "f.toml").vessel
+    (row,) = measure_standard(ship, "stop").criteria
+    assert row["verdict"] == "met"
+    assert "thrust astern of thruster.port, thruster.starboard is extrapolated" in row["note"]
+    units = ship.document["thruster"]
+    measured = {name: {**units[name], "K_T_astern": {"1": 0.2, "J": -0.1}} for name in ("port", "starboard")}
+    known = check_vessel({**ship.document, "thruster": {**units, **measured}}, "f.toml")
+    assert measure_standard(known, "stop").criteria[0]["note"] == ""
+
+
 def test_a_ship_that_does_not_go_straight_gets_a_helmsman():
     lame = load_vessel("gunnerus-28.9").with_values({"thruster.starboard.off": True})
     done = measure_standard(lame, "turning", (20,), duration=120.0)
