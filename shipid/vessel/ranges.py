@@ -190,9 +190,9 @@ def _against_the_wind(values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     if not gamma:
         return
     least, most = min(gamma)[0], max(gamma)[0]
-    if least > ALONG or most < 180 - ALONG:
-        words = f"from {least:g} to {most:g} deg: expected from 0, a head wind, to 180"
-        yield "wind.gamma_deg", f"{words}, one from astern; beyond its ends a table is constant"
+    if abs(least) > ALONG or abs(most - 180) > ALONG:
+        words = f"from {least:g} to {most:g} deg: expected from 0, a head wind, to 180, one from astern"
+        yield "wind.gamma_deg", f"{words}; beyond its ends a table is constant, and the other side is its mirror image"
     (first, head), (_, beam) = (min(gamma, key=lambda one: abs(one[0] - of)) for of in (0.0, 90.0))
     if abs(first) < ALONG and values[f"wind.C_X.{head}"] > 0:
         words = f"{values[f'wind.C_X.{head}']:g} at {first:g} deg: a head wind drives her astern, C_X < 0"

@@ -199,9 +199,9 @@ def test_a_rudder_behind_the_screw_of_the_other_side_is_refused(tmp_path: Path) 
         load_vessel(tmp_path / "twin.toml")
 
 
-@pytest.mark.parametrize("ends", [(0, 90), (30, 150), (90, 270)])
-def test_a_wind_table_of_fewer_angles_is_refused_and_may_be_meant(ends: tuple[float, float], tmp_path: Path) -> None:
-    """A wind from astern would have the force of one abeam."""
+@pytest.mark.parametrize("ends", [(0, 90), (30, 150), (90, 270), (0, 360), (-180, 180)])
+def test_a_wind_table_of_other_angles_is_refused_and_may_be_meant(ends: tuple[float, float], tmp_path: Path) -> None:
+    """With fewer a wind from astern would have the force of one abeam; of more the other side would not be used."""
     gamma = np.linspace(*ends, 5)
     side = np.where(gamma > 180, -1, np.sign(gamma))
     columns = {
