@@ -20,6 +20,7 @@ from shipid.report.wording import metres
 LOGGED, PATH, PHYSICS, BAND, ALARM = "logged track", "predicted path", "physics alone", "band", "alarm"
 COLOURS = {LOGGED: INK, PATH: category(0), PHYSICS: category(1), BAND: category(0), ALARM: INK}
 DASHES = {PHYSICS: "dash", BAND: "dot"}
+FIRST, LEFT_OUT = ("alarm:", "band of"), ("latency:", "error where")  # begins of lines of the summary
 MOST_RUNS, MOMENTS = 24, 6  # runs to choose from; instants of a run whose paths are drawn
 
 
@@ -30,7 +31,7 @@ class AboardContent(PageContent):
     Parameters
     ----------
     title, name : in words, and the predictor.
-    lines : the lines of the summary; the first ones are the answer.
+    lines : the lines of the summary, in the order of the terminal; those that begin with a space belong to one above.
     instants : run, t [s], outside (the alarm), error at the end of the horizon [m], latency [s].
     points : run, t, ahead [s], north, east, physics_north, physics_east [m]; with a band also band_along, band_across
         [m] and band_course [rad, clockwise from north].
@@ -44,9 +45,11 @@ class AboardContent(PageContent):
 
     @property
     def answer(self) -> list[Sentence]:
-        """What was predicted, how often the alarm was raised, and whether the band kept its promise."""
-        kept = [text for text in self.lines if text.startswith(("alarm:", "band of")) or " predictions in " in text]
-        return [Sentence(text[0].upper() + text[1:] + ".", "seen") for text in kept]
+        """What was predicted, how often the alarm was raised, whether the band kept its promise; then its limits."""
+        whole = [text for text in self.lines if not text.startswith((" ", *LEFT_OUT))]
+        first = [text for text in whole if text.startswith(FIRST) or " predictions in " in text]
+        every = [*first, *(text for text in whole if text not in first)]
+        return [Sentence(text[0].upper() + text[1:] + ".", "seen") for text in every]
 
     @property
     def runs(self) -> list[str]:
@@ -93,7 +96,7 @@ def seen(content: AboardContent) -> Figure:
     return Figure(
         id="seen",
         title="What was seen",
-        takeaway=content.answer[-1].text,
+        takeaway=next((one.text for one in content.answer if one.text.startswith("Band of")), content.answer[0].text),
         how=f"Paths of at most {MOMENTS} instants of a run, predicted from the rows up to then; the track went on as "
         "drawn." + (" Ellipses are the band at a few steps of each path." if content.banded else ""),
         alternative="The measured track, with the paths predicted along it and those of the physics alone.",

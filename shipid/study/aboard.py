@@ -305,7 +305,7 @@ def _held(instants: pd.DataFrame, band: Band, bands: Bands) -> list[str]:
             share = percent(share_of(held[promised], run))
             same = share == percent(held[promised].mean())
             what = "that is" if same else f"in the mean over runs {share}, which is"
-            lines.append(f"  {what} fewer than {percent(band.level)} by more than chance: {CHANGED}")
+            lines[0] += f"; {what} fewer than {percent(band.level)} by more than chance: {CHANGED}"
         lines += _by_level(reach[promised], band, bands)
     return lines
 

@@ -62,6 +62,18 @@ def test_it_draws_what_was_played(banded: bool, physics: bool, tmp_path) -> None
     assert "latency: 10 ms" not in text
 
 
+def test_what_limits_the_promise_is_on_the_page() -> None:
+    """That bands do not hold, that wind was taken as 0 and times without rows were said in the terminal alone."""
+    limits = ["not in the log, taken as 0: V_w", "1 time without rows: no errors there"]
+    broken = "band of 90 %: it held 40 % of the 20 whole paths; that is fewer than 90 % by more than chance"
+    here = content()
+    here = replace(here, lines=[here.lines[0], *limits, *here.lines[1:], "  b: from 1 to 2 s", broken])
+    said = [one.text for one in here.answer]
+    assert said == [f"{text[0].upper()}{text[1:]}." for text in (here.lines[0], here.lines[3], broken, *limits)]
+    assert seen(here).takeaway == said[2]
+    assert seen(content(banded=False)).takeaway == said[0], "the figure shows paths, no alarm"
+
+
 def test_of_many_runs_the_worst_is_among_those_to_choose_from() -> None:
     """Of 60 runs 24 were shown, and the worst of these was said to have the largest error of all."""
     here = content()
