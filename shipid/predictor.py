@@ -21,7 +21,7 @@ from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrated
-from shipid.hybrid.method import Case, Corrector, Index, Method, Task, ended, fit_all, place_of, widened
+from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, place_of, placed, widened
 from shipid.hybrid.methods import METHODS, kind_of, listed
 from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.observer import AGE, Observer
@@ -137,25 +137,25 @@ class Predictor:
         ------
         DataError : planned commands, a column or a part of the past is missing, or has another shape; there were too
             few runs for the level.
+        ShipidError : the method of a user makes another mistake, such as a division by zero.
         """
         if level is not None:
             self.check_level(level, kind)
         instants = self._known(instants)
         alone = locked(self._paths(self.physics.paths(instants) if paths is None else paths, instants))
         home = type(self.corrector)
-        try:
-            predicted, lost = self.corrector.predict(self.physics, instants, alone), self._lost(instants)
-        except SystemExit as error:
-            raise DataError(f"the method {self.method!r} {ended(error, home)}") from None
-        except KeyError as error:
-            raise DataError(
-                f"the method was trained with this input, and the instants lack it{place_of(error, home)}",
-                path=str(error.args[0]),
-            ) from error
-        except (ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
-            raise DataError(
-                f"the method {self.method!r} and the instants do not fit together ({error}){place_of(error, home)}"
-            ) from error
+        with placed(f"the method {self.method!r}", home):
+            try:
+                predicted, lost = self.corrector.predict(self.physics, instants, alone), self._lost(instants)
+            except KeyError as error:
+                raise DataError(
+                    f"the method was trained with this input, and the instants lack it{place_of(error, home)}",
+                    path=str(error.args[0]),
+                ) from error
+            except (ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
+                raise DataError(
+                    f"the method {self.method!r} and the instants do not fit together ({error}){place_of(error, home)}"
+                ) from error
         predicted = self._paths(predicted, instants, f"paths of the method {self.method!r}")
         if np.may_share_memory(predicted, alone) or lost.any():  # the prediction is the caller's to change
             predicted = predicted.copy()
@@ -304,7 +304,8 @@ class Predictor:
 
     def _corrector_header(self) -> dict[str, Any]:
         """What the method keeps beside its arrays; DataError for what would not be read back as it is."""
-        header = plain(self.corrector.header())
+        with placed(f"the header of the method {self.method!r}", type(self.corrector)):
+            header = plain(self.corrector.header())
         wrong = f"the header of the method {self.method!r} must be a table of texts, numbers and lists of them"
         if not isinstance(header, dict):
             raise DataError(f"{wrong}, not {type(header).__name__}")
@@ -318,7 +319,11 @@ class Predictor:
 
     def _corrector_arrays(self) -> dict[str, Array]:
         """The arrays of the method; DataError for what would not be read back."""
-        arrays = {str(name): np.asarray(values) for name, values in self.corrector.arrays().items()}
+        with placed(f"the arrays of the method {self.method!r}", type(self.corrector)):
+            given = self.corrector.arrays()
+        if not isinstance(given, Mapping):
+            raise DataError(f"the arrays of the method {self.method!r} must be a table, not {type(given).__name__}")
+        arrays = {str(name): np.asarray(values) for name, values in given.items()}
         taken = next((name for name in arrays if name == "header" or name.startswith(BANDS)), None)
         fault = _fault_of(arrays) if taken is None else f"{taken!r} is a name that is taken: use another"
         if fault:

@@ -16,7 +16,7 @@ import torch
 
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows, cut_windows
-from shipid.errors import DataError
+from shipid.errors import DataError, ShipidError
 from shipid.hybrid.alone import Alone, Unchanged
 from shipid.hybrid.features import Memory
 from shipid.hybrid.forest import Forest
@@ -389,16 +389,18 @@ def _parts_that_do_not_fit(paths: Any) -> Any:
         (_parts_that_do_not_fit, r"the method 'mine' and the instants do not fit together \(.*\)"),
         (lambda paths: {}["slope"] + paths, "slope: the method was trained with this input, and the instants lack it"),
         (lambda _: sys.exit(2), r"the method 'mine' calls sys\.exit"),
+        (lambda paths: paths + 1 / len(paths[:0]), "the method 'mine': ZeroDivisionError: .*"),
+        (lambda paths: paths.mean_of_all(), "the method 'mine': AttributeError: .*"),
     ],
 )
 def test_a_mistake_in_a_method_of_a_user_has_its_place(made: Callable[[Any], Any], message: str) -> None:
     """One sentence without file and line: the mistake might be anywhere. The last line of the user's file is named."""
     known = Predictor(NONE, "mine", Mistaken(lambda _, __, paths: made(paths)))
-    with pytest.raises(DataError, match=f"^{message} in {re.escape(__file__)}, line ") as caught:
+    with pytest.raises(ShipidError, match=f"^{message} in {re.escape(__file__)}, line ") as caught:
         known.predict(WINDOWS.instants())
     lines = Path(__file__).read_text().splitlines()
     line = lines[int(re.search(r"line (\d+)", str(caught.value))[1]) - 1]  # type: ignore[index]
-    assert any(part in line for part in ("np.zeros(3)", '{}["slope"]', "sys.exit"))
+    assert any(part in line for part in ("np.zeros(3)", '{}["slope"]', "sys.exit", "1 / len", "mean_of_all"))
 
 
 @pytest.mark.parametrize(
@@ -429,6 +431,7 @@ def test_paths_of_a_method_that_are_none_are_named(made: Callable[[Any], Any], m
         ({}, {"std": np.zeros(2)}, "arrays of the method 'mine': 'std' must be above 0"),
         ({}, {"header": np.zeros(2)}, "arrays of the method 'mine': 'header' is a name that is taken: use another"),
         ({}, {"bands.x": np.zeros(2)}, "arrays of the method 'mine': 'bands.x' is a name that is taken"),
+        ({}, None, "the arrays of the method 'mine' must be a table, not NoneType"),
         ([1], {}, "the header of the method 'mine' must be a table of texts, numbers and lists of them, not list"),
         ({"a": {1, 2}}, {}, "the header of the method 'mine' must be a table .* not JSON serializable"),
         ({"names": [3]}, {}, "the header of the method 'mine': commands and names and modules must be lists of texts"),

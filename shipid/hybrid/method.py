@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol, Self
 
@@ -206,17 +207,8 @@ def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
     user makes a mistake.
     """
     name, shape = type(method).__name__, task.windows.future.shape
-    try:
+    with placed(f"{name}.fit", type(method)):
         given = method.fit(task)
-    except SystemExit as error:
-        raise ShipidError(f"{name}.fit {ended(error, type(method))}") from None
-    except (ShipidError, MemoryError):
-        raise
-    except Exception as error:
-        place = place_of(error, type(method))
-        if not place:
-            raise
-        raise ShipidError(f"{name}.fit: {type(error).__name__}: {error}{place}") from error
     if not isinstance(given, Mapping):
         raise DataError(f"{name}.fit must return a table, foundation -> Fitted, not {type(given).__name__}")
     for case in task.cases:
@@ -250,10 +242,25 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...]) -> None:
             number(f"{where}: hyperparameters of the corrector: {key}", value, DataError)
 
 
-def ended(error: SystemExit, kind: type) -> str:
-    """What the code of a class did that calls `sys.exit`, in words."""
-    words = f" ({error.code})" if isinstance(error.code, str) else ""
-    return f"calls sys.exit{words}{place_of(error, kind)}: a method may not end the process, raise DataError instead"
+@contextmanager
+def placed(where: str, kind: type) -> Iterator[None]:
+    """Raise ShipidError, one line with its place, for a mistake in the code of a user's class, or a call of `sys.exit`.
+
+    Errors that arise elsewhere pass as they are.
+    """
+    try:
+        yield
+    except SystemExit as error:
+        words = (f" ({error.code})" if isinstance(error.code, str) else "") + place_of(error, kind)
+        remedy = "a method may not end the process, raise DataError instead"
+        raise ShipidError(f"{where} calls sys.exit{words}: {remedy}") from None
+    except (ShipidError, MemoryError):
+        raise
+    except Exception as error:
+        place = place_of(error, kind)
+        if not place:
+            raise
+        raise ShipidError(f"{where}: {type(error).__name__}: {error}{place}") from error
 
 
 def place_of(error: BaseException, kind: type) -> str:
