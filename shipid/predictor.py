@@ -24,6 +24,7 @@ from shipid.hybrid.calibration import calibrated
 from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, place_of, placed, widened
 from shipid.hybrid.methods import METHODS, kind_of, listed
 from shipid.hybrid.physics import Physics, check_columns, check_instants
+from shipid.metrics import lengths
 from shipid.observer import AGE, Observer
 from shipid.physics.signals import SIGNALS, measurable
 from shipid.simulation.log import column_of
@@ -316,6 +317,26 @@ class Predictor:
         if not _named(header):
             raise DataError(f"the header of the method {self.method!r}: {' and '.join(NAMES)} must be lists of texts")
         return header
+
+    def check_restored(self, instants: Instants, paths: Array) -> None:
+        """Raise ShipidError where the method of a user, read back from what `save` writes, predicts something else.
+
+        instants, paths : of which the first is predicted, as for `predict`.
+        """
+        home = type(self.corrector)
+        if home.__module__.startswith("shipid."):  # the tests of shipid say so
+            return
+        header = json.loads(json.dumps(self._corrector_header(), default=str))
+        with placed(f"from_arrays of the method {self.method!r}", home):
+            corrector = METHODS[self.method].corrector.from_arrays(header, self._corrector_arrays())
+        one, first = instants.select(np.arange(1)), paths[:, :1]
+        pair = [replace(self, corrector=each).predict(one, first) for each in (self.corrector, corrector)]
+        if not np.allclose(*pair, rtol=1e-6, atol=1e-6, equal_nan=True):
+            away = float(np.nanmax(lengths(pair[0] - pair[1])))
+            raise ShipidError(
+                f"the method {self.method!r}, saved and read back, predicts places {away:.2g} m away: `header`, "
+                "`arrays` and `from_arrays` must keep all that `predict` uses, and `predict` may draw nothing at random"
+            )
 
     def _corrector_arrays(self) -> dict[str, Array]:
         """The arrays of the method; DataError for what would not be read back."""

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -401,6 +401,47 @@ def test_a_mistake_in_a_method_of_a_user_has_its_place(made: Callable[[Any], Any
     lines = Path(__file__).read_text().splitlines()
     line = lines[int(re.search(r"line (\d+)", str(caught.value))[1]) - 1]  # type: ignore[index]
     assert any(part in line for part in ("np.zeros(3)", '{}["slope"]', "sys.exit", "1 / len", "mean_of_all"))
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A corrector that a user wrote: a shift, which it keeps or loses."""
+
+    shift: float
+    kept: bool = True
+    past: float = 0.0
+    hyperparameters: Any = field(default_factory=dict)
+
+    def predict(self, physics: Physics, instants: Instants, paths: Any) -> Any:  # noqa: ARG002
+        return paths + self.shift
+
+    def header(self) -> dict[str, Any]:
+        return {"shift": self.shift} if self.kept else {}
+
+    def arrays(self) -> dict[str, Any]:
+        return {}
+
+    @classmethod
+    def from_arrays(cls, header: Any, arrays: Any) -> Stored:
+        assert arrays == {}
+        return cls(4.0 / header.get("shift", 2.0))
+
+
+def test_a_method_that_loses_what_it_learned_is_seen_before_its_results(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its errors were those of the fit, and the predictor of the same cell was 3 m beside them, without a word."""
+
+    class Mine(Shared):
+        corrector: ClassVar[type[Any]] = Stored
+
+    monkeypatch.setitem(METHODS, "mine", Mine)
+    instants, paths = WINDOWS.instants(), np.zeros((HORIZON, len(WINDOWS), 2))
+    Predictor(NONE, "mine", Stored(2.0)).check_restored(instants, paths)
+    with pytest.raises(
+        ShipidError, match=r"the method 'mine', saved and read back, predicts places 4\.2 m away: `header`"
+    ):
+        Predictor(NONE, "mine", Stored(5.0, kept=False)).check_restored(instants, paths)
+    with pytest.raises(ShipidError, match=r"^from_arrays of the method 'mine': ZeroDivisionError: .*, line "):
+        Predictor(NONE, "mine", Stored(0.0)).check_restored(instants, paths)
 
 
 @pytest.mark.parametrize(

@@ -512,11 +512,12 @@ def _judged(
         sentence = share if np.isfinite(one.paths).all() else one.sentence
         return _failed(sentence, "diverged") | {"hyperparameters": words}, None
     instants = instants_of(plan, predictor.vessel, prepared.data, test, one.estimates)
+    predictor.check_restored(instants, one.test_paths)
     paths = predictor.predict(instants, one.test_paths)
     failed = _beyond_ships(paths, test.step)
     if failed.any():
         where = f"{percent(failed.mean(), 1)} of the test windows"
-        sentence = f"the prediction diverges on {where}: no ship gets so far"
+        sentence = f"the prediction is not a number, or farther than any ship gets, on {where}"
         return _failed(sentence, "diverged") | {"hyperparameters": words}, None
     error = summary(position_error(paths, test.future))
     errors = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"]}

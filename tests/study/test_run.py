@@ -396,7 +396,7 @@ def test_a_path_that_no_ship_can_follow_is_a_cell_without_a_result(
     monkeypatch.setattr(Predictor, "predict", wild)
     rows = [row for row, *_ in run_unit(plan, prepare(plan, obtain(plan)), plan.whole(plan.batches[0]), "cpu")]
     assert {row["status"] for row in rows} == {"diverged"}
-    assert all("the prediction diverges on 50.0" in row["sentence"] for row in rows)
+    assert all("farther than any ship gets, on 50.0" in row["sentence"] for row in rows)
     assert np.isnan([row["H"] for row in rows]).all()
 
 
