@@ -300,6 +300,35 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     """Print estimates, what is not identified, free runs, manoeuvres, manoeuvres to run next, and warnings."""
     from shipid.identification.sides import HEADS, shown
 
+    _show_estimates(outcome, answer)
+    _show_nuisances(outcome, answer)
+    _show_free_runs(outcome, answer)
+    _show_manoeuvres(outcome, answer)
+    if len(outcome.groups):
+        answer.say(f"Errors by side, helm and speed, on {'runs held out' if outcome.held_out else 'the fitted runs'}:")
+        answer.rows("groups", outcome.groups, table(list(HEADS), shown(outcome.groups)))
+    if outcome.solution.effective:
+        worth = ", ".join(f"{name} {count:.0f}" for name, count in outcome.solution.effective.items())
+        counts = dict(outcome.solution.effective)
+        answer.say(f"number of independent residuals that they are worth: {worth}", independent_residuals=counts)
+    profiles = [curve.sentence for curve in outcome.profiles]
+    answer.say("\n".join(f"profile: {sentence}" for sentence in profiles), profiles=profiles)
+    if outcome.programme is not None:
+        answer.say("To run next, by information per hour:")
+        ranked = [
+            [row["manoeuvre"], *(f"{row[name]:.2f}" for name in ("hours", "gain", "per_hour")), row["narrows"],
+             percent(1 - row['after'] / row['before'])]
+            for row in outcome.programme.head(10).to_dict("records")
+        ]  # fmt: skip
+        heads = ["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"]
+        answer.rows("to_run_next", outcome.programme, table(heads, ranked))
+    answer.say(warnings=outcome.warnings)
+    for warning in outcome.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+
+
+def _show_estimates(outcome: Identified, answer: Answer) -> None:
+    """Print how the fit ended, the factors with their intervals, and what the data cannot separate."""
     solution = outcome.solution
     fitted = (
         f"{len(outcome.runs)} of {len(outcome.runs) + len(outcome.held_out)} runs, {len(solution.residuals)} residuals"
@@ -331,7 +360,10 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
         standard_errors_by=outcome.statistics.chosen,
     )
     answer.say("\n".join(f"  {sentence}" for sentence in outcome.unseen), unseen=outcome.unseen)
-    _show_nuisances(outcome, answer)
+
+
+def _show_free_runs(outcome: Identified, answer: Answer) -> None:
+    """Print errors of free runs, and of measured outputs, before the fit and after it."""
     answer.say(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
     heads = ["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
     answer.rows("free_runs", outcome.errors, table(heads, _free_rows(outcome)))
@@ -342,6 +374,10 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
         ]
         heads = ["measured output", "unit", "rms", "error before", "after"]
         answer.rows("outputs", outcome.outputs, table(heads, levels))
+
+
+def _show_manoeuvres(outcome: Identified, answer: Answer) -> None:
+    """Print measures of standard manoeuvres before the fit and after it, and which of them the runs do not cover."""
     banded = "low" in outcome.manoeuvres
     compared = [
         [
@@ -359,27 +395,6 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
         typer.echo(f"note: no {', '.join(titles)}: {note}", err=True)
     beyond = list(outcome.beyond)
     answer.say("\n".join(f"extrapolated: {sentence}" for sentence in beyond), extrapolated=beyond)
-    if len(outcome.groups):
-        answer.say(f"Errors by side, helm and speed, on {'runs held out' if outcome.held_out else 'the fitted runs'}:")
-        answer.rows("groups", outcome.groups, table(list(HEADS), shown(outcome.groups)))
-    if outcome.solution.effective:
-        worth = ", ".join(f"{name} {count:.0f}" for name, count in outcome.solution.effective.items())
-        counts = dict(outcome.solution.effective)
-        answer.say(f"number of independent residuals that they are worth: {worth}", independent_residuals=counts)
-    profiles = [curve.sentence for curve in outcome.profiles]
-    answer.say("\n".join(f"profile: {sentence}" for sentence in profiles), profiles=profiles)
-    if outcome.programme is not None:
-        answer.say("To run next, by information per hour:")
-        ranked = [
-            [row["manoeuvre"], *(f"{row[name]:.2f}" for name in ("hours", "gain", "per_hour")), row["narrows"],
-             percent(1 - row['after'] / row['before'])]
-            for row in outcome.programme.head(10).to_dict("records")
-        ]  # fmt: skip
-        heads = ["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"]
-        answer.rows("to_run_next", outcome.programme, table(heads, ranked))
-    answer.say(warnings=outcome.warnings)
-    for warning in outcome.warnings:
-        typer.echo(f"warning: {warning}", err=True)
 
 
 def _free_rows(outcome: Identified) -> Iterator[list[str]]:
