@@ -67,16 +67,7 @@ def perform(
     ShipidError : an approach that does not settle, a run that diverges, an interval that is no multiple of the step, a
         time that is not positive, an unknown method or output.
     """
-    given: Any = [manoeuvres] if isinstance(manoeuvres, Manoeuvre | str) else manoeuvres
-    if not isinstance(given, Iterable):
-        raise ShipidError(f"manoeuvres must be a manoeuvre, or several, not {given!r}")
-    manoeuvres = list[Manoeuvre](given)
-    odd: list[Any] = [one for one in manoeuvres if not isinstance(one, Manoeuvre)]
-    if odd:
-        remedy = "give some of `shipid.simulation.manoeuvre`, such as Zigzag(...)"
-        raise ShipidError(f"{odd[0]!r} is no manoeuvre: {remedy}")
-    if not manoeuvres:
-        raise ShipidError("no manoeuvre is given: give at least one")
+    manoeuvres = _listed(manoeuvres)
     step = positive("step", step)
     between = step if interval is None else positive("interval", interval)
     if duration is not None:
@@ -84,26 +75,17 @@ def perform(
     every = steps_in(between, step)
     if not every:
         raise ShipidError(f"interval {between:g} s must be a multiple of step {step:g} s")
-    names = [one.name or number for one, number in zip(manoeuvres, run_names(len(manoeuvres)), strict=True)]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise DocumentError(f"two runs are named {twice!r}", path="manoeuvre.name")
+    names = _names(manoeuvres)
     rows = [_rows(one.length if duration is None else duration, between) for one in manoeuvres]
     environment = {} if environment is None else environment
     by_name("environment", environment, "a name to a number or an array")
     weather = _weather(vessel, environment, len(manoeuvres), every * (max(rows) - 1) + 1)
     one_of("method", method, get_args(Method))
     named(engine, "cpu")
-    components = {} if components is None else components
-    by_name("components", components, "the path of a term to an array")
+    seas = _seas({} if components is None else components, len(manoeuvres))
     outputs = names_of("outputs", outputs)
     for name in outputs:
         one_of("outputs", name, dynamics(vessel).outputs)
-    seas = {path: np.atleast_1d(drawn) for path, drawn in components.items()}
-    short = next((path for path, drawn in seas.items() if len(drawn) != len(manoeuvres)), None)
-    if short is not None:
-        counted = f"components of {short} are for {len(seas[short])} ships"
-        raise ShipidError(f"{counted}, and there are {len(manoeuvres)} manoeuvres")
     controls = Controls(vessel)
     groups: dict[Helmsman | None, list[int]] = {}
     for place, one in enumerate(manoeuvres):
@@ -125,6 +107,40 @@ def perform(
     frame["t"] = np.concatenate([np.arange(count) * (step * every) for count in rows])
     frame |= {name: np.concatenate([log[name] for log in logs]) for name in logs[0]}
     return pd.DataFrame(frame | {"flags": np.zeros(sum(rows), dtype=np.int64)})
+
+
+def _listed(given: Any) -> list[Manoeuvre]:
+    """One manoeuvre or several as a list; ShipidError for what is none, and for no manoeuvre."""
+    given = [given] if isinstance(given, Manoeuvre | str) else given
+    if not isinstance(given, Iterable):
+        raise ShipidError(f"manoeuvres must be a manoeuvre, or several, not {given!r}")
+    manoeuvres = list(given)
+    for one in manoeuvres:
+        if not isinstance(one, Manoeuvre):
+            remedy = "give some of `shipid.simulation.manoeuvre`, such as Zigzag(...)"
+            raise ShipidError(f"{one!r} is no manoeuvre: {remedy}")
+    if not manoeuvres:
+        raise ShipidError("no manoeuvre is given: give at least one")
+    return manoeuvres
+
+
+def _names(manoeuvres: Sequence[Manoeuvre]) -> list[str]:
+    """Name of each run, a number where the manoeuvre has none; DocumentError where two are the same."""
+    names = [one.name or number for one, number in zip(manoeuvres, run_names(len(manoeuvres)), strict=True)]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DocumentError(f"two runs are named {twice!r}", path="manoeuvre.name")
+    return names
+
+
+def _seas(components: Mapping[str, Array], count: int) -> dict[str, Array]:
+    """Wave components (count, ...) by the path of their term; ShipidError for another number of ships."""
+    by_name("components", components, "the path of a term to an array")
+    seas = {path: np.atleast_1d(drawn) for path, drawn in components.items()}
+    for path, drawn in seas.items():
+        if len(drawn) != count:
+            raise ShipidError(f"components of {path} are for {len(drawn)} ships, and there are {count} manoeuvres")
+    return seas
 
 
 @dataclass(frozen=True)

@@ -96,14 +96,7 @@ def standard(
         raise ShipidError(f"no manoeuvre is called {name!r}: {choices(name, KINDS)}", path="NAME")
     build, most = KINDS[name]
     angles = numbers("angles", angles).ravel().tolist()
-    if len(angles) > most:
-        raise ShipidError(f"{name} takes {most or 'no'} {plural(most, 'angle')}", path="ANGLES")
-    if any(angle <= 0 for angle in angles):
-        raise ShipidError("angles are positive: --side gives the direction of the first turn", path="ANGLES")
-    for place, angle in enumerate(angles):
-        greatest = MOST_HEADING if place else MOST_HELM  # as much of a reverse spiral, in deg/s
-        if not angle <= greatest:
-            raise ShipidError(f"{angle:g} deg: give at most {greatest:g} deg", path="ANGLES")
+    _check_angles(name, angles, most)
     if not isinstance(side, str) or side not in get_args(Side):
         raise ShipidError(f"{side!r} is no side: starboard or port", path="--side")
     if not isinstance(approach, str) or approach not in APPROACHES:
@@ -143,6 +136,17 @@ def standard(
         remedy = f"at most {MOST_STEPS:.0e}: give a {'shorter duration' if step is None else 'longer step'}"
         raise ShipidError(f"{steps:.2g} steps of {interval / STEPS:g} s, {remedy}", path=option)
     return Standard(name, _title(name, manoeuvre), manoeuvre, float(asked), interval / STEPS, interval)
+
+
+def _check_angles(name: str, angles: Sequence[float], most: int) -> None:
+    if len(angles) > most:
+        raise ShipidError(f"{name} takes {most or 'no'} {plural(most, 'angle')}", path="ANGLES")
+    if any(angle <= 0 for angle in angles):
+        raise ShipidError("angles are positive: --side gives the direction of the first turn", path="ANGLES")
+    for place, angle in enumerate(angles):
+        greatest = MOST_HEADING if place else MOST_HELM  # as much of a reverse spiral, in deg/s
+        if not angle <= greatest:
+            raise ShipidError(f"{angle:g} deg: give at most {greatest:g} deg", path="ANGLES")
 
 
 def shaft_speed(controls: Controls, speed: float) -> float:
