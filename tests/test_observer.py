@@ -493,6 +493,25 @@ def test_along_a_log_it_is_the_function_that_goes_aboard(monkeypatch: pytest.Mon
             np.testing.assert_allclose(one.innovation[k][seen], innovation[seen, 0], rtol=1e-6, atol=1e-9)
 
 
+def test_the_spread_of_an_innovation_is_that_of_the_state_and_of_the_sensor() -> None:
+    filters = bank(load_vessel("gunnerus-28.9"))
+    model = filters.model
+    start = np.array([0.0, 0.0, 0.3, 4.0, 0.1, 0.0])
+    states = begin(filters, start, np.zeros(len(model.commands)))[:, 0]
+    given = [np.zeros(len(model.commands)), np.zeros(len(model.environment)), list(filters.vessel.parameters.values())]
+    step, numbers = filter_function(model), filters.numbers[0]
+    spreads = [np.array(step(states, *given, start, noise, numbers, 1.0)[3]).ravel() for noise in (0.0, 2.0, 3.0)]
+    np.testing.assert_allclose(spreads[1] - spreads[0], 4.0)
+    np.testing.assert_allclose(spreads[2] - spreads[0], 9.0)
+    assert (spreads[0] > 0).all()
+
+
+def test_a_filter_takes_as_few_steps_between_rows_as_its_longest_step_allows() -> None:
+    filters = bank(load_vessel("gunnerus-28.9"))
+    steps = filters.longest * np.array([0.3, 1.0, 2.0, 2.5, 0.1 + 0.2, 3 * 1.1 / 1.1])
+    assert filters.parts(steps).tolist() == [1, 1, 2, 3, 1, 3]
+
+
 @pytest.mark.parametrize(("name", "wrong"), [("north", 1e3), ("east", -1e6), ("u", 1e4), ("psi", 1e3)])
 def test_a_spike_of_a_sensor_passes(name: str, wrong: float) -> None:
     """A measurement that cannot be is left out: twenty rows later the estimates are where they would be without it."""
