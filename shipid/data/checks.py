@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,6 +36,8 @@ STRETCH, WINDOW = 30.0, 10.0  # s
 SURE = 4.0  # standard errors beyond which a difference is no chance: one clean run in some ten thousand
 EXACT = 1e-4  # of a change: a smaller misfit is none
 DELAY, DELAYS, EXPLAINED = 0.3, 3.0, 0.35  # s: least delay reported, longest tried; share of the misfit it explains
+FEWEST, MOST = 20, 5000  # windows that show a delay
+LIVELY, WILD = 0.1, 6.0  # of the larger changes: less says nothing; of the usual misfit: more is a spike
 
 
 def check_dataset(dataset: Dataset) -> pd.DataFrame:
@@ -202,7 +204,8 @@ def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     off, by_noise = np.degrees(rms(error)), np.degrees(noise)
     sentence = f"changes of psi leave the integral of r by {off:.2g} deg (RMS), {by_noise:.2g} by noise"
     yield _row("heading error", rms(error), "rad", HEADING_ERROR * change + chance, sentence)
-    yield from _late(stretches, "heading latency", "heading", "yaw rate", lambda rows: np.unwrap(rows["psi"]), _turned)
+    seen = [np.unwrap(rows["psi"]).astype(complex) for rows in stretches]
+    yield from _latency("heading latency", "heading", "yaw rate", stretches, seen, [_turned(one) for one in stretches])
 
 
 def _proves_rate(heading: list[dict[str, Any]]) -> bool:
@@ -223,51 +226,74 @@ def way(rows: pd.DataFrame) -> Plane:
     return cumulative_integral(t, rate.real) + 1j * cumulative_integral(t, rate.imag)
 
 
-def _late(
-    stretches: list[pd.DataFrame],
-    check: str,
-    what: str,
-    against: str,
-    seen: Callable[[pd.DataFrame], Any],
-    integrated: Callable[[pd.DataFrame], Plane],
+def _latency(
+    check: str, what: str, against: str, stretches: list[pd.DataFrame], seen: list[Plane], integrated: list[Plane]
 ) -> Iterator[dict[str, Any]]:
-    """Delay of a signal behind the integral of its rate: where the misfit is least, if that is much less than at 0."""
-    steps = [float(np.median(np.diff(rows["t"]))) for rows in stretches if len(rows) > 1]
-    if not steps:
-        return
-    usual = max(steps)
+    delay = delay_of(zip((rows["t"].to_numpy() for rows in stretches), seen, integrated, strict=True))
+    if delay is not None:
+        yield _row(check, abs(delay.seconds), "s", delay.limit, delay.said(what, against)[1])
+
+
+@dataclass(frozen=True)
+class Delay:
+    """Delay of a signal behind the integral of its rate.
+
+    seconds, limit : the delay [s], 0 where none is sure, and the least one that counts. explained : share (0 to 1) of
+    the misfit that it explains.
+    """
+
+    seconds: float
+    limit: float
+    explained: float
+
+    def said(self, what: str, against: str) -> tuple[str, str]:
+        """Which of the signal `what` and the rate `against` is late, and the sentence that says so."""
+        late, other = (what, against) if self.seconds >= 0 else (against, what)
+        by = f"{abs(self.seconds):.2g} s later than the {other} says ({100 * self.explained:.0f} % of the misfit)"
+        return late, f"{late} comes {by}"
+
+
+def delay_of(stretches: Iterable[tuple[Array, Plane, Plane]]) -> Delay | None:
+    """Delay at which changes of a signal over windows fit those of an integral times any scale; None for few windows.
+
+    stretches : t (N,) [s] without a hole, signal and integral of its rate (N,). A delay is sure if it explains much of
+    the misfit, and more than noise does. Windows that fit at no delay, as those with a spike, are left out.
+    """
+    stretches = [one for one in stretches if len(one[0]) >= 8]
+    usual = max((float(np.median(np.diff(t))) for t, _, _ in stretches), default=1.0)
     longest = max(DELAYS, 3 * usual)
-    delays = np.arange(-longest, longest + usual / 4, max(usual / 2, longest / 24))
-    misfit, noise, size, count = np.zeros(len(delays)), 0.0, 0.0, 0
-    for rows in stretches:
-        t = rows["t"].to_numpy()
-        span = t[-1] - t[0]
-        width = max(WINDOW, span / len(t)) if span > 4 * WINDOW else span / 6  # no more windows than rows
-        first = np.arange(t[0] + longest, t[-1] - longest - width, width)
-        if len(first) < 2 or len(t) < 8:
-            continue
-        values, total = np.asarray(seen(rows), dtype=complex), integrated(rows)
-        change = _moved(t, values, first + width) - _moved(t, values, first)
-        for index, delay in enumerate(delays):
-            ran = _moved(t, total, first + width - delay) - _moved(t, total, first - delay)
-            misfit[index] += float(np.sum(np.abs(change - ran) ** 2))
-        sigma = np.hypot(noise_of(values.real), noise_of(values.imag))
-        noise += 2 * sigma**2 * len(first)
-        size += float(np.sum(np.abs(change) ** 2))
-        count += len(first)
-    if count < 6:
-        return
-    best, none = int(np.argmin(misfit)), int(np.argmin(np.abs(delays)))
-    explained = 1.0 - misfit[best] / misfit[none] if misfit[none] > 0 else 0.0
+    none = round(longest / max(usual / 2, longest / 24))
+    delays = np.linspace(-longest, longest, 2 * none + 1)
+    changes, integrals, variances = [np.empty(0, complex)], [np.empty((len(delays), 0), complex)], [np.empty(0)]
+    least = max(usual, sum(t[-1] - t[0] for t, _, _ in stretches) / MOST)
+    for t, signal, total in stretches:
+        width = min(max(WINDOW, 4 * usual), (t[-1] - t[0]) / 6)
+        first = np.arange(t[0] + longest, t[-1] - longest - width, max(width / 4, least))
+        changes.append(_moved(t, signal, first + width) - _moved(t, signal, first))
+        moved = [_moved(t, total, first + width - delay) - _moved(t, total, first - delay) for delay in delays]
+        integrals.append(np.array(moved))
+        variances.append(np.full(len(first), 2 * (noise_of(signal.real) ** 2 + noise_of(signal.imag) ** 2)))
+    change, integrated = np.concatenate(changes), np.concatenate(integrals, axis=1)
+    if len(change) < FEWEST:
+        return None
+    misfit, size = _misfit(change, integrated), np.abs(integrated[none])
+    moving = size >= LIVELY * np.percentile(size, 90)
+    keep = (misfit <= WILD * np.median(misfit[:, moving], axis=1, keepdims=True) + 1e-9).any(axis=0)
+    left = (_misfit(change[keep], integrated[:, keep]) ** 2).sum(axis=1)
+    noise, best = float(np.concatenate(variances)[keep].sum()), int(np.argmin(left))
+    gain = float(left[none] - left[best])
+    explained = gain / float(left[none]) if gain > 0 else 0.0
     # without a delay both misfits are noise, of the log or of its digits, and differ by its scatter alone
-    chance = SURE * noise * np.sqrt(2 / count) + EXACT**2 * size
-    real = misfit[none] - misfit[best] > chance and misfit[none] > 2 * noise and explained > EXPLAINED
-    delay = float(delays[best]) if real else 0.0
-    late, other = (what, against) if delay >= 0 else (against, what)
-    sentence = (
-        f"{late} comes {abs(delay):.2g} s later than the {other} says ({100 * max(explained, 0):.0f} % of the misfit)"
-    )
-    yield _row(check, abs(delay), "s", max(DELAY, 0.75 * usual), sentence)
+    chance = SURE * noise * np.sqrt(2 / keep.sum()) + EXACT**2 * float(np.sum(np.abs(change[keep]) ** 2))
+    sure = gain > chance and left[none] > 2 * noise and explained > EXPLAINED
+    return Delay(float(delays[best]) if sure else 0.0, max(DELAY, 0.75 * usual), explained)
+
+
+def _misfit(change: Plane, integrated: Plane) -> Array:
+    """Distance (D, W) of changes (W,) from those of integrals (D, W) times the scale, 0 or more, that fits best."""
+    power = np.maximum((np.abs(integrated) ** 2).sum(axis=1), 1e-30)
+    scale = np.maximum((integrated.conj() * change).real.sum(axis=1), 0.0)
+    return np.asarray(np.abs(change - (scale / power)[:, None] * integrated))
 
 
 def _moved(t: Array, values: Plane, instants: Array) -> Plane:
@@ -286,9 +312,8 @@ def _path(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     noise = rms(np.array([_path_noise(rows, speed) for rows, speed in zip(stretches, speeds, strict=True)]))
     sentence = f"positions leave integrated velocities by {error:.2g} m (RMS) in {STRETCH:g} s, {distance:.3g} m run"
     yield _row("path", error, "m", PATH_ERROR * distance + SURE / 2 * noise, f"{sentence}; {noise:.2g} m by noise")
-    yield from _late(
-        stretches, "path latency", "position", "velocity", lambda rows: rows["north"] + 1j * rows["east"], way
-    )
+    seen = [(rows["north"] + 1j * rows["east"]).to_numpy() for rows in stretches]
+    yield from _latency("path latency", "position", "velocity", stretches, seen, [way(rows) for rows in stretches])
 
 
 def _path_noise(rows: pd.DataFrame, speed: Array) -> float:

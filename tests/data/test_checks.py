@@ -115,6 +115,53 @@ def noisy(seed: int) -> pd.DataFrame:
     return frame.assign(**{name: frame[name] + random.normal(0, scale * std, len(t)) for name, std in noise.items()})
 
 
+def weaving(t: np.ndarray) -> np.ndarray:
+    """Path north + i east [m] of a ship that weaves."""
+    psi = 0.8 * np.sin(2 * np.pi * t / 90.0)
+    velocity = (4.0 + 0.5j * np.sin(2 * np.pi * t / 70.0)) * np.exp(1j * psi)
+    return np.append(0.0, np.cumsum((velocity[1:] + velocity[:-1]) / 2 * np.diff(t)))
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.51])
+@pytest.mark.parametrize("delay", [-1.5, 0.0, 2.0])
+def test_a_delay_is_measured_whatever_the_scale_and_beside_spikes(delay: float, scale: float) -> None:
+    t = np.arange(0.0, 600.0, 0.5)
+    path = weaving(t)
+    late = scale * (np.interp(t - delay, t, path.real) + 1j * np.interp(t - delay, t, path.imag))
+    late[[100, 400, 800]] += 500.0
+    measured = checks.delay_of([(t[:700], late[:700], path[:700]), (t[700:] + 50.0, late[700:], path[700:])])
+    assert measured is not None
+    assert measured.seconds == pytest.approx(delay, abs=0.26)
+    assert measured.explained > 0.9 or delay == 0.0
+    assert measured.limit == pytest.approx(0.375)
+    late_one = {-1.5: "velocity", 0.0: "position", 2.0: "position"}[delay]
+    assert measured.said("position", "velocity")[0] == late_one
+
+
+@pytest.mark.parametrize("delay", [0.0, 2.0])
+def test_a_rounded_heading_is_late_only_where_it_is(delay: float) -> None:
+    """Of a ship that turns for a third of the time: the rest, where whole degrees do not change, fits at any delay."""
+    t = np.arange(0.0, 600.0, 0.5)
+    r = np.radians(5.0) * np.sin(2 * np.pi * t / 45.0) * (np.floor(t / 45.0) % 3 == 0)
+    total = np.append(0.0, np.cumsum((r[1:] + r[:-1]) / 2 * 0.5))
+    psi = np.radians(np.round(np.degrees(np.interp(t - delay, t, total))))
+    measured = checks.delay_of([(t, psi.astype(complex), total.astype(complex))])
+    assert measured is not None
+    assert measured.seconds == pytest.approx(delay, abs=0.26)
+
+
+def test_noise_is_no_delay_and_few_windows_say_nothing() -> None:
+    t = np.arange(0.0, 300.0, 1.0)
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        total = 0.3 * np.cumsum(0.01 * random.normal(size=len(t)))
+        measured = checks.delay_of([(t, total + random.normal(size=len(t)) + 0j, total + 0j)])
+        assert measured is not None
+        assert measured.seconds == 0.0, seed
+    assert checks.delay_of([(t[:20], t[:20] + 0j, t[:20] + 0j)]) is None
+    assert checks.delay_of([]) is None
+
+
 @pytest.mark.slow
 def test_noise_alone_is_no_finding() -> None:
     """Of a hundred clean runs with noise fewer than 2 % have a finding."""

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.data.checks import Delay, delay_of
 from shipid.data.dataset import Array
 from shipid.logs.dates import date_of
 from shipid.logs.guess import evidence
@@ -126,12 +127,11 @@ def defects_of_motion(state: State) -> None:
     if state.psi is None:
         return
     if state.r is not None:
-        delay, explained = _delay(state, state.psi, evidence.integral(state.t, state.r))
-        if delay:
-            _find_late(state, "heading", "yaw rate", delay, explained)
-            state.psi = np.interp(
-                state.t + delay, state.t, state.psi
-            )  # or the tests below would report the same delay again
+        delay = _delay(state, state.psi, evidence.integral(state.t, state.r))
+        if delay is not None:
+            _find_late(state, "heading", "yaw rate", delay)
+            # or the tests below would report the same delay again
+            state.psi = np.interp(state.t + delay.seconds, state.t, state.psi)
             if state.body is not None and not _is_earth_fixed(state):
                 state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
         _factor_of_rate(state)
@@ -209,10 +209,10 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
     turned = state.chosen.change(np.asarray(np.exp(1j * state.psi)))
     scale = evidence.fit(seen[keep], ran[keep]).scale
     off, error, by_arm = evidence.arm(seen[keep], scale * ran[keep], turned[keep])
-    delay, by_delay = _delay(state, state.position, path)
-    if delay and by_delay > by_arm:
-        _find_late(state, "position", "velocity", delay, by_delay)
-        instants = state.t - delay
+    delay = _delay(state, state.position, path)
+    if delay is not None and delay.explained > by_arm:
+        _find_late(state, "position", "velocity", delay)
+        instants = state.t - delay.seconds
         moved = [np.interp(instants, state.t, part) for part in (path.real, path.imag)]
         late = np.asarray(moved[0] + 1j * moved[1])
         known = np.flatnonzero((instants >= state.t[0]) & (instants <= state.t[-1]))[[0, -1]]
@@ -261,20 +261,19 @@ def _stream(seen: Complex, ran: Complex) -> tuple[complex, float]:
     return best
 
 
-def _delay(state: State, seen: Array | Complex, integrated: Complex) -> tuple[float, float]:
-    """Report a delay; return it [s], 0 if it explains little, and the share of the misfit that it explains."""
-    usual = float(np.median(np.diff(state.t)))
-    delay, explained = evidence.shift(state.t, seen, integrated, max(3.0, 3 * usual))
-    return (delay, explained) if abs(delay) > max(0.3, 0.75 * usual) and explained > 0.35 else (0.0, 0.0)
+def _delay(state: State, seen: Array | Complex, integrated: Complex) -> Delay | None:
+    """Delay of a signal (N,) behind the integral of its rate; None where none is sure."""
+    holes = np.flatnonzero(np.diff(state.t) > evidence.GAP * np.median(np.diff(state.t))) + 1
+    parts = [np.split(values, holes) for values in (state.t, np.asarray(seen, dtype=complex), integrated)]
+    delay = delay_of(zip(*parts, strict=True))
+    return delay if delay is not None and abs(delay.seconds) > delay.limit else None
 
 
-def _find_late(state: State, what: str, against: str, delay: float, explained: float) -> None:
+def _find_late(state: State, what: str, against: str, delay: Delay) -> None:
     """Report which of two signals is late, with the repair: instruments and filters delay, they do not foresee."""
-    late, other = (what, against) if delay > 0 else (against, what)
-    size = abs(delay)
-    sentence = f"{late} comes {size:.2g} s later than the {other} says ({100 * explained:.0f} % of the misfit)"
-    repair = {"kind": "latency", "signal": late, "seconds": round(size, 2)}
-    state.find(f"late {late}", (late,), float(np.clip(explained, 0.2, 0.95)), sentence, repair)
+    late, sentence = delay.said(what, against)
+    repair = {"kind": "latency", "signal": late, "seconds": round(abs(delay.seconds), 2)}
+    state.find(f"late {late}", (late,), float(np.clip(delay.explained, 0.2, 0.95)), sentence, repair)
 
 
 def _jumps(state: State, path: Complex, spikes: bool = True) -> None:

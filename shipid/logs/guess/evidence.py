@@ -130,30 +130,6 @@ def heal(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]
     return np.interp(index, index[known], np.unwrap(values[known], period=turn)), false
 
 
-def shift(t: Array, seen: NDArray[np.generic], integrated: NDArray[np.generic], longest: float) -> tuple[float, float]:
-    """Return the delay [s] of `seen` behind its integral, and the share of the misfit that the delay explains."""
-    usual = float(np.median(np.diff(t)))
-    chosen = windows(t)
-    inside = (t[chosen.first] > t[0] + longest) & (t[chosen.last] < t[-1] - longest)
-    chosen = Windows(chosen.first[inside], chosen.last[inside])
-    if len(chosen.first) < 20:
-        return 0.0, 0.0
-    change = chosen.change(seen)
-    delays = np.arange(-longest, longest + usual / 2, max(usual / 2, longest / 40))
-    # the same windows for all delays, or one that fits worse leaves out more
-    moved = [_at(t, integrated, t[chosen.last] - one) - _at(t, integrated, t[chosen.first] - one) for one in delays]
-    keep = np.any([robust(change, one) for one in moved], axis=0)
-    change = change[keep]
-    left = [float(np.mean(np.abs(change - fit(change, one[keep]).scale * one[keep]) ** 2)) for one in moved]
-    best, none = int(np.argmin(left)), int(np.argmin(np.abs(delays)))
-    return float(delays[best]), 1.0 - left[best] / left[none] if left[none] > 0 else 0.0
-
-
-def _at(t: Array, values: NDArray[np.generic], instants: Array) -> Complex:
-    real, imaginary = (np.interp(instants, t, part) for part in (np.real(values), np.imag(values)))
-    return np.asarray(real + 1j * imaginary, dtype=complex)
-
-
 def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, float, float]:
     """Return the arm x + i y [m] from the point of the velocities to that of the positions.
 

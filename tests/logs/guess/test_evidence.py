@@ -75,25 +75,6 @@ def test_an_angle_is_unwrapped_and_false_samples_within_a_jump_are_replaced() ->
     np.testing.assert_allclose(healed, true, atol=1.0)
 
 
-@pytest.mark.parametrize("delay", [-1.5, 0.0, 2.0])
-def test_a_delay_is_seen(delay: float) -> None:
-    late = np.interp(T - delay, T, PATH.real) + 1j * np.interp(T - delay, T, PATH.imag)
-    seconds, explained = evidence.shift(T, late, PATH, 3.0)
-    assert seconds == pytest.approx(delay, abs=0.26)
-    assert explained > 0.9 or delay == 0.0
-
-
-@pytest.mark.parametrize("delay", [0.0, 2.0])
-def test_a_rounded_heading_is_late_only_where_it_is(delay: float) -> None:
-    """Of a ship that turns for a third of the time: the rest, where whole degrees do not change, fits at any delay."""
-    r = np.radians(5.0) * np.sin(2 * np.pi * T / 45.0) * (np.floor(T / 45.0) % 3 == 0)
-    whole = evidence.integral(T, r)
-    psi = np.radians(np.round(np.degrees(np.interp(T - delay, T, whole.real))))
-    seconds, explained = evidence.shift(T, psi, whole, 3.0)
-    assert seconds == pytest.approx(delay, abs=0.26)
-    assert (explained > 0.9) == (delay > 0)
-
-
 def test_an_arm_is_seen() -> None:
     lever = 7.0 - 2.0j
     turned = np.exp(1j * PSI)
