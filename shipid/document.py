@@ -206,18 +206,21 @@ def merge(under: Document, over: Document) -> Document:
     return result
 
 
-def leaves(document: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted path and value of every leaf, in document order; entries of a list are addressed by index."""
+def leaves(document: Any, prefix: str = "", *, lists: bool = True) -> Iterator[tuple[str, Any]]:
+    """Dotted path and value of every leaf, in document order.
+
+    lists : entries of a list are leaves, addressed by index; else a list is one leaf.
+    """
     items: Any
     if isinstance(document, Mapping):
         items = document.items()
-    elif isinstance(document, list):
+    elif lists and isinstance(document, list):
         items = enumerate(document)
     else:
         yield prefix, document
         return
     for key, value in items:
-        yield from leaves(value, f"{prefix}.{key}" if prefix else str(key))
+        yield from leaves(value, f"{prefix}.{key}" if prefix else str(key), lists=lists)
 
 
 def parts(path: str) -> list[str]:
@@ -442,12 +445,14 @@ def required(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
 
 
 def _place(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
-    """The parts of a pydantic location that are keys or indices of the data, without the names of union members."""
+    """The parts of a pydantic location that are in the data, such as keys, without the names of union members."""
     location = problem["loc"]
     for position, part in enumerate(location):
         listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
         if listed or (isinstance(data, Mapping) and part in data):
             data = data[part]
+        elif isinstance(part, str) and part in dict(leaves(data, lists=False)):  # nested tables, taken by their paths
+            data = get(data, part)
         elif problem["type"] != "missing" or position < len(location) - 1:
             continue
         yield str(part)

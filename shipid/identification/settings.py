@@ -106,7 +106,7 @@ class Identify(Checked, BaseModel):
     @classmethod
     def _by_column(cls, given: Any) -> Any:
         """The nested table `propeller = { thrust = 500 }` as the column `propeller.thrust`."""
-        return dict(documents.leaves(given)) if isinstance(given, dict) else given
+        return dict(documents.leaves(given, lists=False)) if isinstance(given, dict) else given
 
     @model_validator(mode="after")
     def _known(self) -> Identify:
@@ -339,7 +339,7 @@ def without_zeros(group: Sequence[str], settings: Identify, base: Mapping[str, f
 
 def overrides_of(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:
     """The overrides `<run>.<path>` -> value in the settings that belong to some runs."""
-    given = documents.leaves(settings.runs)
+    given = documents.leaves(settings.runs, lists=False)
     return {key: value for key, value in given if any(key.startswith(f"{run}.") for run in runs)}
 
 
@@ -353,7 +353,7 @@ def overrides(
     """
     result: dict[str, dict[str, float]] = {run: {} for run in (*runs, *known)}
     valid = [*vessel.parameters, *(f"{ENVIRONMENT}.{name}" for name in channels)]
-    for key, value in documents.leaves(settings.runs):
+    for key, value in documents.leaves(settings.runs, lists=False):
         run = next((name for name in sorted(result, key=len, reverse=True) if key.startswith(f"{name}.")), None)
         where = f"{BLOCK}.runs.{key}"
         if run is None:

@@ -518,6 +518,7 @@ def test_runs_too_short_for_inverse_dynamics_are_fitted_from_another_start(start
         ({"runs": {"M09.environment.V_w": 1.0}}, "does not begin with the name of a run"),
         ({"runs": {"M01.environment.V_x": 1.0}}, "cannot be set for a run"),
         ({"runs": {"M01.environment.V_w": "calm"}}, "is not a number"),
+        ({"runs": {"M01.environment.V_w": [8.0]}}, "[8.0] is not a number"),
         ({"runs": {f"M01.{FEW[0]}": 1.0}}, "is free in the fit"),
         ({"runs": {"M01.environment.beta_c": 1.0}, "nuisance": ["current"]}, "nuisance.current estimates it"),
         ({"start": {"hull.derivatives.X_rr": 1.0}}, "is not free in the fit"),
