@@ -32,6 +32,7 @@ from shipid.vessel.schema import term_blocks
 TRIALS: tuple[tuple[str, tuple[float, ...]], ...] = (("turning", (35,)), ("zigzag", (10, 10)), ("zigzag", (20, 20)))
 """Standard manoeuvres [deg] that have criteria."""
 FROM_REST = "the ship comes from rest: the tests ask for a steady approach at the test speed"
+SLOW, FAST = 0.9, 1.1  # of the service speed: the approach of the tests
 LEVELS = {"spiral": levels, "reverse-spiral": rate_levels}  # kind -> how its steady levels are read from a record
 
 
@@ -121,9 +122,18 @@ def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
     judged = criteria(chosen.kind, measures, length, calm=True)
     if chosen.manoeuvre.approach == "rest":
         judged = [replace(one, met=None, note=FROM_REST) for one in judged]
-    elif chosen.kind == "stop":
-        judged = [replace(one, note="; ".join(filter(None, [_thrust_astern(vessel), one.note]))) for one in judged]
+    else:
+        remarks = [_other_speed(vessel, chosen.speed), _thrust_astern(vessel) if chosen.kind == "stop" else ""]
+        judged = [replace(one, note="; ".join(filter(None, [*remarks, one.note]))) for one in judged]
     return Measured(vessel, chosen, frame, record, measure_rows(measures, length), criterion_rows(judged))
+
+
+def _other_speed(vessel: Vessel, speed: float) -> str:
+    """Whether the approach speed [m/s] is another than that of the tests, as far as U_0 says; empty near it."""
+    service = vessel.document.get("particulars", {}).get("U_0", speed)
+    if SLOW <= speed / service <= FAST:
+        return ""
+    return f"the approach is at {speed:.3g} m/s, {speed / service:.2g} times the service speed U_0"
 
 
 def _thrust_astern(vessel: Vessel) -> str:

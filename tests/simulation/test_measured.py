@@ -46,6 +46,15 @@ def test_a_stop_says_where_the_thrust_astern_is_extrapolated():
     assert measure_standard(known, "stop").criteria[0]["note"] == ""
 
 
+@pytest.mark.parametrize(("speed", "note"), [(None, ""), (13.6, "13.6 m/s, 1.9 times"), (3.5, "3.5 m/s, 0.5 times")])
+def test_criteria_say_that_the_approach_is_at_another_speed(speed: float | None, note: str):
+    """Speeds in knots for m/s, and trials at half speed, would meet standards without a word."""
+    ship = first_guess(Particulars(100.0, 16.0, 6.0, 0.7, speed=7.0), "s", "s.toml").vessel
+    for row in measure_standard(ship, "zigzag", speed=speed, duration=60.0).criteria:
+        assert note in row["note"]
+        assert bool(note) == ("times the service speed U_0" in row["note"])
+
+
 def test_a_ship_that_does_not_go_straight_gets_a_helmsman():
     lame = load_vessel("gunnerus-28.9").with_values({"thruster.starboard.off": True})
     done = measure_standard(lame, "turning", (20,), duration=120.0)
