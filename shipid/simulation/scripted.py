@@ -115,7 +115,8 @@ def _given(script: Script, vessel: Vessel) -> list[Manoeuvre]:
         try:
             one.check(controls)
         except DocumentError as error:
-            key = (error.path or "").removeprefix("manoeuvre").removeprefix(".")
-            raise DocumentError(error.message, path=f"{where}.{key}".rstrip(".")) from None
+            group, _, key = (error.path or "").partition(".")
+            path = f"{where}.{key}" if key and group == "manoeuvre" else where  # else of the vessel, which is named
+            raise DocumentError(error.message, path=path) from None
         manoeuvres.append(one)
     return manoeuvres

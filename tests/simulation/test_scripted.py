@@ -50,6 +50,12 @@ def test_given_manoeuvres_are_performed_as_in_python(tmp_path: Path) -> None:
     assert not [name for name in frame if str(name).startswith("actual.")]
 
 
+def test_a_vessel_that_cannot_perform_a_manoeuvre_is_not_a_key_of_the_document(tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match="no angle command turns") as caught:
+        simulated(load_vessel("otter"), written(tmp_path, GIVEN))
+    assert caught.value.path == "manoeuvre.0"
+
+
 def test_a_log_that_begins_with_an_order_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Of such a log, without noise, the yaw damping of a ship was identified 27 % off and said to be known."""
     simulated(SHIP, written(tmp_path, GIVEN))
