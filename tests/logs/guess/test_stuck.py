@@ -82,6 +82,18 @@ def test_a_sensor_that_stops_at_a_limit_is_clipped(name: str, share: float, told
     assert [finding.columns for finding in found if finding.columns == (name,)] == ([(name,)] if told else [])
 
 
+@pytest.mark.parametrize("noise", [0.0, 3.0])
+def test_a_shaft_at_what_was_ordered_is_not_clipped(noise: float, tmp_path: Path) -> None:
+    """Trials at two shaft speeds in turn; a measured speed that varies and never passes the larger one is clipped."""
+    frame = bridge()
+    orders = np.where(np.arange(len(frame)) // 50 % 2, 180.0, 130.0)
+    shaft = np.minimum(orders + np.random.default_rng(3).normal(0, noise, len(frame)), 180.0) if noise else orders
+    frame.assign(rpm=shaft).to_csv(tmp_path / "log.csv", index=False)
+    found = [one for one in guess(tmp_path / "log.csv").findings if one.columns == ("rpm",)]
+    assert [one.kind for one in found if one.kind == "clipped"] == (["clipped"] if noise else [])
+    assert all("'rpm'" in one.sentence for one in found if one.kind == "clipped")
+
+
 @pytest.mark.parametrize("decimals", [0, 1])
 def test_a_speed_in_coarse_steps_is_not_clipped(decimals: int, tmp_path: Path) -> None:
     frame = bridge().assign(SOG=lambda x: (x["SOG"] / 0.5144).round(decimals))
