@@ -18,6 +18,7 @@ NO_PHYSICS = "no physics"
 """Name of that model for people, in sentences and figures: `none` would say that nobody does."""
 # Columns of a trial; every other column of its frame is a searched hyperparameter.
 TRIAL = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")
+MODELS = ("model", "without", "with")  # columns that name a model
 PUBLISHED = "published"  # the set of the envelope that holds the paper's numbers
 
 
@@ -186,13 +187,12 @@ class ReportContent:
 
 def _renamed(frame: pd.DataFrame) -> pd.DataFrame:
     """A frame whose models have their names for people; itself where they have them."""
-    if "model" not in frame or not frame["model"].isin(names := _without_physics(frame)).any():
-        return frame
-    return frame.assign(model=frame["model"].replace({name: spoken(name) for name in names}))
-
-
-def _without_physics(frame: pd.DataFrame) -> list[str]:
-    return [name for name in pd.unique(frame["model"]) if isinstance(name, str) and spoken(name) != name]
+    changed = {}
+    for column in (name for name in MODELS if name in frame):
+        raw = [name for name in pd.unique(frame[column]) if isinstance(name, str) and spoken(name) != name]
+        if raw:
+            changed[column] = frame[column].replace({name: spoken(name) for name in raw})
+    return frame.assign(**changed) if changed else frame
 
 
 def _window(snapshot: Snapshot) -> Snapshot:

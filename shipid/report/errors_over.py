@@ -112,7 +112,7 @@ def over_time(content: ReportContent) -> Figure | None:
     return Figure(
         id="over-time",
         title="Error over time",
-        takeaway=_takeaway_time(content, worst, last),
+        takeaway=_takeaway_time(worst, last),
         how="At each instant t of a test run: mean position error of the prediction made there, over its horizon. "
         "The commands that were given are below."
         + (f" Of {seeds} seeds the first is drawn." if (seeds := content.cells["seed"].nunique()) > 1 else "")
@@ -301,13 +301,11 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     pure = data_driven(content)
     best = content.best if content.best in together.index else str(together.idxmin())
     of = "" if content.best in together.index or len(together) < 2 else f", the least of {len(together)} models"
-    text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {in_words(content, best)} is "
+    text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {in_words(best)} is "
     text += f"{metres(together[best])} off on average{of}"
     text += f", its physics alone {metres(alone[best])}" if best in alone.index else ""
     return text + (
-        f"; {in_words(content, pure)} {metres(together[pure])}."
-        if pure and pure != best and pure in together.index
-        else "."
+        f"; {in_words(pure)} {metres(together[pure])}." if pure and pure != best and pure in together.index else "."
     )
 
 
@@ -320,10 +318,10 @@ def _worst(content: ReportContent, means: pd.DataFrame) -> Any | None:
     return together[together.model == best].nlargest(1, "error").iloc[0]
 
 
-def _takeaway_time(content: ReportContent, worst: Any | None, means: pd.DataFrame) -> str:
+def _takeaway_time(worst: Any | None, means: pd.DataFrame) -> str:
     if worst is None:
         return "No compensated model gave a prediction."
-    text = f"{in_words(content, worst.model)} errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
+    text = f"{in_words(worst.model)} errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
     same = means[
         means.model.eq(worst.model) & means.source.eq("physics") & means.run.eq(worst.run) & means.t.eq(worst.t)
     ]

@@ -17,7 +17,7 @@ from shipid.report.selection import families
 from shipid.report.wording import counted, listed, metres, number, shortened
 
 ROW = 42  # height of a model [px]
-LONGEST = 18  # characters of a name that fit beside its errors on a phone
+LONGEST = 11  # characters of a name that fit beside its errors on a phone
 TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 5.0, 10.0, 20.0, 50.0, 100.0)
 
 

@@ -187,7 +187,7 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
     for size in (means.N_D.min(), means.N_D.max()):
         here = means[means.N_D.eq(size)].set_index("model").H
         known = [
-            f"{in_words(content, name)} has H = {metres(here[name])}"
+            f"{in_words(name)} has H = {metres(here[name])}"
             for name in (content.best, pure)
             if name and name in here.index
         ]
@@ -291,5 +291,5 @@ def _takeaway_dumbbell(content: ReportContent, means: pd.DataFrame) -> str:
     if before.empty:
         text = "No physics model has a result with data"
     if pure and pure in after.index:
-        text += f"; {in_words(content, pure)} has H = {metres(after[pure])}"
+        text += f"; {in_words(pure)} has H = {metres(after[pure])}"
     return f"{text}; {CONSTANT} {metres(content.naive['mean'])}."

@@ -14,8 +14,8 @@ from shipid.report.content import Floats, ReportContent
 from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line, marks
 from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
-from shipid.report.selection import spread
-from shipid.report.tables import Cell, Table, figure, text
+from shipid.report.selection import in_words, spread
+from shipid.report.tables import Cell, Table, figure, length_places, text
 from shipid.report.wording import counted, difference, listed, metres, number
 
 ROW, GAP, MARGIN = 118, 26, 56  # heights of a row of a stacked figure, between rows, and around them [px]
@@ -268,10 +268,11 @@ def _takeaway_gain(frame: pd.DataFrame) -> str:
     last = frame[frame.N_D.eq(frame.N_D.max())]
     gains, losses = int((last.high < 0).sum()), int((last.low > 0).sum())
     best = last.nsmallest(1, "difference").iloc[0]
+    which = f"{in_words(best.model)}, {_interval(best.to_dict())} ({best.comparison})"
     where = f"With N_D = {int(best.N_D)}" if best.N_D else "With physics alone"
     return (
         f"{where}, {gains} of {counted(len(last), 'comparison')} lower H and {losses} raise it with an interval free "
-        f"of 0; the lowest difference is that of {best.model}, {_interval(best.to_dict())} ({best.comparison})."
+        f"of 0; the lowest difference is that of {which}."
     )
 
 
@@ -336,7 +337,8 @@ def _window_lines(frame: pd.DataFrame, moments: Floats) -> Plot:
 def _takeaway_windows(mine: pd.DataFrame, worst: Any) -> str:
     share = 100 * float((mine.error_with < mine.error_without).mean())
     return (
-        f"{mine['with'].iloc[0]} errs less than {mine['without'].iloc[0]} in {share:.0f} % of the windows of "
+        f"{in_words(mine['with'].iloc[0])} errs less than {in_words(mine['without'].iloc[0])} in {share:.0f} % of the "
+        f"windows of "
         f"{counted(mine.run.nunique(), 'test run')}; where the latter errs most, in {worst.run} at t = {worst.t:g} s, "
         f"{metres(worst.error_without)} become {metres(worst.error_with)}."
     )
@@ -450,13 +452,12 @@ def table(content: ReportContent) -> Table | None:
     if frame.empty:
         return None
     rows: list[list[Cell]] = []
+    lengths = ("A", "H_without", "H_with", "difference")
+    places = length_places(frame["H_without"])
     for row in frame.to_dict("records"):
         bracket = f"{number(row['low'])} to {number(row['high'])}" if math.isfinite(row["low"]) else "–"
         named = [text(row[name]) for name in ("without", "with")]
-        numbers = [
-            figure(row["N_D"], 0),
-            *(figure(row[name], 2) for name in ("A", "H_without", "H_with", "difference")),
-        ]
+        numbers = [figure(row["N_D"], 0), *(figure(row[name], places) for name in lengths)]
         rows.append(
             [*named, *numbers, Cell(bracket, row["low"]), Cell(f"{row['better']} of {row['runs']}", row["better"])]
         )

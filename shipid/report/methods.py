@@ -14,7 +14,7 @@ from shipid.report.content import DATA_DRIVEN, PageContent, ReportContent, Sente
 from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line, logarithmic
 from shipid.report.palette import INK, OKABE_ITO, SYMBOLS, Style, category
 from shipid.report.section import Section
-from shipid.report.tables import Cell, Table, figure, text
+from shipid.report.tables import Cell, Table, figure, length_places, text
 from shipid.report.wording import counted, difference, ends, listed, number, shortened
 
 EVERY = "with physics"
@@ -218,14 +218,14 @@ def table(content: ReportContent | MethodsContent) -> Table | None:
     frame = _frame(content)
     if frame.empty:
         return None
-    several = len(_conditions(frame)) > 1
+    several, places = len(_conditions(frame)) > 1, length_places(frame["H"])
     rows: list[list[Cell]] = []
     for row in frame.to_dict("records"):
         names = [text(spoken(row[name])) for name in (*(["condition"] if several else []), "family", "method")]
         failed = Cell(f"{row['failed']} of {row['cells']}", float(row["failed"]), bad=bool(row["failed"]))
-        numbers = [figure(row["N_D"], 0), *(figure(row[name], 2) for name in ("H", "H_90", "end"))]
+        numbers = [figure(row["N_D"], 0), *(figure(row[name], places) for name in ("H", "H_90", "end"))]
         price = [figure(row["seconds"], 1), figure(row["trials"], 0), failed]
-        rows.append([*names, *numbers, *price, figure(row["difference"], 2), *_intervals(row)])
+        rows.append([*names, *numbers, *price, figure(row["difference"], places), *_intervals(row)])
     headings = [*(["condition"] if several else []), "family", "method", "N_D [1]", "H [m]", "H_90 [m]", "end [m]"]
     headings += ["core-seconds [s]", "trials [1]", "no result", "difference of H [m]", "95 % interval, runs [m]"]
     headings += ["better runs", "by world [m]"]

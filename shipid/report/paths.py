@@ -111,11 +111,7 @@ def snapshots(content: ReportContent) -> Figure | None:
             for name in models or [""]
             for i, c in enumerate(counts)
         ]
-        takeaway = (
-            _takeaway_models(content, window, models, counts)
-            if models
-            else _takeaway_row(content, [window] * 3, counts)
-        )
+        takeaway = _takeaway_models(window, models, counts) if models else _takeaway_row(content, [window] * 3, counts)
     else:
         run = max(range(len(names)), key=lambda i: len(runs[names[i]]))
         mine = runs[names[run]]
@@ -372,7 +368,7 @@ def _takeaway(content: ReportContent, size: int) -> str:
     together = _mean_end_error(windows, {key for key, source in called.items() if source == "cooperative"})
     alone = _mean_end_error(windows, {key for key, source in called.items() if source == "physics"})
     learned = _mean_end_error(windows, {k for k in keys if k[0] == pure and k[2] == size})
-    parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, in_words(content, pure or ""))]
+    parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, in_words(pure or ""))]
     errors = [f"{word} by {metres(value)}" for value, word in parts if np.isfinite(value)]
     where = f", N_D = {size}" if size else ""  # where no cell has a result there is physics alone
     return (
@@ -401,13 +397,13 @@ def _takeaway_row(content: ReportContent, windows: list[Snapshot], counts: list[
     return "No compensated path was recorded for these windows."
 
 
-def _takeaway_models(content: ReportContent, window: Snapshot, models: list[str], counts: list[int]) -> str:
+def _takeaway_models(window: Snapshot, models: list[str], counts: list[int]) -> str:
     """How far each model ends from the truth, by rising N_D."""
     parts = []
     for name in models:
         ends = [_mean_end_error([window], {(name, "cooperative", size)}) for size in counts]
         alone = _mean_end_error([window], {(name, "physics", 0)})
-        text = f"{in_words(content, name)} {listed([number(end) for end in ends])} m"
+        text = f"{in_words(name)} {listed([number(end) for end in ends])} m"
         parts.append(text + (f" (physics alone {metres(alone)})" if np.isfinite(alone) else ""))
     numbers = listed([str(size) for size in counts])
     return f"Distance from the true place at the end, with N_D = {numbers}: {'; '.join(parts)}."

@@ -20,7 +20,7 @@ MOST_DOTS = 1200  # in one panel: more hide each other
 MOST_CHOSEN = 200
 BINS = 9  # of the middle line
 WIDE = 3.0  # largest / smallest value from which an axis is logarithmic
-MOST_DECADES = 5.0  # with a tick each
+MOST_DECADES = 4.0  # with a tick each: more have no room
 CEILING = 4.0  # times the best of the cell: farther off is drawn here
 FAILED = CEILING * 1.25  # where diverged trials lie
 UNITS = {"delays": "s"}  # of hyperparameters; others have none
@@ -193,8 +193,8 @@ def _frame(name: str, every: pd.Series[float]) -> dict[str, Any]:
         decades = float(np.ptp(ends))
         span = [float(ends[0] - room * decades), float(ends[1] + room * decades)]
         x = logarithmic(title, (1,) if decades > 1.5 else (1, 2, 3, 5), range=span)
-        if decades > MOST_DECADES:
-            x |= {name: x[name][::2] for name in ("tickvals", "ticktext")}
+        each = math.ceil(decades / MOST_DECADES)
+        x |= {name: x[name][::each] for name in ("tickvals", "ticktext")} if each > 1 else {}
     else:
         x = axis(title, range=[low - room * (high - low), high + room * (high - low)], nticks=6)
         counts = sorted(set(every.dropna()))

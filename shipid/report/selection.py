@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, Floats, Indices, ReportContent
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, Indices, ReportContent
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
 MOST_MODELS = 12  # with more, figures of all models leave out the methods that the study does not judge by
@@ -58,9 +58,9 @@ def nothing_learns(content: ReportContent) -> bool:
     return bool(len(content.alone)) and bool(content.cells.model.isin(list(content.alone)).all())
 
 
-def in_words(content: ReportContent, model: str) -> str:
+def in_words(model: str) -> str:
     """Name of a model in a sentence: without quotes `no physics errs most` would say that no model does."""
-    return f'"{model}"' if model == data_driven(content) else model
+    return f'"{model}"' if model.partition(" + ")[0] == NO_PHYSICS else model
 
 
 def middles(content: ReportContent) -> dict[str, str]:

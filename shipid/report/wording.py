@@ -45,11 +45,11 @@ def short(value: float) -> str:
 
 
 def scientific(value: float, digits: int = 4) -> str:
-    """So many digits, with a power of ten where the number is very large or small: 803, 1.175 × 10⁵."""
+    """So many digits, with a power of ten where the number is very large or small: 803, 1.175 × 10⁵, 10⁻⁶."""
     text = f"{value:.{digits}g}".replace("-", "−")
     front, _, power = text.partition("e")
     raised = str(int(power.replace("−", "-"))) if power else ""
-    return f"{front} × 10{raised.translate(RAISED)}" if raised else text
+    return f"{'' if front == '1' else f'{front} × '}10{raised.translate(RAISED)}" if raised else text
 
 
 def shortened(name: str, most: int) -> str:

@@ -148,6 +148,20 @@ def test_windows_offer_the_largest_and_the_smallest_gain(past: ReportContent) ->
     assert (first[-1], second[-1]) == pytest.approx((1.59, 1.3))
 
 
+def test_rivals_without_physics_are_named_as_everywhere(past: ReportContent) -> None:
+    """`none + b errs less than none + a` says that nothing does."""
+    sums, time = (past.frames[name] for name in ("memory", "memory_over_time"))
+    bare = replace(past, frames={**past.frames, "memory": sums[sums.model.eq("no physics")], "memory_over_time": time})
+    figure, table = memory.windows(bare), memory.table(bare)
+    assert figure is not None
+    assert table is not None
+    assert figure.takeaway.startswith('"no physics + b" errs less than "no physics + a" in ')
+    assert [cell.text for cell in table.rows[0][:2]] == ["no physics + a", "no physics + b"]
+    gained = memory.gain(bare)
+    assert gained is not None
+    assert 'is that of "no physics", 0.30 m' in gained.takeaway
+
+
 def test_the_map_has_a_cell_for_each_model_and_amount(past: ReportContent) -> None:
     figure = memory.difference_map(past)
     assert figure is not None
@@ -179,3 +193,7 @@ def test_the_table_has_every_comparison(past: ReportContent) -> None:
     assert table is not None
     assert len(table.rows) == len(SUMS)
     assert [cell.text for cell in table.rows[-1]][-2:] == ["–", "15 of 20"]
+    small = past.frames["memory"].assign(H_without=0.0123, H_with=0.0119, difference=-0.0004)
+    of_a_model_ship = memory.table(replace(past, frames={**past.frames, "memory": small}))
+    assert of_a_model_ship is not None
+    assert [cell.text for cell in of_a_model_ship.rows[0][4:7]] == ["0.012", "0.012", "0.000"]

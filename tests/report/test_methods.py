@@ -75,6 +75,15 @@ def test_every_number_is_in_the_table_and_every_view_in_the_figure(conditions: t
         assert any(cell.bad for cell in shown) == bool(given["failed"])
 
 
+def test_errors_of_a_model_ship_are_no_zeros_in_the_table() -> None:
+    rows = frame(2, ("",), failing=False)
+    lengths = ["H", "H_90", "end", "difference", "low", "high"]
+    printed = table(content(rows.assign(**{name: rows[name] / 1000 for name in lengths})))
+    assert printed is not None
+    for given, shown in zip(rows.to_dict("records"), printed.rows, strict=True):
+        assert f"{given['H'] / 1000:.4f}" == shown[3].text
+
+
 def test_methods_are_in_the_order_that_the_page_says() -> None:
     """The best at the top: with physics, or without where a method has none; at the foot what gave no result."""
     rows = frame(2, ("",))

@@ -31,6 +31,16 @@ def test_a_panel_per_hyperparameter_that_varies(simulation):
     assert panels(dropped)["hidden dropout"].figure.layout.xaxis.type is None
 
 
+def test_ticks_over_many_decades_have_room(simulation):
+    """A panel is 190 px wide: names of five powers of ten lay over each other."""
+    for decades in range(2, 13):
+        values = np.geomspace(10.0 ** (4 - decades), 1e4, len(simulation.trials))
+        x = panels(replace(simulation, trials=simulation.trials.assign(weight_decay=values)))["weight decay"].figure
+        low, high = x.layout.xaxis.range
+        shown = [tick for tick in x.layout.xaxis.tickvals if low <= np.log10(tick) <= high]
+        assert 2 <= len(shown) <= 5
+
+
 def test_dots_are_relative_to_the_best_of_their_cell(simulation):
     trials = simulation.trials
     drawn = dots(panels(simulation)["learning rate"])

@@ -51,7 +51,7 @@ def test_two_digits_without_an_exponent():
         "10",
     ]
     assert short(math.inf) == "–"
-    assert [scientific(x) for x in (803.0, -187500.0, 1.5e-7)] == ["803", "−1.875 × 10⁵", "1.5 × 10⁻⁷"]
+    assert [scientific(x) for x in (803.0, -187500.0, 1.5e-7, 1e-8)] == ["803", "−1.875 × 10⁵", "1.5 × 10⁻⁷", "10⁻⁸"]
 
 
 def test_lists():
