@@ -43,6 +43,7 @@ from shipid.study.kinds import kinds_of
 from shipid.study.plan import Batch, Plan, beside, mapping_of
 from shipid.study.ranges import check_memory
 from shipid.units import percent, plural
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, draw
 
@@ -216,6 +217,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
 
     A member that diverges on windows of the pool is redrawn with the next counter; the test set is never looked at.
     """
+    dataset = _in_order(plan, dataset)
     rest, test, notes = partition(plan, dataset)
     notes += [
         f"{way.name} takes no observer: not fitted to {', '.join(way.left_out)}" for way in plan.methods if way.left_out
@@ -243,6 +245,16 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         estimates=estimates,
         kinds=kinds_of(dataset, test=test.spans),
     )
+
+
+def _in_order(plan: Plan, dataset: Dataset) -> Dataset:
+    """Put the commands in the order of the first vessel, others last: a drawn network depends on it as on a seed."""
+    vessel = next((one.base for one in plan.foundations if one.base is not None), None)
+    order = () if vessel is None else dynamics(vessel).commands
+    places = {name: place for place, name in enumerate(order)}
+    commands = sorted(dataset.commands, key=lambda name: (places.get(name, len(order)), name))
+    others = [name for name in dataset.frame if name not in commands]
+    return Dataset(dataset.frame[[*others, *commands]], dataset.metadata)
 
 
 def _copied(dataset: Dataset, rest: Windows, test: Windows) -> list[str]:

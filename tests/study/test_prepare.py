@@ -53,6 +53,22 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Dataset, Prepa
     return plan, dataset, prepare(plan, dataset)
 
 
+def test_the_order_of_columns_changes_no_digit(tmp_path: Path) -> None:
+    """Columns the other way round changed H of drawn networks by up to a half, as another seed would."""
+    drawn = {"name": "drawn", "kind": "path-drawn", "trials": 2, "units": 16, "terms": 4}
+    stepped = {"name": "stepped", "kind": "one-step", "trials": 1, "units": 8, "families": ["right", "none"]}
+    plan = tiny_plan(tmp_path, {"method": [drawn, stepped], "grid.N_D": [4]})
+    dataset = obtain(plan)
+    turned = Dataset(dataset.frame[["run", *[name for name in dataset.frame if name != "run"][::-1]]], dataset.metadata)
+    assert turned.commands == dataset.commands[::-1]
+    first, again = (
+        [row["H"] for row, *_ in run_unit(plan, prepare(plan, one), plan.whole(plan.batches[0]), "cpu")]
+        for one in (dataset, turned)
+    )
+    assert first == again
+    assert prepare(plan, turned).commands == tuple(dataset.commands), "the order of the vessel"
+
+
 def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     plan, dataset, prepared = tiny
     test = set(prepared.test.spans)
