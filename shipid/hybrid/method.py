@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from shipid.arguments import by_name, number
+from shipid.arguments import by_name, number, one_of, whole_number
 from shipid.checked import Checked
 from shipid.data.windows import Instants, Windows, locked
 from shipid.errors import DataError, ShipidError
@@ -198,6 +198,8 @@ class Method(Checked, BaseModel, ABC):
 
 
 TRIAL = ("number", "params", "value", "epochs", "seconds", "state")  # keys of the row of a trial
+STATES = ("complete", "stopped", "diverged")
+TAKEN = ("cell", "model", "N_D", "seed", "chosen", *TRIAL)  # columns of a table of trials beside their params
 
 
 def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
@@ -228,8 +230,14 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...]) -> None:
         if lacking is not None:
             raise DataError(f"{where}: a trial lacks {lacking!r}: make it by shipid.hybrid.trials.row_of")
         by_name(f"{where}: params of a trial", row["params"], "a name to a number", DataError)
+        taken = next((key for key in row["params"] if key in TAKEN), None)
+        if taken is not None:
+            raise DataError(f"{where}: params of a trial: {taken!r} is a name that is taken: use another")
         for key in ("value", "seconds"):
             number(f"{where}: {key} of a trial", row[key], DataError)
+        for key in ("number", "epochs"):
+            whole_number(f"{where}: {key} of a trial", row[key], 0, DataError)
+        one_of(f"{where}: state of a trial", row["state"], STATES, DataError)
     number(f"{where}: seconds", one.seconds, DataError)
     if one.left_out is not None and np.shape(one.left_out) != shape:
         raise DataError(f"{where}: left_out must be {shape}, not {np.shape(one.left_out)}")
