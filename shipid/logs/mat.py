@@ -17,8 +17,8 @@ from shipid.logs.formats import MatFormat
 def read_mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
     """Return the vectors of a MATLAB file that are as long as the clock, as a table.
 
-    `attrs["other"]` says of every other variable what it is, and how to make a vector of it; `attrs["to save anew"]`
-    names those that MATLAB must save otherwise.
+    `attrs["other"]` says of every other variable what it is, and how to make a vector of it; `attrs["notes"]` are
+    sentences on those that MATLAB must save otherwise.
     """
     from scipy.io import loadmat
 
@@ -47,7 +47,8 @@ def read_mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
             other[name] = f"of {len(values)} values, and {measure!r} has {length}: a column has a value for every time"
     table = pd.DataFrame({name: values for name, values in vectors.items() if len(values) == length})
     table.attrs["other"] = other
-    table.attrs["to save anew"] = list(dict.fromkeys(name for name, _, remedy in further if remedy))
+    anew = dict.fromkeys(name for name, _, remedy in further if remedy)
+    table.attrs["notes"] = [f"{name!r} is {other[name]}" for name in anew]
     return table
 
 

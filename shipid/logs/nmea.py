@@ -5,122 +5,223 @@ from __future__ import annotations
 import bisect
 import math
 import re
-from collections.abc import Callable
+from array import array
+from collections import Counter, defaultdict
+from collections.abc import Iterator
 from datetime import datetime
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.dates import DAY, HALF_DAY, NEXT_DAY
 from shipid.logs.foreign import refuse_foreign
 from shipid.logs.formats import LOOKED_AT, NmeaFormat
-from shipid.units import KNOT
+from shipid.logs.sentences import NMEA_COLUMNS, SENTENCES, TIMES, has_checksum, parsed
 
 FIRST_DAY = datetime(1970, 1, 1).toordinal()
 LATE_DATE = 60.0  # s after midnight: so long a receiver may write the date of the day before
+SILENT = 1.5  # usual steps of a talker: where it says nothing for longer, another one may speak for it
 _DOTTED = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})")
 _DATED = re.compile(r"\d{4}([-/]?)\d\d\1\d\d")
 _TAG_TIME = re.compile(r"[\\,]c:(\d+)")
-_SENTENCE = re.compile(r"\$[A-Z]{2}[A-Z]{3},")
+_BEGIN = re.compile(r"[$!]([A-Z][A-Z0-9]{3,7}),")
 
 
 def read_nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
-    """Return sentences as rows: `time` [s] and the columns of `SENTENCES`, NaN where a sentence has no value."""
-    import pynmea2
+    """Return sentences as rows: `time` [s] and columns of their values, NaN where a sentence has no value.
 
+    Of talkers that say a column side by side, the one who says it most often has it. The others have columns with their
+    letters, such as `heading_GP`. `attrs["unreadable"]` counts the lines that are no sentence or fail their checksum.
+    """
     refuse_foreign(file)
-    rows: list[dict[str, float]] = []
-    unreadable, clock = 0, _Clock()
-    for number, line in enumerate(file.read_bytes().decode("latin-1").splitlines(), start=1):
-        stamp, dollar, body = line.partition("$")
-        if not line.strip():
-            continue
-        try:
-            sentence = pynmea2.parse(dollar + body.strip(), check=True) if dollar else None
-            values = _values_of(sentence)
-        except (pynmea2.ParseError, ValueError, TypeError, AttributeError, IndexError):
-            sentence = None
-        if sentence is None:
-            unreadable += 1
-            continue
-        if form.time == "line":
+    heard = _Heard(form.time == "line")
+    with file.open(encoding="latin-1") as stream:
+        heard.checked = any(has_checksum(line.partition("$")[2]) for line in islice(stream, LOOKED_AT))
+        stream.seek(0)
+        for number, line in enumerate(stream, start=1):
             try:
-                rows.append({"time": _stamp(stamp), **values})
+                heard.hear(line)
             except ValueError as error:
                 message = f"{error}: set [format] time = 'fix'"
                 raise DataError(message, file=file, path=f"row {number}") from None
-            continue
-        clock.read(sentence)
-        if clock.fixes:  # before the first fix the time is unknown
-            rows.append({"time": len(clock.fixes) - 1, **values})
-    if not rows:
-        message = f"no NMEA 0183 sentence with a time in {unreadable} unreadable lines: set [format] kind or time"
-        raise DataError(message, file=file, path="format.kind")
-    table = pd.DataFrame(rows).reindex(columns=["time", *NMEA_COLUMNS])
-    if form.time == "fix":
-        table["time"] = clock.times()[table["time"]]
-    again = table["time"].ne(table["time"].shift()).cumsum()  # sentences of one instant are one row
-    table = table.groupby(again).first().reset_index(drop=True)
-    table.attrs["unreadable"] = unreadable
+    if not heard.said:
+        raise DataError(heard.nothing(), file=file, path="format.kind")
+    table = heard.table()
+    table.attrs |= {"unreadable": heard.unreadable, "notes": list(heard.notes(table))}
     return table
+
+
+class _Heard:
+    """What the lines of a log say. stamped : whether each line begins with its time; else fixes say the time.
+
+    said : column -> values, their places among the times, and their talkers, in the order of the log.
+    """
+
+    def __init__(self, stamped: bool) -> None:
+        self.stamped, self.checked = stamped, True
+        self.clock, self.stamps = _Clock(), array("d")
+        self.said: dict[str, tuple[array[float], array[int], list[str]]] = defaultdict(_nothing_said)
+        self.unreadable, self.unread = 0, Counter[str]()
+
+    def hear(self, line: str) -> None:
+        """Take a line in; ValueError where no time is before a sentence that needs one."""
+        stamp, dollar, body = line.partition("$")
+        sentence = parsed(body, self.checked) if dollar else None
+        if sentence is None:
+            other = None if dollar else _BEGIN.match(line)
+            self.unread.update([other[1]] if other else ())
+            self.unreadable += int(other is None and not line.isspace())
+            return
+        if sentence.kind not in SENTENCES and sentence.kind not in TIMES:
+            self.unread[sentence.kind] += 1
+            return
+        try:
+            values, time = sentence.values(), sentence.time()
+        except ValueError:
+            self.unreadable += 1
+            return
+        if self.stamped and values:
+            self.stamps.append(_stamp(stamp))
+        elif time is not None and (values or sentence.kind == "ZDA"):
+            self.clock.add(sentence.talker, time, sentence.day(), "latitude" in values)
+        place = len(self.stamps if self.stamped else self.clock.seconds) - 1
+        for name, value in values.items() if place >= 0 else ():  # before the first fix the time is unknown
+            values_of, places, talkers = self.said[name]
+            values_of.append(value)
+            places.append(place)
+            talkers.append(sentence.talker)
+
+    def table(self) -> pd.DataFrame:
+        """Return the rows: what is said at one time is in one, of a column what is said first."""
+        times = np.array(self.stamps) if self.stamped else self.clock.times()
+        known = np.isfinite(times)
+        new = known & (times != np.append(np.nan, times[:-1]))
+        row = np.cumsum(new) - 1
+        columns: dict[str, Array] = {}
+        for name, (values, at, talkers) in self.said.items():
+            places = np.array(at)
+            for column, those in _by_talker(name, times[places], np.array(talkers)):
+                those = those[known[places[those]]][::-1]
+                columns[column] = np.full(int(new.sum()), np.nan)
+                columns[column][row[places[those]]] = np.array(values)[those]
+        for name in ("rpm", "engine_rpm"):  # a single shaft has the number 0 or 1
+            if name not in columns and f"{name}_0" in columns:
+                columns[name] = columns.pop(f"{name}_0")
+        order = [*NMEA_COLUMNS, *sorted(columns.keys() - {*NMEA_COLUMNS})]
+        return pd.DataFrame({"time": times[new], **columns}).reindex(columns=["time", *order])
+
+    def notes(self, table: pd.DataFrame) -> Iterator[str]:
+        """Yield sentences on what of the log is not in the usual columns."""
+        if self.unread:
+            kinds = ", ".join(f"{kind} ({count})" for kind, count in self.unread.most_common())
+            yield f"sentences of these kinds are not read: {kinds}"
+        for name in table.columns:
+            first, _, talker = name.rpartition("_")
+            if first in NMEA_COLUMNS and talker.isupper():
+                yield f"{first!r} is said by several talkers: {name!r} is that of {talker}"
+
+    def nothing(self) -> str:
+        """Say why no row is there."""
+        kinds = ", ".join(kind for kind, _ in self.unread.most_common(5))
+        if self.unread and all(kind.endswith(("VDM", "VDO")) for kind in self.unread):
+            return f"messages of AIS alone ({kinds}), not read: decode them, and write a CSV with the rows of one ship"
+        others = f", and its sentences are of other kinds: {kinds}" if self.unread else ""
+        message = f"no sentence with a time and a value ({self.unreadable} unreadable lines{others})"
+        return f"{message}: set [format] kind or time"
+
+
+def _nothing_said() -> tuple[array[float], array[int], list[str]]:
+    return array("d"), array("q"), []
+
+
+def _by_talker(name: str, t: Array, talkers: NDArray[np.str_]) -> Iterator[tuple[str, NDArray[np.int_]]]:
+    """Yield the columns of what was said at t (N,) [s] by talkers (N,) of one column, and which of it they have."""
+    counts = Counter(talkers.tolist())
+    main = _speaking(t, talkers == counts.most_common(1)[0][0])
+    yield name, np.flatnonzero(main)
+    for talker in counts:
+        those = np.flatnonzero((talkers == talker) & ~main)
+        if len(those):
+            yield f"{name}_{talker}", those
+
+
+def _speaking(t: Array, main: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether what was said at t (N,) [s, also of the day] is of a main talker, or said while that is silent.
+
+    A receiver may change its letters with the satellites in sight, as from GP to GN. Two receivers speak side by side.
+    """
+    places = np.flatnonzero(main)
+    steps = _apart(t[places][1:], t[places][:-1])
+    usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    behind = np.searchsorted(places, np.arange(len(t)))
+    first, last = np.maximum(behind - 1, 0), np.minimum(behind, len(places) - 1)
+    before, after = np.where(behind > 0, t[places[first]], t), np.where(behind < len(places), t[places[last]], t)
+    gap = _apart(after, before) * np.where((behind > 0) & (behind < len(places)), 1.0, 2.0)  # half of it is in the log
+    return np.asarray(main | (gap > SILENT * usual))
+
+
+def _apart(after: Array, before: Array) -> Array:
+    """Return how far times (N,) [s] are apart, over midnight, too."""
+    return np.asarray(np.abs((after - before + HALF_DAY) % DAY - HALF_DAY))
 
 
 class _Clock:
     """Times of fixes: seconds since 1970, by the dates of RMC and ZDA, or since the midnight before the first fix.
 
-    A fix without a date is of the day of that one before or behind it whose time of day is nearer. Without any date
-    a time of day that goes back by twelve hours is of the next day.
+    Beside the positions of a receiver, those of a second one and ZDA say no other time. A fix without a date is of the
+    day of that one before or behind it whose time of day is nearer. Without any date a time of day that goes back by
+    twelve hours is of the next day.
     """
 
     def __init__(self) -> None:
-        self.fixes: list[tuple[float, int | None]] = []  # s of the day, and day
+        self.seconds = array("d")  # of the day
+        self.days: dict[int, int] = {}  # place of a fix -> its day
+        self.talkers: list[str] = []  # of positions; empty of others
 
-    def read(self, sentence: Any) -> None:
-        """Add the fix of a sentence that has one."""
-        time: Any = getattr(sentence, "timestamp", None)
-        if hasattr(time, "hour"):
-            seconds = 3600.0 * time.hour + 60.0 * time.minute + time.second + 1e-6 * time.microsecond
-            self.fixes.append((seconds, _day_of(sentence)))
+    def add(self, talker: str, seconds: float, day: int | None, position: bool) -> None:
+        """Add a fix, with its time of day [s] and its day."""
+        if day is not None:
+            self.days[len(self.seconds)] = day
+        self.seconds.append(seconds)
+        self.talkers.append(talker if position else "")
 
     def times(self) -> Array:
-        """Return the times (N,) [s] of the fixes."""
-        since = np.array([seconds for seconds, _ in self.fixes])
-        known = [place for place, (_, day) in enumerate(self.fixes) if day is not None]
+        """Return the times (N,) [s] of the fixes; one that says no time has that of the fix before, or NaN."""
+        since = np.array(self.seconds)
+        main = Counter(filter(None, self.talkers)).most_common(1)
+        first = np.array(self.talkers) == (main[0][0] if main else "")
+        places = np.flatnonzero(first)
+        behind = places[np.minimum(np.searchsorted(places, np.arange(len(since))), len(places) - 1)]
+        kept = np.flatnonzero(_speaking(since, first) | (since == since[behind]))  # an instant may begin with another
+        before = np.searchsorted(kept, np.arange(len(since)), side="right") - 1
+        return np.where(before < 0, np.nan, self._dated(since, kept)[before])
+
+    def _dated(self, since: Array, kept: NDArray[np.int_]) -> Array:
+        """Times (M,) [s] of the fixes at the places `kept`; since (N,) [s] are the times of day of all."""
+        result, known = since[kept], sorted(self.days)
         if not known:
-            return np.asarray(since + DAY * np.cumsum(np.diff(since, prepend=since[:1]) < -HALF_DAY))
-        days = [self._day(place, known) for place in range(len(since))]
-        result = since + DAY * (np.array(days) - FIRST_DAY)
-        for place in np.flatnonzero(since < LATE_DATE):
+            return np.asarray(result + DAY * np.cumsum(np.diff(result, prepend=result[:1]) < -HALF_DAY))
+        result = result + DAY * (np.array([self._day(place, known) for place in kept.tolist()]) - FIRST_DAY)
+        for place in np.flatnonzero(since[kept] < LATE_DATE):
             if place and 0.0 <= result[place] + DAY - result[place - 1] < NEXT_DAY:  # the date is of the day before
                 result[place] += DAY
         return np.asarray(result)
 
     def _day(self, place: int, known: list[int]) -> int:
         """Day of a fix, where those at the places `known` say theirs."""
-        now, day = self.fixes[place]
-        if day is not None:
-            return day
-        behind = bisect.bisect_left(known, place)
-        near = [self.fixes[one] for one in known[max(0, behind - 1) : behind + 1]]
-        apart = [(now - seconds + HALF_DAY) % DAY - HALF_DAY for seconds, _ in near]
-        nearest = int(np.argmin(np.abs(apart)))
-        seconds, day = near[nearest]
-        return int(day or 0) + round((seconds + apart[nearest] - now) / DAY)
-
-
-def _day_of(sentence: Any) -> int | None:
-    """Day of a valid RMC or ZDA, None of another sentence and of one without a date."""
-    kind = getattr(sentence, "sentence_type", "")
-    if kind not in ("RMC", "ZDA") or getattr(sentence, "status", "A") == "V":
-        return None
-    try:
-        return int(sentence.datestamp.toordinal())
-    except (AttributeError, TypeError, ValueError):
-        return None
+        if place in self.days:
+            return self.days[place]
+        now, behind = self.seconds[place], bisect.bisect_left(known, place)
+        near = known[max(0, behind - 1) : behind + 1]
+        apart = [(now - self.seconds[one] + HALF_DAY) % DAY - HALF_DAY for one in near]
+        nearest = min(range(len(near)), key=lambda one: abs(apart[one]))
+        return self.days[near[nearest]] + round((self.seconds[near[nearest]] + apart[nearest] - now) / DAY)
 
 
 def _stamp(text: str) -> float:
@@ -157,88 +258,13 @@ def _is_stamp(text: str) -> bool:
         return False
 
 
-def _values_of(sentence: Any) -> dict[str, float]:
-    """Return the values of a sentence by column; none of an invalid one (status V; GGA: quality 0; VTG: mode N)."""
-    kind = getattr(sentence, "sentence_type", "")
-    if getattr(sentence, "status", "A") == "V" or str(getattr(sentence, "gps_qual", 1)) == "0":
-        return {}
-    if kind == "VTG" and getattr(sentence, "faa_mode", None) == "N":
-        return {}
-    values = {name: read(sentence) for name, read in SENTENCES.get(kind, {}).items()}
-    return {name: float(value) for name, value in values.items() if value not in (None, "")}
-
-
-def _position(name: str) -> Callable[[Any], Any]:
-    """Return the position in decimal degrees; nothing where the field is empty (the parser would return 0)."""
-    return lambda sentence: getattr(sentence, name) if getattr(sentence, name[:3]) else None
-
-
-def _apparent(name: str) -> Callable[[Any], Any]:
-    return lambda sentence: getattr(sentence, name) if sentence.reference == "R" else None
-
-
-def _turns(sentence: Any, source: str) -> str | None:
-    """Number of the shaft (source S) or engine (E) whose speed a sentence has; None where it is of the other kind."""
-    return str(sentence.engine_no) if sentence.source == source else None
-
-
-def _revolutions(source: str, *numbers: str) -> Callable[[Any], Any]:
-    return lambda sentence: sentence.speed if _turns(sentence, source) in numbers else None
-
-
-def _rudder(side: str) -> Callable[[Any], Any]:
-    """Return the angle of the rudder of a side; nothing where its status says that it is invalid."""
-    return lambda s: None if getattr(s, f"rsa_{side}_status", "A") == "V" else getattr(s, f"rsa_{side}")
-
-
-def _speed(sentence: Any) -> Any:
-    """Return the apparent wind speed [m/s] from a value in N (knots), K (km/h) or M (m/s)."""
-    if sentence.reference != "R" or not sentence.wind_speed:
-        return None
-    factor = {"N": KNOT, "K": 1.0 / 3.6, "M": 1.0}.get(sentence.wind_speed_units)
-    return None if factor is None else float(sentence.wind_speed) * factor
-
-
-def _true_wind(sentence: Any) -> Any:
-    """Return the true wind speed [m/s], which a sentence has in m/s, in knots or in both."""
-    if sentence.wind_speed_meters in (None, "") and sentence.wind_speed_knots:
-        return float(sentence.wind_speed_knots) * KNOT
-    return sentence.wind_speed_meters
-
-
-SENTENCES: dict[str, dict[str, Callable[[Any], Any]]] = {
-    "GGA": {"latitude": _position("latitude"), "longitude": _position("longitude")},
-    "GLL": {"latitude": _position("latitude"), "longitude": _position("longitude")},
-    "RMC": {
-        "latitude": _position("latitude"),
-        "longitude": _position("longitude"),
-        "sog": lambda s: s.spd_over_grnd,
-        "cog": lambda s: s.true_course,
-    },
-    "VTG": {"sog": lambda s: s.spd_over_grnd_kts, "cog": lambda s: s.true_track},
-    "HDT": {"heading": lambda s: s.heading},
-    "ROT": {"rot": lambda s: s.rate_of_turn},
-    "RSA": {"rudder": _rudder("starboard"), "rudder_port": _rudder("port")},
-    "RPM": {
-        "rpm": _revolutions("S", "0", "1"),
-        "rpm_2": _revolutions("S", "2"),
-        "engine_rpm": _revolutions("E", "0", "1"),
-        "engine_rpm_2": _revolutions("E", "2"),
-    },
-    "MWV": {"apparent_angle": _apparent("wind_angle"), "apparent_speed": _speed},
-    "MWD": {"wind_from": lambda s: s.direction_true, "wind_speed": _true_wind},
-}
-"""Sentence -> column -> how it is read: deg; rot deg/min; sog kn; rpm; wind speeds m/s."""
-NMEA_COLUMNS = tuple(dict.fromkeys(name for columns in SENTENCES.values() for name in columns))
-
-
 def is_nmea(_: Path, head: bytes) -> dict[str, Any] | None:
     """Recognise NMEA 0183: most lines are sentences; the time is before them, or in the position fixes."""
     if b"\0" in head:
         return None
     lines = [line for line in head.decode("latin-1").splitlines()[:LOOKED_AT] if line.strip()]
-    sentences = [line for line in lines if _SENTENCE.search(line)]
+    sentences = [line for line in lines if _BEGIN.search(line)]
     if len(sentences) <= len(lines) / 2:
         return None
-    stamped = sum(_is_stamp(line.partition("$")[0]) for line in sentences)
-    return {"kind": "nmea", "time": "line" if stamped > len(sentences) / 2 else "fix"}
+    stamps = [stamp for stamp, dollar, _ in (line.partition("$") for line in sentences) if dollar]
+    return {"kind": "nmea", "time": "line" if sum(map(_is_stamp, stamps)) > len(stamps) / 2 else "fix"}

@@ -48,7 +48,7 @@ def require_file(file: Path) -> int:
 def read_table(
     file: Path, form: Format, clock: str, columns: Iterable[str] = (), progress: Progress | None = None
 ) -> pd.DataFrame:
-    """Read a log as its format says; `attrs["unreadable"]` counts the lines that were skipped.
+    """Read a log as its format says; `attrs["unreadable"]` counts the skipped lines, `attrs["notes"]` has sentences.
 
     Parameters
     ----------

@@ -128,7 +128,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
             raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)
     else:
         table = read_table(file, model, "time")
-        notes = tuple(f"{name!r} is {table.attrs['other'][name]}" for name in table.attrs.get("to save anew", ()))
+        notes = tuple(table.attrs.get("notes", ()))
     _refuse_ships(table, file)
     table, in_units, mixed = _without_units(table)
     columns, words = _numbers(table, form.get("decimal", "."), form.get("thousands"))

@@ -1,0 +1,66 @@
+"""Sentences of NMEA 0183: what each kind says, and which say nothing."""
+
+import math
+from typing import Any
+
+import pytest
+
+from shipid.logs.sentences import parsed
+from tests.logs.test_nmea import sentence
+
+WHERE = "4807.038,N,01131.000,W"
+PLACE = {"latitude": 48 + 7.038 / 60, "longitude": -(11 + 31 / 60)}
+
+
+@pytest.mark.parametrize(
+    ("body", "values"),
+    [
+        (f"GNGNS,120000,{WHERE},AN,09,0.9,5.0,40.0,,", PLACE),
+        (f"GNGNS,120000,{WHERE},NN,09,0.9,5.0,40.0,,", {}),
+        (f"GPGGA,120000,{WHERE},1,8,0.9,5.0,M,46.9,M,,", PLACE),
+        (f"GPGGA,120000,{WHERE},0,0,,,M,,M,,", {}),
+        (f"GPGLL,{WHERE},120000,A", PLACE),
+        (f"GPRMC,120000,A,{WHERE},5.0,,271022", PLACE | {"sog": 5.0}),
+        ("GPRMC,120000,A,,,,,5.0,84.0,271022,,,A", {"sog": 5.0, "cog": 84.0}),
+        ("GPVTG,54.0,T,,M,,N,18.52,K,A", {"cog": 54.0, "sog": 10.0}),
+        ("HETHS,123.4,A", {"heading": 123.4}),
+        ("HETHS,123.4,V", {}),
+        ("IIRPM,S,0,90.0,,A", {"rpm_0": 90.0}),
+        ("IIRPM,S,3,90.0,,A", {"rpm_3": 90.0}),
+        ("PGRMC,A,218.8,100,6378137.0", {}),
+        ("HCHDG,120.0,,,3.0,E", {}),
+    ],
+)
+def test_what_a_sentence_says(body: str, values: dict[str, float]) -> None:
+    """One of Garmin that begins with $PGRMC is no RMC."""
+    said = parsed(sentence(body)[1:], checked=True)
+    assert said is not None
+    assert said.values() == pytest.approx(values)
+
+
+@pytest.mark.parametrize("fields", ["4860.000,N,01131.000,W", "4807.038,,01131.000,W", "4807.038,N,01131.000,N"])
+def test_a_position_that_is_none_is_refused(fields: str) -> None:
+    """Before, a position without its side was at 0 deg."""
+    said = parsed(sentence(f"GPGLL,{fields},120000,A")[1:], checked=True)
+    assert said is not None
+    with pytest.raises(ValueError, match=r"is no (latitude|longitude)"):
+        said.values()
+
+
+@pytest.mark.parametrize(
+    ("body", "time"),
+    [(f"GPRMC,235960.5,A,{WHERE},5,84,271022", 86400.5), ("RATTM,01,2.3,45.0,T,,,T,,,N,A,T,,115957.00,A", None)],
+)
+def test_fixes_say_the_time_and_radar_targets_do_not(body: str, time: Any) -> None:
+    said = parsed(sentence(body)[1:], checked=True)
+    assert said is not None
+    assert said.time() == time
+
+
+def test_a_checksum_is_the_exclusive_or_of_all_characters() -> None:
+    good = "GPGLL,3751.65,S,14507.36,E*77"  # of the manual of a receiver
+    assert parsed(good, checked=True) is not None
+    assert parsed(good.replace("65", "66"), checked=False) is None
+    assert parsed(good.partition("*")[0], checked=True) is None
+    assert parsed(good.partition("*")[0], checked=False) is not None
+    assert math.isclose(parsed(good, checked=True).values()["latitude"], -(37 + 51.65 / 60))  # type: ignore[union-attr]
