@@ -42,6 +42,7 @@ Rows = NDArray[np.bool_]
 LONG = 1e4  # rows between two runs that have a clock each
 FEWEST_TIMES = 10  # of a second clock that are compared with the first
 APART, OFF = 10, 0.02  # steps of the first clock, and share of its span, by which a second one may go otherwise
+FEWEST, NEARLY = 0.3, 0.9  # shares of the rows of a clock with a fault that have a time, and that rise, at least
 LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
 REPEATED = 0.05  # share of the rows that may repeat the row before, at most
 CLOCK_WORDS = frozenset(
@@ -245,7 +246,9 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
             if name in texts:
                 fault = _unread(table, name, times[name]) or _fault(times[name])
                 raise DataError(f"no column can be the clock: {name!r} {fault}", file=file)
-    candidates = [name for name in rising if name in called] or [name for name in rising if not _counts(columns[name])]
+    faulty = [name for name in called if name not in rising and _nearly_rises({**times, **columns}[name])]
+    others = [] if faulty else [name for name in rising if not _counts(columns[name])]  # a total rises, too
+    candidates = [name for name in rising if name in called] or others
     unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
     rounded = [name for name in called or unnamed if name in finite and name not in rising]
     for name in [*candidates[:1], *rounded] if candidates and candidates[0] in called else [*rounded, *candidates[:1]]:
@@ -256,9 +259,10 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
             return {"from": name, "unit": unit, "every": rate[0]}, rate[1]
         if rises:
             return {"from": name, "unit": unit}, t
-    if rising:
+    if rising and not faulty:
         unit, t = _read_clock(table, rising[0], finite[rising[0]], file)
         return {"from": rising[0], "unit": unit}, t
+    called = faulty or called
     first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
     if called and called[0] in finite:
         first = clock_seconds(first, _unit_of_clock(called[0], first))
@@ -535,9 +539,17 @@ def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
         return f"{begin}, without the hour, as Excel shows times: show them as hh:mm:ss.000, and export again"
     if wrong.all():
         return f"{begin}, no number, date or time of day that can be read: write dates as 2024-05-14 08:00:00"
+    if np.isfinite(seconds(pd.Series([text]))[0]) and not np.isfinite(pd.to_numeric(text, errors="coerce")):
+        return f"{begin}, and other rows are written otherwise: write all in one way, with a zone in each or in none"
     what = "a leap second" if re.search(r":60(\D|$)", text) else "a comment" if text[:1] in "#%/;" else "no time"
     lines = "the line" if wrong.sum() == 1 else f"the {wrong.sum()} such lines"
     return f"{begin}, {what}: remove {lines}"
+
+
+def _nearly_rises(values: Array) -> bool:
+    """Whether a column (N,) rises but for a few rows that are lost or go back, as a clock with a fault does."""
+    steps = np.diff(values[np.isfinite(values)])
+    return bool(len(steps) > FEWEST * len(values) and np.mean(steps > 0) > NEARLY)
 
 
 def _counter(values: Array) -> str:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -509,3 +512,41 @@ def test_a_second_clock_that_goes_otherwise_is_asked(
     log.to_csv(tmp_path / "log.csv", index=False)
     doubts = sniff(tmp_path / "log.csv").doubts
     assert [doubt.partition(",")[0] for doubt in doubts] == [f"{next(iter(second))!r} is a clock"] * asked
+
+
+def _rows(change: Any) -> list[str]:
+    times = [f"{k}.0" for k in range(60)]
+    change(times)
+    return ["time,north,fuel total", *(f"{time},{k % 7},{100 + 0.01 * k * k:.2f}" for k, time in enumerate(times))]
+
+
+@pytest.mark.parametrize(
+    ("first", "changed", "fault"),
+    [
+        (30, lambda k: f"{k - 5}.0", "goes back from 29 s to 25 s in row 31"),
+        (59, lambda _: "", "has no value in row 60"),
+        (59, lambda _: "1" + "0" * 400, "in row 60, no time: remove the line"),
+        (59, lambda _: "err", "holds 'err' in row 60, no time: remove the line"),
+    ],
+)
+def test_a_total_that_rises_is_no_clock_beside_a_clock_with_a_fault(
+    first: int, changed: Any, fault: str, tmp_path: Path
+) -> None:
+    """Before, the fuel total was the clock, and the draft said that no column is called one."""
+
+    def change(times: list[str]) -> None:
+        times[first:] = [changed(k) for k in range(first, 60)]
+
+    with pytest.raises(DataError, match=f"no column can be the clock: 'time' .*{re.escape(fault)}"):
+        sniff(log_of(tmp_path, _rows(change)))
+
+
+@pytest.mark.parametrize("other", ["%Y-%m-%dT%H:%M:%SZ", "%d.%m.%Y %H:%M:%S"])
+def test_dates_written_in_two_ways_are_refused_with_what_to_do(other: str, tmp_path: Path) -> None:
+    def change(times: list[str]) -> None:
+        begin = datetime(2024, 5, 14, 8, tzinfo=UTC)
+        ways = ["%Y-%m-%d %H:%M:%S"] * 35 + [other] * 25
+        times[:] = [f"{begin + timedelta(seconds=k):{way}}" for k, way in enumerate(ways)]
+
+    with pytest.raises(DataError, match=r"'time' holds .* in row .*, and other rows are written otherwise"):
+        sniff(log_of(tmp_path, _rows(change)))
