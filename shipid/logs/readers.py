@@ -70,6 +70,9 @@ def read_table(
         if table is None:
             table = READERS[form.kind].read(file, form, clock)
     except OSError as error:
+        if error.errno is None:  # of a library, not of the system
+            message = f"no file of kind {form.kind!r}, or damaged: set [format] kind"
+            raise DataError(message, file=file, path="format.kind") from None
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
     if len(table) < 2:
         raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)

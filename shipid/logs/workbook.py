@@ -52,7 +52,7 @@ def check_width(cells: int, file: Path) -> None:
     """Raise DataError where a line has more cells than that of any log."""
     if cells > WIDEST:
         raise DataError(
-            f"a line of {cells} cells: a log has {WIDEST} columns at most; is the table transposed?", file=file
+            f"a line of more than {WIDEST} cells, more than a log has columns: is the table transposed?", file=file
         )
 
 

@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 from typer.testing import CliRunner
 
 from shipid.cli import app
-from shipid.errors import ShipidError
+from shipid.errors import DataError, ShipidError
+from shipid.logs.readers import READERS, read_table
 from tests.logs.conftest import PLAIN, as_log, turning
 
 T = np.arange(0.0, 60.0, 0.5)
@@ -308,3 +310,35 @@ def test_a_place_where_one_may_not_write(tmp_path: Path) -> None:
     status, output = shipid("data", "import", str(PLAIN), str(tmp_path / "log.csv"), "--out", out)
     assert status == 1
     assert "cannot be written" in output
+
+
+@pytest.mark.parametrize("mark", [",", " "])
+def test_a_line_of_a_million_cells_is_refused(mark: str, tmp_path: Path) -> None:
+    """Before, a draft said that there is no table of numbers."""
+    (tmp_path / "log.csv").write_text("\n".join(mark.join(map(str, range(1_000_000))) for _ in range(2)))
+    for arguments in (("--guess",), (str(PLAIN),)):
+        status, output = shipid("data", "import", *arguments, str(tmp_path / "log.csv"))
+        assert status == 1
+        assert ("more than 10000 cells" in output) == (mark == "," or "--guess" in arguments)
+
+
+@pytest.mark.parametrize("kind", ["mat", "parquet"])
+def test_damaged_bytes_are_said_to_be_damaged(kind: str, tmp_path: Path) -> None:
+    """Before, some were "cannot be read (None)": the library has errors of the system without a number."""
+    table, file = pd.DataFrame({"t": T, "x": np.sin(T)}), tmp_path / f"log.{kind}"
+    if kind == "mat":
+        savemat(file, {name: table[name].to_numpy() for name in table})
+    else:
+        table.to_parquet(file)
+    whole, random, said = file.read_bytes(), np.random.default_rng(0), []
+    for _ in range(40):
+        damaged = bytearray(whole)
+        for place in random.integers(130, len(damaged) - 8, 10):
+            damaged[place] = random.integers(256)
+        file.write_bytes(damaged[: None if kind == "parquet" else int(random.integers(130, len(damaged)))])
+        try:
+            read_table(file, READERS[kind].options(kind=kind), "t")
+        except DataError as error:
+            said.append(str(error))
+    assert said
+    assert not [one for one in said if "None" in one]

@@ -21,7 +21,7 @@ from shipid.logs.formats import LOOKED_AT, SheetFormat, TextFormat
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.words import NO_VALUE, fits, known_words
 from shipid.logs.readers import READERS, grouped_by
-from shipid.logs.workbook import SEPARATOR, sheet_text, sheets_of
+from shipid.logs.workbook import SEPARATOR, check_width, sheet_text, sheets_of
 
 ELSEWHERE = ("cp932", "gb18030", "cp949", "cp1251")  # encodings of texts whose words no other one shows
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
@@ -110,6 +110,8 @@ def _text_format(
     lines: list[str], encoding: str, file: Path, names: tuple[str, ...], separators: tuple[str, ...] = SEPARATORS
 ) -> dict[str, Any]:
     """Return the keys of [format] of a text, or of a sheet, by its first lines; the header is above the data."""
+    for line, mark in itertools.product(lines, separators):
+        check_width(len(line.split()) if mark == "whitespace" else line.count(mark) + 1, file)
     score, separator, decimal, mark = _marks(lines, separators)
     _refuse_long([cells(line, separator) for line in lines if line.strip()] if separator else [], file)
     if score < NUMERIC / 2:
