@@ -330,9 +330,9 @@ class Predictor:
         with placed(f"from_arrays of the method {self.method!r}", home):
             corrector = METHODS[self.method].corrector.from_arrays(header, self._corrector_arrays())
         one, first = instants.select(np.arange(1)), paths[:, :1]
-        pair = [replace(self, corrector=each).predict(one, first) for each in (self.corrector, corrector)]
-        if not np.allclose(*pair, rtol=1e-6, atol=1e-6, equal_nan=True):
-            away = float(np.nanmax(lengths(pair[0] - pair[1])))
+        kept, restored = (replace(self, corrector=each).predict(one, first) for each in (self.corrector, corrector))
+        if not np.allclose(kept, restored, rtol=1e-6, atol=1e-6, equal_nan=True):
+            away = float(np.nanmax(lengths(kept - restored)))
             raise ShipidError(
                 f"the method {self.method!r}, saved and read back, predicts places {away:.2g} m away: `header`, "
                 "`arrays` and `from_arrays` must keep all that `predict` uses, and `predict` may draw nothing at random"

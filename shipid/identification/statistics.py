@@ -255,7 +255,7 @@ def _nothing(fit: LinearFit) -> Statistics:
     """Statistics of a fit without a free factor: infinite errors, nothing identified."""
     n = len(fit.paths)
     none, wide, fixed = np.zeros(0), np.full(n, np.inf), np.zeros(n, dtype=bool)
-    covariance = Covariance("fisher", np.zeros((0, 0)), none, False, "no factor is free", none.reshape(0, 0))
+    covariance = Covariance("fisher", np.zeros((0, 0)), none, False, "no factor is free")
     sentences = _sentences(fit, wide, wide, fixed, ())
     low, high, levels = fit.factors - wide, fit.factors + wide, whiteness(fit)
     return Statistics(

@@ -110,8 +110,8 @@ def _text_format(
     lines: list[str], encoding: str, file: Path, names: tuple[str, ...], separators: tuple[str, ...] = SEPARATORS
 ) -> dict[str, Any]:
     """Return the keys of [format] of a text, or of a sheet, by its first lines; the header is above the data."""
-    for line, mark in itertools.product(lines, separators):
-        check_width(len(line.split()) if mark == "whitespace" else line.count(mark) + 1, file)
+    for line, sign in itertools.product(lines, separators):
+        check_width(len(line.split()) if sign == "whitespace" else line.count(sign) + 1, file)
     score, separator, decimal, mark = _marks(lines, separators)
     _refuse_long([cells(line, separator) for line in lines if line.strip()] if separator else [], file)
     if score < NUMERIC / 2:
