@@ -563,8 +563,10 @@ def test_wrong_values_are_refused_and_the_instance_goes_on(ship, folder):
     with pytest.raises(fmi.FMICallException):
         one.fmu.doStep(0.0, 1.0)
     assert one.get("u") == [4.0]
+    assert one.fmu.getInteger([0]) == [4]
     one.set(**{"load.X": 0.0})
     one.fmu.doStep(0.0, 1.0)
+    assert one.fmu.getInteger([0]) == [0]
     assert 3.0 < one.get("u")[0] < 4.5
     state = one.fmu.getFMUstate()
     bytes_ = one.fmu.serializeFMUstate(state)
