@@ -89,7 +89,7 @@ class Memory(Checked, BaseModel):
         present heading, and in u, v, r. It holds wind, current, and what the model lacks. One number or several.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     history: tuple[PositiveFloat, ...] = ()
     turned: tuple[PositiveFloat, ...] = ()
     error: tuple[PositiveFloat, ...] = ()

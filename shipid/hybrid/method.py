@@ -167,7 +167,7 @@ class Method(Checked, BaseModel, ABC):
     corrector : the class that a saved predictor is rebuilt with.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     validation: ClassVar[str] = "share"
     compensates: ClassVar[bool] = True
     meets_none: ClassVar[bool] = True

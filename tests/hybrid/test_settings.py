@@ -28,6 +28,9 @@ def test_a_field_can_be_changed_in_either_method():
         ("path-trained", {"units": [64, 32]}, "units: a range goes from low to high"),
         ("path-trained", {"weight_decay": [0.0, 1.0]}, r"method\.weight_decay"),  # searched by its logarithm
         ("path-trained", {"ridge": 1.0}, r"method\.ridge: unknown key"),
+        ("path-drawn", {"memory": {"turned": float("inf")}}, r"method\.memory\.turned: inf: must be a finite number"),
+        ("recurrent", {"seconds": float("inf")}, r"method\.seconds: inf: must be a finite number"),
+        ("hankel-dmd", {"delays": [float("inf")]}, r"method\.delays.*: inf: must be a finite number"),
     ],
 )
 def test_a_method_that_cannot_be_meant_is_refused_in_one_line(name, changes, message):
