@@ -177,8 +177,8 @@ def _run_parts(
             if not leaves and done[name] == part.plan.cells:
                 continue
             yield Event("note", f"{name}:")
-            given = {"workers": workers, "scheduler": scheduler, "device": device, "leave": leaves}
-            for event in run_study(part.plan, folders[name], **given):  # type: ignore[arg-type]
+            where = folders[name]
+            for event in run_study(part.plan, where, workers=workers, scheduler=scheduler, device=device, leave=leaves):
                 if event.kind == "note":
                     yield event
                 else:
