@@ -33,13 +33,13 @@ class Guarded(typer.core.TyperCommand):
     """A command that refuses numbers that are not finite, and a file named to be read and written, or written twice."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take the arguments as Typer does; what is no number is told with its value, which Typer leaves out."""
+        """Take the arguments as Typer does; the error for what is no number shows its value, too."""
         try:
             return super().parse_args(ctx, args)
         except typer.BadParameter as error:
-            found: list[Any] = getattr(error.__cause__, "errors", list)()
-            if found and (words := NO_NUMBER.get(found[0]["type"])):
-                error.message = f"{found[0]['input']!r} {words}"
+            faults: list[Any] = getattr(error.__cause__, "errors", list)()
+            if faults and (words := NO_NUMBER.get(faults[0]["type"])):
+                error.message = f"{faults[0]['input']!r} {words}"
             raise
 
     def invoke(self, ctx: Any) -> Any:

@@ -135,8 +135,8 @@ class _Printer:
         elif operation == ca.OP_OUTPUT:
             self.outputs[target[1]] = self.slot[source[0]]
         else:
-            found = self.looked_up(k) if k in self.tables else None
-            self.slot[target[0]] = found or self.operation(k, operation, [self.slot[i] for i in source])
+            value = self.looked_up(k) if k in self.tables else None
+            self.slot[target[0]] = value or self.operation(k, operation, [self.slot[i] for i in source])
         if operation != ca.OP_OUTPUT:
             self.values[k] = self.slot[target[0]]
 
@@ -195,7 +195,7 @@ class _Printer:
         return _Value(self.dialect.operations[ca.OP_INV].format(text), value.stage)
 
     def finish(self) -> Printed:
-        """Everything that was printed."""
+        """The lines of all stages, what they save for later stages, and the expressions of the outputs."""
         outputs = tuple(self.use(self.outputs[i], self.last) for i in sorted(self.outputs))
         lines = tuple(tuple(stage) for stage in self.lines)
         return Printed(lines, tuple(map(tuple, self.saved)), outputs, tuple(self.names), tuple(self.stage_of))

@@ -119,9 +119,9 @@ def rollout(
     return Trajectories(records, kept, diverged, step * every)
 
 
-def _judged(way: Engine, batch: Batch, *found: Array) -> tuple[Array, ...]:
-    """What an engine has found, with whether each (variant, sample) has diverged in place of its greatest speed."""
-    *kept, worst = found
+def _judged(way: Engine, batch: Batch, *results: Array) -> tuple[Array, ...]:
+    """Results of an engine, with whether each (variant, sample) has diverged in place of its greatest speed."""
+    *kept, worst = results
     slow = worst <= SPEED_LIMIT
     return *kept, ~(slow if way.checks else slow & finite(batch))
 

@@ -1,8 +1,8 @@
-"""Tables in the equations: piecewise linear functions, found in a CasADi function and looked up by vectors of C.
+"""Tables in the equations: piecewise linear functions, recognised in a CasADi function and looked up by vectors of C.
 
 `shipid.physics.wind.interpolate` writes a table as a sum of ramps, which every engine can compute and differentiate:
 y_0 + b_0 (x - k_0) + sum_i (b_i - b_(i-1)) max(x - k_i, 0). That is three operations for each knot. In C the interval
-of x is found once for all tables with the same knots. Then ordinate and slope are read: lane by lane, or, where a
+of x is computed once for all tables with the same knots. Then ordinate and slope are read: lane by lane, or, where a
 processor permutes vectors (AVX-512), by one instruction for each 16 intervals (32 in single precision). The values are
 those of the ramps to rounding. This needs knots that are evenly apart; with others the ramps are as fast.
 """
@@ -55,7 +55,7 @@ class Lookup:
     def head(self) -> str:
         """C functions. `v_place` gives the interval of x, and how far x is in it, in widths of an interval."""
         further, slope = self.apart
-        return f"""{self.found()}
+        return f"""{self.reading()}
 static inline V v_place(V x, V first, V scale, int count, M *place) {{
   V along = (x - first) * scale, whole = v_min(v_max(along - K(0.5), K(0)), K(count - 1)) + K(ROUND);
   *place = (M)whole - (M)K(ROUND);
@@ -71,7 +71,7 @@ static void v_table(V *table, REAL width, REAL y, REAL slope, const REAL *bends,
 }}
 """
 
-    def found(self) -> str:
+    def reading(self) -> str:
         """C of `v_value`: the value of a table so far `along` the interval at `place`."""
         return """
 static inline V v_value(const V *table, int rows, M place, V along) {
@@ -122,10 +122,10 @@ class Permuted(Lookup):
 
     apart: ClassVar = (1, "rows * W / 2")
 
-    def found(self) -> str:
+    def reading(self) -> str:
         """C of `v_value`: the value of a table so far `along` the interval at `place`."""
         return f"""
-static inline V v_found(const V *table, M place, int rows) {{
+static inline V v_picked(const V *table, M place, int rows) {{
   V all = K(0);
   for (int i = 0; i < rows; i += 2) {{
     V r = table[i];
@@ -135,7 +135,7 @@ static inline V v_found(const V *table, M place, int rows) {{
   return all;
 }}
 static inline V v_value(const V *table, int rows, M place, V along) {{
-  return v_found(table, place, rows / 2) + along * v_found(table + rows / 2, place, rows / 2);
+  return v_picked(table, place, rows / 2) + along * v_picked(table + rows / 2, place, rows / 2);
 }}
 """
 

@@ -24,7 +24,7 @@ COMPONENT_GRAIN = 8  # grain of compiled blocks if each sample has drawn compone
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """A lowered step.
+    """One step of a rollout as PyTorch functions, in stages.
 
     parameters_stage : parameters (P, V, 1) -> saved tensors of all functions, once a rollout.
     held_stage : (commands, environment, saved) -> what else is known before the state is, once while they are held.

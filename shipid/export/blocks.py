@@ -116,7 +116,7 @@ class Formula(Block):
 
     @property
     def function(self) -> ca.Function:
-        """The function itself."""
+        """The function of scalars as it was given."""
         return self.sx
 
     def statements(self, call: dict[int, str], precision: Precision) -> list[str]:  # noqa: ARG002
@@ -263,7 +263,7 @@ class Nearest(Block):
 
     @property
     def inputs(self) -> tuple[tuple[str, int], ...]:  # type: ignore[override]
-        """The point."""
+        """Coordinates z (d,) of the point."""
         return (("z", self.centres.shape[1]),)
 
     @cached_property
@@ -470,7 +470,7 @@ class Graph(Block):
         return Value(name, 0, symbol)
 
     def add(self, x: Value, factor: float | Duration, k: Value) -> Value:
-        """X + factor k."""
+        """The vector x + factor k, both of one size."""
         name = self._new(x.size)
         self._lines.append(("add", (name, x.size, x.text, factor, k.text)))
         return Value(name, 0, x.symbol + (factor.symbol if isinstance(factor, Duration) else factor) * k.symbol)
@@ -521,7 +521,7 @@ class Graph(Block):
         return Value(name, 0, ca.vertcat(*results))
 
     def finish(self, output: Value) -> Graph:
-        """Say what the output is."""
+        """Return the graph with its output."""
         self._output, self.size = output, output.size
         return self
 

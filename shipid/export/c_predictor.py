@@ -234,7 +234,7 @@ int {name}_path(const {name}_real *now, const {name}_real *reached, const {name}
 """
 
     def source(self) -> str:
-        """The source."""
+        """Text of the C file: tables, functions of the blocks, and the functions of the header."""
         model, name, names = self.model, self.name, self.model.layout
         blocks: list[Block] = [model.graph]
         advance = _advance(model.vessel) if model.vessel is not None and names.reached else None

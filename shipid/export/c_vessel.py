@@ -138,7 +138,7 @@ int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_re
 """
 
     def source(self) -> str:
-        """The source."""
+        """Text of the C file: functions of the blocks, and the functions of the header."""
         name, equations, groups = self.name, self.equations, self.groups()
         model, n = equations.model, equations.num_carry
         step = equations.step(self.method)

@@ -28,7 +28,7 @@ class Equations:
 
     @cached_property
     def model(self) -> Dynamics:
-        """Symbolic equations."""
+        """Symbolic equations of motion of the vessel."""
         return dynamics(self.vessel)
 
     @property

@@ -200,7 +200,7 @@ def _compiled(folder: Path, name: str) -> Path:
 
 
 def description(unit: Packed, guid: str) -> str:
-    """modelDescription.xml."""
+    """Text of modelDescription.xml (FMI 2.0): the variables with their units, and the sources."""
     units = sorted({variable.unit for variable in unit.variables} - {"-", ""})
     rows = []
     for reference, variable in enumerate(unit.variables):

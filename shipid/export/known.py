@@ -336,7 +336,7 @@ class Table:
     trajectory: tuple[int, ...]
 
     def values(self, names: Sequence[str]) -> Value:
-        """Some inputs in order."""
+        """Values of the inputs of a method, by their names and in this order."""
         known, layout_ = self.known, self.known.names
         groups = {name: SX.sym(name, size) for name, size in layout_.sizes.items() if name != "parameters"}
         given = {name: known.values[name] for name in groups}

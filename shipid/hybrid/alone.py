@@ -37,7 +37,7 @@ class Unchanged:
 
     @classmethod
     def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:  # noqa: ARG003
-        """Rebuild it from nothing."""
+        """Return the corrector, which has neither numbers nor arrays."""
         return cls({})
 
 

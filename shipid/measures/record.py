@@ -237,7 +237,7 @@ def departure(t: Array, order: Array, index: int) -> float:
 
 
 def _bend(t: Array, values: Array) -> tuple[float, float] | None:
-    """Time at which values, which rise at the end, leave their level, and this level; None where none is found.
+    """Time at which values, which rise at the end, leave their level, and this level; None where they do not.
 
     The last rows are divided into a level and a straight line by least squares. So many rows are taken that at least
     half of them are level, and that half as many give the same level.

@@ -16,7 +16,7 @@ INSTALLED = ("site-packages", "dist-packages")
 
 @cache
 def code_digest() -> str:
-    """Digest (8 hex digits) of the names and contents of all source files of shipid, as this process found them."""
+    """Digest (8 hex digits) of the names and contents of all source files of shipid, at the first call of a process."""
     package = Path(__file__).parents[1]
     files = sorted((file.relative_to(package).as_posix(), file) for file in package.rglob("*.py"))
     lines = (f"{name} {hashlib.sha256(file.read_bytes()).hexdigest()}\n" for name, file in files)
@@ -41,7 +41,7 @@ def of_users(kind: type) -> bool:
 def users_code(kinds: tuple[type, ...]) -> str:
     """Digest (8 hex digits) of the files that classes of a user are in, and of what these import from beside them.
 
-    Classes of a notebook have none. As `code_digest`: the files as this process found them.
+    Classes of a notebook have none. As `code_digest`: the files at the first call in this process.
     """
     files: set[Path] = set()
     for kind in filter(of_users, kinds):
