@@ -94,6 +94,7 @@ def identify(
     from shipid.data.dataset import read_dataset
     from shipid.files import check_new
     from shipid.identification.outcome import check, read_settings, run_identification, write_patch
+    from shipid.study.structures import comparable
     from shipid.vessel.load import load_vessel
 
     if structures is None and folds is not None:
@@ -118,17 +119,19 @@ def identify(
         options["parameters"] = ["hull.*"]
     declared = read_settings(settings, options | parsed(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
+    how: dict[str, Any] = {"runs": runs or (), "held_out": test or (), "ahead": ahead}
     if structures is None:
         with _of_settings(settings):
             check(ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ())
     elif needless := next((name for name, value in {"--profile": profile, "--design": design}.items() if value), None):
         raise ShipidError("does not go with --structures: identify the structure chosen", path=needless)
+    else:
+        how |= {} if folds is None else {"folds": folds}
+        comparable(log, declared, _structures(structures), **how)
     with answering(as_json) as answer, _of_settings(settings):
         _look(ship, log, runs or (), test or (), answer)
         if structures is not None:
-            how: dict[str, Any] = {"runs": runs or (), "held_out": test or (), "ahead": ahead}
-            how |= {} if folds is None else {"folds": folds}
-            _compare(ship, log, declared, structures, how, band, file, html, dataset, answer)
+            _compare(ship, log, declared, _structures(structures), how, band, file, html, dataset, answer)
             return
         with ended_by(), iterations() as progress:
             outcome = run_identification(
@@ -162,11 +165,18 @@ def _paths(given: Sequence[str]) -> list[str]:
     return [path.strip() for words in given for path in words.split(",")]
 
 
+def _structures(given: str) -> list[str]:
+    """Names of the structures of `--structures`."""
+    from shipid.identification.structures import PRESENT, STRUCTURES
+
+    return [PRESENT, *STRUCTURES] if given == "all" else [name.strip() for name in given.split(",")]
+
+
 def _compare(
     ship: Vessel,
     log: Dataset,
     declared: Identify,
-    structures: str,
+    names: list[str],
     how: dict[str, Any],
     band: float | None,
     file: Path,
@@ -175,10 +185,8 @@ def _compare(
     answer: Answer,
 ) -> None:
     """Compare structures of the hull, print the comparison, and write the vessel with the structure chosen."""
-    from shipid.identification.structures import PRESENT, STRUCTURES
     from shipid.study.structures import LEVEL, compare_structures, structures_content, write_chosen
 
-    names = [PRESENT, *STRUCTURES] if structures == "all" else [name.strip() for name in structures.split(",")]
     with ended_by(), steps() as say:
         compared = compare_structures(ship, log, declared, names, level=LEVEL if band is None else band, say=say, **how)
     _show_structures(compared, answer)
@@ -230,14 +238,17 @@ def _show_structures(compared: Compared, answer: Answer) -> None:
         answer.say(f"Errors of {compared.chosen} by side, helm and speed, on runs that the fit has not seen:")
         answer.rows("groups", compared.groups, table(list(HEADS), shown(compared.groups)))
     answer.say("\n".join(compared.sentences), sentences=list(compared.sentences))
-    for warning in compared.shared:
-        typer.echo(f"warning: {warning}", err=True)
-    for name, fit in compared.fits.items():
-        if fit.caution:
-            typer.echo(f"warning: intervals of {name}: {fit.caution}", err=True)
+    answer.rows("spread", compared.spread, None)
+    answer.rows("to_run_next", compared.programme, None)
     notes = compared.manoeuvres[(compared.manoeuvres["note"].fillna("") != "") & (compared.manoeuvres["measure"] == "")]
-    for row in notes.to_dict("records"):
-        typer.echo(f"warning: {row['structure']}, {row['manoeuvre']}: {row['note']}", err=True)
+    warnings = [
+        *compared.shared,
+        *(f"intervals of {name}: {fit.caution}" for name, fit in compared.fits.items() if fit.caution),
+        *(f"{row['structure']}, {row['manoeuvre']}: {row['note']}" for row in notes.to_dict("records")),
+    ]
+    answer.say(warnings=warnings)
+    for warning in warnings:
+        typer.echo(f"warning: {warning}", err=True)
 
 
 def _with_interval(row: Any) -> str:

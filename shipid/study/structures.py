@@ -198,23 +198,9 @@ def compare_structures(
     DocumentError, DataError : vessel, dataset, settings and runs do not fit together.
     ShipidError : fewer than two structures or runs, or no structure that can be fitted.
     """
-    check_structures(names)
     check_level(level)
-    if not names:
-        raise ShipidError(f"name structures to compare: {', '.join((PRESENT, *STRUCTURES))}", path="structures")
     digest = dataset.digest
-    fitted, tested = pick_runs(dataset, runs, held_out)
-    dataset, fitted, shared = without_shared(dataset, fitted, tested)
-    if folds < 2:
-        raise ShipidError(f"{folds}: give two folds or more", path="folds")
-    if folds > max(len(fitted), FOLDS):
-        raise ShipidError(
-            f"{folds} folds of {len(fitted)} runs: give as many as there are runs, or fewer", path="folds"
-        )
-    if len(fitted) < 2:
-        raise DataError(
-            "only one run: give two or more, because each run is predicted by a fit to the others", path="runs"
-        )
+    dataset, fitted, tested, shared = comparable(dataset, settings, names, runs, held_out, ahead=ahead, folds=folds)
     length = proposed_horizon(vessel, dataset)[0] if ahead is None else ahead
     check_length(settings, length)
     report = say or (lambda _: None)
@@ -265,6 +251,39 @@ def compare_structures(
         uneven=uneven(groups),
         programme=_programme(dataset, fitted, fits, chosen, table),
     )
+
+
+def comparable(
+    dataset: Dataset,
+    settings: Identify,
+    names: Sequence[str],
+    runs: Sequence[str] = (),
+    held_out: Sequence[str] = (),
+    *,
+    ahead: float | None = None,
+    folds: int = FOLDS,
+) -> tuple[Dataset, tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """The dataset whose runs to fit see nothing of those held out, the runs to fit, those held out, and warnings.
+
+    Raises what `compare_structures` raises of these arguments, before anything is simulated.
+    """
+    check_structures(names)
+    if not names:
+        raise ShipidError(f"name structures to compare: {', '.join((PRESENT, *STRUCTURES))}", path="structures")
+    check_length(settings, ahead or 0.0)
+    fitted, tested = pick_runs(dataset, runs, held_out)
+    dataset, fitted, shared = without_shared(dataset, fitted, tested)
+    if folds < 2:
+        raise ShipidError(f"{folds}: give two folds or more", path="folds")
+    if folds > max(len(fitted), FOLDS):
+        raise ShipidError(
+            f"{folds} folds of {len(fitted)} runs: give as many as there are runs, or fewer", path="folds"
+        )
+    if len(fitted) < 2:
+        raise DataError(
+            "only one run: give two or more, because each run is predicted by a fit to the others", path="runs"
+        )
+    return dataset, fitted, tested, shared
 
 
 def _judged(

@@ -265,6 +265,7 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "shipid.data.dataset:read_dataset": lambda *_: LOG,
         "shipid.data.checks:check_dataset": lambda *_: None,
         "shipid.identification.outcome:check": lambda *_, **__: None,
+        "shipid.study.structures:comparable": lambda *_, **__: None,
         "shipid.identification.segments:too_short": lambda *_: [],
         "shipid.cli.identify:_look": lambda *_: None,
         "shipid.engine.engines:check_device": lambda *_: None,
