@@ -648,6 +648,7 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
         freedom=float(judged.covariances[judged.chosen].freedom[judged.free.index(path)]),
         ratio=variance_ratio(judged, path),
         bounds=(float(unknown.low[index]), float(unknown.high[index])),
+        unit="its base value" if unknown.centre[index] else "its scale",
     )
 
 

@@ -15,7 +15,7 @@ Chandler, Bate, Biometrika 94 (2007) 167.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -31,7 +31,7 @@ Refit = Callable[[str, float, Array], tuple[float, Array]]
 STEP, GROWTH = 0.5, 1.5  # first step in half-widths of the linear interval, and what each next one is of it
 MOST_REFITS = 12  # on each side
 NEAR = 0.02  # of t: so near an end must lie to the limit of the profile
-FARTHEST = 10.0  # base values, the farthest that a factor without bounds is taken from its estimate
+FARTHEST = 10.0  # of the base value, or of a larger estimate: how far a factor without bounds is taken from its estimate
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,7 @@ def profile(
     freedom: float,
     ratio: float = 1.0,
     bounds: tuple[float, float] = (-np.inf, np.inf),
+    unit: str = "its base value",
 ) -> Profile:
     """Compute the profile of one factor, from the estimate to both sides, until it leaves the 95 % interval.
 
@@ -109,34 +110,36 @@ def profile(
     refit : function that fits the other factors with this one held, see `Refit`.
     half_width : half-width of the linear 95 % interval, for the first step. freedom : degrees of freedom of t.
     ratio : s^2, variance of the residuals over the declared one, or `variance_ratio`.
-    bounds : lower and upper bound of the factor.
+    bounds : lower and upper bound of the factor. unit : what the factor is relative to, in words.
     """
     curve = _Curve(path, refit, ratio, {float(factors[index]): (objective, np.asarray(factors, dtype=float))})
     limit = float(stdtrit(freedom, 0.5 + LEVEL / 2) ** 2)
-    step = STEP * (half_width if 0 < half_width < FARTHEST else 1.0)
+    far = FARTHEST * max(1.0, abs(float(factors[index])))
+    step = STEP * (half_width if 0 < half_width < far else 1.0)
     ends: dict[int, float] = {}
     least = np.inf
     while curve.least < least * (1 - 1e-6) - 1e-9 or not ends:  # again if a refit improves on the estimate
         least = curve.least
         centre = min(curve.points, key=lambda value: curve.points[value][0])
         for side, bound in ((-1, bounds[0]), (1, bounds[1])):
-            ends[side] = _end(curve, centre, side, step, limit, bound)
+            farthest = bound if np.isfinite(bound) else centre + side * far
+            ends[side] = _end(curve, centre, side, step, limit, farthest)
     values = np.array(sorted(curve.points))
     rises = np.array([curve.rise(value) for value in values])
     best = float(values[np.argmin(rises)])
     moved = (objective - curve.least) / ratio > 0.01 * limit
-    sentence = _sentence(path, ends[-1], ends[1], (float(values[0]), float(values[-1])), best if moved else None)
+    tried = tuple(f"{value:.4g}{' (its bound)' * (value in bounds)}" for value in (values[0], values[-1]))
+    sentence = _sentence(path, unit, ends[-1], ends[1], tried, best if moved else None)
     if curve.failed:
         sentence += f"; {len(curve.failed)} refits failed and count as outside"
     return Profile(path, values, rises, limit, ends[-1], ends[1], len(curve.failed), sentence)
 
 
-def _end(curve: _Curve, estimate: float, side: int, step: float, limit: float, bound: float) -> float:
+def _end(curve: _Curve, estimate: float, side: int, step: float, limit: float, farthest: float) -> float:
     """Value of the factor where the profile crosses the limit on one side (-1 or 1); infinite if it stays below.
 
     Growing steps bracket the crossing, then regula falsi on sqrt(profile), which is nearly linear in the factor.
     """
-    farthest = bound if np.isfinite(bound) else estimate + side * FARTHEST
     inside, outside, value = estimate, None, estimate
     for _ in range(MOST_REFITS):
         value = value + side * step
@@ -162,16 +165,17 @@ def _end(curve: _Curve, estimate: float, side: int, step: float, limit: float, b
     return float(value)
 
 
-def _sentence(path: str, low: float, high: float, tried: tuple[float, float], best: float | None) -> str:
-    """One sentence with the interval, the open sides, and a better fit if there is one."""
+def _sentence(path: str, unit: str, low: float, high: float, tried: Sequence[str], best: float | None) -> str:
+    """One sentence with the interval, open sides with the farthest value tried, and a better fit if there is one."""
+    fitted = "the data are fitted as well"
     if np.isfinite(low) and np.isfinite(high):
-        sentence = f"{path} lies between {low:.4g} and {high:.4g} times its base value"
+        sentence = f"{path} lies between {low:.4g} and {high:.4g} times {unit}"
     elif np.isfinite(low):
-        sentence = f"{path} is above {low:.4g}; upwards it is open: at {tried[1]:.4g} the data are fitted as well"
+        sentence = f"{path} is above {low:.4g} times {unit}; upwards it is open: at {tried[1]} {fitted}"
     elif np.isfinite(high):
-        sentence = f"{path} is below {high:.4g}; downwards it is open: at {tried[0]:.4g} the data are fitted as well"
+        sentence = f"{path} is below {high:.4g} times {unit}; downwards it is open: at {tried[0]} {fitted}"
     else:
-        sentence = f"{path} is not identified: from {tried[0]:.4g} to {tried[1]:.4g} the data are fitted as well"
+        sentence = f"{path} is not identified: from {tried[0]} to {tried[1]} times {unit} {fitted}"
     return (
         sentence if best is None else f"{sentence}; the fit had not converged: {best:.4g} fits better than the estimate"
     )
