@@ -31,7 +31,7 @@ Refit = Callable[[str, float, Array], tuple[float, Array]]
 STEP, GROWTH = 0.5, 1.5  # first step in half-widths of the linear interval, and what each next one is of it
 MOST_REFITS = 12  # on each side
 NEAR = 0.02  # of t: so near an end must lie to the limit of the profile
-FARTHEST = 10.0  # of the base value, or of a larger estimate: how far a factor without bounds is taken from its estimate
+FARTHEST = 10.0  # of the base value, or of a larger estimate: how far from its estimate a factor without bounds goes
 
 
 @dataclass(frozen=True)
