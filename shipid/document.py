@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
+import os
 import re
 import tomllib
 import unicodedata
@@ -90,12 +91,16 @@ def find(name: str | Path, kind: str, relative_to: Path | None = None) -> Path:
         raise DocumentError("no such file", file=name)
     available = bundled(kind)
     if name not in available:
-        label = {"models": "vessel", "studies": "study", "studies/mappings": "mapping"}[kind]
-        raise DocumentError(
-            f"no {label} of this name comes with shipid: {choices(name, available)}; "
-            "a path to another file needs a slash or the ending .toml",
-            path=name,
-        )
+        label, drafted = {
+            "models": ("vessel", "vessel new"),
+            "studies": ("study", "study new"),
+            "studies/mappings": ("mapping", "data import --guess LOG"),
+        }[kind]
+        if os.path.isfile(name):  # False, too, of a name that no file can have
+            words = f"is a file, and no {label}, which is a TOML document: `shipid {drafted}` writes a first one"
+        else:
+            words = f"no {label} of this name comes with shipid: {choices(name, available)}"
+        raise DocumentError(f"{words}; a path to another file needs a slash or the ending .toml", path=name)
     return available[name]
 
 

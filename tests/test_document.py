@@ -177,6 +177,14 @@ def test_find_corrects_names(kind: str) -> None:
         documents.find("nothing-like-it", kind)
 
 
+def test_find_says_what_writes_a_document_where_a_log_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`shipid data import log.csv`: that no mapping of this name comes with shipid helps nobody."""
+    (tmp_path / "log.csv").write_text("t,u\n0,1\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(DocumentError, match=r"log.csv: is a file, and no mapping.*`shipid data import --guess LOG`"):
+        documents.find("log.csv", "studies/mappings")
+
+
 class Inner(BaseModel):
     model_config = ConfigDict(extra="forbid")
     speed: float = Field(gt=0)
