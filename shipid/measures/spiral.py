@@ -134,7 +134,8 @@ def reverse_spiral(record: Record) -> Measures:
     Returns
     -------
     Measures : `neutral_helm` [rad] at rate 0; `loop_width` [rad], the largest decrease of the helm with rising rate, 0
-        for a stable ship; `levels`, their count.
+        for a stable ship; `levels_apart` [rad/s], the largest distance of rates: a fold between them is cut off, and a
+        loop of lower rates is not seen; `levels`, their count.
     """
     measures, points = Measures(), rate_levels(record)
     order = np.argsort(points.rate)
@@ -144,5 +145,6 @@ def reverse_spiral(record: Record) -> Measures:
     measures.add("neutral_helm", float(np.interp(0.0, rate, helm)) if both else NAN, "rad", why)
     width = float((np.maximum.accumulate(helm) - helm).max()) if both else NAN
     measures.add("loop_width", width, "rad", why)
+    measures.add("levels_apart", float(np.diff(rate).max()) if both else NAN, "rad/s", why)
     measures.add("levels", len(rate), "-", "")
     return measures

@@ -88,6 +88,8 @@ def test_reverse_spiral_finds_the_folds() -> None:
     """The helm r^3 - 3 r falls from 2 to -2 deg as the rate rises from -1 to 1 deg/s: 4 deg wide."""
     measures = reverse_spiral(every(reverse(), 0.5))
     assert measures["levels"].value == len(RATES)
+    apart = np.diff(np.sort(RATES)).max() * DEGREE  # a fold between two rates is cut off
+    assert measures["levels_apart"].value == pytest.approx(apart, rel=1e-2)
     assert measures["loop_width"].value == pytest.approx(4 * DEGREE, abs=0.02 * DEGREE)
     assert measures["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)
 
