@@ -39,6 +39,7 @@ Array = np.ndarray
 TRACK = ["run", "t", "north", "east"]
 AHEAD = 5  # moments of the horizon that the summary shows
 CHANGED = "the ship, her loading or the weather is not that of the training, and bands do not hold"
+UNPLANNED = "later orders were not known as they were in calibration"
 STANDARD = (0.5, 0.8, 0.9, 0.95)  # levels that the summary judges beside the one that was asked for
 
 
@@ -267,7 +268,7 @@ def _promise(played: Played) -> list[str]:
     """How often the band held whole paths, by how much it adapted, and its size over the horizon; none without one."""
     if played.band is None or played.bands is None:
         return []
-    lines = _held(played.instants, played.band, played.bands)
+    lines = _held(played.instants, played.band, played.bands, f"{UNPLANNED}, or {CHANGED}" if played.plan else CHANGED)
     if played.band.rate is not None:
         factors = played.instants["factor"]
         ends = factors.groupby(played.instants["run"], sort=False).last()[:5]
@@ -281,8 +282,8 @@ def _promise(played: Played) -> list[str]:
     return lines
 
 
-def _held(instants: pd.DataFrame, band: Band, bands: Bands) -> list[str]:
-    """How often the band held the whole paths that can be judged, and whether that is fewer than was promised."""
+def _held(instants: pd.DataFrame, band: Band, bands: Bands, why: str) -> list[str]:
+    """How often the band held the whole paths that can be judged, and why if that is fewer than was promised."""
     reach, outside = instants["reach"].to_numpy(), instants["outside"].to_numpy(dtype=bool)
     judged = np.isfinite(reach)
     promised = judged & ~outside
@@ -305,7 +306,7 @@ def _held(instants: pd.DataFrame, band: Band, bands: Bands) -> list[str]:
             share = percent(share_of(held[promised], run))
             same = share == percent(held[promised].mean())
             what = "that is" if same else f"in the mean over runs {share}, which is"
-            lines[0] += f"; {what} fewer than {percent(band.level)} by more than chance: {CHANGED}"
+            lines[0] += f"; {what} fewer than {percent(band.level)} by more than chance: {why}"
         lines += _by_level(reach[promised], band, bands)
     return lines
 

@@ -181,6 +181,8 @@ def test_a_summary_says_when_bands_hold_less_than_promised_by_more_than_chance(b
         played = play(file, saved(pd.concat(parts, ignore_index=True), tmp_path), level=0.8)
         said.append(any("by more than chance" in line for line in summary(played)))
     assert said == [False, True]
+    ways = [" ".join(summary(replace(played, plan=plan))) for plan in (False, True)]
+    assert ["later orders were not known" in text for text in ways] == [False, True], "known orders calibrated it"
 
 
 def test_a_band_adapts_to_the_past_alone(banded, tmp_path):
