@@ -26,6 +26,7 @@ from shipid.logs.guess.clock import (
     is_clock,
     other_clocks,
     restarts,
+    zone_in,
 )
 from shipid.logs.guess.layout import format_of, format_of_sheet, table_below
 from shipid.logs.guess.words import NO_VALUE, fits, is_run, parts_of, units_in
@@ -182,6 +183,8 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     kept = {name: values for name, values in kept.items() if name not in runs}
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
     doubts = tuple(doubts_on(table.loc[once], clock, t))
+    above = "\n".join(lines.splitlines()[: model.skip_rows]) if isinstance(model, TableFormat) else ""
+    doubts += tuple(zone_in(above, table, clock))
     doubts += tuple(_minus_ones(columns))
     doubts += () if runs else tuple(other_clocks(table.loc[once], columns, clock, t))
     return Sniffed(
