@@ -315,13 +315,7 @@ def run_identification(
                 if path not in determined
             ),
         )
-        judgements = {path: verdict(vessel, path, solution.values) for path in solution.values}
-        judgements |= {
-            path: f"{path}: {words}; hold it, or give it a prior"
-            for path, words in _odd(pair[AFTER]).items()
-            if not judgements.get(path)
-        }
-        warnings += tuple(filter(None, judgements.values()))
+        warnings += _implausible(vessel, pair[AFTER], solution.values)
         outputs = _outputs(pair, dataset, fitted)
         warnings += tuple(_unused(outputs, settings))
         groups = _groups(pair[AFTER], dataset, tested or fitted, settings)
@@ -370,6 +364,17 @@ def _as_read(vessel: Vessel) -> tuple[str, dict[str, float]]:
         message = "more than numbers of it were changed after it was read: a patch on it is another vessel"
         raise ShipidError(f"{message}; write the change in a file that `extends` it, and load that", file=vessel.file)
     return read.digest, changed
+
+
+def _implausible(vessel: Vessel, identified: Vessel, values: Mapping[str, float]) -> tuple[str, ...]:
+    """A sentence for each estimate that no ship has, whether the fit or the rest of the document shows it."""
+    judgements = {path: verdict(vessel, path, values) for path in values}
+    judgements |= {
+        path: f"{path}: {words}; hold it, or give it a prior"
+        for path, words in _odd(identified).items()
+        if not judgements.get(path)
+    }
+    return tuple(filter(None, judgements.values()))
 
 
 def _odd(vessel: Vessel) -> dict[str, str]:
