@@ -347,9 +347,9 @@ def _sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool_]) -> 
     if result.status == "diverged":
         bad = result.at.run[~np.isfinite(result.at.r)]
         place = f"run {problem.runs[bad[0]]!r} diverges" if len(bad) else "a prediction diverges"
-        return (
-            f"{place} within {problem.settings.step:g} s steps: take a smaller step, rk4, or a start nearer the truth"
-        )
+        finer = ["a smaller step", *(["rk4"] if problem.settings.method != "rk4" else [])]
+        remedy = f"take {', '.join(finer)}, or a start nearer the truth"
+        return f"{place} within {problem.settings.step:g} s steps: {remedy}"
     if result.status == "stopped":
         return f"stopped after {result.iterations} iterations: this is not the optimum"
     return (

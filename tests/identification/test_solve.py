@@ -464,10 +464,12 @@ def solution_of(**more: object) -> Solution:
     return identify(SHIP, dataset, given.get("runs_wanted", dataset.runs), settings(**more), start=given.get("start"))  # type: ignore[arg-type]
 
 
-def test_a_start_that_diverges_is_reported() -> None:
-    solution = solution_of(start={FEW[0]: -1e6})
+@pytest.mark.parametrize(("method", "finer"), [("rk4", "a smaller step"), ("euler", "a smaller step, rk4")])
+def test_a_start_that_diverges_is_reported(method: str, finer: str) -> None:
+    solution = solution_of(start={FEW[0]: -1e12}, method=method)
     assert solution.status == "diverged"
     assert "'M01'" in solution.sentence
+    assert solution.sentence.endswith(f"take {finer}, or a start nearer the truth")
     assert "\n" not in solution.sentence
 
 
