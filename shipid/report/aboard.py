@@ -47,7 +47,7 @@ class AboardContent(PageContent):
     def answer(self) -> list[Sentence]:
         """What was predicted, how often the alarm was raised, whether the band kept its promise; then its limits."""
         whole = [text for text in self.lines if not text.startswith((" ", *LEFT_OUT))]
-        first = [text for text in whole if text.startswith(FIRST) or " predictions in " in text]
+        first = [text for text in whole if text.startswith(FIRST) or (" prediction" in text and " ahead; " in text)]
         every = [*first, *(text for text in whole if text not in first)]
         return [Sentence(text[0].upper() + text[1:] + ".", "seen") for text in every]
 

@@ -236,7 +236,7 @@ def summary(played: Played) -> list[str]:
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
     early = f"{played.skipped} {plural(played.skipped, 'instant')} before there was a past"
     lines = [
-        f"{len(instants)} predictions in {runs} {plural(runs, 'run')}, "
+        f"{len(instants)} {plural(len(instants), 'prediction')} in {runs} {plural(runs, 'run')}, "
         f"{played.horizon * played.step:g} s ahead; {early}"
     ]
     if played.assumed:
