@@ -153,7 +153,7 @@ class Predictor:
                     f"the method was trained with this input, and the instants lack it{place_of(error, home)}",
                     path=str(error.args[0]),
                 ) from error
-            except (ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
+            except (ValueError, TypeError, IndexError) as error:
                 raise DataError(
                     f"the method {self.method!r} and the instants do not fit together ({error}){place_of(error, home)}"
                 ) from error

@@ -184,7 +184,7 @@ def test_what_cannot_be_held_or_has_no_value_is_refused(tmp_path: Path, monkeypa
 def test_a_sheet_wider_than_any_log_is_refused_at_once(tmp_path: Path) -> None:
     file = saved(tmp_path / "log.xlsx", [[f"c{k}" for k in range(10_001)], [*range(10_001)]])
     for read in (sniff, rows_of):
-        with pytest.raises(DataError, match="a line of 10001 cells: a log has 10000 columns at most"):
+        with pytest.raises(DataError, match="a line of more than 10000 cells"):
             read(file)
 
 
