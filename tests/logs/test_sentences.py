@@ -3,6 +3,8 @@
 import math
 from typing import Any
 
+import numpy as np
+import pynmea2
 import pytest
 
 from shipid.logs.sentences import parsed
@@ -64,3 +66,43 @@ def test_a_checksum_is_the_exclusive_or_of_all_characters() -> None:
     assert parsed(good.partition("*")[0], checked=True) is None
     assert parsed(good.partition("*")[0], checked=False) is not None
     assert math.isclose(parsed(good, checked=True).values()["latitude"], -(37 + 51.65 / 60))  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_sentences_say_what_another_implementation_reads(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    degrees, minutes = rng.integers([0, 0], [90, 180]), rng.uniform(0, 60, 2)
+    where = f"{degrees[0]:02d}{minutes[0]:07.4f},{rng.choice(['N', 'S'])}"
+    where += f",{degrees[1]:03d}{minutes[1]:07.4f},{rng.choice(['E', 'W'])}"
+    clock = f"{rng.integers(24):02d}{rng.integers(60):02d}{rng.uniform(0, 60):05.2f}"
+    day = f"{rng.integers(1, 29):02d}{rng.integers(1, 13):02d}{rng.integers(100):02d}"
+    a, b, c = (f"{value:.1f}" for value in rng.uniform(-40, 360, 3))
+    talker = rng.choice(["GP", "GN", "II", "HE"])
+    read = {
+        f"GGA,{clock},{where},1,8,0.9,5.0,M,46.9,M,,": {"latitude": "latitude", "longitude": "longitude"},
+        f"GLL,{where},{clock},A": {"latitude": "latitude", "longitude": "longitude"},
+        f"RMC,{clock},A,{where},{a},{b},{day},,": {"sog": "spd_over_grnd", "cog": "true_course"},
+        f"VTG,{a},T,,M,{b},N,{c},K,A": {"cog": "true_track", "sog": "spd_over_grnd_kts"},
+        f"HDT,{a},T": {"heading": "heading"},
+        f"ROT,{a},A": {"rot": "rate_of_turn"},
+        f"RSA,{a},A,{b},A": {"rudder": "rsa_starboard", "rudder_port": "rsa_port"},
+        f"RPM,S,1,{a},{b},A": {"rpm": "speed"},
+        f"MWD,{a},T,{b},M,,N,{c},M": {"wind_from": "direction_true", "wind_speed": "wind_speed_meters"},
+    }
+    for body, names in read.items():
+        text = sentence(f"{talker}{body}")
+        ours, theirs = parsed(text[1:], checked=True), pynmea2.parse(text, check=True)
+        assert ours is not None
+        values = ours.values()
+        for name, other in names.items():
+            assert values[name] == pytest.approx(float(getattr(theirs, other)), rel=1e-12), (body, name)
+        if body.startswith(("GGA", "GLL", "RMC")):
+            moment = theirs.timestamp
+            seconds = 3600 * moment.hour + 60 * moment.minute + moment.second + 1e-6 * moment.microsecond
+            assert ours.time() == pytest.approx(seconds, abs=1e-6)
+        if body.startswith("RMC"):
+            assert ours.day() == theirs.datestamp.toordinal()
+    damaged = text[:-1] + ("0" if text[-1] != "0" else "1")
+    assert parsed(damaged[1:], checked=True) is None
+    with pytest.raises(pynmea2.ChecksumError):
+        pynmea2.parse(damaged, check=True)
