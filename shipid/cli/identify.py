@@ -119,19 +119,20 @@ def identify(
         options["parameters"] = ["hull.*"]
     declared = read_settings(settings, options | parsed(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
+    names = [] if structures is None else _structures(structures)
     how: dict[str, Any] = {"runs": runs or (), "held_out": test or (), "ahead": ahead}
+    how |= {} if folds is None else {"folds": folds}
     if structures is None:
         with _of_settings(settings):
             check(ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ())
     elif needless := next((name for name, value in {"--profile": profile, "--design": design}.items() if value), None):
         raise ShipidError("does not go with --structures: identify the structure chosen", path=needless)
     else:
-        how |= {} if folds is None else {"folds": folds}
-        comparable(log, declared, _structures(structures), **how)
+        comparable(log, declared, names, **how)
     with answering(as_json) as answer, _of_settings(settings):
         _look(ship, log, runs or (), test or (), answer)
         if structures is not None:
-            _compare(ship, log, declared, _structures(structures), how, band, file, html, dataset, answer)
+            _compare(ship, log, declared, names, how, band, file, html, dataset, answer)
             return
         with ended_by(), iterations() as progress:
             outcome = run_identification(

@@ -336,10 +336,10 @@ def _window_lines(frame: pd.DataFrame, moments: Floats) -> Plot:
 
 def _takeaway_windows(mine: pd.DataFrame, worst: Any) -> str:
     share = 100 * float((mine.error_with < mine.error_without).mean())
+    first, other = (in_words(mine[column].iloc[0]) for column in ("with", "without"))
     return (
-        f"{in_words(mine['with'].iloc[0])} errs less than {in_words(mine['without'].iloc[0])} in {share:.0f} % of the "
-        f"windows of "
-        f"{counted(mine.run.nunique(), 'test run')}; where the latter errs most, in {worst.run} at t = {worst.t:g} s, "
+        f"{first} errs less than {other} in {share:.0f} % of the windows of {counted(mine.run.nunique(), 'test run')}; "
+        f"where the latter errs most, in {worst.run} at t = {worst.t:g} s, "
         f"{metres(worst.error_without)} become {metres(worst.error_with)}."
     )
 
