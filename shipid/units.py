@@ -16,12 +16,13 @@ GRAVITY = 9.81
 
 
 def decimals_of(length: float) -> int:
-    """Number of decimals that a length [m] is written with: two, or more where it has two digits only so, up to four.
+    """Number of decimals that a length [m] is written with: two, or more where it has two digits only so, up to six.
 
-    So errors of a model ship are no zeros. What is below 0.00005 m counts as 0.
+    So errors of a model ship are no zeros. What is below 0.0000005 m counts as 0.
     """
     size = abs(length)
-    return 4 if 0.00005 <= size < 0.00995 else 3 if 0.00995 <= size < 0.0995 else 2
+    power = int(f"{size:.1e}".partition("e")[2]) if 0.0000005 <= size < 0.0995 else 0  # once two digits are rounded
+    return min(max(1 - power, 2), 6)
 
 
 def length_text(length: float) -> str:

@@ -246,7 +246,8 @@
 
   // as `length_text` in Python
   function lengthText(value) {
-    return value.toFixed(value >= 0.0995 || value < 0.00005 ? 2 : value >= 0.00995 ? 3 : 4);
+    const power = value >= 0.0000005 && value < 0.0995 ? Number(value.toExponential(1).split("e")[1]) : 0;
+    return value.toFixed(Math.min(Math.max(1 - power, 2), 6));
   }
 
   const browser = document.getElementById("browser");

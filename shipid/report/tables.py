@@ -75,8 +75,8 @@ def decimals(values: pd.DataFrame | pd.Series[float]) -> int:
 
 
 def length_places(lengths: pd.Series[float]) -> int:
-    """Decimals of a column of lengths [m], from two to four, that leave two digits to the median."""
-    return _places(pd.to_numeric(lengths, errors="coerce").to_numpy(dtype=float), 2, 2, 4)
+    """Decimals of a column of lengths [m], from two to six, that leave two digits to the median."""
+    return _places(pd.to_numeric(lengths, errors="coerce").to_numpy(dtype=float), 2, 2, 6)
 
 
 def _places(values: Floats, digits: int, least: int, most: int) -> int:

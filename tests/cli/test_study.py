@@ -216,8 +216,8 @@ def test_differences_of_a_ship_model_are_no_zeros_and_a_column_has_the_same_deci
     _show_matched(Comparison(("a", "b"), pd.DataFrame(), errors, ()), Answer(as_json=False))
     shown = [line.split()[4:] for line in capsys.readouterr().out.splitlines() if "drawn" in line]
     assert shown == [
-        ["1.5000", "1.0000", "-0.5000", "[-0.6000,", "-0.4000]", "lower"],
-        ["0.0004", "0.0002", "-0.0002", "[-0.0003,", "-0.0001]", "lower"],
+        ["1.50000", "1.00000", "-0.50000", "[-0.60000,", "-0.40000]", "lower"],
+        ["0.00040", "0.00020", "-0.00020", "[-0.00030,", "-0.00010]", "lower"],
     ]
     _show_matched(Comparison(("a", "b"), pd.DataFrame(), errors[:1], ()), Answer(as_json=False))
     assert " 1.500   1.000   -0.500 [-0.600, -0.400]" in capsys.readouterr().out

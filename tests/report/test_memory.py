@@ -182,7 +182,7 @@ def test_no_difference_is_no_loss(past: ReportContent) -> None:
 
 
 def test_no_minus_before_a_zero(past: ReportContent) -> None:
-    sums = past.frames["memory"].assign(difference=-0.00001, low=-0.1, high=0.1)
+    sums = past.frames["memory"].assign(difference=-0.0000001, low=-0.1, high=0.1)
     figure = memory.difference_map(replace(past, frames={**past.frames, "memory": sums}))
     assert figure is not None
     assert set(figure.views["0"][0].figure.data[1].text) == {"0.00"}

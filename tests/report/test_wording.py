@@ -25,14 +25,11 @@ def test_three_digits():
         "131",
     ]
     assert number(-1.5) == "−1.50"
-    assert [number(x) for x in (0.0994, 0.0995, 0.00834, -0.00052, 0.00004, 0.0)] == [
-        "0.099",
-        "0.10",
-        "0.0083",
-        "−0.0005",
-        "0.00",
-        "0.00",
-    ], "a model of a metre errs by less"
+    small = {
+        0.0994: "0.099", 0.0995: "0.10", 0.00834: "0.0083", 0.00996: "0.010", -0.00052: "−0.00052",
+        0.000041: "0.000041", 0.0000066: "0.000007", 0.0000006: "0.000001", 0.0000004: "0.00", 0.0: "0.00",
+    }  # fmt: skip
+    assert {x: number(x) for x in small} == small, "a model of a metre errs by less"
     assert number(math.nan) == number(math.inf) == "–"
     assert metres(0.5) == "0.50 m"
     assert distance(963.2) == "963 m"

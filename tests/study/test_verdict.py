@@ -48,11 +48,11 @@ def test_numbers_in_words() -> None:
     assert metres(9.996) == "10.0 m"
     assert interval(1.0, 12.0, 10.5) == " [1.0, 12.0]"
     assert (metres(-1e-9), interval(-1e-9, 0.5, 0.2)) == ("0.00 m", " [0.00, 0.50]"), "no minus zero"
-    assert [metres(value) for value in (0.42, 0.0423, -0.00423, 0.000423, 1e-6)] == [
+    assert [metres(value) for value in (0.42, 0.0423, -0.00423, 0.000423, 1e-7)] == [
         "0.42 m",
         "0.042 m",
         "-0.0042 m",
-        "0.0004 m",
+        "0.00042 m",
         "0.00 m",
     ]
     assert metres(0.018) + interval(0.0, 3.42, 0.018) == "0.018 m [0.000, 3.420]", "digits that match"
