@@ -405,7 +405,8 @@ class _Drawn:
 
     def _variant(self, number: int, values: Mapping[str, float], counter: int) -> Variant:
         family, base, original = self.family, self.base, self.original
-        factors = {path: value / original[path] for path, value in values.items() if original[path] != 0}
+        changed = {path: value for path, value in values.items() if original[path] != 0}
+        factors = {path: value / original[path] + 0.0 for path, value in changed.items()}  # + 0.0: none is -0.0
         name = family.name if family.members == 1 else f"{family.name}-{number + 1}"
         of, digest = family.base or base.key, base.digest
         return Variant(name, family.name, number, of, digest, values, factors, counter, family.seed, original)

@@ -139,6 +139,7 @@ def test_removal_is_zero_and_leaves_the_structure(base: Vessel, tmp_path: Path) 
     assert set(variant.values) == third
     assert len(third) == 3 + 6 + 6
     assert set(variant.values.values()) == {0.0}
+    assert {f"{factor:g}" for factor in variant.factors.values()} == {"0"}, "of negative numbers, too, not -0"
     assert rebuilt(variant, tmp_path).structure == base.structure
 
 
