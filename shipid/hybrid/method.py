@@ -17,6 +17,7 @@ from shipid.arguments import by_name, number, one_of, whole_number
 from shipid.checked import Checked
 from shipid.data.windows import Instants, Windows, locked
 from shipid.errors import DataError, ShipidError
+from shipid.files import json_text
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.physics import Physics
 
@@ -238,6 +239,12 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...]) -> None:
         for key in ("number", "epochs"):
             whole_number(f"{where}: {key} of a trial", row[key], 0, DataError)
         one_of(f"{where}: state of a trial", row["state"], STATES, DataError)
+        for key, value in row.items():
+            try:
+                json_text(value)
+            except (TypeError, ValueError, RecursionError) as error:
+                words = f"must be plain data, numbers, texts or lists of them ({error})"
+                raise DataError(f"{where}: {key} of a trial {words}") from None
     number(f"{where}: seconds", one.seconds, DataError)
     if one.left_out is not None and np.shape(one.left_out) != shape:
         raise DataError(f"{where}: left_out must be {shape}, not {np.shape(one.left_out)}")

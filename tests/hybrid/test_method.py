@@ -114,6 +114,11 @@ ROW = row_of(0, {}, 1.0, 0.0)
         ({"right": Fitted(None, [{**ROW, "number": "1"}], 0.0)}, "number of a trial must be a whole number, 0 or more"),
         ({"right": Fitted(None, [{**ROW, "state": "done"}], 0.0)}, "state of a trial 'done' is not known: valid: comp"),
         ({"right": Fitted(None, [{**ROW, "params": {"seed": 1.0}}], 0.0)}, "params of a trial: 'seed' is a name that"),
+        ({"right": Fitted(None, [{**ROW, "seen": {1}}], 0.0)}, "seen of a trial must be plain data, numbers, texts or"),
+        (
+            {"right": Fitted(None, [{**ROW, "params": {"k": {1}}}], 0.0)},
+            "params of a trial must be plain data, .* not JSON",
+        ),
         ({"right": Fitted(None, [ROW], "1 s")}, "seconds must be a number, not '1 s'"),  # type: ignore[arg-type]
         ({"right": Fitted(Unchanged({"k": "3"}), [ROW], 0.0)}, "hyperparameters of the corrector: k must be a n"),  # type: ignore[dict-item]
         ({"right": Fitted(None, [ROW], 0.0, np.zeros((2, 4)))}, r"left_out must be \(3, \d+, 2\), not \(2, 4\)"),
