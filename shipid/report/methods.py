@@ -229,11 +229,11 @@ def table(content: ReportContent | MethodsContent) -> Table | None:
     headings = [*(["condition"] if several else []), "family", "method", "N_D [1]", "H [m]", "H_90 [m]", "end [m]"]
     headings += ["core-seconds [s]", "trials [1]", "no result", "difference of H [m]", "95 % interval, runs [m]"]
     headings += ["better runs", "by world [m]"]
-    reference, bad = str(frame.reference.iloc[0]), frame[frame.family.ne(EVERY)]
-    takeaway = (
-        f"Core-seconds and errors are means over the cells of a row; differences are to {reference}. "
-        f"{counted(int(bad.failed.sum()), 'cell')} of {int(bad.cells.sum())} gave no result."
-    )
+    reference = str(frame.reference.iloc[0])
+    counts = frame.loc[frame.family.ne(EVERY), ["failed", "cells"]].sum()
+    bad, every = int(counts["failed"]), counted(int(counts["cells"]), "cell")
+    takeaway = f"Core-seconds and errors are means over the cells of a row; differences are to {reference}. "
+    takeaway += f"{bad} of {every} gave no result." if bad else f"All {every} gave a result."
     words = 3 if several else 2
     return Table("methods-table", "Every method", takeaway, headings, [False] * words + [True] * 11, rows)
 

@@ -75,6 +75,15 @@ def test_every_number_is_in_the_table_and_every_view_in_the_figure(conditions: t
         assert any(cell.bad for cell in shown) == bool(given["failed"])
 
 
+def test_the_table_says_how_many_cells_gave_no_result() -> None:
+    """Of none it said `0 cells of 96 gave no result`."""
+    rows = frame(1, ("",), failing=False)
+    for count, said in ((0, "All 48 cells gave a result."), (1, "1 of 48 cells gave no result.")):
+        printed = table(content(rows.assign(failed=np.where(rows.index == 0, count, 0))))
+        assert printed is not None
+        assert printed.takeaway.endswith(said)
+
+
 def test_errors_of_a_model_ship_are_no_zeros_in_the_table() -> None:
     rows = frame(2, ("",), failing=False)
     lengths = ["H", "H_90", "end", "difference", "low", "high"]
