@@ -46,8 +46,8 @@ REQUIRED = {
     "dict_type": "must be a table",
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",
-    "too_short": "must have {min_length} or more entries, not {actual_length}",
-    "too_long": "must have {max_length} or fewer entries, not {actual_length}",
+    "too_short": "must be a {kind} of {min_length} or more entries (it has {actual_length})",
+    "too_long": "must be a {kind} of {max_length} or fewer entries (it has {actual_length})",
     "string_too_short": "must have {min_length} or more characters",
     "string_too_long": "must have {max_length} or fewer characters",
     "string_pattern_mismatch": "must match the pattern {pattern}",
@@ -435,12 +435,12 @@ def _of_no_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:
 
 def required(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
     """What pydantic's problem with a value says would be right; more problems are of other members of a union."""
-    sentences = [
-        REQUIRED[one["type"]].format(**one.get("ctx", {}))
-        if one["type"] in REQUIRED
-        else one["msg"].removeprefix("Value error, ")
-        for one in (first, *others)
-    ]
+    sentences = []
+    for one in (first, *others):
+        limits = one.get("ctx", {})
+        kind = "table" if limits.get("field_type") == "Dictionary" else "list"
+        words = REQUIRED.get(one["type"])
+        sentences.append(words.format(kind=kind, **limits) if words else one["msg"].removeprefix("Value error, "))
     if not all(one.startswith(MUST) for one in sentences):
         return sentences[0]
     parts = list(dict.fromkeys(one.removeprefix(MUST) for one in sentences))

@@ -360,7 +360,7 @@ def test_what_has_no_end_is_no_document() -> None:
         (Family, {"name": "a/b"}, "family.name", "'a/b'"),
         (Family, {"name": "a", "perturb": [{"parameters": ["*"], "factor": [2, 1]}]}, "family.perturb.0.factor", "low"),
         (Family, {"name": "a", "perturb": [{"factr": 2}]}, "family.perturb.0.factr", "did you mean 'factor'?"),
-        (Identify, {"parameters": []}, "identify.parameters", "must have 1 or more"),
+        (Identify, {"parameters": []}, "identify.parameters", "must be a list of 1 or more entries (it has 0)"),
         (Identify, {"parameters": ["*"], "horizon": -1}, "identify.horizon", "-1"),
         (Family, 3, "family", "3"),
     ],
