@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import bisect
+import io
 import math
 import re
 from array import array
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import datetime
 from itertools import islice
 from pathlib import Path
@@ -27,24 +28,29 @@ from shipid.logs.sentences import NMEA_COLUMNS, SENTENCES, TIMES, has_checksum, 
 FIRST_DAY = datetime(1970, 1, 1).toordinal()
 LATE_DATE = 60.0  # s after midnight: so long a receiver may write the date of the day before
 SILENT = 1.5  # usual steps of a talker: where it says nothing for longer, another one may speak for it
+SAID = 100_000  # lines, after which it is said how far the log is read
 _DOTTED = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})")
 _DATED = re.compile(r"\d{4}([-/]?)\d\d\1\d\d")
 _TAG_TIME = re.compile(r"[\\,]c:(\d+)")
 _BEGIN = re.compile(r"[$!]([A-Z][A-Z0-9]{3,7}),")
 
 
-def read_nmea(file: Path, form: NmeaFormat, _: str) -> pd.DataFrame:
+def read_nmea(file: Path, form: NmeaFormat, _: str, progress: Callable[[float], None] | None = None) -> pd.DataFrame:
     """Return sentences as rows: `time` [s] and columns of their values, NaN where a sentence has no value.
 
     Of talkers that say a column side by side, the one who says it most often has it. The others have columns with their
     letters, such as `heading_GP`. `attrs["unreadable"]` counts the lines that are no sentence or fail their checksum.
+    progress : called with the share of a long log that has been read, 0 to 1.
     """
     refuse_foreign(file)
+    size = file.stat().st_size
     heard = _Heard(form.time == "line")
-    with file.open(encoding="latin-1") as stream:
+    with file.open("rb") as raw, io.TextIOWrapper(raw, encoding="latin-1") as stream:
         heard.checked = any(has_checksum(line.partition("$")[2]) for line in islice(stream, LOOKED_AT))
         stream.seek(0)
         for number, line in enumerate(stream, start=1):
+            if progress is not None and number % SAID == 0:
+                progress(raw.tell() / size)
             try:
                 heard.hear(line)
             except ValueError as error:

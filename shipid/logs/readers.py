@@ -67,6 +67,8 @@ def read_table(
         table: pd.DataFrame | None = None
         if isinstance(form, TextFormat) and size > LARGE and columns:
             table = _large_text(file, form, {clock, *columns}, progress, size)
+        elif isinstance(form, NmeaFormat):
+            table = read_nmea(file, form, clock, progress)
         if table is None:
             table = READERS[form.kind].read(file, form, clock)
     except OSError as error:

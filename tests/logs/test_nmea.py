@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
+from shipid.logs import nmea
 from shipid.logs.formats import NmeaFormat
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.readers import READERS, read_table
@@ -257,6 +258,14 @@ def test_messages_of_ais_and_targets_of_a_radar_are_passed_over(tmp_path: Path) 
     assert table.attrs["notes"] == ["sentences of these kinds are not read: AIVDM (180), TTM (30)"]
     with pytest.raises(DataError, match="messages of AIS alone"):
         read(lines[4:5] * 20, tmp_path / "ais")
+
+
+def test_how_far_a_long_log_is_read_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(nmea, "SAID", 500)
+    file, shares = tmp_path / "log", list[float]()
+    file.write_text("\n".join(sentence(RMC.format(k // 60 % 60, k % 60)) for k in range(2200)) + "\n")
+    read_table(file, NmeaFormat(kind="nmea"), "time", progress=shares.append)
+    assert shares == pytest.approx([500 / 2200, 1000 / 2200, 1500 / 2200, 2000 / 2200], abs=0.06)
 
 
 def test_two_gyros_and_two_receivers_are_not_mixed(tmp_path: Path) -> None:
