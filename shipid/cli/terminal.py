@@ -228,16 +228,17 @@ def iterations() -> Iterator[Any]:
 
 @contextmanager
 def steps(first: str = "") -> Iterator[Callable[[str], object]]:
-    """Give a function that takes the step of a long calculation; shown at once on a terminal, else now and then."""
+    """Give a function that takes the step of a long calculation; on a terminal it is shown, else told if it is long."""
     if sys.stderr.isatty():
         with _console(stderr=True).status(first) as status:
             yield lambda step: status.update(visible(step))
         return
-    last = [first]
+    last, said = [first], [""]
 
     def say() -> None:
-        if last[0]:
-            sys.stderr.write(f"{visible(last[0])}\n")
+        if last[0] != said[0]:
+            said[0] = last[0]
+            sys.stderr.write(f"{visible(said[0])}\n")
 
     with looking(say, SILENCE):
         yield lambda step: last.__setitem__(0, step)
@@ -264,11 +265,12 @@ def looking(look: Callable[[], None], every: float) -> Iterator[None]:
 
 
 class Quiet:
-    """Plain lines of a run: after a silence, how far the searches are."""
+    """Plain lines of a run: after a silence, how far the searches are, if that is new."""
 
     def __init__(self, watch: Watch) -> None:
         self.watch = watch
         self.last = time.monotonic()
+        self.words = ""
 
     def say(self, line: str) -> None:
         """Print a line."""
@@ -279,7 +281,10 @@ class Quiet:
         """Print the search that moved last, if it is time to."""
         if time.monotonic() - self.last >= SILENCE and (searches := self.watch.look()):
             more = f" ({len(searches)} searches are running)" if len(searches) > 1 else ""
-            self.say(f"... {searches[0].words}{more}")
+            words = f"... {searches[0].words}{more}"
+            if words != self.words:
+                self.words = words
+                self.say(words)
 
 
 def draw(events: Iterable[Event], watch: Watch) -> Event | None:
