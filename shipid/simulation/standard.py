@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, cast, get_args
@@ -25,10 +26,11 @@ from shipid.simulation.manoeuvre import (
     TurningCircle,
     Zigzag,
 )
-from shipid.units import RPM, plural
+from shipid.units import DEGREE, RPM, plural
 from shipid.vessel.load import Vessel
 from shipid.vessel.stability import growths
 
+log = logging.getLogger(__name__)
 Side = Literal["starboard", "port"]
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
 LEAST_STEPS, MOST_STEPS = 10, 1e7  # steps for a ship length, and of a manoeuvre
@@ -139,6 +141,7 @@ def standard(
 
 
 def _check_angles(name: str, angles: Sequence[float], most: int) -> None:
+    """Refuse angles [deg] that do not fit; tell of a helm that may be in rad."""
     if len(angles) > most:
         raise ShipidError(f"{name} takes {most or 'no'} {plural(most, 'angle')}", path="ANGLES")
     if any(angle <= 0 for angle in angles):
@@ -147,6 +150,9 @@ def _check_angles(name: str, angles: Sequence[float], most: int) -> None:
         greatest = MOST_HEADING if place else MOST_HELM  # as much of a reverse spiral, in deg/s
         if not angle <= greatest:
             raise ShipidError(f"{angle:g} deg: give at most {greatest:g} deg", path="ANGLES")
+    if angles and name != "reverse-spiral" and angles[0] <= MOST_HELM * DEGREE:  # as every helm in rad is
+        inside = f"they are in deg, and {angles[0]:g} rad are {angles[0] / DEGREE:.2g} deg"
+        log.warning("ANGLES: %g deg of helm is little: %s", angles[0], inside)
 
 
 def shaft_speed(controls: Controls, speed: float) -> float:

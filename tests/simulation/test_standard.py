@@ -214,3 +214,20 @@ def test_angles_are_one_or_several() -> None:
     assert standard(SHIP, "zigzag", np.array([20, 10])) == standard(SHIP, "zigzag", (20, 10))  # type: ignore[arg-type]
     with pytest.raises(ShipidError, match="angles must be an array of numbers"):
         standard(SHIP, "zigzag", ("10", "10"))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "angle", "said"),
+    [
+        ("zigzag", 0.17, "ANGLES: 0.17 deg of helm is little: they are in deg, and 0.17 rad are 9.7 deg"),
+        ("turning", 0.61, "0.61 rad are 35 deg"),
+        ("turning", 2.0, ""),
+        ("reverse-spiral", 0.5, ""),  # a rate in deg/s
+    ],
+)
+def test_angles_that_may_be_radians_are_told(
+    name: str, angle: float, said: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    standard(SHIP, name, (angle,))
+    assert said in caplog.text
+    assert bool(said) == bool(caplog.messages)
