@@ -33,6 +33,16 @@ DURATION = (
 """A time since the begin of a log as MATLAB and pandas write it: 0.5 sec, 0 days 00:00:00.5."""
 ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
 """The end of a date in ISO 8601 that says its zone."""
+_SAID = re.compile(
+    r"(?:\b(?:UTC|GMT)|\b(?:tz|time[ _]?zone|Zeitzone|UTC[ _]?offset)\W{1,4}(?:UTC|GMT)?)"
+    r"\s*[+-]\s*0?[1-9]\d?(?::?\d\d)?\b"
+    r"|\b(?:tz|time[ _]?zone|Zeitzone)\W{1,4}(?!UTC|GMT|Etc)[A-Z]\w+(?:/\w+)*|\blocal[ _]time\b|\b(?:Orts|Lokal)zeit\b",
+    re.IGNORECASE,
+)
+"""A zone other than UTC in the head of a log, or in the name of its clock."""
+_SAID_OF_CLOCK = re.compile(r"(?<![A-Za-z])(?:CES?T|MES?Z|[ECMP][SD]T|JST|KST|AE[SD]T|(?i:local))(?![A-Za-z])")
+"""A zone in letters, in the name of a clock alone."""
+ZONE_REMEDY = "write UTC, or the zone behind every time, as in 2024-05-14T08:00:00+01:00"
 DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y")
 DAYS += ("%d-%m-%Y", "%m-%d-%Y", "%y/%m/%d", "%d-%b-%Y", "%d %b %Y")
 HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
@@ -40,6 +50,17 @@ WAYS = (*(f"{day} {hour}" for day in DAYS for hour in HOURS), *(f"%Y-%m-%d {hour
 """Ways in which a date and a time of day may be written, but for ISO 8601."""
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
 SAMPLES = 60  # texts by which the way of writing is looked for
+
+
+def other_zone(head: str, clock: str, first: str) -> str:
+    """Say that a first time without a zone is read as UTC, where the head of a log, or its clock's name, says another.
+
+    Empty where they say none, and for a time of day alone.
+    """
+    said = _SAID_OF_CLOCK.search(clock) or _SAID.search(f"{head}\n{clock}")
+    if said is None or re.search(f"{ZONE}|{UTC_BEHIND}|^{TIME_OF_DAY}$", first):
+        return ""
+    return f"{first!r} is read as UTC, and the log says {said[0]!r}"
 
 
 def seconds(dates: pd.Series[Any]) -> Array:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as PlainMapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +33,8 @@ from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices, is_utf_8
 from shipid.logs.cells import column_of, numbers_of, of_ais, of_minutes, of_parts, of_quaternion
 from shipid.logs.channels import Channel, at_instants, close_gaps, common_instants, interpolation_of
-from shipid.logs.dates import span_of
+from shipid.logs.dates import ZONE_REMEDY, other_zone, span_of
+from shipid.logs.formats import TextFormat
 from shipid.logs.frames import check_wraps, in_body, projected, true_wind, unwrapped
 from shipid.logs.instants import instants_of, times_of, without_repeats
 from shipid.logs.mapping import Mapping, Parts, Segment, Source, names_of, read_mapping, sides_of, to_si
@@ -52,6 +55,7 @@ from shipid.physics.signals import is_command, is_output
 
 __all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
 
+logger = logging.getLogger(__name__)
 Begins = list[tuple[float, str]]
 
 
@@ -190,12 +194,27 @@ def _tables(
     whole_rows = mapping.clock.repeated == "drop" and mapping.clock.every is not None  # compared in all columns
     for run, file in logs.items():
         log = read_table(file, mapping.format, mapping.clock.sources[0], () if whole_rows else here, progress)
+        if file == next(iter(logs.values())):  # once for all of them
+            _tell_of_zone(log, mapping, file)
         first = 0
         for end in [*_restarts(log, mapping, file), len(log)]:
             part = log.iloc[first:end] if first or end < len(log) else log
             part.attrs = {} if first else log.attrs
             yield run, file, part
             first = end
+
+
+def _tell_of_zone(table: pd.DataFrame, mapping: Mapping, file: Path) -> None:
+    """Tell where dates without a zone count as UTC, and the head of the log or the name of its clock says another."""
+    if mapping.clock.unit != "date" or len(mapping.clock.sources) > 1:
+        return
+    (clock,), form, head = mapping.clock.sources, mapping.format, ""
+    if isinstance(form, TextFormat):
+        with file.open(encoding=form.encoding, errors="replace") as stream:
+            head = "".join(islice(stream, form.skip_rows))
+    first = str(column_of(table, clock, file, "clock.from").iloc[0]).strip()
+    if said := other_zone(head, clock, first):
+        logger.warning("%s: clock.from: %s: if it is the time there, %s", file.name, said, ZONE_REMEDY)
 
 
 def _restarts(log: pd.DataFrame, mapping: Mapping, file: Path) -> list[int]:

@@ -15,7 +15,7 @@ from shipid.errors import DataError, DocumentError
 from shipid.logs import frames, readers
 from shipid.logs.importing import import_log, read_mapping, runs_of
 from shipid.logs.mapping import Source
-from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, stamps, turning
+from tests.logs.conftest import CLOCKS, DATES, PLAIN, SPEEDS, as_log, stamps, turning
 
 Write = Callable[..., Path]
 T = np.arange(0.0, 120.0, 0.5)
@@ -480,6 +480,29 @@ def test_a_point_that_may_mark_thousands_is_refused_beside_a_decimal_comma(
     )
     shaft = import_log(read_mapping(mapping), tmp_path / "log.csv").frame["propeller.n"]
     np.testing.assert_allclose(60 * shaft, 0.001 * np.arange(len(log)), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "zone", "told"), [("# tz=+01:00\n", "", True), ("# tz=+01:00\n", "+01:00", False), ("", "", False)]
+)
+def test_a_zone_that_only_the_head_says_is_told(
+    head: str, zone: str, told: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Times are counted as UTC; the draft asks, and a mapping may have been written without one."""
+    frame = turning(np.arange(0.0, 60.0, 0.5))
+    log = pd.read_csv(as_log(frame, tmp_path / "plain.csv"))
+    log["time"] = [
+        f"{moment.isoformat()}{zone}" for moment in pd.Timestamp("2024-05-14T08:00") + pd.to_timedelta(frame["t"], "s")
+    ]
+    (tmp_path / "log.csv").write_text(head + log.to_csv(index=False))
+    text = (
+        PLAIN.read_text().replace('from = "time"', 'from = "time"\nunit = "date"')
+        + f"\n[format]\nskip_rows = {len(head.splitlines())}\n"
+    )
+    (tmp_path / "mapping.toml").write_text(text)
+    import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+    said = "log.csv: clock.from: '2024-05-14T08:00:00' is read as UTC, and the log says 'tz=+01:00'"
+    assert [message.startswith(said) for message in caplog.messages] == [True] * told
 
 
 PARTED = """

@@ -22,8 +22,7 @@ from shipid.logs.dates import (
     LAST_DATE,
     NEXT_DAY,
     TIME_OF_DAY,
-    UTC_BEHIND,
-    ZONE,
+    ZONE_REMEDY,
     date_of,
     date_texts,
     dated,
@@ -31,6 +30,7 @@ from shipid.logs.dates import (
     hour_twice,
     in_one_number,
     moment_of,
+    other_zone,
     seconds,
     time_texts,
     ways_of,
@@ -87,15 +87,6 @@ GPS, OF_GPS = 315_964_800, frozenset("gps gnss gpst".split())
 """Seconds from 1970 to 6 January 1980, from which GPS counts, and words of a clock that may."""
 LEAP, LEAPS = 1_483_228_800, 18  # s since 1970 (UTC): from 2017 on GPS is so many seconds ahead of UTC
 OF_1904 = 2_082_844_800  # s from 1904, from which LabVIEW counts, to 1970
-_ZONE = re.compile(
-    r"(?:\b(?:UTC|GMT)|\b(?:tz|time[ _]?zone|Zeitzone|UTC[ _]?offset)\W{1,4}(?:UTC|GMT)?)"
-    r"\s*[+-]\s*0?[1-9]\d?(?::?\d\d)?\b"
-    r"|\b(?:tz|time[ _]?zone|Zeitzone)\W{1,4}(?!UTC|GMT|Etc)[A-Z]\w+(?:/\w+)*|\blocal[ _]time\b|\b(?:Orts|Lokal)zeit\b",
-    re.IGNORECASE,
-)
-"""A zone other than UTC in the head of a log, or in the name of its clock."""
-_ZONE_OF_CLOCK = re.compile(r"(?<![A-Za-z])(?:CES?T|MES?Z|[ECMP][SD]T|JST|KST|AE[SD]T|(?i:local))(?![A-Za-z])")
-"""A zone in letters, in the name of a clock alone."""
 COUNTERS, LONG_STEP = (2**16, 2**32), 10.0  # numbers of a counter; usual steps that lie over its end, at most
 SHORT_YEAR = 2e-6  # years, a minute: no clock of a ship has steps of as many seconds, or hours, without a unit
 SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
@@ -290,11 +281,9 @@ def zone_in(head: str, table: pd.DataFrame, clock: dict[str, Any]) -> Iterator[s
     """Yield a question where dates without a zone are read as UTC, and the head of a log or its clock says another."""
     if clock["unit"] != "date" or not isinstance(clock["from"], str):
         return
-    said = _ZONE_OF_CLOCK.search(clock["from"]) or _ZONE.search(f"{head}\n{clock['from']}")
     text = str(column_called(table, clock["from"]).iloc[0]).strip()
-    if said is not None and not re.search(f"{ZONE}|{UTC_BEHIND}|^{TIME_OF_DAY}$", text):
-        begin = f"{text!r} is read as UTC, and the log says {said[0]!r}: is it the time there?"
-        yield f"{begin} Then write UTC, or the zone behind every time, as in 2024-05-14T08:00:00+01:00"
+    if said := other_zone(head, clock["from"], text):
+        yield f"{said}: is it the time there? Then {ZONE_REMEDY}"
 
 
 def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[str]:
