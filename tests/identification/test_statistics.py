@@ -11,15 +11,20 @@ from scipy import stats
 
 from shipid.errors import ShipidError
 from shipid.identification.statistics import (
+    WHITE,
     LinearFit,
+    _Basis,
+    _Drift,
+    _drift,
     against_priors,
     autocorrelation,
     blocks,
     decided_alone,
+    open_to_drift,
     statistics,
     whiteness,
 )
-from tests.identification.linear import SIGNALS, design, fitted, labels, noise
+from tests.identification.linear import LEVELS, SIGNALS, design, fitted, labels, noise
 
 RUNS, SAMPLES, COUNT = 20, 80, 6
 JACOBIAN = design(RUNS, SAMPLES, COUNT)
@@ -263,6 +268,88 @@ def test_a_slow_drift_in_noise_is_seen(share: float, least: float, most: float) 
         fit = LinearFit(("p",), np.ones(1), error, np.ones((600, 1)), clusters, signals)
         found += not whiteness(fit)["u"].white
     assert least <= found / 100 <= most
+
+
+T = np.arange(200)
+START = 3 * np.exp(-T / 60)  # what a start that is known to one standard deviation does to a run
+SLOW = np.column_stack([np.ones(200), np.sin(T / 32), np.sin(T / 14), np.sin(T / 6), np.cos(T / 2)])
+QUARTER = np.kron(np.eye(4), np.ones(50))
+
+
+def begun(error: np.ndarray, jacobian: np.ndarray = SLOW, runs: int = 1) -> LinearFit:
+    """Fit of runs of 200 rows whose starts, drawn from their priors by the caller, are nuisances."""
+    away = START[:, None] / np.linalg.norm(START)
+    shrunk = 1 / np.sqrt(1 + START @ START) - 1
+    whiten = np.kron(np.eye(runs), np.eye(200) + shrunk * away @ away.T)
+    spent = np.tile((away**2).ravel() * (1 - (1 + shrunk) ** 2), runs)
+    clusters, signals = np.repeat(np.arange(runs), 200), ("u",) * 200 * runs
+    return fitted(whiten @ np.tile(jacobian, (runs, 1)), whiten @ error, clusters, signals, spent=spent)
+
+
+def drifts(fit: LinearFit) -> _Drift:
+    return _drift(fit, [np.flatnonzero(fit.clusters == run) for run in np.unique(fit.clusters)], _Basis.of(fit))
+
+
+@pytest.mark.parametrize("prior", [np.inf, 0.2])
+def test_the_covariance_of_means_over_quarters_is_that_of_residuals_of_a_fit(prior: float) -> None:
+    """Q (I - H) Q^T: the factors have taken in what is slow."""
+    fit = begun(np.random.default_rng(0).normal(size=400), runs=2)
+    fit = replace(fit, prior_widths=np.full(SLOW.shape[1], prior))
+    Q = np.kron(np.eye(2), QUARTER) / 50**0.5
+    inverse = np.linalg.inv(fit.jacobian.T @ fit.jacobian + np.eye(SLOW.shape[1]) / prior**2)
+    C = Q @ (np.eye(400) - fit.jacobian @ inverse @ fit.jacobian.T) @ Q.T
+    seen = drifts(fit)
+    assert (seen.expected, seen.squares) == pytest.approx((np.trace(C), np.trace(C @ C)))
+    assert seen.expected < 7
+
+
+@pytest.mark.parametrize("runs", [1, 3])
+def test_means_over_quarters_of_white_residuals_are_as_probable_as_they_say(runs: int) -> None:
+    """One run's factors take in so much that 1 fit of 200 was below 5 %, as if there were no factors."""
+    rng, found = np.random.default_rng(0), []
+    for _ in range(600):
+        error = rng.normal(size=200 * runs) + np.kron(rng.normal(size=runs), START)
+        found.append(drifts(begun(error, runs=runs)).probability)
+    assert 0.025 <= np.mean(np.array(found) < 0.05) <= 0.075
+    assert 0.42 <= np.mean(np.array(found) < 0.5) <= 0.58
+
+
+@pytest.mark.parametrize("runs", [1, 3, 10])
+def test_every_second_fit_overlooks_the_hidden_drift(runs: int) -> None:
+    """And `ratio` shows, in the mean of all fits, what it adds. Without nuisances, which take in a part of it."""
+    rng, jacobian = np.random.default_rng(1), np.tile(SLOW, (runs, 1))
+    clusters, signals, seen, added = np.repeat(np.arange(runs), 200), ("u",) * 200 * runs, [], 0.0
+    for _ in range(301):
+        drift = np.kron(np.eye(runs), QUARTER.T) @ rng.normal(0, np.sqrt(added / 50), 4 * runs)
+        seen.append(drifts(fitted(jacobian, rng.normal(size=200 * runs) + drift, clusters, signals)))
+        added = seen[0].hidden
+    assert 0.3 <= np.mean([one.probability < WHITE / 2 for one in seen[1:]]) <= 0.6
+    assert np.mean([one.ratio for one in seen[1:]]) == pytest.approx(1 + added, rel=0.2)
+
+
+def test_a_drift_that_one_run_does_not_show_is_told_with_the_factors_that_it_moves() -> None:
+    """Of the fits that pass for white, intervals of factors that are not named cover; half of those named did not."""
+    rng, passed, covered, open_ = np.random.default_rng(0), 0, np.zeros(5), np.zeros(5)
+    for _ in range(300):
+        drift = noise(rng, 1, 600, 0.99)[400:600] / LEVELS["u"]
+        judged = statistics(begun(rng.normal(size=200) + 0.4 * drift))
+        if judged.chosen == "fisher" and judged.covariances["fisher"].trusted:
+            passed += 1
+            named = open_to_drift(judged)
+            open_ += [path in named for path in judged.free]
+            covered += (judged.low <= 1) & (judged.high >= 1)
+    assert passed > 50
+    assert set(open_[:2]) == {passed}
+    assert not open_[3:].any()
+    assert covered[0] / passed < 0.7
+    assert (covered[3:] / passed > 0.9).all()
+
+
+def test_ten_runs_show_a_drift_that_would_matter() -> None:
+    rng = np.random.default_rng(0)
+    few, more = (statistics(begun(rng.normal(size=200 * runs), runs=runs)) for runs in (2, 10))
+    assert open_to_drift(few)["p0"] > 1.3
+    assert not open_to_drift(more)
 
 
 def test_autocorrelation_is_the_mean_product_of_all_pairs() -> None:
