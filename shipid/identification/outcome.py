@@ -40,6 +40,7 @@ from shipid.identification.statistics import (
     against_priors,
     autocorrelation,
     decided_alone,
+    open_to_drift,
     statistics,
 )
 from shipid.identification.unstable import grows, growth_in
@@ -722,6 +723,15 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
             f"excite {path} in another run, too"
             for path, run in decided_alone(judged.fit).items()
         ]
+    drifting = open_to_drift(judged) if best.kind == "fisher" and best.trusted else {}
+    if drifting:
+        said = [
+            f"{name} {times:.1f}" for name, times in zip(short_names(tuple(drifting)), drifting.values(), strict=True)
+        ]
+        warnings.append(
+            "so few runs may hide a slow drift of sensors, wind or current, which makes errors larger than their "
+            f"intervals say, by these factors: {listed(said)}; fit more runs"
+        )
     contrary = against_priors(judged.fit)
     if contrary:
         of_path = dict(zip(solution.paths, short_names(solution.paths), strict=True))

@@ -317,6 +317,19 @@ def test_a_free_run_that_diverges_is_no_number(log: Dataset) -> None:
 
 
 @pytest.mark.usefixtures("one_manoeuvre")
+@pytest.mark.parametrize(("runs", "word"), [(1, True), (10, False)])
+def test_few_runs_that_may_hide_a_drift_are_told(runs: int, word: bool) -> None:
+    """White noise; the resistance decides the mean speed, as a drift of the log would."""
+    path = "hull.derivatives.X_u|u|"
+    log = noisy(trials(SHIP, runs=runs, steps=60))
+    wanted = settings(parameters=[path, FEW[1]], nuisance=["initial_state"])
+    warnings = " ".join(run_identification(SHIP, log, wanted).warnings)
+    assert "are correlated over" not in warnings
+    assert ("few runs may hide a slow drift of sensors, wind or current" in warnings) == word
+    assert ("by these factors: X_u|u| 1." in warnings) == word
+
+
+@pytest.mark.usefixtures("one_manoeuvre")
 def test_coloured_residuals_and_a_short_horizon_are_warned_of(log: Dataset) -> None:
     rng, drift = np.random.default_rng(1), np.zeros(len(log.frame))
     for i in range(1, len(drift)):
