@@ -41,7 +41,7 @@ BROKEN = {
     "missing-kind": ("thruster.stern.kind", "valid: azimuth, controllable_pitch, four_quadrant, propeller"),
     "unequal-wind-columns": ("wind", "gamma_deg 3, C_X 3, C_Y 4, C_N 3"),
     "wind-angles-not-rising": ("wind.gamma_deg", "must rise"),
-    "wind-table-of-one": ("wind.gamma_deg", "must have 2 or more"),
+    "wind-table-of-one": ("wind.gamma_deg", "2 or more entries"),
     "missing-rho": ("constants.rho", "a term needs rho"),
     "no-strips": ("hull.crossflow.strips", "must be at least 1"),
     "half-a-strip": ("hull.crossflow.strips", "must be a whole number"),
