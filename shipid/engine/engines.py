@@ -21,7 +21,7 @@ AUTO, REPEATED = "auto", "repeated"  # `repeated`: as `auto`, where so many call
 Result = TypeVar("Result")
 COMPONENTS_A_STEP = 4  # drawn components that take as long as all the rest of a step
 NATIVE_FROM = 2e5  # rate evaluations: below it compiling C (half a second, once) costs more than it saves
-COMPILE_FROM = 5e8  # the same for a kernel on a GPU (ten seconds)
+COMPILE_FROM = 5e8  # the same for a kernel on a GPU (15 s): 2e8 of small batches, 3e9 of large ones on an H200
 BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operation an instruction
 
 

@@ -17,7 +17,7 @@ from shipid.vessel.dynamics import Dynamics
 
 EAGER_BLOCK = 16384  # samples x variants of one block
 COMPILED_BLOCK = 8192  # samples of one block, one variant
-DEVICE_BLOCK = 262144  # samples of one block on a GPU
+DEVICE_BLOCK = 1048576  # samples x variants of one block on a GPU, eager or compiled
 GRAIN = 256  # compiled blocks are a multiple of it: similar batches share a kernel
 COMPONENT_GRAIN = 8  # grain of compiled blocks if each sample has drawn components
 
@@ -173,8 +173,8 @@ def is_device(name: str) -> bool:
 def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[np.ndarray, np.ndarray]:
     """Records (R, V, S, C) and the greatest speed (V, S), in blocks of one fixed shape, the last one padded.
 
-    Eager, a block holds all variants; compiled, one variant and a number of samples that is a power of two, so that
-    a family of any size needs one compilation and a block stays in the cache.
+    A block holds all variants, because each call costs as much as many samples. Compiled on the CPU it holds one
+    variant, so that a family of any size needs one compilation and a block stays in the cache.
     """
     num_steps, every, rows, device = job.num_steps, job.every, list(job.rows), job.device
     varying = len(batch.commands) > 1 or len(batch.environment) > 1
@@ -193,7 +193,8 @@ def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[
     held = [tensor(batch.commands), tensor(batch.environment), tensor(batch.tau_extra)]
     drawn = [tensor(part.swapaxes(1, 2)).movedim(1, -1) for part in batch.components]  # (entries, 1, S, components)
     values = torch.tensor(batch.parameters, dtype=torch.float64, device=place).T[..., None]
-    groups = [slice(v, v + 1) for v in range(num_variants)] if compiled else [slice(0, num_variants)]
+    together = 1 if compiled and device == "cpu" else num_variants
+    groups = [slice(v, v + together) for v in range(0, num_variants, together)]
     records = torch.empty((num_steps // every + 1, len(rows), num_variants, padded), dtype=torch.float64, device=place)
     worst = torch.empty((num_variants, padded), dtype=torch.float64, device=place)
     with torch.no_grad():
@@ -265,7 +266,10 @@ def _at(series: torch.Tensor, k: int) -> torch.Tensor:
 
 def _width(num_samples: int, num_variants: int, num_components: int, compiled: bool, device: str) -> int:
     """Number of samples in a block: equal blocks with little padding whose intermediate results fit in the cache."""
-    most = DEVICE_BLOCK if device != "cpu" else COMPILED_BLOCK if compiled else max(256, EAGER_BLOCK // num_variants)
+    if device != "cpu":
+        most = max(GRAIN, DEVICE_BLOCK // num_variants)
+    else:
+        most = COMPILED_BLOCK if compiled else max(256, EAGER_BLOCK // num_variants)
     grain = GRAIN if compiled else 1
     if num_components > 1:
         most, grain = max(most // num_components, 1), min(grain, COMPONENT_GRAIN)

@@ -39,7 +39,8 @@ ASKED = {
     "verdicts": 1,
     "guess": 1,
     "sharing": 1,
-}  # the same, of what is no matter of time and takes minutes: only where named
+    "gpu": 1,
+}  # the same, only where named: they take minutes and are no matter of time, or need a GPU
 GROUPS = THREADS | ASKED
 RESULTS = Path("results/bench.json")
 WIDTH = 140

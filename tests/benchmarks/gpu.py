@@ -1,0 +1,73 @@
+"""A GPU against all cores of the processor: rollouts of gunnerus-28.9, and batches of the study `simulation`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+
+from shipid.engine.rollout import rollout
+from shipid.study.plan import read_plan
+from shipid.study.prepare import obtain, prepare
+from shipid.study.run import run_unit
+from shipid.vessel.load import load_vessel
+from tests.benchmarks.rollouts import STEPS, inputs, variants
+from tests.benchmarks.timing import best_of, clock
+
+SIZES = ((6016, 1), (6016, 16), (60160, 16))  # samples, variants
+
+
+def run() -> dict[str, Any]:
+    """Million steps per second with the final states, first calls, and seconds of a batch of 21 models."""
+    if not torch.cuda.is_available():
+        return {"GPU": "PyTorch sees none"}
+    figures: dict[str, Any] = {"GPU": torch.cuda.get_device_name()}
+    for samples, count in SIZES:
+        figures |= _rollouts(samples, count)
+    return figures | _batches()
+
+
+def _rollouts(samples: int, count: int) -> dict[str, Any]:
+    vessel = load_vessel("gunnerus-28.9")
+    start, commands, environment = inputs(samples)
+    family = variants(vessel, count)
+
+    def states(engine: str, device: str) -> np.ndarray:
+        return rollout(
+            vessel, start, commands, environment, step=1.0, num_steps=STEPS, every=STEPS, parameters=family,
+            engine=engine, device=device,  # type: ignore[arg-type]
+        ).states  # fmt: skip
+
+    ways = {
+        "native": lambda: states("native", "cpu"),
+        "torch on the GPU": lambda: states("torch", "cuda"),
+        "compiled on the GPU": lambda: states("compiled", "cuda"),
+    }
+    first = {name: round(clock(way), 1) for name, way in ways.items()}
+    for name in ways:
+        assert np.allclose(ways[name](), ways["native"](), rtol=1e-9, atol=1e-9), name
+    seconds = best_of(ways, rounds=5, settled=True)
+    size = f"{samples} samples, {count} variants"
+    work = samples * count * STEPS / 1e6
+    return {
+        **{f"{size}: {name} [million steps/s]": round(work / took, 1) for name, took in seconds.items()},
+        f"{size}: first call of compiled [s]": first["compiled on the GPU"],
+    }
+
+
+def _batches() -> dict[str, Any]:
+    plan = read_plan("simulation", {"method.0.kind": "path-drawn"})
+    dataset = obtain(plan)
+    of_amount = {batch.N_D: batch for batch in plan.batches}
+    ends = [of_amount[10], of_amount[10], of_amount[100]]
+    figures, errors = {}, {}
+    for device in ("cpu", "cuda"):
+        prepared = prepare(plan, dataset, device)
+        for batch in ends:  # the first is timed twice: what is loaded once is not its price
+            rows = []
+            took = clock(lambda: rows.extend(run_unit(plan, prepared, plan.whole(batch), device)))  # noqa: B023
+            figures[f"batch, N_D {batch.N_D}, one thread, {device} [s]"] = round(took, 1)
+            errors[device, batch.N_D] = np.array([cell.row["H"] for cell in rows])
+    apart = max(float(np.abs(errors["cuda", n] - errors["cpu", n]).max()) for n in (10, 100))
+    return figures | {"H apart, at most [mm]": round(1000 * apart, 3)}
