@@ -14,7 +14,7 @@ from shipid.logs.foreign import refuse_foreign
 from shipid.logs.formats import MatFormat
 
 
-def read_mat(file: Path, _: MatFormat, clock: str) -> pd.DataFrame:
+def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
     """Return the vectors of a MATLAB file that are as long as the clock, as a table.
 
     `attrs["other"]` says of every other variable what it is, and how to make a vector of it; `attrs["notes"]` are

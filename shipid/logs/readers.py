@@ -67,10 +67,8 @@ def read_table(
         table: pd.DataFrame | None = None
         if isinstance(form, TextFormat) and size > LARGE and columns:
             table = _large_text(file, form, {clock, *columns}, progress, size)
-        elif isinstance(form, NmeaFormat):
-            table = read_nmea(file, form, clock, progress)
         if table is None:
-            table = READERS[form.kind].read(file, form, clock)
+            table = READERS[form.kind].read(file, form, clock, progress)
     except OSError as error:
         if error.errno is None:  # of a library, not of the system
             message = f"no file of kind {form.kind!r}, or damaged: set [format] kind"
@@ -102,7 +100,7 @@ def _is_binary(head: bytes, form: TextFormat) -> bool:
     return b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32"))
 
 
-def _text(file: Path, form: TextFormat, _: str) -> pd.DataFrame:
+def _text(file: Path, form: TextFormat, *_: object) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
     if form.skip_rows == 0:
         refuse_foreign(file)
@@ -409,13 +407,13 @@ def _decimal(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
     return column.str.replace(",", ".") if form.decimal == "," else column
 
 
-def _sheet(file: Path, form: SheetFormat, _: str) -> pd.DataFrame:
+def _sheet(file: Path, form: SheetFormat, *_: object) -> pd.DataFrame:
     refuse_foreign(file)
     name = sheets_of(file)[0] if form.sheet is None else form.sheet
     return parse_text(io.StringIO(sheet_text(file, name)), form.text(), file)
 
 
-def _parquet(file: Path, _: ParquetFormat, __: str) -> pd.DataFrame:
+def _parquet(file: Path, *_: object) -> pd.DataFrame:
     refuse_foreign(file)
     try:
         stored = read_arrow(file)
@@ -432,13 +430,13 @@ class Reader:
     """One format of logs.
 
     options : model of the keys of [format] in a mapping.
-    read : (file, options, name of the column of time) -> table; raises DataError.
+    read : (file, options, name of the column of time, progress as of `read_table`) -> table; raises DataError.
     detect : (file, its first bytes) -> keys of [format] where it is of this format, else None; without it, no guess.
     scattered : whether rows are single sentences that do not say everything, so that empty cells are no defect.
     """
 
     options: type[Format]
-    read: Callable[[Path, Any, str], pd.DataFrame]
+    read: Callable[[Path, Any, str, Progress | None], pd.DataFrame]
     detect: Callable[[Path, bytes], dict[str, Any] | None] | None = None
     scattered: bool = False
 
