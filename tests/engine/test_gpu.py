@@ -27,7 +27,9 @@ def spread(values: np.ndarray, count: int) -> np.ndarray:
     return values * np.random.default_rng(5).uniform(0.9, 1.1, (count, len(values)))
 
 
-@pytest.mark.parametrize(("samples", "variants"), [(1, 1), (6016, 1), (6016, 16), (300_000, 3), (50, 10_000)])
+@pytest.mark.parametrize(
+    ("samples", "variants"), [(1, 1), (6016, 1), (6016, 16), (300_000, 3), (300_000, 16), (50, 10_000)]
+)
 @pytest.mark.parametrize("compiled", [False, True])
 def test_a_block_of_a_gpu_holds_all_variants_and_not_too_much(samples: int, variants: int, compiled: bool) -> None:
     width = engine._width(samples, variants, 1, compiled, "cuda")
