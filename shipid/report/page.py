@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
 from shipid.errors import ResultError
@@ -100,11 +100,8 @@ def page(
     _check_links(content.answer, anchors | declared(sections))
     titles = {"findings": "Findings", "provenance": "Provenance"}
     titles |= {item.id: item.title for section in parts for item in section.items}
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     sentences = list(content.answer)
-    environment.filters |= {"number": number, "bound": bound, "glossed": glossed, "cell": cell_html}
-    template = environment.from_string(_resource("template.html.j2"))
-    return template.render(
+    return _template().render(
         content=content,
         kicker=kicker,
         answer=sentences[:LEAD],
@@ -196,6 +193,13 @@ def _plotly() -> dict[str, Markup]:
     script = _resource("vendor/plotly-cartesian.min.js")
     notice = script[script.index("/**") + 3 : script.index("*/")]
     return {"script": packed(script), "notice": Markup(notice.replace("--", "-").strip())}
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"number": number, "bound": bound, "glossed": glossed, "cell": cell_html}
+    return environment.from_string(_resource("template.html.j2"))
 
 
 def _resource(name: str) -> str:

@@ -191,8 +191,10 @@ def _refuse_long(rows: list[list[str]], file: Path) -> None:
     held = [row for row in rows if len(row) == width][1:]
     for place in range(width if 3 <= width <= LONG_WIDTH else 0):
         column = [row[place] for row in held]
+        if len({*column}) > len(column) / 2 or any(map(_is_number, column)):
+            continue
         quantities = {next(filter(None, fits(cell)), "") for cell in {*column}} - {""}
-        if any(map(_is_number, column)) or len(quantities) < 3 or len({*column}) > len(column) / 2:
+        if len(quantities) < 3:
             continue
         if np.mean([one != other for one, other in itertools.pairwise(column)]) > 0.5:  # the tags take turns
             first = ", ".join(map(repr, list(dict.fromkeys(column))[:3]))

@@ -404,8 +404,10 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
         ends = {float(finite.max()), float(finite.min())} if len(finite) else set()
         for value in dict.fromkeys([*SENTINELS, *never, *ends]):
             hit = values == value
+            if not hit.any():
+                continue
             others = values[~hit & ~np.isin(values, SENTINELS) & np.isfinite(values)]
-            if not hit.any() or len(others) < 2:
+            if len(others) < 2:
                 continue
             low, high = float(others.min()), float(others.max())
             if value in never:
