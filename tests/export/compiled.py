@@ -43,11 +43,17 @@ def compile_(command: list[str], folder: Path, *arguments: str) -> None:
     assert not result.stderr
 
 
+_BUILT: dict[tuple[object, ...], Path] = {}  # text and options -> the library of the first test that compiled them
+
+
 def library(files: Files, folder: Path, *options: str) -> ctypes.CDLL:
-    """The source as a shared library."""
+    """The source as a shared library; the same source is compiled once."""
     write(files, folder)
-    compile_([compiler()], folder, *(options or ("-O0",)), "-shared", "-fPIC", "-o", "model.so", f"{files.name}.c")
-    return ctypes.CDLL(str(folder / "model.so"))
+    key = (files.name, *sorted(files.texts.items()), *options)
+    if key not in _BUILT:
+        compile_([compiler()], folder, *(options or ("-O0",)), "-shared", "-fPIC", "-o", "model.so", f"{files.name}.c")
+        _BUILT[key] = folder / "model.so"
+    return ctypes.CDLL(str(_BUILT[key]))
 
 
 def run_example(files: Files, folder: Path, *options: str) -> str:
