@@ -195,7 +195,7 @@ def _tables(
     for run, file in logs.items():
         log = read_table(file, mapping.format, mapping.clock.sources[0], () if whole_rows else here, progress)
         if file == next(iter(logs.values())):  # once for all of them
-            _tell_of_zone(log, mapping, file)
+            _warn_of_zone(log, mapping, file)
         first = 0
         for end in [*_restarts(log, mapping, file), len(log)]:
             part = log.iloc[first:end] if first or end < len(log) else log
@@ -204,8 +204,8 @@ def _tables(
             first = end
 
 
-def _tell_of_zone(table: pd.DataFrame, mapping: Mapping, file: Path) -> None:
-    """Tell where dates without a zone count as UTC, and the head of the log or the name of its clock says another."""
+def _warn_of_zone(table: pd.DataFrame, mapping: Mapping, file: Path) -> None:
+    """Warn where dates without a zone count as UTC, and the head of the log or the name of its clock says another."""
     if mapping.clock.unit != "date" or len(mapping.clock.sources) > 1:
         return
     (clock,), form, head = mapping.clock.sources, mapping.format, ""

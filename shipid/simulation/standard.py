@@ -141,7 +141,7 @@ def standard(
 
 
 def _check_angles(name: str, angles: Sequence[float], most: int) -> None:
-    """Refuse angles [deg] that do not fit; tell of a helm that may be in rad."""
+    """Refuse angles [deg] that do not fit; warn of a helm that may be in rad."""
     if len(angles) > most:
         raise ShipidError(f"{name} takes {most or 'no'} {plural(most, 'angle')}", path="ANGLES")
     if any(angle <= 0 for angle in angles):

@@ -318,7 +318,7 @@ def test_a_free_run_that_diverges_is_no_number(log: Dataset) -> None:
 
 @pytest.mark.usefixtures("one_manoeuvre")
 @pytest.mark.parametrize(("runs", "word"), [(1, True), (10, False)])
-def test_few_runs_that_may_hide_a_drift_are_told(runs: int, word: bool) -> None:
+def test_few_runs_that_may_hide_a_drift_are_warned_of(runs: int, word: bool) -> None:
     """White noise; the resistance decides the mean speed, as a drift of the log would."""
     path = "hull.derivatives.X_u|u|"
     log = noisy(trials(SHIP, runs=runs, steps=60))

@@ -327,7 +327,7 @@ def test_every_second_fit_overlooks_the_hidden_drift(runs: int) -> None:
     assert np.mean([one.ratio for one in seen[1:]]) == pytest.approx(1 + added, rel=0.2)
 
 
-def test_a_drift_that_one_run_does_not_show_is_told_with_the_factors_that_it_moves() -> None:
+def test_a_drift_that_one_run_does_not_show_names_the_factors_that_it_moves() -> None:
     """Of the fits that pass for white, intervals of factors that are not named cover; half of those named did not."""
     rng, passed, covered, open_ = np.random.default_rng(0), 0, np.zeros(5), np.zeros(5)
     for _ in range(300):

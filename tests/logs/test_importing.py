@@ -483,10 +483,10 @@ def test_a_point_that_may_mark_thousands_is_refused_beside_a_decimal_comma(
 
 
 @pytest.mark.parametrize(
-    ("head", "zone", "told"), [("# tz=+01:00\n", "", True), ("# tz=+01:00\n", "+01:00", False), ("", "", False)]
+    ("head", "zone", "warned"), [("# tz=+01:00\n", "", True), ("# tz=+01:00\n", "+01:00", False), ("", "", False)]
 )
-def test_a_zone_that_only_the_head_says_is_told(
-    head: str, zone: str, told: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+def test_a_zone_that_only_the_head_says_is_warned_of(
+    head: str, zone: str, warned: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Times are counted as UTC; the draft asks, and a mapping may have been written without one."""
     frame = turning(np.arange(0.0, 60.0, 0.5))
@@ -502,7 +502,7 @@ def test_a_zone_that_only_the_head_says_is_told(
     (tmp_path / "mapping.toml").write_text(text)
     import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
     said = "log.csv: clock.from: '2024-05-14T08:00:00' is read as UTC, and the log says 'tz=+01:00'"
-    assert [message.startswith(said) for message in caplog.messages] == [True] * told
+    assert [message.startswith(said) for message in caplog.messages] == [True] * warned
 
 
 PARTED = """

@@ -225,7 +225,7 @@ def test_angles_are_one_or_several() -> None:
         ("reverse-spiral", 0.5, ""),  # a rate in deg/s
     ],
 )
-def test_angles_that_may_be_radians_are_told(
+def test_angles_that_may_be_radians_are_warned_of(
     name: str, angle: float, said: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     standard(SHIP, name, (angle,))
