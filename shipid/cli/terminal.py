@@ -228,7 +228,7 @@ def iterations() -> Iterator[Any]:
 
 @contextmanager
 def steps(first: str = "") -> Iterator[Callable[[str], object]]:
-    """Give a function that takes the step of a long calculation: shown on a terminal, else printed once if it is long."""
+    """Give a function that takes the step of a long calculation: shown on a terminal, else printed once if long."""
     if sys.stderr.isatty():
         with _console(stderr=True).status(first) as status:
             yield lambda step: status.update(visible(step))
