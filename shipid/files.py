@@ -262,7 +262,7 @@ def read_arrays(file: str | os.PathLike[str], *beginnings: str) -> dict[str, np.
     try:
         with open_file(file) as stream, np.load(stream, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files if name.startswith(beginnings or "")}
-    except (*_NOT_WHOLE, TypeError, AttributeError, NotImplementedError) as error:
+    except (*_NOT_WHOLE, TypeError, AttributeError, NotImplementedError) as error:  # the last: a foreign compression
         raise ValueError(f"{file} is not a whole .npz") from error
 
 

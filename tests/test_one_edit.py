@@ -368,7 +368,7 @@ def test_physics_feels_the_depth_and_methods_see_it(depth: Vessel, tmp_path: Pat
         np.testing.assert_allclose(path.T, expected[:, i], atol=1e-9)
 
 
-def read_toy(file: Path, _: readers.Format, __: str) -> pd.DataFrame:
+def read_toy(file: Path, *_: object) -> pd.DataFrame:
     """Lines `name: value value ...` under a first line `TOY`."""
     lines = file.read_text().splitlines()[1:]
     return pd.DataFrame({name: values.split() for name, values in (line.split(": ") for line in lines)})
