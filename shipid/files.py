@@ -115,14 +115,18 @@ def sweep(folder: Path) -> None:
 
 
 def is_alive(process: int) -> bool:
-    """Whether a process of this machine runs, or may run."""
+    """Whether a process of this machine runs, or may run; not one that has ended and is not yet waited for."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
     except (OSError, OverflowError):
         return True
-    return True
+    try:
+        status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:  # no Linux
+        return True
+    return status.rpartition(")")[2].split()[:1] != ["Z"]  # behind the name, which may have any characters
 
 
 def as_argument(file: str | os.PathLike[str]) -> str:

@@ -214,28 +214,42 @@ def test_a_document_on_a_full_disk_is_one_sentence(tmp_path: Path, monkeypatch: 
     assert not list(tmp_path.iterdir())
 
 
-def killed_while_it_writes(file: Path) -> None:
+def killed_while_it_writes(file: Path) -> int:
+    """The process, which nobody has waited for."""
     process = os.fork()
     if not process:
         with files.whole(file) as temporary:
             temporary.write_text("half")
             os._exit(0)
-    os.waitpid(process, 0)
+    os.waitid(os.P_PID, process, os.WEXITED | os.WNOWAIT)
+    return process
 
 
 def test_what_a_killed_process_leaves_is_swept(tmp_path: Path) -> None:
     with files.whole(tmp_path / "b.txt") as mine:
         mine.write_text("whole")
-        killed_while_it_writes(tmp_path / "a.txt")
+        os.waitpid(killed_while_it_writes(tmp_path / "a.txt"), 0)
         assert len(list(tmp_path.iterdir())) == 2
         files.sweep(tmp_path)
         assert list(tmp_path.iterdir()) == [mine.parent], "only what is at work stays"
     assert [file.name for file in tmp_path.iterdir()] == ["b.txt"]
 
 
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+def test_a_process_that_nobody_has_waited_for_is_gone(tmp_path: Path) -> None:
+    """Before, a container whose first process waits for no other kept its temporary folders for a day."""
+    process = killed_while_it_writes(tmp_path / "a.txt")
+    assert files.is_alive(os.getpid())
+    assert not files.is_alive(process)
+    files.sweep(tmp_path)
+    assert not list(tmp_path.iterdir())
+    os.waitpid(process, 0)
+    assert not files.is_alive(process)
+
+
 def test_the_next_process_that_writes_sweeps(tmp_path: Path) -> None:
     """Before, what a killed import or export left behind stayed beside its file for good."""
-    killed_while_it_writes(tmp_path / "a.txt")
+    os.waitpid(killed_while_it_writes(tmp_path / "a.txt"), 0)
     assert len(list(tmp_path.iterdir())) == 1
     files.write_text(tmp_path / "b.txt", "whole")
     assert [file.name for file in tmp_path.iterdir()] == ["b.txt"]
