@@ -3,18 +3,20 @@
 There is one Optuna study for each cell. A process that works on a unit is alone in its journal: before it writes it
 looks whether it still is, and of trials that two have written all the same each number counts once. `merge` makes one
 file of those of a run. A trial is written when it has ended, in one line: a search has no trial that is half done, and
-the order of the lines is the order of the trials. A line that a killed process left behind half written is cut off by
-the next one that writes.
+the order of the lines is the order of the trials. A last line that a killed process left behind half written, or that
+is damaged, is cut off by the next one that writes. Each trial carries a checksum.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from math import nan
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO, Any
 
 import optuna
@@ -30,6 +32,8 @@ from shipid.hybrid.method import Row, Space
 
 COUNT = "trials"  # attribute of a study: how many it will have
 FIXED, NUMBER = "fixed", "number"  # attributes of a trial: all settings in order, null if searched; its place
+CHECKSUM = "crc32"  # attribute of a trial: of its cell and row
+ANEW = "take the journal away, and searches that were interrupted begin again"
 
 
 class Journal:
@@ -47,20 +51,27 @@ class Journal:
         try:
             self._storage = JournalStorage(self._file)
         except (ValueError, KeyError, TypeError, AttributeError):
-            message = "damaged: no journal of trials; take it away, and searches that were interrupted begin again"
-            raise ResultError(message, file=file) from None
+            raise ResultError(f"damaged: no journal of trials; {ANEW}", file=file) from None
         self._known = {study.study_name for study in self._storage.get_all_studies()}
 
     def rows(self, cell: str) -> list[Row]:
-        """Return the trials of a search that ended, in order."""
+        """Return the trials of a search that ended, in order; ResultError for one that is not as it was written."""
         trials = self._study(cell).trials if cell in self._known else []
         numbered: list[Row] = []
         for trial in trials:
             if FIXED not in trial.user_attrs:  # someone else has put it in
                 continue
             if trial.user_attrs.get(NUMBER, len(numbered)) == len(numbered):
-                numbered.append(_row(len(numbered), trial))
+                numbered.append(self._row(cell, len(numbered), trial))
         return numbered
+
+    def _row(self, cell: str, number: int, trial: FrozenTrial) -> Row:
+        """A trial as it was added; ResultError if it is damaged."""
+        with suppress(KeyError, TypeError):  # an attribute is missing or is another's
+            row = _row(number, trial)
+            if trial.user_attrs.get(CHECKSUM) in (None, _checksum(cell, row)):  # none: from an earlier version
+                return row
+        raise ResultError(f"damaged: trial {number} of {cell} is not as written; {ANEW}", file=self._file.path)
 
     def count(self, cell: str) -> int | None:
         """Return how many trials the budget of a search allowed; None before that is decided."""
@@ -74,7 +85,10 @@ class Journal:
     def add(self, rows: Mapping[str, Sequence[Row]], space: Space) -> None:
         """Append trials to searches: cell -> rows, each with the next number."""
         where = distributions(space)
-        trials = {self._study(cell): [frozen(row, where) for row in mine] for cell, mine in rows.items()}
+        trials = {
+            self._study(cell): [frozen(row, where, {CHECKSUM: _checksum(cell, row)}) for row in mine]
+            for cell, mine in rows.items()
+        }
         with self._file.together():
             for study, mine in trials.items():
                 study.add_trials(mine)
@@ -99,8 +113,13 @@ def distributions(space: Space) -> dict[str, BaseDistribution]:
     return drawn
 
 
-def frozen(row: Row, where: Mapping[str, BaseDistribution]) -> FrozenTrial:
-    """A trial that ended, as Optuna keeps it; an attribute holds what is not searched, and the order of all."""
+def frozen(
+    row: Row, where: Mapping[str, BaseDistribution], further: Mapping[str, Any] = MappingProxyType({})
+) -> FrozenTrial:
+    """A trial that ended, as Optuna keeps it; an attribute holds what is not searched, and the order of all.
+
+    further : attributes that it has beside.
+    """
     searched = {name: value for name, value in row["params"].items() if name in where}
     complete = row["state"] == "complete"
     fixed = {name: None if name in where else value for name, value in row["params"].items()}
@@ -109,8 +128,13 @@ def frozen(row: Row, where: Mapping[str, BaseDistribution]) -> FrozenTrial:
         value=row["value"] if complete else None,
         params=searched,
         distributions={name: _holding(where[name], value) for name, value in searched.items()},
-        user_attrs={"seconds": row["seconds"], "epochs": row["epochs"], FIXED: fixed, NUMBER: row["number"]},
+        user_attrs={"seconds": row["seconds"], "epochs": row["epochs"], FIXED: fixed, NUMBER: row["number"], **further},
     )
+
+
+def _checksum(cell: str, row: Row) -> int:
+    """CRC-32 of a row of a search."""
+    return zlib.crc32(json.dumps([cell, sorted(row.items())]).encode())
 
 
 def _holding(where: BaseDistribution, value: float) -> BaseDistribution:
@@ -166,13 +190,13 @@ class _Lines(JournalFileBackend):
 
     def __init__(self, file: str, check: Callable[[], object]) -> None:
         super().__init__(file)
-        self._path, self._check = file, check
+        self.path, self._check = file, check
         self._stream: IO[bytes] | None = None
 
     @contextmanager
     def together(self) -> Iterator[None]:
         """Write the entries of this block with the file locked once; the disk is waited for at the end."""
-        with open(self._path, "r+b") as stream, _alone(stream, self._path):
+        with open(self.path, "r+b") as stream, _alone(stream, self.path):
             self._check()
             end = _last_whole(stream)
             stream.truncate(end)
@@ -197,8 +221,20 @@ class _Lines(JournalFileBackend):
 
 
 def _last_whole(stream: IO[bytes]) -> int:
-    """Where the last whole line of a file ends."""
-    end = stream.seek(0, os.SEEK_END)
+    """Where the last whole entry of a file ends: a last line that Optuna cannot read is none, it passes over it."""
+    end = _after_newline(stream, stream.seek(0, os.SEEK_END))
+    if end:
+        begin = _after_newline(stream, end - 1)
+        stream.seek(begin)
+        try:
+            json.loads(stream.read(end - begin))
+        except ValueError:
+            return begin
+    return end
+
+
+def _after_newline(stream: IO[bytes], end: int) -> int:
+    """Place after the last newline of the first `end` bytes; 0 if there is none."""
     while end:
         begin = max(end - 4096, 0)
         stream.seek(begin)
