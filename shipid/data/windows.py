@@ -8,7 +8,6 @@ from operator import itemgetter
 from typing import Any, Literal, get_args
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.arguments import of_class, one_of, positive, whole_number
@@ -16,7 +15,9 @@ from shipid.data.checks import GAP
 from shipid.data.dataset import (
     Array,
     Dataset,
+    Rows,
     clock_slack,
+    columns_of_pieces,
     cumulative_integral,
     in_force,
     pieces,
@@ -253,8 +254,8 @@ def cut_windows(
     one_of("path", path, get_args(PathSource), DataError)
     shared = shares_clock(dataset)
     parts = []
-    for run, rows in sorted(pieces(dataset), key=itemgetter(0)):
-        t = rows["t"].to_numpy()
+    for run, rows in sorted(columns_of_pieces(dataset), key=itemgetter(0)):
+        t = rows["t"]
         instants = _instants(t, past * step, horizon * step, interval)
         if len(instants):
             grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], t[-1])  # (T + 1, S)
@@ -291,7 +292,7 @@ def _instants(t: Array, past: float, ahead: float, interval: float) -> Array:
     return np.asarray(t[rows[t[rows] >= first - slack]])
 
 
-def past_of(rows: pd.DataFrame, instants: Array, past: int, step: float, path: PathSource) -> dict[str, Array]:
+def past_of(rows: Rows, instants: Array, past: int, step: float, path: PathSource) -> dict[str, Array]:
     """Columns of one unbroken stretch at P, ..., 1 steps before the instants (S,) [s], name -> (P, S); none for P = 0.
 
     x, y [m] are the positions then in the frame (11) of the instant, by the same true path as the future; the columns
@@ -299,7 +300,7 @@ def past_of(rows: pd.DataFrame, instants: Array, past: int, step: float, path: P
     """
     if not past:
         return {}
-    t = rows["t"].to_numpy()
+    t = np.asarray(rows["t"])
     grid = np.concatenate([instants - step * np.arange(past, 0, -1)[:, None], instants[None]])  # (P + 1, S)
     grid = np.clip(grid, t[0], t[-1])
     values = sample(rows, grid)
@@ -308,15 +309,13 @@ def past_of(rows: pd.DataFrame, instants: Array, past: int, step: float, path: P
     return {**kept, "x": before[..., 0], "y": before[..., 1]}
 
 
-def future_of(rows: pd.DataFrame, instants: Array, horizon: int, step: float, path: PathSource) -> Array:
+def future_of(rows: Rows, instants: Array, horizon: int, step: float, path: PathSource) -> Array:
     """True paths (T, S, 2) [m] in the frame (11) after instants (S,) [s] of one unbroken stretch that holds them."""
-    grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], rows["t"].to_numpy()[-1])
+    grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], np.asarray(rows["t"])[-1])
     return true_path(rows, grid, sample(rows, grid), path)[1:]
 
 
-def true_path(
-    rows: pd.DataFrame, instants: Array, values: Mapping[str, Array], path: PathSource, origin: int = 0
-) -> Array:
+def true_path(rows: Rows, instants: Array, values: Mapping[str, Array], path: PathSource, origin: int = 0) -> Array:
     """True positions (T, ..., 2) [m] at instants (T, ...) [s] of one unbroken stretch, in the frame (11) of the first.
 
     values : what `sample` gives at the instants. origin : index of another instant to take the frame of.
@@ -325,9 +324,9 @@ def true_path(
     return np.stack(to_frame(north, east, north[origin], east[origin], values["psi"][origin]), axis=-1)
 
 
-def travelled(rows: pd.DataFrame, instants: Array) -> tuple[Array, Array]:
+def travelled(rows: Rows, instants: Array) -> tuple[Array, Array]:
     """North and east [m] travelled since the first row: trapezoid of R(psi) (u, v), exact between rows too."""
-    t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
+    t, psi, u, v = (np.asarray(rows[name]) for name in ("t", "psi", "u", "v"))
     row = np.clip(np.searchsorted(t, instants, side="right") - 1, 0, len(t) - 1)
 
     def along(rate: Array) -> Array:

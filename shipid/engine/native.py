@@ -501,7 +501,7 @@ def measure_native(
     there = _packed(goal, target(precision).lanes, precision)
     _run(model, batch, job, precision, worst=worst, goal=there, sums=sums, tally=tally)
     whole = tally[:, 0] if tally.shape[1] == 1 else tally.sum(axis=1, dtype=np.uint32)
-    return sums[:, :num_samples].astype(float), whole, worst[:, :num_samples]
+    return sums[:, :num_samples].astype(float, copy=False), whole, worst[:, :num_samples]
 
 
 def run_single(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
