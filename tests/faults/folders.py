@@ -273,10 +273,14 @@ def two_plans(seed: int) -> None:
 
 
 def damaged(seed: int) -> None:
-    """A finished folder with one to three damages: refused in one line, or the numbers of the undisturbed run."""
+    """A finished folder, or that of a killed run, with one to three damages: refused in one line, or as undisturbed."""
     rng = random.Random(seed)
     with a_place() as place:
-        shutil.copytree(reference()[0], place / "run")
+        if rng.random() < 0.5:
+            shutil.copytree(reference()[0], place / "run")
+        else:
+            at = rng.randrange(reference()[2] // 4, reference()[2])
+            child(lambda: _stopped(tiny_plan(place), place / "run", at, "after"))
         words = [_damage(place / "run", rng) for _ in range(rng.choice([1, 1, 2, 3]))]
         what = ", ".join(words)
         with suppress(ShipidError):
@@ -293,7 +297,8 @@ def damaged(seed: int) -> None:
 
 
 def _damage(folder: Path, rng: random.Random) -> str:
-    files = sorted(file for file in folder.rglob("*") if file.is_file())
+    """Damage one file, and say which and how; no claim, for one that nobody can read is waited for a minute."""
+    files = sorted(file for file in folder.rglob("*") if file.is_file() and file.parent.name != claims.FOLDER)
     file = rng.choice(files)
     name = f"{file.relative_to(folder)}"
     kind = rng.choice(
