@@ -27,7 +27,7 @@ from optuna.storages.journal._storage import JournalOperation
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from shipid.errors import ResultError
-from shipid.files import whole
+from shipid.files import open_file, whole
 from shipid.hybrid.method import Row, Space
 
 COUNT = "trials"  # attribute of a study: how many it will have
@@ -41,12 +41,14 @@ class Journal:
 
     Parameters
     ----------
-    file : the journal; made where there is none. ResultError where it is not one.
+    file : the journal; made where there is none. ResultError where it is not one, OSError for a device or a pipe.
     check : called before each write; what it raises, where this process may not write any more, ends the search.
     """
 
     def __init__(self, file: Path, check: Callable[[], object] = lambda: None) -> None:
         optuna.logging.set_verbosity(optuna.logging.WARNING)
+        with suppress(FileNotFoundError):
+            open_file(file).close()
         self._file = _Lines(str(file), check)
         try:
             self._storage = JournalStorage(self._file)

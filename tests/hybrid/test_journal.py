@@ -213,3 +213,10 @@ def test_a_file_that_is_no_journal_is_one_line(tmp_path: Path) -> None:
         with pytest.raises(ResultError, match="damaged") as caught:
             Journal(file)
         assert "\n" not in str(caught.value)
+
+
+def test_a_journal_that_is_a_device_is_named(tmp_path: Path) -> None:
+    (tmp_path / "t.log").symlink_to("/dev/null")
+    with pytest.raises(OSError, match="a device or a pipe") as caught:
+        Journal(tmp_path / "t.log")
+    assert caught.value.filename == str(tmp_path / "t.log")
