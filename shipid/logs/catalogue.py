@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import pooch
-
 from shipid import document
 from shipid.errors import DataError
 from shipid.logs.importing import digest_of
@@ -57,6 +55,8 @@ def fetch(name: str) -> Path:
 
 
 def _download(name: str, url: str, sha256: str, file: str | None) -> Path:
+    import pooch  # takes 60 ms, which commands without a download need not wait for
+
     stem = Path(name).stem  # the name may be the path of a mapping; the file must still lie in the cache folder
     cache = Path(pooch.os_cache("shipid"))
     pooch.get_logger().setLevel("WARNING")
