@@ -7,6 +7,8 @@ gradients here.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -38,7 +40,14 @@ def hidden(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
         return torch.addmm(offset, values, weight).tanh_()
     units = np.matmul(values.numpy(), weight.numpy())
     units += offset.numpy()
-    return torch.from_numpy(np.tanh(units, out=units))
+    return torch.from_numpy(units).tanh_() if _tanh_by_torch() else torch.from_numpy(np.tanh(units, out=units))
+
+
+@cache
+def _tanh_by_torch() -> bool:
+    """Whether NumPy's tanh is the one for AVX2, which takes twice the time of PyTorch's; that for AVX-512 does not."""
+    kinds = np.lib.introspect.opt_func_info(func_name="^tanh$", signature="float64")
+    return kinds["tanh"]["dd"]["current"] in ("X86_V3", "FMA3__AVX2")  # as NumPy 2.4 calls AVX2, and as 2.3 does
 
 
 def sums_of_squares(values: Tensor) -> Tensor:

@@ -640,8 +640,7 @@ class _FewRows:
         lower, failed = torch.linalg.cholesky_ex(torch.sub(self.unit, hat, out=hat))
         unsound = failed.bool() | (lower.diagonal(dim1=1, dim2=2).amin(dim=1) ** 2 < SOUND)
         lower[unsound] = self.unit
-        inverse = torch.linalg.solve_triangular(lower, self.unit, upper=False)
-        errors = matmul(inverse.mT, matmul(inverse, missed))
+        errors = matmul(torch.cholesky_inverse(lower), missed)
         if unsound.any():
             errors = errors.double()
             errors[unsound] = self._double(self.block.out[unsound], diagonal, columns)

@@ -39,7 +39,9 @@ def test_squares_are_summed_over_rows() -> None:
         torch.testing.assert_close(products.sums_of_squares(one), (one**2).sum(1), rtol=1e-13, atol=1e-13)
 
 
-def test_a_layer_is_the_tanh_of_its_sums() -> None:
+@pytest.mark.parametrize("by_torch", [False, True])
+def test_a_layer_is_the_tanh_of_its_sums(by_torch: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(products, "_tanh_by_torch", lambda: by_torch)
     generator = torch.Generator().manual_seed(3)
     values, weight, offset = (
         torch.randn(*shape, generator=generator, dtype=torch.float64) for shape in ((9, 3), (3, 5), (5,))
