@@ -1,8 +1,8 @@
 """Products of matrices for tensors of PyTorch: by NumPy on the processor, by PyTorch on every other device.
 
 A tensor on the processor is also an array of NumPy, at the same place in memory. On AMD products and functions of NumPy
-take a third to nine tenths of the time of those of PyTorch: docs/performance.md, "Where the time goes". Tensors have no
-gradients here.
+take a third to nine tenths of the time of those of PyTorch, except tanh with AVX2 only: docs/performance.md, "Where the
+time goes". Tensors have no gradients here.
 """
 
 from __future__ import annotations
@@ -46,8 +46,9 @@ def hidden(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
 @cache
 def _tanh_by_torch() -> bool:
     """Whether NumPy's tanh is the one for AVX2, which takes twice the time of PyTorch's; that for AVX-512 does not."""
-    kinds = np.lib.introspect.opt_func_info(func_name="^tanh$", signature="float64")
-    return kinds["tanh"]["dd"]["current"] in ("X86_V3", "FMA3__AVX2")  # as NumPy 2.4 calls AVX2, and as 2.3 does
+    functions = np.lib.introspect.opt_func_info(func_name="^tanh$", signature="float64")  # empty on some processors
+    used = [kind["current"] for kinds in functions.values() for kind in kinds.values()]
+    return any(name in ("X86_V3", "FMA3__AVX2") for name in used)  # as NumPy 2.4 calls AVX2, and as 2.3 does
 
 
 def sums_of_squares(values: Tensor) -> Tensor:
