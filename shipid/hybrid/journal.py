@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from math import nan
 from pathlib import Path
-from types import MappingProxyType
 from typing import IO, Any
 
 import optuna
@@ -33,7 +32,7 @@ from shipid.hybrid.method import Row, Space
 COUNT = "trials"  # attribute of a study: how many it will have
 FIXED, NUMBER = "fixed", "number"  # attributes of a trial: all settings in order, null if searched; its place
 CHECKSUM = "crc32"  # attribute of a trial: of its cell and row
-ANEW = "take the journal away, and searches that were interrupted begin again"
+REMEDY = "take the journal away, and searches that were interrupted begin again"
 
 
 class Journal:
@@ -48,12 +47,12 @@ class Journal:
     def __init__(self, file: Path, check: Callable[[], object] = lambda: None) -> None:
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         with suppress(FileNotFoundError):
-            open_file(file).close()
+            open_file(file).close()  # Optuna would read a pipe without an end
         self._file = _Lines(str(file), check)
         try:
             self._storage = JournalStorage(self._file)
         except (ValueError, KeyError, TypeError, AttributeError):
-            raise ResultError(f"damaged: no journal of trials; {ANEW}", file=file) from None
+            raise ResultError(f"damaged: no journal of trials; {REMEDY}", file=file) from None
         self._known = {study.study_name for study in self._storage.get_all_studies()}
 
     def rows(self, cell: str) -> list[Row]:
@@ -64,16 +63,16 @@ class Journal:
             if FIXED not in trial.user_attrs:  # someone else has put it in
                 continue
             if trial.user_attrs.get(NUMBER, len(numbered)) == len(numbered):
-                numbered.append(self._row(cell, len(numbered), trial))
+                numbered.append(self._checked(cell, len(numbered), trial))
         return numbered
 
-    def _row(self, cell: str, number: int, trial: FrozenTrial) -> Row:
+    def _checked(self, cell: str, number: int, trial: FrozenTrial) -> Row:
         """A trial as it was added; ResultError if it is damaged."""
         with suppress(KeyError, TypeError):  # an attribute is missing or is another's
             row = _row(number, trial)
             if trial.user_attrs.get(CHECKSUM) in (None, _checksum(cell, row)):  # none: from an earlier version
                 return row
-        raise ResultError(f"damaged: trial {number} of {cell} is not as written; {ANEW}", file=self._file.path)
+        raise ResultError(f"damaged: trial {number} of {cell} is not as written; {REMEDY}", file=self._file.path)
 
     def count(self, cell: str) -> int | None:
         """Return how many trials the budget of a search allowed; None before that is decided."""
@@ -88,7 +87,7 @@ class Journal:
         """Append trials to searches: cell -> rows, each with the next number."""
         where = distributions(space)
         trials = {
-            self._study(cell): [frozen(row, where, {CHECKSUM: _checksum(cell, row)}) for row in mine]
+            self._study(cell): [frozen(row, where, **{CHECKSUM: _checksum(cell, row)}) for row in mine]
             for cell, mine in rows.items()
         }
         with self._file.together():
@@ -115,12 +114,10 @@ def distributions(space: Space) -> dict[str, BaseDistribution]:
     return drawn
 
 
-def frozen(
-    row: Row, where: Mapping[str, BaseDistribution], further: Mapping[str, Any] = MappingProxyType({})
-) -> FrozenTrial:
+def frozen(row: Row, where: Mapping[str, BaseDistribution], **further: Any) -> FrozenTrial:
     """A trial that ended, as Optuna keeps it; an attribute holds what is not searched, and the order of all.
 
-    further : attributes that it has beside.
+    further : more attributes, name -> value.
     """
     searched = {name: value for name, value in row["params"].items() if name in where}
     complete = row["state"] == "complete"
