@@ -273,7 +273,7 @@ def two_plans(seed: int) -> None:
 
 
 def damaged(seed: int) -> None:
-    """A finished folder, or that of a killed run, with one to three damages: refused in one line, or as undisturbed."""
+    """A finished folder, or that of a killed run, with one to three damages: refused in one line, or whole."""
     rng = random.Random(seed)
     with a_place() as place:
         if rng.random() < 0.5:
@@ -297,7 +297,7 @@ def damaged(seed: int) -> None:
 
 
 def _damage(folder: Path, rng: random.Random) -> str:
-    """Damage one file, and say which and how; no claim, for one that nobody can read is waited for a minute."""
+    """Damage one file; its name and how. Claims are left alone: a run waits a minute for one that it cannot read."""
     files = sorted(file for file in folder.rglob("*") if file.is_file() and file.parent.name != claims.FOLDER)
     file = rng.choice(files)
     name = f"{file.relative_to(folder)}"
