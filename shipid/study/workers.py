@@ -11,8 +11,9 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import islice
-from multiprocessing import Pipe, get_context
+from multiprocessing import Pipe, current_process, get_context
 from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 from multiprocessing.reduction import ForkingPickler
 from queue import SimpleQueue
 from typing import Any, TypeVar, cast
@@ -25,6 +26,8 @@ LONGEST = 107 - len("/pymp-12345678/listener-12345678")  # bytes of a folder in 
 PRELOADED = ["shipid.study.run", "shipid.hybrid.training", "shipid.hybrid.ridge"]
 """Modules that workers need, PyTorch with them: a name that cannot be imported is passed over without a word."""
 QUICK_END = "shipid.study.quick_end"  # imported last of all: what is registered last is called first at the end
+NO_GUARD = 64  # exit status of a worker whose script starts workers: EX_USAGE of sysexits.h
+END = 5.0  # s in which a process that has closed its connection has ended
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  # read at import
 
 Task = TypeVar("Task")
@@ -37,6 +40,7 @@ def import_for_workers() -> None:
     Once per process. The workers ignore Ctrl-C, as their source does: this process stops them. Nothing happens where
     workers are not forked, or in a thread, which cannot set signals; then each worker imports for itself.
     """
+    _check_guard()
     if _method() != "forkserver" or threading.current_thread() is not threading.main_thread():
         return
     from multiprocessing import forkserver
@@ -56,22 +60,24 @@ def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int
     What `work` raises is raised here; ShipidError if a process dies. The processes end with the iterator and with this
     process, whatever they are doing.
     """
-    left, workers, doing = iter(tasks), ExitStack(), {}
+    _check_guard()
+    left, workers, doing, processes = iter(tasks), ExitStack(), {}, {}
     try:
         with uninterrupted(), _one_thread():  # half a process would complain
             for task in islice(left, count):
-                with _alive():
-                    connection = _start(work, workers)
+                connection, process = _start(workers)
+                with _alive(process):
+                    connection.send(work)
                     connection.send(task)
-                doing[connection] = task
+                doing[connection], processes[connection] = task, process
         while doing:
             for ready in cast("list[Connection]", wait(list(doing))):
-                with _alive():
+                with _alive(processes[ready]):
                     result, done = ready.recv(), doing.pop(ready)
                 if isinstance(result, Exception):
                     raise result
                 for task in islice(left, 1):
-                    with _alive():
+                    with _alive(processes[ready]):
                         ready.send(task)
                     doing[ready] = task
                 yield done, result
@@ -79,12 +85,27 @@ def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int
         workers.close()
 
 
+def _check_guard() -> None:
+    """End a worker that imports the script of its user, where the script starts workers: they would start more.
+
+    A process begins with that import. What no line `if __name__ == "__main__":` guards is done once more.
+    """
+    if getattr(current_process(), "_inheriting", False):  # where multiprocessing would raise an error of 20 lines
+        os._exit(NO_GUARD)
+
+
 @contextmanager
-def _alive() -> Iterator[None]:
+def _alive(process: BaseProcess) -> Iterator[None]:
     """ShipidError where the process at the other end of a connection is gone."""
     try:
         yield
     except (EOFError, ConnectionError):
+        process.join(END)
+        if process.exitcode == NO_GUARD:
+            raise ShipidError(
+                'each worker imports your script: put what it does below a line `if __name__ == "__main__":`',
+                file=sys.modules["__main__"].__file__,
+            ) from None
         raise ShipidError(
             "a worker was killed, perhaps because memory ran out; finished cells are kept: resume with fewer --workers"
         ) from None
@@ -95,27 +116,33 @@ def _method() -> str:
     return METHOD if len(os.fsencode(tempfile.gettempdir())) <= LONGEST else "spawn"
 
 
-def _start(work: Callable[[Any], Any], workers: ExitStack) -> Connection:
-    """Start a process that does the work, ended when `workers` closes; returns the connection to it."""
+def _start(workers: ExitStack) -> tuple[Connection, BaseProcess]:
+    """Start a process, ended when `workers` closes; returns the connection to it, which takes the work, and itself.
+
+    What a process gets as it starts is short: multiprocessing does not say how one ended that died before it had all.
+    """
     context: Any = get_context(_method())
     here, there = Pipe()
-    process = context.Process(target=_serve, args=(there, work), daemon=True)
+    process = context.Process(target=_serve, args=(there,), daemon=True)
     process.start()
     there.close()
     workers.callback(process.join)
     workers.callback(process.kill)  # whatever the work has made of the signals
-    return here
+    return here, process
 
 
-def _serve(connection: Connection, work: Callable[[Any], Any]) -> None:
-    """Do the tasks that come; errors are results that keep where they arose."""
+def _serve(connection: Connection) -> None:
+    """Receive the work and do the tasks that come; errors are results that keep where they arose."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tasks: SimpleQueue[Any] = SimpleQueue()
     try:
+        work = connection.recv()
         threading.Thread(target=_listen, args=(connection, tasks), daemon=True).start()
-    except RuntimeError as error:  # no more threads for this user
-        connection.send_bytes(_packed(error))
+    except EOFError:
         return
+    except Exception as error:  # a class of the user that cannot be imported here, or no more threads for this user
+        connection.send_bytes(_packed(error))
+        _listen(connection, tasks)  # so that the task that comes first is no write to a closed connection
     while True:
         result = None
         task = tasks.get()

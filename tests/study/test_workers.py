@@ -77,6 +77,45 @@ if __name__ == "__main__":
     assert process.stdout == "[(4.0, 2.0)]\n", process.stderr
 
 
+@pytest.mark.parametrize("first", ["import_for_workers()", ""])
+@pytest.mark.parametrize("size", [1, 10_000_000])  # what workers get, also more than a pipe holds
+def test_a_script_without_its_guard_is_named(first: str, size: int, tmp_path: Path) -> None:
+    """Each worker imports the script, and would start workers; multiprocessing says so in 20 lines, and blamed memory."""
+    program = f"""
+from functools import partial
+from shipid.study.workers import import_for_workers, on_workers
+{first}
+print(list(on_workers(partial(max, bytes({size})), [b"1"], 1)))
+"""
+    (tmp_path / "program.py").write_text(program)
+    command = [sys.executable, tmp_path / "program.py"]
+    process = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    place = f"shipid.errors.ShipidError: {tmp_path / 'program.py'}: "
+    assert process.stderr.splitlines()[-1].startswith(f"{place}each worker imports your script: put what it does below")
+    assert process.stderr.count("Traceback") == 1
+    assert not process.stdout
+
+
+def gone() -> None:
+    raise ModuleNotFoundError("my module is gone")
+
+
+class Gone:
+    """Work that cannot be made again where it is received."""
+
+    def __reduce__(self) -> tuple[object, tuple[()]]:
+        return gone, ()
+
+    def __call__(self, task: float) -> float:
+        return task
+
+
+def test_work_that_cannot_be_received_is_its_error() -> None:
+    with pytest.raises(ModuleNotFoundError, match="my module is gone"):
+        list(on_workers(Gone(), [1.0, 2.0], 2))
+    assert not multiprocessing.active_children()
+
+
 def test_nothing_to_do_starts_nothing() -> None:
     assert list(on_workers(math.sqrt, [], 2)) == []
 
