@@ -87,7 +87,7 @@ class Bands:
     slopes : (5,) growth per standard deviation of each trait, as the logarithm.
     length : mean length [m] of the predicted paths of calibration.
     kinds : kinds of manoeuvre of the runs of calibration -> number of runs, where they were known.
-    by_kind : (kinds, 99) radius that holds whole paths of runs of each kind.
+    by_kind : (kinds, 99) radius that holds whole paths of runs of each kind; of use where a kind has enough runs.
     """
 
     runs: int

@@ -109,9 +109,11 @@ def calibrated(
     assert best is not None
     _, fitted, whole = best
     of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
-    known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind and (of == kind).sum() >= FEWEST}
+    known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
     reach, of = fitted.scores.max(axis=0), of[runs.place]
-    by_kind = [radii(reach[of == kind], runs.place[of == kind]) for kind in known]
+    by_kind = [  # of too few runs no band is promised, whatever is here
+        radii(reach[of == kind], runs.place[of == kind]) if count >= FEWEST else whole for kind, count in known.items()
+    ]
     return Bands(
         runs=runs.count,
         along=fitted.scale[:, 0],

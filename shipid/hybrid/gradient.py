@@ -61,8 +61,6 @@ def tune_gradient(task: Task, method: PathTrained) -> dict[str, Fitted]:
             else:
                 studies[key].tell(trial, state=TrialState.FAIL)
         search.record({key: rows[key] for key in names})
-        if task.on_trial is not None:
-            task.on_trial(number + 1, search.count or number + 1)
     return {key: trainer.fitted(key, search, best[key]) for key in names}
 
 

@@ -140,8 +140,6 @@ class LearnedForce(Searched):
                 losses.append(trainer.error(weights, instants.select(validation), future[:, validation]))
             value = float(np.mean(losses)) / 2  # per coordinate, as the other methods
             search.record({name: row_of(number, {"ridge": ridge}, value, start, most)})
-            if task.on_trial is not None:
-                task.on_trial(number + 1, len(self.ridges()))
         rows = search.rows[name]
         if not best_of(rows):
             return Fitted(None, rows, search.seconds)
@@ -219,14 +217,16 @@ def plain(block: Mapping[str, Array]) -> dict[str, Any]:
 
 
 class _Trainer:
-    """Loss and slope of the weights of one network on some windows."""
+    """Loss and slope of the weights of one network on some windows, without those that diverge at its first weights."""
 
     def __init__(
         self, physics: Physics, block: Mapping[str, Array], instants: Instants, future: Array, iterations: int
     ) -> None:
         self.physics = physics.with_values({BLOCK: plain(block)})
         assert self.physics.vessel is not None
-        self.first, self.instants, self.future, self.iterations = dict(block), instants, future, iterations
+        sound = np.flatnonzero(~self.physics.variant_paths(instants)[1][0])
+        self.instants, self.future = instants.select(sound), future[:, sound]
+        self.first, self.iterations = dict(block), iterations
         self.names = [f"{BLOCK}.{key}.{unit}" for key in (*HIDDEN, *OUTPUT) for unit in range(len(block["w_0"]))]
         paths = list(self.physics.vessel.parameters)
         self.places = np.array([paths.index(name) for name in self.names])
@@ -241,7 +241,7 @@ class _Trainer:
         return values
 
     def solve(self, ridge: float, start: Array | None) -> tuple[Array, int]:
-        """Minimise the loss from a start (default: no force); weights and the number of iterations."""
+        """Minimise the loss from a start (default: the weights of `started`); weights and the number of iterations."""
         from scipy.optimize import minimize  # a study is read without it
 
         def loss(weights: Array) -> tuple[float, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol, Self
@@ -100,7 +100,6 @@ class Task:
     seed : of all that is random.
     hidden : foundation -> states of its actuators at the instants (S,), where it has any.
     estimates : foundation -> what its observer knows at the instants (S,), where it has one.
-    on_trial : called with (trials done, trials in all) after each trial.
     device : a PyTorch device.
     journal : where searches are written as they go and read back; without one they are kept in memory.
     cells : foundation -> name of its search in the journal.
@@ -114,7 +113,6 @@ class Task:
     seed: int = 0
     hidden: Mapping[str, Mapping[str, Array] | None] = field(default_factory=dict)
     estimates: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
-    on_trial: Callable[[int, int], None] | None = None
     device: str = "cpu"
     journal: Journal | None = None
     cells: Mapping[str, str] = field(default_factory=dict)

@@ -122,7 +122,7 @@ class Physics:
         """Mean squared position error [m^2] over windows and steps, and its slope by the parameters `names`, (K,).
 
         future : true paths (T, S, 2) [m] in the frame (11). parameters : (P,) numbers instead of the vessel's.
-        Windows on which the rollout diverges are left out; the error is infinite where all do.
+        The error is infinite where the rollout of a window diverges: without this window it would be smaller.
         """
         start, commands, environment, slow, drift = self._inputs(instants)
         gradients = rollout_gradient(
@@ -139,10 +139,9 @@ class Physics:
             memory=instants.hidden,
             tau_extra=slow,
         )
-        sound = ~gradients.diverged
-        if not sound.any():
+        if gradients.diverged.any():
             return float("inf"), np.zeros(len(names))
-        return float(gradients.loss[sound].mean()), np.asarray(gradients.parameters[sound].mean(axis=0))
+        return float(gradients.loss.mean()), np.asarray(gradients.parameters.mean(axis=0))
 
     def _north_east(self, instants: Instants, future: Array, drift: Array | None) -> Array:
         """Paths (T, S, 2) [m] in the frame (11) as north and east, less the drift of the water."""

@@ -263,11 +263,7 @@ class _Tuning:
                 for key in group.names:
                     made[key] |= {"seconds": seconds, "epochs": 0}
             search.keep(made)
-            if task.on_trial is not None:
-                task.on_trial(number + 1, search.count or number + 1)
         search.write()
-        if not self.names and task.on_trial is not None:
-            task.on_trial(self.method.trials, self.method.trials)
         self.rows = search.rows
 
     def judge_finalists(self) -> None:

@@ -57,10 +57,8 @@ def fit_each(
 ) -> dict[str, Fitted]:
     """Result of `fit` for every foundation of a task by name; where its physics is not finite all trials diverged."""
     fitted = {}
-    for count, name in enumerate(task.cases):
+    for name in task.cases:
         fitted[name] = fit(name) if sound(task, name) else diverged(method, points())
-        if task.on_trial is not None:
-            task.on_trial(count + 1, len(task.cases))
     return fitted
 
 

@@ -30,7 +30,7 @@ from shipid.vessel.load import Vessel
 Array = NDArray[np.float64]
 Measure = Callable[[Vessel], Mapping[str, float]]
 LONG = 10.0  # a horizon is long from this multiple of the correlation time of the residuals on
-SMALL = 1e-4  # share of the variance of a measure's greatest axis: axes of the covariance below it are left out
+SMALL = 1e-4  # of the standard deviation along the greatest axis of a covariance: shorter axes are left out
 
 
 def check_level(level: float | None) -> None:

@@ -125,6 +125,8 @@ def _solved(problem: _Problem, centre: Array, widths: Array, linear: bool) -> tu
             if linear or cost <= float(left @ left):
                 break
             step = step / 2
+        else:
+            return factors, levels, False  # no step lowers the cost
         factors, (residual, jacobian) = trial, evaluated
         after = problem.levels(residual)
         moved = max(abs(after[name] / levels[name] - 1) for name in levels)

@@ -241,7 +241,7 @@ def _searched(
 
 def _blurred(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
     """A warning if the step of the fit is longer than the interval of the log or does not divide it, else no text."""
-    between, length = interval_of(dataset, runs), float(vessel.document.get("particulars", {}).get("L_pp", 0.0))
+    between, length = interval_of(dataset, runs), vessel.length
     if settings.step > COARSE * between:
         return (
             f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: "
@@ -252,7 +252,7 @@ def _blurred(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Id
         times = np.diff(rows["t"].to_numpy())
         between = float(np.median(times))
         steps, even = between / settings.step, np.abs(times - between) < UNEVEN * between
-        far = between * float(rows["u"].abs().mean()) >= FAR * length
+        far = length is not None and between * float(rows["u"].abs().mean()) >= FAR * length
         if far and even.mean() > 0.5 and abs(steps - round(steps)) > UNEVEN * steps:
             return (
                 f"rows of run {run} are {between:.4g} s apart, which steps of {settings.step:g} s do not divide: "

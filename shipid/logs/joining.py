@@ -22,7 +22,7 @@ PAUSE = 3600.0  # s put between recordings whose clocks overlap but count from n
 def join(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
     """Return one dataset with all runs, and notes on what was changed.
 
-    Positions have the origin of the first dataset. Columns that not all have are left out, unless they are commands.
+    Positions have the origin of the first dataset. Columns that not all have are left out; commands must be the same.
     Names of runs that clash get the name of their file before them.
 
     Parameters

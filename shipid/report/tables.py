@@ -159,7 +159,7 @@ def kinds(content: ReportContent) -> Table | None:
     if frame.empty:
         return None
     pairs = zip(frame.source, frame.N_D, strict=True)
-    how = [HOW[source] + (f", {N_D} runs" if N_D else "") for source, N_D in pairs]
+    how = [HOW[source] + (f", {counted(N_D, 'run')}" if N_D else "") for source, N_D in pairs]
     shown = frame.assign(how=how, model=frame.model.where(frame.source.ne("naive"), ""))
     of, source = ("of physics alone", "physics") if nothing_learns(content) else ("with data", "cooperative")
     learned = frame[frame.source.eq(source)]

@@ -46,7 +46,7 @@ SWEEPS = 2  # over all groups taken, once every one is taken
 WORTH = 0.06  # of the error that a further group must save
 SAVING = 0.15  # of the error that all groups together must save, else nothing is reported
 LEAST_ERROR = 1e-3  # m: no log has positions that are so near to the truth; a smaller error is none
-PENALTY = 3.0  # times the error of constant u, v, r: a prediction that diverges
+PENALTY = 30.0  # times the error of constant u, v, r: no window counts more, such as one that diverges
 STRAIGHT, STEADY = np.radians(4.0), 0.03  # of heading at every step and of the speed at the end: a steady straight run
 TURNS, LEAST_TURN = 10, np.radians(5.0)  # windows, and how far one turns, from which the turning is judged
 FEW = 3  # windows
@@ -287,7 +287,7 @@ class _Trial:
         return self.known[gear]
 
     def errors(self, rows: Sequence[Mapping[str, float]]) -> list[float]:
-        """Mean error [m] for each set of changed numbers; what diverges counts as `PENALTY` times constant motion."""
+        """Mean error [m] for each set of changed numbers; no window counts more than `PENALTY` times constant motion."""
         by_gear: dict[Gear, list[int]] = {}
         for number, row in enumerate(rows):
             gear = tuple(sorted((path, value) for path, value in row.items() if ".actuator." in path))
@@ -304,7 +304,7 @@ class _Trial:
             physics = Physics(vessel, self.windows.horizon, self.windows.step, "rk4")
             distances = physics.distances(self.instants(gear), self.windows.future, parameters, engine=REPEATED)
             mean = np.where(distances.diverged, np.inf, distances.total / self.windows.horizon)
-            capped = np.minimum(np.nan_to_num(mean, nan=np.inf), PENALTY * max(self.constant, 1e-9) * 10)
+            capped = np.minimum(np.nan_to_num(mean, nan=np.inf), PENALTY * max(self.constant, 1e-9))
             for number, place in enumerate(places):
                 result[place] = float(capped[number].mean())
         return result

@@ -58,8 +58,7 @@ def _estimate(value: Array, drawn: Array, runs: int, limits: tuple[float, float]
 
 def _trained(drawn: Array, noise: Array) -> Array:
     """Resampled means (B, ...) as other trainings would give them: each times a factor of relative spread `noise`."""
-    factors = np.random.default_rng(SEED).normal(1.0, 1.0, drawn.shape)
-    return drawn * np.exp((factors - 1) * noise)
+    return drawn * np.exp(np.random.default_rng(SEED).standard_normal(drawn.shape) * noise)
 
 
 def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate | None:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import f_oneway
 
+from shipid.errors import DataError
+from shipid.hybrid.bands import Bands
 from shipid.hybrid.calibration import (
     CENTRES,
     PRIOR,
@@ -111,6 +115,21 @@ def test_each_kind_has_its_radii() -> None:
             shares.append(region.holds(fresh.errors)[mine].mean())
     assert min(np.mean(shares) for shares in held.values()) > 0.86
     assert max(np.mean(shares) for shares in held.values()) < 0.96
+
+
+@pytest.mark.parametrize("few", [1, 2, 3])
+def test_a_kind_of_few_runs_is_known_and_has_no_band(few: int) -> None:
+    """Of one or two runs nothing was kept, and reports said that there were none."""
+    drawn = runs(1, count=12)
+    names = np.unique(drawn.run)
+    kinds = {str(name): "spiral" if place < few else "turning" for place, name in enumerate(names)}
+    bands = replace(drawn, kinds=kinds).bands()
+    assert bands.kinds == {"spiral": few, "turning": 12 - few}
+    assert bands.promises(0.7, "spiral") == (few >= 3)
+    with pytest.raises(DataError, match=f"of the kind 'spiral' to calibrate it: there are {few}$"):
+        bands.check(0.8, "spiral")
+    again = Bands.from_arrays(bands.header(), bands.arrays())
+    np.testing.assert_array_equal(again.table("turning"), bands.table("turning"))
 
 
 def test_runs_without_errors_do_not_calibrate() -> None:

@@ -120,12 +120,8 @@ def test_a_model_that_diverged_is_a_value_and_harms_nobody(columns, targets, met
 
 
 @pytest.mark.parametrize(("method", "epochs"), [(DRAWN, 0), (SMALL, 40)])
-def test_rows_seconds_and_progress(columns, targets, method, epochs):
-    calls = []
-    tuned = tune(
-        columns, COMMANDS, targets, [FOLD], method, 1, on_trial=lambda done, total: calls.append((done, total))
-    )
-    assert calls == [(1, 3), (2, 3), (3, 3)]
+def test_rows_and_seconds(columns, targets, method, epochs):
+    tuned = tune(columns, COMMANDS, targets, [FOLD], method, 1)
     for one in tuned.values():
         assert [row["number"] for row in one.trials] == [0, 1, 2]
         assert {row["state"] for row in one.trials} == {"complete"}

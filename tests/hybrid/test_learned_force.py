@@ -144,6 +144,18 @@ def test_no_more_windows_than_asked_for(windows: Windows) -> None:
     assert [row["state"] for row in lost.trials] == ["diverged"]
 
 
+def test_windows_that_the_physics_cannot_follow_do_not_train(windows: Windows) -> None:
+    """The others do: the error of a set with such a window is infinite, whatever the force."""
+    every = np.arange(len(windows))
+    instants = windows.instants(known=True)
+    broken = replace(instants, columns={**instants.columns, "u": np.where(every == 4, 1e9, instants.columns["u"])})
+    trainer = _Trainer(WRONG, block(weight=0.0), broken, windows.future, 5)
+    assert len(trainer.instants) == len(every) - 1
+    np.testing.assert_array_equal(trainer.future, windows.future[:, every != 4])
+    alone = _Trainer(WRONG, block(weight=0.0), instants.select(every[every != 4]), windows.future[:, every != 4], 5)
+    np.testing.assert_array_equal(trainer.solve(0.1, None)[0], alone.solve(0.1, None)[0])
+
+
 def test_a_trial_is_judged_by_windows_that_its_force_has_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing of a validation window, not even its scale, reaches the training; the last fit takes all windows."""
     windows = turns(count=3, rows=15)

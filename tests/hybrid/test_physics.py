@@ -179,6 +179,19 @@ def afloat(count: int = 4) -> Instants:
     return Instants(columns, estimates=known)
 
 
+def test_the_error_does_not_fall_where_a_window_diverges(windows: Windows) -> None:
+    """It was the mean over the other windows: what trains on it was led to where a hard window diverges."""
+    instants, number = windows.instants(), len(windows)
+    hard = WRONG.gradient(instants, windows.future + 10.0 * (np.arange(number) == 3)[:, None], [])[0]
+    u = np.where(np.arange(number) == 3, 1e9, instants.columns["u"])
+    columns = Instants({**instants.columns, "u": u})
+    assert WRONG.variant_paths(columns)[1][0].nonzero()[0].tolist() == [3]
+    assert np.isfinite(hard)
+    assert WRONG.gradient(columns, windows.future, ["inertia.m"])[0] == np.inf
+    rest = np.flatnonzero(np.arange(number) != 3)
+    assert np.isfinite(WRONG.gradient(columns.select(rest), windows.future[:, rest], [])[0])
+
+
 @pytest.mark.parametrize("observer", [None, Observer()])
 def test_the_error_of_a_gradient_is_that_of_the_paths(observer: Observer | None) -> None:
     physics, here = Physics(GUNNERUS, 6, 1.0, "euler", observer), afloat()

@@ -9,7 +9,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.identification.collinearity import combinations
-from shipid.identification.inverse import inverse_dynamics
+from shipid.identification.inverse import _Problem, _solved, inverse_dynamics
 from shipid.simulation.truth import Truth, simulate
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
@@ -168,3 +168,31 @@ def test_mistakes_are_reported() -> None:
     short = Dataset(pd.DataFrame(LOG.frame.groupby("run").head(4)), LOG.metadata)
     with pytest.raises(DataError, match="longer"):
         inverse_dynamics(SHIP, short, LOG.runs, [[MAIN[0]]])
+
+
+class Bent(_Problem):
+    """One residual, arctan(100 (f - 0.5)) with a constant beside it; steps of a tangent are far too long."""
+
+    signals = ("u",)
+
+    def __init__(self, slope: float) -> None:
+        self.slope = slope  # of the derivative that it says, over the true one
+
+    def evaluate(self, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        bend = 100.0 * (factors[0] - 0.5)
+        return np.array([np.arctan(bend), 1.0]), np.array([[self.slope * 100.0 / (1.0 + bend**2)], [0.0]])
+
+    def levels(self, residual: np.ndarray) -> dict[str, float]:
+        return {"u": float(np.sqrt(np.mean(residual**2)))}
+
+
+@pytest.mark.parametrize("slope", [1.0, -1.0])
+def test_a_step_that_lowers_nothing_is_not_taken(slope: float) -> None:
+    """The last of the halved steps was taken, whatever it did to the cost."""
+    problem, centre = Bent(slope), np.array([0.51])
+    factors, _, settled = _solved(problem, centre, np.array([1.0]), linear=False)
+    before, after = (float(np.sum(problem.evaluate(one)[0] ** 2)) for one in (centre, factors))
+    assert after <= before
+    assert settled == (slope > 0)
+    if slope < 0:
+        np.testing.assert_array_equal(factors, centre)

@@ -195,6 +195,15 @@ def test_a_kind_that_no_run_of_calibration_has_is_promised_nothing(results: Resu
     assert not any("Too few runs calibrate" in sentence for sentence in words)
 
 
+def test_a_kind_of_too_few_runs_is_not_said_to_be_unknown(results: Results) -> None:
+    (kind,) = set(results.kinds.values())
+    other = {cell: replace(band, kinds={kind: 2, "spiral": 9}) for cell, band in results.bands.items()}
+    words = [sentence for sentence, _ in bands.answer(replace(results, bands=other))]
+    assert f"Too few runs calibrate a band of {percent(LEVEL)} for one kind of manoeuvre alone: {kind}." in words
+    notes = set(bands.groups_frame(replace(results, bands=other)).query("by == 'kind'")["note"])
+    assert notes == {"2 runs of this kind calibrated the band: too few"}
+
+
 def test_too_few_runs_are_reported(tiny_run: Path) -> None:
     results = read_results(tiny_run)  # 0.9 of 6 runs
     assert results.cells["coverage"].isna().all()
