@@ -504,6 +504,6 @@ def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, d
         return
     with steps() as say:
         report = share_pages(folder, say)
-    for line in (folder / ANSWER).read_text(encoding="utf-8").splitlines():
+    for line in (folder / ANSWER).read_text(encoding="utf-8", errors="replace").splitlines():
         typer.echo(f"  {line}")
     typer.echo(f"report: {report}")

@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -246,14 +246,15 @@ def steps(first: str = "") -> Iterator[Callable[[str], object]]:
 
 @contextmanager
 def looking(look: Callable[[], None], every: float) -> Iterator[None]:
-    """Call a function every so many seconds, in a thread beside the block."""
+    """Call a function every so many seconds, in a thread beside the block, until what it prints cannot be written."""
     from threading import Event, Thread
 
     ended = Event()
 
     def go() -> None:
-        while not ended.wait(every):
-            look()
+        with suppress(OSError):  # the block ends the process where it cannot print either
+            while not ended.wait(every):
+                look()
 
     thread = Thread(target=go, daemon=True)
     thread.start()

@@ -32,6 +32,7 @@ from shipid.hybrid.method import Row, Space
 COUNT = "trials"  # attribute of a study: how many it will have
 FIXED, NUMBER = "fixed", "number"  # attributes of a trial: all settings in order, null if searched; its place
 CHECKSUM = "crc32"  # attribute of a trial: of its cell and row
+STUDY = "digest"  # attribute of a trial: of the study that it belongs to
 REMEDY = "take the journal away, and searches that were interrupted begin again"
 
 
@@ -42,9 +43,11 @@ class Journal:
     ----------
     file : the journal; made where there is none. ResultError where it is not one, OSError for a device or a pipe.
     check : called before each write; what it raises, where this process may not write any more, ends the search.
+    study : digest of the study that the searches are of, if they are of one: those of another are refused.
     """
 
-    def __init__(self, file: Path, check: Callable[[], object] = lambda: None) -> None:
+    def __init__(self, file: Path, check: Callable[[], object] = lambda: None, study: str = "") -> None:
+        self._own = {STUDY: study} if study else {}
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         with suppress(FileNotFoundError):
             open_file(file).close()  # Optuna would read a pipe without an end
@@ -68,6 +71,8 @@ class Journal:
 
     def _checked(self, cell: str, number: int, trial: FrozenTrial) -> Row:
         """A trial as it was added; ResultError if it is damaged."""
+        if self._own and trial.user_attrs.get(STUDY, self._own[STUDY]) != self._own[STUDY]:
+            raise ResultError(f"trial {number} of {cell} is of another study; {REMEDY}", file=self._file.path)
         with suppress(KeyError, TypeError):  # an attribute is missing or is another's
             row = _row(number, trial)
             if trial.user_attrs.get(CHECKSUM) in (None, _checksum(cell, row)):  # none: from an earlier version
@@ -87,7 +92,7 @@ class Journal:
         """Append trials to searches: cell -> rows, each with the next number."""
         where = distributions(space)
         trials = {
-            self._study(cell): [frozen(row, where, **{CHECKSUM: _checksum(cell, row)}) for row in mine]
+            self._study(cell): [frozen(row, where, **{CHECKSUM: _checksum(cell, row)}, **self._own) for row in mine]
             for cell, mine in rows.items()
         }
         with self._file.together():

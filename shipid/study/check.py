@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from shipid.files import TEMPORARY, read_json
+from shipid.files import TEMPORARY
 from shipid.study import claims, seals, store
 from shipid.study.plan import Plan
 from shipid.study.seals import Fault
@@ -43,7 +43,7 @@ def check_folder(folder: Path) -> Checked:
         counted = f"{len(every)} {plural(len(every), 'fault')}; how far the run is cannot be said: {error}"
         return Checked([*(line for lines, _ in faults for line in lines), counted], every)
     names = [name for name in plan.parts if store.part_folder(folder, name).is_dir()]
-    checked = [_checked(store.part_folder(folder, name), plan.parts[name].plan, name) for name in names]
+    checked = [_checked(store.check_part(folder, name, (p := plan.parts[name].plan)), p, name) for name in names]
     checked.append(_checked(folder, plan))
     lines = [line for one in checked for line in one.lines]
     if plan.parts:
@@ -73,7 +73,7 @@ def _checked(folder: Path, plan: Plan, part: str = "") -> Checked:
     if left:
         folders = f"{len(left)} {plural(len(left), 'temporary folder')}"
         lines.append(f"{folders} of killed runs: the next run removes {plural(len(left), 'it', 'them')}")
-    sessions = read_json(folder / store.PROVENANCE).get("sessions", [])
+    sessions = store.provenance(folder).get("sessions", [])
     for before, after in pairwise(sessions):
         lines.append(f"computed in parts: {'; '.join(store.differences(before, after))}")
     return Checked(lines, faults)

@@ -201,8 +201,18 @@ class Claims:
         while True:
             make_folder(self._folder)  # another process may have removed it when its last claim ended
             with suppress(FileNotFoundError):
-                self._me.write_text(self._words, encoding="utf-8")
+                self._write(self._me, "w")
                 return
+
+    def _write(self, file: Path, mode: str) -> None:
+        """Write the words of this process; on a full disk nothing is left, which others would take for alive."""
+        with file.open(mode, encoding="utf-8") as stream:
+            try:
+                stream.write(self._words)
+                stream.flush()
+            except OSError:
+                file.unlink(missing_ok=True)
+                raise
 
     def _made(self, file: Path) -> bool:
         """Make the file of a claim; False if it is there already."""
@@ -217,8 +227,7 @@ class Claims:
             except OSError:  # a file system without links, or with few
                 try:
                     make_folder(self._folder)
-                    with file.open("x", encoding="utf-8") as stream:
-                        stream.write(self._words)
+                    self._write(file, "x")
                 except FileExistsError:
                     return False
                 self._apart.add(file.name)

@@ -119,7 +119,7 @@ def _write_one(folder: Path, say: Say | None) -> tuple[Path, bool]:
     """The pages of one run, and whether all of its cells are in them."""
     with Claims(folder) as claims, claims.alone(store.RESULTS):  # tables are those of the page, or of the whole run
         results = read_results(folder, say)
-        store.write_results(folder, results.cells, whole=results.complete)
+        store.write_results(folder, results.plan, results.cells, whole=results.complete)
     content = report_content(results, say)
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     write_summary(content, folder / SUMMARY)
@@ -135,11 +135,13 @@ def share_pages(folder: Path, say: Say | None = None) -> Path:
     """
     report, parts = folder / REPORT, store.stored_plan(folder).parts
     places = [store.part_folder(folder, name) for name in parts] or [folder]
+    pages = [place / name for place in places for name in (ANSWER, SUMMARY, REPORT)]
+    pages += [folder / name for name in (ANSWER, METHODS, REPORT)] if parts else []
 
     def is_done() -> bool:
         try:
             tables = max(seals.seal_file(place, store.RESULTS).stat().st_mtime for place in places)
-            return report.stat().st_mtime >= tables and (folder / ANSWER).is_file()
+            return report.stat().st_mtime >= tables and all(page.stat().st_size for page in pages)
         except FileNotFoundError:
             return False
 
@@ -154,7 +156,7 @@ def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]
     notes: dict[str, str] = {}
     whole: list[bool] = []
     for name, part in plan.parts.items():
-        mine = store.part_folder(folder, name)
+        mine = store.check_part(folder, name, part.plan)
         if not (mine / store.STUDY).is_file() or not store.finished(mine, part.plan.units):
             notes[name] = "no cell is finished yet"
             continue

@@ -287,7 +287,7 @@ class _Trial:
         return self.known[gear]
 
     def errors(self, rows: Sequence[Mapping[str, float]]) -> list[float]:
-        """Mean error [m] for each set of changed numbers; no window counts more than `PENALTY` times constant motion."""
+        """Mean error [m] for each set of changed numbers; a window counts `PENALTY` times constant motion at most."""
         by_gear: dict[Gear, list[int]] = {}
         for number, row in enumerate(rows):
             gear = tuple(sorted((path, value) for path, value in row.items() if ".actuator." in path))

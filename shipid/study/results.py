@@ -157,20 +157,25 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
     Columns: cell, foundation, family, member, method, model (foundation, with the method where several learn), N_D,
     runs, minutes [min], seed, status, sentence, A, A_90, A_rms, H, H_90, rms, width [m], coverage [1], seconds [s],
     trials (a list of dicts), and, of a study of several parts, condition and part. Raises ResultError for a folder
-    without a finished cell.
+    without a finished cell, and where a row is not as it was written.
     """
     folder = path_of("folder", folder)
     plan = store.stored_plan(folder)
     if not plan.parts:
-        return _labelled(store.read_rows(folder), plan)
+        return _cells(folder, plan)
     frames = [
-        _labelled(store.read_rows(place), part.plan).assign(condition=part.condition, part=name)
+        _cells(place, part.plan).assign(condition=part.condition, part=name)
         for name, part in plan.parts.items()
-        if (place := store.part_folder(folder, name)).is_dir() and store.finished(place, part.plan.units)
+        if (place := store.check_part(folder, name, part.plan)).is_dir() and store.finished(place, part.plan.units)
     ]
     if not frames:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
     return pd.concat(frames, ignore_index=True)
+
+
+def _cells(folder: Path, plan: Plan) -> pd.DataFrame:
+    seals.check(folder, "batches/")
+    return _labelled(store.read_rows(folder, plan), plan)
 
 
 def _labelled(cells: pd.DataFrame, plan: Plan) -> pd.DataFrame:
@@ -228,7 +233,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         naive=naive,
         paths=StoredPaths(files, kept),
         dataset=dataset,
-        provenance=read_json(folder / store.PROVENANCE),
+        provenance=store.provenance(folder),
         bands=bands,
         no_band=no_band,
     )
@@ -572,7 +577,7 @@ def provenance_words(results: Results) -> dict[str, str]:
         "computed with": f"Python {machine.get('python', '?')} on {machine.get('system', '?')}, "
         f"{machine.get('cores', '?')} cores",
         "packages": ", ".join(f"{name} {number}" for name, number in machine.get("packages", {}).items()),
-        "wall time": f"{record.get('wall_seconds', float('nan')):.0f} s",
+        "wall time": f"{record.get('wall_seconds', float('nan')):.0f} s, without interrupted sessions",
     }
     if plan.seed:
         words["world"] = f"seed {plan.seed}"

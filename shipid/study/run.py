@@ -26,7 +26,7 @@ from shipid.engine.engines import check_device
 from shipid.engine.native import engine
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError
-from shipid.files import make_folder, read_json, write_json
+from shipid.files import make_folder, write_json
 from shipid.hybrid.compensator import shared_units
 from shipid.hybrid.device import use_threads, vectors
 from shipid.hybrid.journal import Journal
@@ -169,7 +169,7 @@ def _run_parts(
     What others work on is left to the end.
     """
     total = sum(part.plan.cells for part in plan.parts.values())
-    folders = {name: store.part_folder(folder, name) for name in plan.parts}
+    folders = {name: store.check_part(folder, name, part.plan) for name, part in plan.parts.items()}
     done = {name: _cells(store.finished(folders[name], part.plan.units)) for name, part in plan.parts.items()}
     yield Event("start", done=sum(done.values()), total=total)
     for leaves in (True, False)[: 1 if leave else 2]:
@@ -203,18 +203,18 @@ def _write_data(plan: Plan, folder: Path) -> None:
 def _finish(plan: Plan, folder: Path, claims: Claims, prepared: Prepared, device: str, begun: float) -> None:
     """Write what only the end of a run knows: the tables, and in the provenance notes, machine and time."""
     with claims.alone(SESSIONS):  # a process that joins notes its session there
-        record = read_json(folder / store.PROVENANCE)
+        record = store.provenance(folder)
         record["notes"] = list(prepared.notes)
         record["machine"] = {**machine(), "device": device}
         record["wall_seconds"] = record.get("wall_seconds", 0.0) + time.perf_counter() - begun
         write_json(folder / store.PROVENANCE, record)
     rows = store.read_rows(folder, plan)
-    store.write_results(folder, rows, whole=len(rows) == plan.cells)
+    store.write_results(folder, plan, rows, whole=len(rows) == plan.cells)
 
 
 def _is_finished(folder: Path) -> bool:
     """Whether the tables hold all cells, and the provenance what the end of a run says."""
-    return seals.is_sealed(folder, store.RESULTS) and "wall_seconds" in read_json(folder / store.PROVENANCE)
+    return seals.is_sealed(folder, store.RESULTS) and "wall_seconds" in store.provenance(folder)
 
 
 def _mended(folder: Path, claims: Claims) -> list[str]:
@@ -323,7 +323,9 @@ def run_unit(
     """
     use_threads(1)
     check_device(device)
-    journal = Journal(trials / f"{unit.key}.log", check) if trials is not None and trials.is_dir() else None
+    journal = (
+        Journal(trials / f"{unit.key}.log", check, plan.digest) if trials is not None and trials.is_dir() else None
+    )
     batch = unit.batch
     runs = prepared.runs(plan, batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))

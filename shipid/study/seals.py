@@ -1,7 +1,8 @@
 """Digests of the files in a folder of results, so that damage is mended and an edit is never taken for a result.
 
-`seals/NAME.sha256` holds a line per file, as the tool `sha256sum` writes: in the folder of a run, `sha256sum -c
-seals/*` checks it too. A batch counts as done when its seal is there, which is written last.
+`seals/NAME.sha256` holds a comment with the digest of the study and a line per file, as the tool `sha256sum` writes: in
+the folder of a run, `sha256sum -c seals/*` checks it too. A batch counts as done when its seal is there, which is
+written last.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from shipid.errors import ResultError, ShipidError
 from shipid.files import read_arrays, read_table, write_text
 
 FOLDER, PROVENANCE = "seals", "provenance.json"
+STUDY = "# study "  # begins the comment
 TRIES = 10  # looks at files that other processes may write at the same time
 FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results.parquet"}
 """Name of a seal that is not of a batch -> the first file in it."""
@@ -27,7 +29,7 @@ FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results
 class Fault:
     """A file that is not what was written: `missing`, `damaged` (no whole file of its kind) or `edited`.
 
-    `foreign`: a cell of another study, copied into this folder with its seal; `reason` names the record of its search.
+    `foreign`: of another study, copied into this folder with its seal; `reason` names what belongs to it.
     `unreadable`: the system does not let this user read it, or the disk fails; it may be whole, and `reason` says why.
     """
 
@@ -63,7 +65,8 @@ def write_seal(folder: Path, name: str, files: Iterable[Path]) -> None:
     """
     files = list(files)
     for _ in range(TRIES):
-        lines = [f"{_digest(file)}  {file.relative_to(folder).as_posix()}\n" for file in files]
+        lines = [f"{STUDY}{study}\n"] if (study := _study(folder)) else []
+        lines += [f"{_digest(file)}  {file.relative_to(folder).as_posix()}\n" for file in files]
         write_text(seal_file(folder, name), "".join(lines))
         if not any(_faults(folder, seal_file(folder, name))):
             return
@@ -76,14 +79,17 @@ def remove(folder: Path, name: str) -> None:
     seal_file(folder, name).unlink(missing_ok=True)
 
 
-def faults(folder: Path) -> list[Fault]:
-    """Every sealed file that is not as it was written; a seal that is damaged itself is one."""
-    return [fault for file in sorted((folder / FOLDER).glob("*.sha256")) for fault in _faults(folder, file)]
+def faults(folder: Path, among: str = "") -> list[Fault]:
+    """Every sealed file that is not as it was written; a seal that is damaged itself is one.
+
+    among : how the paths in the folder of the files begin that are looked at, by default of all.
+    """
+    return [fault for file in sorted((folder / FOLDER).glob("*.sha256")) for fault in _faults(folder, file, among)]
 
 
-def check(folder: Path) -> None:
+def check(folder: Path, among: str = "") -> None:
     """Raise ResultError for the first sealed file that is not as it was written; nothing is mended."""
-    for fault in faults(folder):
+    for fault in faults(folder, among):
         raise wrong(folder, fault)
 
 
@@ -124,11 +130,13 @@ def mend(folder: Path) -> Iterator[str]:
         yield f"{words}: computed again"
 
 
-def _faults(folder: Path, seal: Path) -> Iterator[Fault]:
-    name = seal.name.removesuffix(".sha256")
+def _faults(folder: Path, seal: Path, among: str = "") -> Iterator[Fault]:
+    name, study = seal.name.removesuffix(".sha256"), None
     try:
-        lines = [line.split("  ", 1) for line in seal.read_text(encoding="utf-8").splitlines()]
-        known = [(digest, path) for digest, path in lines]
+        lines = seal.read_text(encoding="utf-8").splitlines()
+        if lines and lines[0].startswith(STUDY):
+            study = lines.pop(0).removeprefix(STUDY)
+        known = [(digest, path) for digest, path in (line.split("  ", 1) for line in lines)]
         whole = known and all(len(digest) == 64 and _inside(path) for digest, path in known)
         whole = whole and known[0][1] == FIRST.get(name, f"batches/{name}.json")
     except (FileNotFoundError, ValueError):
@@ -139,11 +147,16 @@ def _faults(folder: Path, seal: Path) -> Iterator[Fault]:
     if not whole:
         yield Fault(name, f"{FOLDER}/{seal.name}", "damaged")
         return
+    first = known[0][1]
     for digest, path in known:
+        if not path.startswith(among):
+            continue
         try:
             if _digest(folder / path) != digest:
                 yield Fault(name, path, "edited" if _readable(folder / path) else "damaged")
-            elif path.startswith("cells/") and _is_foreign(folder, folder / path):
+            elif path == first and study not in (None, _study(folder) or study):
+                yield Fault(name, path, "foreign", f"{FOLDER}/{seal.name}" if name in FIRST else f"trials/{name}.log")
+            elif study is None and path.startswith("cells/") and _is_foreign(folder, folder / path):
                 yield Fault(name, path, "foreign", f"trials/{name}.log")
         except (FileNotFoundError, NotADirectoryError):
             yield Fault(name, path, "missing")
@@ -163,12 +176,19 @@ def _digest(file: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
+def _study(folder: Path) -> str | None:
+    """Digest of the study of a folder, by its provenance; None where it does not say so."""
+    try:
+        return str(json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["digest"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None  # said elsewhere
+
+
 def _is_foreign(folder: Path, cell: Path) -> bool:
-    """Whether a predictor names another study than the provenance of the folder; one that names none does not."""
+    """Whether a predictor, whose seal is of an earlier version, names another study; one that names none does not."""
     try:
         header = json.loads(str(read_arrays(cell, "header")["header"]))
-        study = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["digest"]
-        return bool(header["provenance"].get("digest", study) != study)
+        return header["provenance"].get("digest") not in (None, _study(folder))
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False  # said elsewhere
 

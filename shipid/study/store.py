@@ -39,10 +39,17 @@ from shipid.vessel.load import check_vessel
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", seals.PROVENANCE, "foundations.json"
 DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
 JOURNALS, TRIALS = "trials", "trials.log"
+FOLDERS = ("cells", "predictions", "batches", "claims", seals.FOLDER, JOURNALS)
 RESULTS = "results"  # name of the seal of the tables
 PARTS = "parts"
 UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
+ENTRIES: dict[str, tuple[type | tuple[type, ...], type]] = {
+    **dict.fromkeys(("digest", "name", "file"), (str, object)),
+    **dict.fromkeys(("sources", "changes", "machine"), (dict, object)),
+    **{"sessions": (list, dict), "notes": (list, str), "wall_seconds": ((float, int), object)},
+}
+"""Entries of the provenance -> what each is, and what those in it are."""
 
 
 class NotTaken(ResultError):
@@ -76,9 +83,12 @@ def open_folder(folder: Path, plan: Plan) -> None:
             _make(folder, plan)
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
-    if _provenance(folder)["digest"] != plan.digest:
+    if provenance(folder)["digest"] != plan.digest:
         raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
     check_writable(folder)
+    for name in FOLDERS:
+        if os.path.lexists(folder / name) and not (folder / name).is_dir():
+            raise ResultError("is no folder, where one belongs: move it away, and resume", file=folder / name)
     _mend(folder, plan)
     sweep_run(folder)
 
@@ -108,7 +118,7 @@ def check_place(folder: Path, plan: Plan) -> None:
 
 def sweep_run(folder: Path) -> None:
     """Remove what processes that are gone were writing into the folder of a run."""
-    for place in (folder, *(folder / name for name in ("cells", "predictions", "batches", seals.FOLDER, JOURNALS))):
+    for place in (folder, *(folder / name for name in FOLDERS)):
         sweep(place)
 
 
@@ -169,7 +179,7 @@ def stored_plan(folder: Path) -> Plan:
     """
     if not (folder / STUDY).is_file():
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
-    provenance = _provenance(folder)
+    record = provenance(folder)
     try:
         document = documents.read(folder / STUDY)
     except DocumentError as error:
@@ -182,11 +192,11 @@ def stored_plan(folder: Path) -> Plan:
     except DocumentError as error:
         raise _not_taken(error, folder / VESSELS) from None
     try:
-        sources, changes = (provenance.get(key, {}) for key in ("sources", "changes"))
-        plan = build_plan(document, Path(provenance["file"]), vessels, sources, changes)
+        sources, changes = (record.get(key, {}) for key in ("sources", "changes"))
+        plan = build_plan(document, Path(record["file"]), vessels, sources, changes)
     except DocumentError as error:
         raise _not_taken(error, folder / STUDY) from None
-    if plan.digest != provenance["digest"]:
+    if plan.digest != record["digest"]:
         raise ResultError(
             "its study or vessels were changed by hand, or this shipid has other defaults: run the study again",
             file=folder,
@@ -203,13 +213,28 @@ def _not_taken(error: DocumentError, file: Path) -> NotTaken:
     return NotTaken(message, file=file, path=error.path)
 
 
-def _provenance(folder: Path) -> dict[str, Any]:
-    """Read what says to which study a folder belongs; ResultError where it does not say so."""
+def provenance(folder: Path) -> dict[str, Any]:
+    """Read what says to which study a folder belongs; ResultError where it does not say so, or an entry is no such."""
     record = read_json(folder / PROVENANCE)
-    named = isinstance(record, dict) and {"digest", "name", "file"} <= record.keys()
-    if not isinstance(record, dict) or not named or not isinstance(record.get("changes", {}), dict):
+    if not isinstance(record, dict) or not {"digest", "name", "file"} <= record.keys():
         raise ResultError("damaged: run the study again into a new folder", file=folder / PROVENANCE)
+    for key, (kind, inner) in ENTRIES.items():
+        if key not in record:
+            continue
+        held = record[key]
+        every = held.values() if isinstance(held, dict) else held if isinstance(held, list) else ()
+        if not isinstance(held, kind) or not all(isinstance(one, inner) for one in every):
+            message = "is not what shipid writes there: put it back, or run the study again into a new folder"
+            raise ResultError(message, file=folder / PROVENANCE, path=key)
     return record
+
+
+def check_part(folder: Path, name: str, plan: Plan) -> Path:
+    """The folder of one part of a study; ResultError where it holds another one, such as a part of another study."""
+    place = part_folder(folder, name)
+    if (place / STUDY).exists() and provenance(place)["digest"] != plan.digest:
+        raise ResultError(f"is not part {name} of this study: move it away, and resume", file=place)
+    return place
 
 
 def write_patches(folder: Path, foundations: Iterable[Foundation]) -> int:
@@ -285,7 +310,7 @@ def note_session(folder: Path, session: Mapping[str, Any]) -> list[str]:
 
     session : entries such as `shipid`, `engine`, `processor` and `packages`, as plain data; each kind is noted once.
     """
-    record = _provenance(folder)
+    record = provenance(folder)
     before = record.get("sessions", [])
     if dict(session) not in before:
         write_json(folder / PROVENANCE, {**record, "sessions": [*before, dict(session)]})
@@ -299,10 +324,20 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     return [f"{name} was {one.get(name)}, now {other.get(name)}" for name in changed]
 
 
+def _names(folder: Path, plan: Plan) -> set[str]:
+    """Names of the files of a plan's units: their keys, and those of batches that an earlier version stored whole."""
+    sealed = seals.sealed(folder)
+    return {unit.key for unit in plan.units} | ({unit.batch.key for unit in plan.units} & sealed)
+
+
 def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
-    """One row per finished cell, with its trials; ordered by N_D, seed and, with the plan, foundation and method."""
-    sealed = seals.sealed(folder)  # other files are of units that are computed again, perhaps cut in another way
-    files = sorted(file for file in (folder / "batches").glob("*.json") if file.stem in sealed)
+    """One row per finished cell, with its trials; ordered by N_D, seed and, with the plan, foundation and method.
+
+    Other files, such as copies by a program that synchronises folders, are left out where the plan is given.
+    """
+    wanted = seals.sealed(folder)  # other files are of units that are computed again, perhaps cut in another way
+    wanted &= _names(folder, plan) if plan is not None else wanted
+    files = sorted(file for file in (folder / "batches").glob("*.json") if file.stem in wanted)
     rows = [row for file in files for row in read_json(file)]
     if not rows:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
@@ -315,8 +350,10 @@ def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
     return frame.sort_values(["N_D", "seed", "place"], kind="stable").drop(columns="place").reset_index(drop=True)
 
 
-def write_results(folder: Path, rows: pd.DataFrame, whole: bool = True) -> Path:
+def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = True) -> Path:
     """`results.parquet`: one row per cell and metric, and `trials.parquet`: one row per cell and trial.
+
+    `trials.log` holds the journals of all units of the plan.
 
     whole : whether all cells are there; only then the tables have a seal, which says that a run has ended.
     """
@@ -327,7 +364,8 @@ def write_results(folder: Path, rows: pd.DataFrame, whole: bool = True) -> Path:
     write_table(folder / "results.parquet", table)
     trials = [{"cell": row["cell"], **_flat(trial)} for _, row in rows.iterrows() for trial in row["trials"]]
     write_table(folder / "trials.parquet", pd.DataFrame(trials))
-    if journals := sorted((folder / JOURNALS).glob("*.log")):
+    names = _names(folder, plan)
+    if journals := sorted(file for file in (folder / JOURNALS).glob("*.log") if file.stem in names):
         from shipid.hybrid.journal import merge  # with Optuna, which a study is read without
 
         merge(journals, folder / TRIALS)

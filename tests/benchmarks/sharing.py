@@ -60,7 +60,7 @@ def played(cells: int, workers: int) -> dict[str, float]:
         (cell,) = run_unit(plan, prepared, first, "cpu")
         seconds = _played(plan, folder, workers, cell)
         seconds["results"] = -time.process_time()
-        store.write_results(folder, store.read_rows(folder, plan))
+        store.write_results(folder, plan, store.read_rows(folder, plan))
         seconds["results"] += time.process_time()
         seconds["report"] = -time.process_time()
         write_pages(folder)

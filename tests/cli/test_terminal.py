@@ -201,3 +201,20 @@ def test_where_there_is_no_terminal_a_long_step_is_said(
         time.sleep(0.1)
     said = capsys.readouterr().err.splitlines()
     assert said == ["fold 1 of 3", "iteration 3, objective 0.25"], "each once: the same again says nothing"
+
+
+def test_what_cannot_be_printed_ends_the_look_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pipe that closes during a long cell gave the traceback of a thread."""
+    from shipid.cli.terminal import looking
+
+    looks, raised = [], []
+    monkeypatch.setattr("threading.excepthook", raised.append)
+
+    def look() -> None:
+        looks.append(1)
+        raise BrokenPipeError
+
+    with looking(look, 0.01):
+        time.sleep(0.3)
+    assert looks == [1]
+    assert not raised

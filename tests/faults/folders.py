@@ -323,7 +323,7 @@ def _damage(folder: Path, rng: random.Random) -> str:
         file.mkdir()
     elif kind == "link":
         file.unlink()
-        file.symlink_to("/nowhere" if rng.random() < 0.5 else "/dev/null")
+        file.symlink_to(file.parent / "nowhere" / file.name if rng.random() < 0.5 else "/dev/null")
     else:
         with suppress(ValueError, OSError, EOFError, zipfile.BadZipFile):  # an earlier damage made it unreadable
             _edit(file, rng)

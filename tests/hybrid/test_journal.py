@@ -52,6 +52,17 @@ def test_trials_come_back_to_the_digit(tmp_path: Path, seed: int) -> None:
     assert Journal(tmp_path / "t.log").rows("unknown") == []
 
 
+def test_a_journal_of_another_study_is_refused(tmp_path: Path) -> None:
+    """Where folders were merged, an interrupted search went on with trials of another world, without a word."""
+    file = tmp_path / "t.log"
+    Journal(file, study="one").add({"a": rows(3, 1)}, SPACE)
+    assert len(Journal(file, study="one").rows("a")) == len(Journal(file).rows("a")) == 3
+    with pytest.raises(ResultError, match=r"t\.log: trial 0 of a is of another study; take the journal away"):
+        Journal(file, study="other").rows("a")
+    Journal(file).add({"b": rows(2, 2)}, SPACE)  # as an earlier version did
+    assert len(Journal(file, study="other").rows("b")) == 2
+
+
 def test_optuna_opens_the_file_as_it_is(tmp_path: Path) -> None:
     """What its dashboard does: a journal storage on the path, with its lock and its reader."""
     mine = rows(12, 3)

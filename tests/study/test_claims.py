@@ -33,6 +33,23 @@ def test_a_unit_is_claimed_once(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(os.name == "nt", reason="no limit of the size of a file")
+def test_a_full_disk_leaves_no_sign_of_a_process(tmp_path: Path) -> None:
+    """An empty one was taken for a living process for a minute, and stayed for good."""
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"), Claims(tmp_path):
+            pass
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.rglob(".*"))
+    with Claims(tmp_path) as here:
+        assert not here.others()
+
+
 def test_a_claim_of_a_process_that_is_gone_is_taken_over(tmp_path: Path) -> None:
     process = os.fork()
     if not process:

@@ -105,6 +105,22 @@ def test_a_report_of_a_run_that_goes_on_is_no_end_of_it(
     assert report.stat().st_mtime_ns == last, "another process that ends at the same time writes no second page"
 
 
+@pytest.mark.parametrize("name", ["answer.txt", "summary.md", "report.html"])
+@pytest.mark.parametrize("gone", [True, False])
+def test_pages_that_are_gone_or_empty_are_written_again(name: str, gone: bool, tiny_run: Path, tmp_path: Path) -> None:
+    """The report of a run that is resumed was one of 0 bytes, and stayed so."""
+    folder = shutil.copytree(tiny_run, tmp_path / "run")
+    with without_figures():
+        share_pages(folder)
+        text = (folder / name).read_bytes()
+        if gone:
+            (folder / name).unlink()
+        else:
+            (folder / name).write_bytes(b"")
+        share_pages(folder)
+    assert len((folder / name).read_bytes()) == len(text) > 0
+
+
 def test_a_report_before_the_last_note_of_a_run_leaves_the_final_one_to_the_run(tmp_path: Path) -> None:
     """All cells are there and the report is written; only the run itself knows how long it took, and on what."""
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"

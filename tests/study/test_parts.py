@@ -68,6 +68,24 @@ def test_a_part_is_the_run_that_it_would_be_alone(four: tuple[Plan, Path], tmp_p
     pd.testing.assert_frame_equal(*kept)
 
 
+@pytest.mark.parametrize("foreign", [True, False])
+def test_a_part_that_is_another_is_refused(foreign: bool, four: tuple[Plan, Path], tmp_path: Path) -> None:
+    """Parts of another study, or two that changed places, were reported under the name of their folder."""
+    folder = shutil.copytree(four[1], tmp_path / "run")
+    parts = folder / store.PARTS
+    if foreign:
+        plan = tiny_plan(tmp_path, {**four[0].parts["held-1"].plan.changes, "truth.seed": 9})
+        shutil.rmtree(parts / "held-1")
+        run_here(plan, parts / "held-1")
+    else:
+        (parts / "held-1").rename(tmp_path / "held-1")
+        (parts / "known-1").rename(parts / "held-1")
+        (tmp_path / "held-1").rename(parts / "known-1")
+    for look in (check_folder, write_pages, read_cells, lambda folder: list(events_here(four[0], folder))):
+        with pytest.raises(ResultError, match=r"held-1: is not part held-1 of this study: move it away, and resume"):
+            look(folder)
+
+
 def test_the_folder_has_a_page_over_all_and_one_for_each(four: tuple[Plan, Path]) -> None:
     plan, folder = four
     assert "methods-table" in (folder / "report.html").read_text()

@@ -16,6 +16,8 @@ from shipid.errors import ResultError
 from shipid.files import read_json, write_json
 from shipid.study import seals, store
 from shipid.study.check import check_folder
+from shipid.study.results import read_cells
+from tests.study.tiny import run_here, tiny_plan
 
 
 @pytest.fixture
@@ -28,7 +30,8 @@ def test_a_finished_run_is_sealed(folder: Path) -> None:
     assert seals.faults(folder) == []
     seals.check(folder)
     assert list(seals.mend(folder)) == []
-    sealed = {line.split("  ")[1] for file in (folder / "seals").iterdir() for line in file.read_text().splitlines()}
+    lines = [line for file in (folder / "seals").iterdir() for line in file.read_text().splitlines()]
+    sealed = {line.split("  ")[1] for line in lines if not line.startswith("#")}
     for name in ("dataset.parquet", "test.npz", "envelope.json", "foundations.json", "results.parquet"):
         assert name in sealed
     assert {f"cells/{file.name}" for file in (folder / "cells").iterdir()} <= sealed
@@ -152,16 +155,58 @@ def test_a_cell_of_another_study_is_refused_though_its_seal_came_with_it(folder:
     """Where two folders are merged, cells of one name take each other's place: the report mixed two studies."""
     record = read_json(folder / store.PROVENANCE)
     write_json(folder / store.PROVENANCE, {**record, "digest": "0123456789abcdef"})
-    cell = seals.faults(folder)[0]
-    assert {fault.kind for fault in seals.faults(folder)} == {"foreign"}
-    assert len(seals.faults(folder)) == len(list((folder / "cells").iterdir()))
-    with pytest.raises(
-        ResultError, match=rf"is of another study: delete it and trials/{cell.seal}\.log, and"
-    ) as caught:
+    found = seals.faults(folder)
+    assert {fault.kind for fault in found} == {"foreign"}
+    assert {fault.seal for fault in found} == seals.sealed(folder)
+    unit = next(fault for fault in found if fault.seal not in seals.FIRST)
+    assert unit.reason == f"trials/{unit.seal}.log"
+    with pytest.raises(ResultError, match=r"is of another study: delete it and .*, and cont") as caught:
         list(seals.mend(folder))
-    assert caught.value.file == str(folder / cell.file)
+    assert caught.value.file == str(folder / found[0].file)
+    (folder / unit.file).unlink()
+    assert next(fault for fault in seals.faults(folder) if fault.seal == unit.seal).kind == "missing"
     write_json(folder / store.PROVENANCE, record)
-    seals.check(folder)
+    for seal in (folder / "seals").glob("N*"):  # as an earlier version wrote them
+        seal.write_text("".join(line for line in seal.read_text().splitlines(True) if not line.startswith("#")))
+    write_json(folder / store.PROVENANCE, {**record, "digest": "0123456789abcdef"})
+    cells = [fault for fault in seals.faults(folder) if fault.file.startswith("cells/")]
+    assert len(cells) == len(list((folder / "cells").iterdir()))
+    assert {fault.kind for fault in cells} == {"foreign"}
+
+
+def test_a_dataset_of_another_study_is_refused_though_its_seal_came_with_it(folder: Path, tmp_path: Path) -> None:
+    """What was left to compute took its runs from another world."""
+    other = tiny_plan(tmp_path, {"truth.seed": 9})
+    run_here(other, tmp_path / "other")
+    for name in ("dataset.parquet", "seals/dataset.sha256"):
+        shutil.copyfile(tmp_path / "other" / name, folder / name)
+    (fault,) = seals.faults(folder)
+    assert (fault.file, fault.kind, fault.reason) == ("dataset.parquet", "foreign", "seals/dataset.sha256")
+
+
+def test_the_quick_table_is_of_rows_as_they_were_written(folder: Path) -> None:
+    """`read_cells` took what was in the files."""
+    rows = read_cells(folder)
+    (folder / "cells" / f"{rows['cell'][0]}.npz").unlink()
+    pd.testing.assert_frame_equal(read_cells(folder), rows)  # which needs no predictor
+    file = next((folder / "batches").iterdir())
+    write_json(file, [{**row, "H": 7.7} for row in read_json(file)])
+    with pytest.raises(ResultError, match="was changed after it was written"):
+        read_cells(folder)
+
+
+def test_copies_of_a_program_that_synchronises_are_no_results(folder: Path) -> None:
+    """As "N0004-s0 (1).json": a cell counted twice, and later searches vanished from the merged journal."""
+    rows, whole = read_cells(folder), (folder / store.TRIALS).read_bytes()
+    for place, ending in (("batches", "json"), ("trials", "log")):
+        for file in list((folder / place).glob("N*")):
+            shutil.copyfile(file, folder / place / f"{file.stem} (1).{ending}")
+    for file in list((folder / "seals").glob("N*")):
+        shutil.copyfile(file, folder / "seals" / f"{file.stem} (1).sha256")
+    plan = store.stored_plan(folder)
+    assert store.read_rows(folder, plan)["cell"].tolist() == rows["cell"].tolist()
+    store.write_results(folder, plan, store.read_rows(folder, plan))
+    assert (folder / store.TRIALS).read_bytes() == whole
 
 
 def test_a_seal_names_files_inside_the_folder_only(folder: Path) -> None:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import shutil
 import socket
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,7 +18,9 @@ import pytest
 from shipid.errors import ResultError
 from shipid.files import TEMPORARY, read_json, temporary_folder, write_json
 from shipid.study import seals, store
+from shipid.study.check import check_folder
 from shipid.study.plan import Batch, Unit, read_plan
+from shipid.study.results import read_results
 from tests.study.tiny import TINY, tiny_plan
 
 
@@ -87,8 +92,34 @@ def test_a_stored_plan_knows_what_was_changed(tmp_path: Path) -> None:
     assert [part.plan.command for part in stored.parts.values()] == [part.plan.command for part in plan.parts.values()]
     provenance = tmp_path / "run" / store.PROVENANCE
     write_json(provenance, {**read_json(provenance), "changes": [3]})
-    with pytest.raises(ResultError, match="damaged: run the study again"):
+    with pytest.raises(ResultError, match="changes: is not what shipid writes there"):
         store.stored_plan(tmp_path / "run")
+
+
+@pytest.mark.parametrize("wrong", [None, 3, "x", [3], {"a": 1}])
+@pytest.mark.parametrize("key", sorted(store.ENTRIES))
+def test_an_entry_of_the_provenance_that_is_none_is_one_line(
+    key: str, wrong: Any, tiny_run: Path, tmp_path: Path
+) -> None:
+    """As after an edit by hand; some are sound."""
+    folder = shutil.copytree(tiny_run, tmp_path / "run")
+    record = read_json(folder / store.PROVENANCE)
+    write_json(folder / store.PROVENANCE, {**record, key: wrong})
+    for look in (check_folder, read_results, lambda folder: store.note_session(folder, {"shipid": "0"})):
+        with suppress(ResultError):
+            look(folder)
+    if wrong is None:
+        with pytest.raises(ResultError, match=f"provenance.json: {key}: is not what shipid writes there"):
+            check_folder(folder)
+
+
+@pytest.mark.parametrize("name", store.FOLDERS)
+def test_a_file_where_a_folder_of_a_run_belongs_is_named(name: str, tiny_run: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(tiny_run, tmp_path / "run")
+    shutil.rmtree(folder / name, ignore_errors=True)
+    (folder / name).write_text("")
+    with pytest.raises(ResultError, match=f"{name}: is no folder, where one belongs: move it away, and resume"):
+        store.open_folder(folder, store.stored_plan(folder))
 
 
 def test_a_link_to_an_empty_folder_is_a_place_for_a_run(tmp_path: Path) -> None:
@@ -139,7 +170,7 @@ def test_rows_are_those_of_the_finished_batches(tmp_path: Path) -> None:
 
 def test_results_are_a_row_for_each_metric_and_each_trial(tiny_run: Path, tmp_path: Path) -> None:
     rows = store.read_rows(tiny_run)
-    file = store.write_results(tmp_path, rows)
+    file = store.write_results(tmp_path, store.stored_plan(tiny_run), rows)
     table, trials = pd.read_parquet(file), pd.read_parquet(tmp_path / "trials.parquet")
     assert len(table) == len(rows) * len(store.METRICS)
     assert len(trials) == sum(len(each) for each in rows["trials"])
@@ -156,7 +187,7 @@ def test_results_end_what_a_process_that_is_gone_was_writing(tiny_run: Path, tmp
     left = cells / f"{TEMPORARY}{socket.gethostname()}-{gone.stdout.strip()}-abc"
     left.mkdir()
     with temporary_folder(cells) as mine:
-        store.write_results(tmp_path, rows)
+        store.write_results(tmp_path, store.stored_plan(tiny_run), rows)
         assert mine.exists()
     assert not left.exists()
 

@@ -80,7 +80,7 @@ if __name__ == "__main__":
 @pytest.mark.parametrize("first", ["import_for_workers()", ""])
 @pytest.mark.parametrize("size", [1, 10_000_000])  # what workers get, also more than a pipe holds
 def test_a_script_without_its_guard_is_named(first: str, size: int, tmp_path: Path) -> None:
-    """Each worker imports the script, and would start workers; multiprocessing says so in 20 lines, and blamed memory."""
+    """Each worker imports the script, and would start workers; the error was that memory had run out."""
     program = f"""
 from functools import partial
 from shipid.study.workers import import_for_workers, on_workers
