@@ -36,6 +36,9 @@ CROSSINGS, ROUNDS, MISSES = 4, 40, 4  # searches across kinks, steps of one, and
 FALL = 1e-3  # relative fall of the objective that is worth a search across a kink
 INNER, HALVINGS, CLOSE = 12, 6, 1e-10  # Gauss-Newton steps of one run, halvings of one, and the change that ends them
 BEGIN = {"current_north": 0.01, "current_east": 0.01, "latency": 0.3}  # in prior widths: off a vanishing slope
+CURRENT = ("current_north", "current_east")
+FAR, DIRECTIONS = 0.5, 4  # prior widths, and on the circle: currents that a run is also begun from
+VALLEYS = 3  # searches that go on where the run's current leads to another valley
 NEAR = 1e-3  # of a factor: nearer to a bound than this, with the objective falling towards it, it is set to the bound
 
 
@@ -106,15 +109,47 @@ def search(
     free = problem.unknown.low < problem.unknown.high
     with uninterrupted() as held, np.errstate(all="ignore"):
         begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
-        run = _Search(problem, begin, point, free, _Watch(progress, held, before))
+        watch = _Watch(progress, held, before)
+        run = _Search(problem, begin, deepest(problem, begin, point), free, watch)
         if not np.isfinite(run.start.objective):
             return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
-        word = run.minimise(tolerance, most)
-        at_bound = run.pushed()
-        if word == "ok" and at_bound.any():
-            word = run.settle(at_bound, tolerance, most)
+        word = run.to_the_end(tolerance, most)
         best = run.best
-    return Result(best.factors, best.at, best.objective, run.watch.iterations, word)
+        for _ in range(VALLEYS):
+            if word != "ok":
+                break
+            again = _Search(problem, best.factors, deepest(problem, best.factors, best.point), free, watch)
+            if again.start.objective >= best.objective * (1 - FALL):
+                break
+            word = again.to_the_end(tolerance, most)
+            best = again.best
+    return Result(best.factors, best.at, best.objective, watch.iterations, word)
+
+
+def deepest(problem: Problem, factors: Array, point: Point) -> Point:
+    """Unknowns of the runs in the deepest valley of several: each run may have one for each guess of its current.
+
+    Each run is begun from its unknowns as they are, from the median current of all runs, and from currents around 0.
+    """
+    if not set(CURRENT) <= set(problem.names):
+        return point
+    places = [problem.names.index(name) for name in CURRENT]
+    angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    guesses = [FAR * np.array([np.cos(angle), np.sin(angle)]) for angle in angles]
+    best = _eliminated(problem, factors, point)
+    costs = np.nan_to_num(_costs(problem, best, problem.settings.linear_from), nan=np.inf)
+    nuisances, away = best.nuisances.copy(), best.away.copy()
+    for guess in [np.median(best.nuisances[:, places], axis=0), *guesses]:
+        begin = point.nuisances.copy()
+        begin[:, places] = guess
+        at = _eliminated(problem, factors, Point(begin, point.away))
+        found = np.nan_to_num(_costs(problem, at, problem.settings.linear_from), nan=np.inf)
+        better = found < costs * (1 - FALL)
+        nuisances[better], costs[better] = at.nuisances[better], found[better]
+        if away.size:
+            mine = better[problem.whole.run]
+            away[mine] = at.away[mine]
+    return Point(nuisances, away)
 
 
 @dataclass(frozen=True)
@@ -125,6 +160,11 @@ class _Value:
     at: Prediction
     f: Array
     J: Array
+
+    @property
+    def point(self) -> Point:
+        """The unknowns of the runs."""
+        return Point(self.at.nuisances, self.at.away)
 
     @property
     def objective(self) -> float:
@@ -158,11 +198,17 @@ class _Search:
         """Whether `progress` or Ctrl-C has asked to stop."""
         return self._stopped
 
+    def to_the_end(self, tolerance: float, most: int) -> str:
+        """Search, and once more with the factors on their bounds that were pushed there; the status."""
+        word = self.minimise(tolerance, most)
+        at_bound = self.pushed()
+        return self.settle(at_bound, tolerance, most) if word == "ok" and at_bound.any() else word
+
     def _at(self, x: Array) -> _Value:
         factors = self.best.factors.copy()
         factors[self.free] = x
         if not np.array_equal(factors, self.last.factors):
-            self.last = evaluate(self.problem, factors, Point(self.best.at.nuisances, self.best.at.away))
+            self.last = evaluate(self.problem, factors, self.best.point)
             if self.last.objective < self.best.objective:
                 self.best = self.last
         return self.last
@@ -219,7 +265,7 @@ class _Search:
     def _beside(self, begin: _Value, factors: Array) -> _Value:
         """The evaluation at other factors, clipped to their bounds."""
         factors = np.clip(factors, self.problem.unknown.low, self.problem.unknown.high)
-        return evaluate(self.problem, factors, Point(begin.at.nuisances, begin.at.away))
+        return evaluate(self.problem, factors, begin.point)
 
     def _across(self) -> bool:
         """Take steps where the best point is in a kink; True if they lower the objective by the share `FALL`.
@@ -289,9 +335,7 @@ class _Search:
         """Set factors exactly to their bounds and search over the others: the trust region only approaches a bound."""
         unknown, before = self.problem.unknown, self.best
         nearer = np.where(before.factors - unknown.low < unknown.high - before.factors, unknown.low, unknown.high)
-        there = evaluate(
-            self.problem, np.where(at_bound, nearer, before.factors), Point(before.at.nuisances, before.at.away)
-        )
+        there = evaluate(self.problem, np.where(at_bound, nearer, before.factors), before.point)
         if not np.isfinite(there.objective):
             return "ok"
         self.free = self.free & ~at_bound

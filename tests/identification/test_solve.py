@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
+from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.identification.fit import evaluate, origin, search
 from shipid.identification.late_fit import late_fit
@@ -21,6 +22,7 @@ from shipid.identification.solve import LEAST, Solution, _discounted, _weakest, 
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, orders, trials
 
@@ -198,6 +200,49 @@ def test_a_prior_pulls_as_linear_theory_says() -> None:
     assert np.allclose(solution.prior_widths, width)
     assert np.allclose(solution.factors - 1, expected - 1, rtol=0.02, atol=1e-6)
     assert np.abs(expected - 1.002).max() > 3e-4  # it does pull
+
+
+def astern(vessel: Vessel, seed: int) -> Dataset:
+    """Four runs of 68 s astern in a current of 0.5 m/s towards 1.3 rad, with 1 % of noise."""
+    rng, step, rows, runs = np.random.default_rng(seed), 0.17, 400, 4
+    limits = {"n": (-2.5, 1.25), "alpha": (-0.4, 0.4)}
+    drawn = {name: rng.uniform(*limits[name.rsplit(".", 1)[-1]], (10, runs)) for name in dynamics(vessel).commands}
+    commands = {name: np.repeat(values, rows // 10, axis=0) for name, values in drawn.items()}
+    start = {name: np.zeros(runs) for name in dynamics(vessel).state} | {"u": np.full(runs, -1.0)}
+    start["psi"] = rng.uniform(-3, 3, runs)
+    weather = {name: np.zeros(runs) for name in dynamics(vessel).environment}
+    weather |= {"V_c": np.full(runs, 0.5), "beta_c": np.full(runs, 1.3)}
+    path = rollout(vessel, start, commands, weather, step=step, num_steps=rows, method="rk4")
+    frames = []
+    for run in range(runs):
+        columns = {name: path[name][:-1, 0, run] for name in dynamics(vessel).state}
+        for name, noise in (("u", 0.05), ("v", 0.05), ("r", 0.00173)):
+            columns[name] = columns[name] + noise * rng.standard_normal(rows)
+        columns |= {name: values[:, run] for name, values in commands.items()}
+        frames.append(pd.DataFrame({"run": f"M{run:02d}", "t": step * np.arange(rows), **columns, "flags": 0}))
+    return Dataset(pd.concat(frames, ignore_index=True), {})
+
+
+@pytest.mark.parametrize("seed", [7000, 7001, 7002])
+def test_each_run_finds_its_current_whatever_the_valleys(seed: int) -> None:
+    """Of whole runs astern one stayed in a current of the other sign, at 400 times the error, and bent all factors."""
+    vessel = SHIP.with_values({"current.kind": "uniform"})
+    wanted = Identify(
+        parameters=["hull.derivatives.Y_uv", "hull.derivatives.N_uv"],
+        horizon=0,
+        step=0.17,
+        start="base",
+        weights={"u": 0.05, "v": 0.05, "r": 0.00173},
+        nuisance={"current": 2.5, "initial_state": 3.0},
+    )
+    dataset = astern(vessel, seed)
+    solution = identify(vessel, dataset, dataset.runs, wanted)
+    assert solution.status == "ok"
+    np.testing.assert_allclose(solution.factors, 1.0, atol=0.05)
+    assert solution.objective < 1.2 * len(solution.residuals)
+    for run in solution.nuisances:
+        assert run["current_north"] == pytest.approx(0.5 * np.cos(1.3), abs=0.1)
+        assert run["current_east"] == pytest.approx(0.5 * np.sin(1.3), abs=0.1)
 
 
 def test_what_differs_by_run_is_identified() -> None:
