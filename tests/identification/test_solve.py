@@ -240,7 +240,7 @@ def test_each_run_finds_its_current_whatever_the_valleys(seed: int) -> None:
     assert solution.status == "ok"
     np.testing.assert_allclose(solution.factors, 1.0, atol=0.05)
     assert solution.objective < 1.2 * len(solution.residuals)
-    for run in solution.nuisances:
+    for run in (solution.nuisances[name] for name in dataset.runs):
         assert run["current_north"] == pytest.approx(0.5 * np.cos(1.3), abs=0.1)
         assert run["current_east"] == pytest.approx(0.5 * np.sin(1.3), abs=0.1)
 
