@@ -9,13 +9,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.checks import Delay, delay_of
-from shipid.data.dataset import Array
-from shipid.logs.dates import date_of
+from shipid.data.dataset import DATED, Array
+from shipid.logs.dates import LAST_DATE, date_of
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import Sniffed
-from shipid.logs.mapping import is_date, to_si
+from shipid.logs.mapping import to_si
 from shipid.physics.signals import is_shaft
 
 POSITIONS = ("latitude", "longitude", "north", "east")
@@ -308,7 +308,7 @@ def _jumps(state: State, path: Complex, spikes: bool = True) -> None:
 
 def when(state: State, t: float) -> str:
     """A time [s] as the clock of the log has it: a date, or a number."""
-    return date_of(t) if is_date(t, state.clock_unit) else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
+    return date_of(t) if DATED < t < LAST_DATE else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
 
 
 def _heading_offset(state: State) -> None:
