@@ -11,14 +11,17 @@ from numpy.typing import NDArray
 from shipid.data.dataset import BREAK, clock_slack
 from shipid.errors import DataError
 from shipid.logs.cells import row_in_words
-from shipid.logs.dates import moment_of
+from shipid.logs.dates import moment_of, rolled_over
 from shipid.logs.frames import TURN, is_turn
 from shipid.logs.mapping import Column
 from shipid.logs.repairs import FLAGS, Records, interpolate_at
 from shipid.physics.signals import is_command
 
 Channel = tuple[NDArray[np.float64], NDArray[np.float64]]  # instants [s] and values, (N,) each
-MANY, FAR_MORE = 10_000_000, 100  # instants, and those for each row of a log: beyond both its clock or its step is wrong
+MANY, FAR_MORE = (
+    10_000_000,
+    100,
+)  # instants, and those for each row of a log: beyond both its clock or its step is wrong
 
 
 def common_instants(
@@ -62,8 +65,11 @@ def even_instants(
     if count > MANY and count > FAR_MORE * len(samples := np.unique(np.concatenate(times))):
         row = int(np.argmax(np.diff(samples)))
         before, after = (moment_of(samples[row + one]) for one in (0, 1))
+        after += rolled_over(samples[row + 1] - samples[row])
         message = f"{step:g} s makes {count:.3g} instants of {len(samples)} rows, where after {before} comes {after}"
-        remedy = "was the clock set there? Remove the rows of the wrong time, or split the log; else write a longer step"
+        remedy = (
+            "was the clock set there? Remove the rows of the wrong time, or split the log; else write a longer step"
+        )
         raise DataError(f"{message}: {remedy}", file=file, path=path)
     return np.asarray(first + step * np.arange(count), dtype=np.float64)
 

@@ -16,6 +16,7 @@ from shipid.data.dataset import DATED, Array
 DAY, HALF_DAY = 86400.0, 43200.0  # s
 NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, but for those that go back by an hour
 HOUR = 3600.0  # s: by which local time goes back at the end of daylight saving
+WEEKS = 7 * 1024  # days after which the week number of GPS begins again
 TIME_OF_DAY = r"\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?(\s*[AaPp][Mm])?\s*"
 DAY_OF = (
     r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)|\d\d?(?P<gap>[- ])[A-Za-z]{3}(?P=gap)\d{4}"
@@ -160,6 +161,13 @@ def date_of(moment: float) -> str:
 def moment_of(t: float) -> str:
     """A time [s] of a log in words: a date where it counts from 1970, else seconds."""
     return f"{date_of(t)} UTC" if DATED < t < LAST_DATE else f"{t:.10g} s"
+
+
+def rolled_over(step: float) -> str:
+    """Words for a step [s] of 1,024 weeks, to an hour, forward or back; empty for any other."""
+    remedy = f"add {WEEKS * DAY:.0f} s to the older dates"
+    words = f" (1,024 weeks apart: the week number of a GPS receiver rolled over, {remedy})"
+    return words if abs(abs(step) - WEEKS * DAY) < HOUR else ""
 
 
 def span_of(first: float, last: float) -> str:

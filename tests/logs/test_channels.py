@@ -228,6 +228,22 @@ def test_missing_velocities_are_estimated(tmp_path: Path) -> None:
     assert check_dataset(dataset)["ok"].all()
 
 
+def test_a_single_row_and_columns_that_share_no_time_are_found_by_their_dates(tmp_path: Path) -> None:
+    """Six digits of a date in seconds are 10,000 s."""
+    estimate = "[estimate]\nposition = 0.02\nheading_deg = 0.01\nacceleration = 0.02\nangular_acceleration_deg = 0.05\n"
+    mapping = without({"u", "v", "r"}, estimate, tmp_path)
+    mapping.write_text(mapping.read_text().replace(*GAP))
+    motion = turning(T)
+    motion["t"] += 1_715_673_600.0
+    alone = motion[(T <= 40.0) | (T == 50.0) | (T >= 60.0)]
+    with pytest.raises(DataError, match="a single row between two breaks at 2024-05-14 08:00:50 UTC"):
+        import_log(read_mapping(mapping), logged(alone, tmp_path))
+    stepped = changed(tmp_path, ('from = "time"', 'from = "time"\nmax_gap = 3.0\nstep = 0.5'))
+    apart = motion.assign(psi=motion["psi"].where(T < 40.0), u=motion["u"].where(T > 50.0))
+    with pytest.raises(DataError, match="'u' begins at 2024-05-14 08:00:50 UTC, 'psi' ends at 2024-05-14 08:00:39 UTC"):
+        import_log(read_mapping(stepped), logged(apart, tmp_path))
+
+
 class TestHsva:
     """Facts of the published files, from the description that comes with them."""
 

@@ -106,6 +106,18 @@ def test_an_hour_that_occurs_twice_is_refused(name: str, every: str, log: pd.Dat
         assert caught.value.path == "row 61"
 
 
+def test_a_week_number_that_rolled_over_has_its_word(log: pd.DataFrame, tmp_path: Path) -> None:
+    moments = pd.Timestamp("2019-04-06T23:59:50Z") + pd.to_timedelta(T, "s")
+    rolled = moments.where(T < 10.0, moments - pd.Timedelta(weeks=1024))
+    log.assign(time=rolled.strftime("%Y-%m-%dT%H:%M:%S.%fZ")).to_csv(tmp_path / "log.csv", index=False)
+    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
+    message = "from 2019-04-06 23:59:59 UTC to 1999-08-22 00:00:00 UTC .1,024 weeks apart: .*, add 619315200 s"
+    with pytest.raises(DataError, match=message):
+        import_log(read_mapping(mapping), tmp_path / "log.csv")
+    with pytest.raises(DataError, match=message):
+        sniff(tmp_path / "log.csv")
+
+
 @pytest.mark.parametrize("style", ["%Y-%m-%dT%H:%M:%S.%f%z", "%H:%M:%S.%f"])
 def test_the_end_of_daylight_saving_in_times_that_say_their_zone_or_are_utc(style: str) -> None:
     zone = "Europe/Berlin" if "z" in style else "UTC"

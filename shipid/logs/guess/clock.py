@@ -31,6 +31,7 @@ from shipid.logs.dates import (
     in_one_number,
     moment_of,
     other_zone,
+    rolled_over,
     seconds,
     time_texts,
     ways_of,
@@ -583,9 +584,8 @@ def _fault(values: Array) -> str:
     row = int(np.argmax(np.diff(values) < 0)) + 1
     if values[row] < values[row - 1]:  # rows of one time alone may be a rounded clock
         before, after = moment_of(values[row - 1]), moment_of(values[row])
-        return (
-            f"goes back from {before} to {after} in row {row + 1}: sort the log, or split it there, and join the parts"
-        )
+        back = f"goes back from {before} to {after}{rolled_over(values[row] - values[row - 1])} in row {row + 1}"
+        return f"{back}: sort the log, or split it there, and join the parts"
     return f"repeats in row {int(np.argmax(np.diff(values) == 0)) + 2}"
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from shipid.data.checks import Delay, delay_of
 from shipid.data.dataset import DATED, Array
-from shipid.logs.dates import LAST_DATE, date_of
+from shipid.logs.dates import LAST_DATE, date_of, rolled_over
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
@@ -189,6 +189,7 @@ def _ask_for_set_clock(state: State) -> None:
     near = float(np.percentile(way[steps < evidence.GAP * usual], 99))
     for row in np.flatnonzero((steps > evidence.GAP * usual) & (way <= near) & (speed * steps > FARTHER * near))[:1]:
         times = " comes ".join(when(state, float(state.t[row + one])) for one in (0, 1))
+        times += rolled_over(steps[row])
         words = f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
         state.ask(("clock", "t"), f"{words}Then split the log there")
 

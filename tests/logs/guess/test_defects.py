@@ -177,7 +177,7 @@ def test_a_receiver_that_began_in_1980_is_asked_by_its_dates(rows: int, tmp_path
     since = CLEAN["time"] + np.where(np.arange(len(CLEAN)) < rows, 315_964_800.0, 1_715_673_600.0)
     times = [pd.to_datetime(1e9 * since[rows - 1 + k]).strftime("%Y-%m-%d %H:%M:%S") for k in (0, 1)]
     (asked,) = (one.sentence for one in guessed(tmp_path, CLEAN.assign(time=since)).questions if "set" in one.sentence)
-    assert f"after {times[0]} comes {times[1]}" in asked
+    assert f"after {times[0]} comes {times[1]}, but" in asked
 
 
 @pytest.mark.parametrize("seed", range(3))
