@@ -188,7 +188,7 @@ def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
     """
     days, hours = _as_texts(dates), _as_texts(times).str.replace(",", ".")
     if days.str.fullmatch(DAY_OF_EXCEL).all() and hours.str.fullmatch(FRACTION).all():
-        micros = np.round(1e6 * DAY * (pd.to_numeric(days) - EXCEL + pd.to_numeric(hours)))
+        micros = (1e6 * DAY * (days.astype("Float64") - EXCEL + hours.astype("Float64"))).round()
         return pd.to_datetime(micros, unit="us").dt.strftime("%Y-%m-%d %H:%M:%S.%f").astype(object)
     if hours.str.match(r"\d{5}").any():  # shorter ones are before one o'clock
         hours = hours.str.replace(r"^\d{1,6}(?![\d:])", lambda one: f"{int(one[0]):06d}", regex=True)

@@ -252,8 +252,8 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     rounded = [name for name in called or unnamed if name in finite and name not in rising]
     for name in [*candidates[:1], *rounded] if candidates and candidates[0] in called else [*rounded, *candidates[:1]]:
         unit, t = _read_clock(table, name, finite[name], file)
-        of_day = unit == "hhmmss" or (finite[name].min() >= 0 and finite[name].max() < 1)
-        if of_day and (with_date := _with_date(table, columns, name)):
+        within_day = unit == "hhmmss" or (finite[name].min() >= 0 and finite[name].max() < 1)
+        if within_day and (with_date := _with_date(table, columns, name)):
             return with_date
         rises = bool(np.all(np.diff(t) > 0))  # after midnight, too
         rate = _rate(t) if not rises or _is_coarse(t) else None
