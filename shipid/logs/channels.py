@@ -11,12 +11,17 @@ from numpy.typing import NDArray
 from shipid.data.dataset import BREAK, clock_slack
 from shipid.errors import DataError
 from shipid.logs.cells import row_in_words
+from shipid.logs.dates import moment_of, rolled_over
 from shipid.logs.frames import TURN, is_turn
 from shipid.logs.mapping import Column
 from shipid.logs.repairs import FLAGS, Records, interpolate_at
 from shipid.physics.signals import is_command
 
 Channel = tuple[NDArray[np.float64], NDArray[np.float64]]  # instants [s] and values, (N,) each
+MANY, FAR_MORE = (
+    10_000_000,
+    100,
+)  # instants, and those for each row of a log: beyond both its clock or its step is wrong
 
 
 def common_instants(
@@ -38,14 +43,35 @@ def common_instants(
     first, last = max(times[0] for times in spans.values()), min(times[-1] for times in spans.values())
     slack = clock_slack(t)
     if step is not None:
-        count = max(0, int(np.floor((last - first + slack) / step)) + 1)
-        t = np.asarray(first + step * np.arange(count), dtype=np.float64)
+        t = even_instants(first, last + slack, step, [*spans.values()], file, "clock.step")
     shared: NDArray[np.float64] = t[(t >= first - slack) & (t <= last + slack)]
     if len(shared) < 2:
         late, early = (pick(spans, key=lambda name: spans[name][end]) for pick, end in ((max, 0), (min, -1)))
-        message = f"columns share no time: {late!r} begins at {first:g} s, {early!r} ends at {last:g} s"
+        begin, end = moment_of(first), moment_of(last)
+        message = f"columns share no time: {late!r} begins at {begin}, {early!r} ends at {end}"
         raise DataError(message, file=file, path=f"columns.{late}")
     return shared
+
+
+def even_instants(
+    first: float, last: float, step: float, times: list[NDArray[np.float64]], file: Path, path: str
+) -> NDArray[np.float64]:
+    """Return the instants [s] that are `step` [s] apart from first to last; none where it is before first.
+
+    times : of the samples (N,) [s] of every channel. Raises DataError for far more instants than these: one wrong date
+    puts years between two rows.
+    """
+    count = max(0, int(np.floor((last - first) / step)) + 1)
+    if count > MANY and count > FAR_MORE * len(samples := np.unique(np.concatenate(times))):
+        row = int(np.argmax(np.diff(samples)))
+        before, after = (moment_of(samples[row + one]) for one in (0, 1))
+        after += rolled_over(samples[row + 1] - samples[row])
+        message = f"{step:g} s makes {count:.3g} instants of {len(samples)} rows, where after {before} comes {after}"
+        remedy = (
+            "was the clock set there? Remove the rows of the wrong time, or split the log; else write a longer step"
+        )
+        raise DataError(f"{message}: {remedy}", file=file, path=path)
+    return np.asarray(first + step * np.arange(count), dtype=np.float64)
 
 
 def interpolation_of(name: str, column: Column) -> str:

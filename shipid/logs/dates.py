@@ -16,11 +16,17 @@ from shipid.data.dataset import DATED, Array
 DAY, HALF_DAY = 86400.0, 43200.0  # s
 NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, but for those that go back by an hour
 HOUR = 3600.0  # s: by which local time goes back at the end of daylight saving
+WEEKS = 7 * 1024  # days after which the week number of GPS begins again
 TIME_OF_DAY = r"\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?(\s*[AaPp][Mm])?\s*"
 DAY_OF = (
     r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)|\d\d?(?P<gap>[- ])[A-Za-z]{3}(?P=gap)\d{4}"
 )
 """A date without a time."""
+DAY_OF_EXCEL = r"(?:3[3-9]|4\d|5[0-4])\d{3}"
+"""A date as a day of Excel, from 1990 to 2050."""
+EXCEL = 25569  # day of Excel of 1 January 1970
+FRACTION = r"0|0?\.\d+|\d(?:\.\d+)?[eE]-\d+"
+"""A time of day as a part of a day."""
 ORDINAL = r"^(\d{4})[-:/ ](\d{3})[-:/ T](\d\d:\d\d:\d\d(?:\.\d+)?)Z?$"
 """A date with the day of the year: 2024-135 08:00:00, 2024:135:08:00:00.5."""
 UTC_BEHIND = r"\s+(?:UTC|GMT)$"
@@ -162,6 +168,13 @@ def moment_of(t: float) -> str:
     return f"{date_of(t)} UTC" if DATED < t < LAST_DATE else f"{t:.10g} s"
 
 
+def rolled_over(step: float) -> str:
+    """Words for a step [s] of 1,024 weeks, to an hour, forward or back; empty for any other."""
+    remedy = f"add {WEEKS * DAY:.0f} s to the older dates"
+    words = f" (1,024 weeks apart: the week number of a GPS receiver rolled over, {remedy})"
+    return words if abs(abs(step) - WEEKS * DAY) < HOUR else ""
+
+
 def span_of(first: float, last: float) -> str:
     """Two times [s] of a log in words: dates where they count from 1970, else seconds."""
     dates = min(first, last) > DATED and max(first, last) < LAST_DATE
@@ -169,9 +182,32 @@ def span_of(first: float, last: float) -> str:
 
 
 def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
-    """Return dates and times of day, of two columns (N,) of text, as one column of text for `seconds`."""
-    text = dates.astype("string").str.strip() + " " + times.astype("string").str.strip().str.replace(",", ".")
-    return text.astype(object)
+    """Return dates and times of day, of two columns (N,), as one column of text for `seconds`.
+
+    Both may be in one number, as 20240514 or 140524 and 80000.5; or in days of Excel and their fractions.
+    """
+    days, hours = _as_texts(dates), _as_texts(times).str.replace(",", ".")
+    if days.str.fullmatch(DAY_OF_EXCEL).all() and hours.str.fullmatch(FRACTION).all():
+        micros = (1e6 * DAY * (days.astype("Float64") - EXCEL + hours.astype("Float64"))).round()
+        return pd.to_datetime(micros, unit="us").dt.strftime("%Y-%m-%d %H:%M:%S.%f").astype(object)
+    if hours.str.match(r"\d{5}").any():  # shorter ones are before one o'clock
+        hours = hours.str.replace(r"^\d{1,6}(?![\d:])", lambda one: f"{int(one[0]):06d}", regex=True)
+        hours = hours.str.replace(r"^(\d\d)(\d\d)(?=\d\d(?:\.|$))", r"\1:\2:", regex=True)
+    return (days_with_marks(days) + " " + hours).astype(object)
+
+
+def days_with_marks(dates: pd.Series[Any]) -> pd.Series[Any]:
+    """Return dates (N,) as text, those in one number with marks: 2024-05-14, 14/05/2024, and 14/05/24 or 24/05/14."""
+    texts = _as_texts(dates).str.replace(r"^(\d{5}|\d{7})$", r"0\1", regex=True)
+    texts = texts.str.replace(r"^((?:19|20)\d\d)(0[1-9]|1[0-2])(\d\d)$", r"\1-\2-\3", regex=True)
+    return texts.str.replace(r"^(\d\d)(\d\d)((?:19|20)\d\d|\d\d)$", r"\1/\2/\3", regex=True)
+
+
+def _as_texts(cells: pd.Series[Any]) -> pd.Series[Any]:
+    """Cells (N,) as text, numbers with all their digits, without a point where they are whole."""
+    if pd.api.types.is_numeric_dtype(cells.dtype):
+        cells = cells.astype(object).map(lambda one: f"{one:.15g}", na_action="ignore")
+    return cells.astype("string").str.strip().str.replace(r"^(\d+)\.0*$", r"\1", regex=True)
 
 
 def date_texts(parts: list[Array]) -> pd.Series[Any]:

@@ -32,8 +32,8 @@ from shipid.data.dataset import (
 from shipid.data.kinematics import Noise, smooth
 from shipid.errors import DataError, choices, is_utf_8
 from shipid.logs.cells import column_of, numbers_of, of_ais, of_minutes, of_parts, of_quaternion
-from shipid.logs.channels import Channel, at_instants, close_gaps, common_instants, interpolation_of
-from shipid.logs.dates import ZONE_REMEDY, other_zone, span_of
+from shipid.logs.channels import Channel, at_instants, close_gaps, common_instants, even_instants, interpolation_of
+from shipid.logs.dates import ZONE_REMEDY, moment_of, other_zone, span_of
 from shipid.logs.formats import TextFormat
 from shipid.logs.frames import check_wraps, in_body, projected, true_wind, unwrapped
 from shipid.logs.instants import instants_of, times_of, without_repeats
@@ -135,7 +135,7 @@ def import_log(
     kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in set(frame["run"])}
     metadata |= {"manoeuvres": kinds} if kinds else {}
     dataset = Dataset(frame, metadata)
-    return _resampled(dataset, mapping.resample.step) if mapping.resample else dataset
+    return _resampled(dataset, mapping.resample.step, source) if mapping.resample else dataset
 
 
 def runs_of(source: Source, log: Path) -> dict[str, Path]:
@@ -411,11 +411,8 @@ def _estimated(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Dat
     parts, squares = [], 0.0
     for _, stretch in rows.groupby(np.cumsum(broken), sort=False):
         if len(stretch) < 2:
-            at = f"t = {stretch['t'].iloc[0]:g} s"
-            raise DataError(
-                f"a single row between two breaks at {at}: nothing to estimate from; remove the row",
-                file=file,
-            )
+            at = moment_of(stretch["t"].iloc[0])
+            raise DataError(f"a single row between two breaks at {at}: nothing to estimate from; remove it", file=file)
         logged = {name: stretch[name].to_numpy() for name in ("north", "east", "psi", "u", "v", "r") if name in rows}
         smoothed = smooth(stretch["t"].to_numpy(), logged, noise)
         squares += smoothed.consistency * len(stretch)
@@ -478,13 +475,13 @@ def _named(rows: pd.DataFrame, run: str) -> pd.DataFrame:
     return named
 
 
-def _resampled(dataset: Dataset, step: float) -> Dataset:
+def _resampled(dataset: Dataset, step: float, file: Path) -> Dataset:
     """Rows `step` [s] apart; the first row of a stretch keeps its flags, so breaks stay."""
 
     def resample() -> Iterator[pd.DataFrame]:
         for run, rows in pieces(dataset):
             t = rows["t"].to_numpy()
-            instants = t[0] + step * np.arange(int(np.floor((t[-1] - t[0] + clock_slack(t)) / step)) + 1)
+            instants = even_instants(t[0], t[-1] + clock_slack(t), step, [t], file, "resample.step")
             frame = pd.DataFrame({"t": instants, **sample(rows, instants)})
             frame.insert(0, "run", pd.Series([run] * len(frame), dtype="str"))
             # a break that stays flagged while its row is held over several instants would break each of them

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.cells import column_of, numbers_of, row_in_words
-from shipid.logs.dates import date_texts, dated, hour_twice, moment_of, seconds, time_texts
+from shipid.logs.dates import date_texts, dated, hour_twice, moment_of, rolled_over, seconds, time_texts
 from shipid.logs.formats import Format
 from shipid.logs.mapping import Clock, FileClock, Named, clock_seconds, is_dated, names_of
 from shipid.logs.repairs import Records
@@ -39,7 +39,8 @@ def instants_of(
                 f"the time {moment_of(t[row])} appears twice: remove one of the rows, or set [clock] repeated = 'drop'"
             )
         else:
-            what = f"time goes back from {moment_of(t[row - 1])} to {moment_of(t[row])}: sort or split the log"
+            back = f"from {moment_of(t[row - 1])} to {moment_of(t[row])}{rolled_over(t[row] - t[row - 1])}"
+            what = f"time goes back {back}: sort or split the log"
         raise DataError(what, file=file, path=row_in_words(log, row))
     return t
 

@@ -15,7 +15,7 @@ from pydantic import Field, SerializeAsAny
 from shipid import document
 from shipid.data.dataset import DATED, STANDARD_DEVIATIONS, optional, required, unit_of
 from shipid.errors import DocumentError, choices
-from shipid.logs.dates import DAY, LAST_DATE, NEXT_DAY, over_midnights
+from shipid.logs.dates import DAY, EXCEL, LAST_DATE, NEXT_DAY, over_midnights
 from shipid.logs.formats import Format, TextFormat
 from shipid.logs.readers import READERS
 from shipid.logs.repairs import (
@@ -63,7 +63,7 @@ mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 breaks; `hhmmss` as seconds since the first midnight. `ddmm`, of latitude and longitude only, are degrees and minutes;
 `quaternion`, of the heading only, four columns x, y, z, w; `ais`, of the yaw rate only, the numbers of `rate_of_ais`.
 """
-EPOCHS = {"datenum": 719529.0, "excel": 25569.0, "mjd": 40587.0, "jd": 2440587.5}
+EPOCHS = {"datenum": 719529.0, "excel": float(EXCEL), "mjd": 40587.0, "jd": 2440587.5}
 """Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system; Julian dates, modified
 or not: IAU resolution B1 of 1997)."""
 AGAIN = {"s of day": DAY, "s of week": 7 * DAY, "ms of day": DAY, "ms of week": 7 * DAY}

@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.dates import DAY, HALF_DAY, NEXT_DAY
+from shipid.logs.dates import DAY, HALF_DAY, NEXT_DAY, WEEKS
 from shipid.logs.foreign import refuse_foreign
 from shipid.logs.formats import LOOKED_AT, NmeaFormat
 from shipid.logs.sentences import NMEA_COLUMNS, SENTENCES, TIMES, has_checksum, parsed
 
 FIRST_DAY = datetime(1970, 1, 1).toordinal()
 LATE_DATE = 60.0  # s after midnight: so long a receiver may write the date of the day before
+LONG_LOG = 31  # days: dates of one log are no farther apart
 SILENT = 1.5  # usual steps of a talker: where it says nothing for longer, another one may speak for it
 SAID = 100_000  # lines, after which it is said how far the log is read
 _DOTTED = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})")
@@ -131,6 +132,9 @@ class _Heard:
             first, _, talker = name.rpartition("_")
             if first in NMEA_COLUMNS and talker.isupper():
                 yield f"{first!r} is said by several talkers: {name!r} is that of {talker}"
+        if self.clock.rolled:
+            words = f"{self.clock.rolled} dates are 1,024 weeks before the last one"
+            yield f"{words}, as the week number of a receiver rolled over: they are read as that much later"
 
     def nothing(self) -> str:
         """Say why no row is there."""
@@ -182,13 +186,14 @@ class _Clock:
 
     Beside the positions of a receiver, those of a second one and ZDA say no other time. A fix without a date is of the
     day of that one before or behind it whose time of day is nearer. Without any date a time of day that goes back by
-    twelve hours is of the next day.
+    twelve hours is of the next day. `rolled` counts the dates of a receiver whose week number rolled over.
     """
 
     def __init__(self) -> None:
         self.seconds = array("d")  # of the day
         self.days: dict[int, int] = {}  # place of a fix -> its day
         self.talkers: list[str] = []  # of positions; empty of others
+        self.rolled = 0
 
     def add(self, talker: str, seconds: float, day: int | None, position: bool) -> None:
         """Add a fix, with its time of day [s] and its day."""
@@ -199,14 +204,25 @@ class _Clock:
 
     def times(self) -> Array:
         """Return the times (N,) [s] of the fixes; one that says no time has that of the fix before, or NaN."""
+        self._count_weeks_on()
         since = np.array(self.seconds)
         main = Counter(filter(None, self.talkers)).most_common(1)
         first = np.array(self.talkers) == (main[0][0] if main else "")
         places = np.flatnonzero(first)
-        behind = places[np.minimum(np.searchsorted(places, np.arange(len(since))), len(places) - 1)]
-        kept = np.flatnonzero(_speaking(since, first) | (since == since[behind]))  # an instant may begin with another
+        behind = np.searchsorted(places, np.arange(len(since)))
+        begins = since == np.append(since[places], np.nan)[behind]  # an instant may begin with another
+        kept = np.flatnonzero(_speaking(since, first) | begins)
         before = np.searchsorted(kept, np.arange(len(since)), side="right") - 1
         return np.where(before < 0, np.nan, self._dated(since, kept)[before])
+
+    def _count_weeks_on(self) -> None:
+        """Put the dates that are once or twice 1,024 weeks before the last one that much later, and count them."""
+        last = max(self.days.values(), default=0)
+        for place, day in self.days.items():
+            turns = round((last - day) / WEEKS)
+            if turns and abs(last - day - turns * WEEKS) <= LONG_LOG:
+                self.days[place] += turns * WEEKS
+                self.rolled += 1
 
     def _dated(self, since: Array, kept: NDArray[np.int_]) -> Array:
         """Times (M,) [s] of the fixes at the places `kept`; since (N,) [s] are the times of day of all."""

@@ -119,6 +119,21 @@ def test_a_step_of_the_mapping_holds_orders_and_passes_north(tmp_path: Path) -> 
     assert set(frame["propeller.n"]) <= set(turning(T)["port.n"])
 
 
+@pytest.mark.parametrize("rows", [1, 5])
+@pytest.mark.parametrize("how", ["max_gap = 3.0\nstep = 0.5", "resample"])
+def test_a_wrong_date_is_no_years_of_instants(how: str, rows: int, plain_mapping: Write, tmp_path: Path) -> None:
+    """The clock of a receiver begins in 1980 and is set; both dates are named before any instant is made."""
+    motion = turning(T)
+    motion["t"] += np.where(np.arange(len(T)) < rows, 315_993_600.0, 1_715_673_600.0)
+    resample = how == "resample"
+    more = "\n[resample]\nstep = 0.5\n" * resample
+    mapping = plain_mapping(more, ("" if resample else 'from = "time"', "" if resample else f'from = "time"\n{how}'))
+    dates = f"after 1980-01-06 08:00:0{rows // 2} UTC comes 2024-05-14 08:00:0{rows // 2} UTC: was the clock set there"
+    with pytest.raises(DataError, match=f"2.8e[+]09 instants of 240 rows, where {dates}") as refused:
+        import_log(read_mapping(mapping), logged(motion, tmp_path))
+    assert refused.value.path == ("resample.step" if resample else "clock.step")
+
+
 def test_a_hole_longer_than_max_gap_breaks_the_run(tmp_path: Path) -> None:
     mapping = changed(tmp_path, ('from = "time"', 'from = "time"\nmax_gap = 3.0\nstep = 0.5'))
     motion = turning(T)
@@ -211,6 +226,22 @@ def test_missing_velocities_are_estimated(tmp_path: Path) -> None:
         assert inside[f"std_{name}"].between(1e-6, 0.1).all()
     assert dataset.metadata["repairs"][-1]["column"] == "u, v, r"
     assert check_dataset(dataset)["ok"].all()
+
+
+def test_a_single_row_and_columns_that_share_no_time_are_found_by_their_dates(tmp_path: Path) -> None:
+    """Six digits of a date in seconds are 10,000 s."""
+    estimate = "[estimate]\nposition = 0.02\nheading_deg = 0.01\nacceleration = 0.02\nangular_acceleration_deg = 0.05\n"
+    mapping = without({"u", "v", "r"}, estimate, tmp_path)
+    mapping.write_text(mapping.read_text().replace(*GAP))
+    motion = turning(T)
+    motion["t"] += 1_715_673_600.0
+    alone = motion[(T <= 40.0) | (T == 50.0) | (T >= 60.0)]
+    with pytest.raises(DataError, match="a single row between two breaks at 2024-05-14 08:00:50 UTC"):
+        import_log(read_mapping(mapping), logged(alone, tmp_path))
+    stepped = changed(tmp_path, ('from = "time"', 'from = "time"\nmax_gap = 3.0\nstep = 0.5'))
+    apart = motion.assign(psi=motion["psi"].where(T < 40.0), u=motion["u"].where(T > 50.0))
+    with pytest.raises(DataError, match="'u' begins at 2024-05-14 08:00:50 UTC, 'psi' ends at 2024-05-14 08:00:39 UTC"):
+        import_log(read_mapping(stepped), logged(apart, tmp_path))
 
 
 class TestHsva:

@@ -106,6 +106,18 @@ def test_an_hour_that_occurs_twice_is_refused(name: str, every: str, log: pd.Dat
         assert caught.value.path == "row 61"
 
 
+def test_a_week_number_that_rolled_over_has_its_word(log: pd.DataFrame, tmp_path: Path) -> None:
+    moments = pd.Timestamp("2019-04-06T23:59:50Z") + pd.to_timedelta(T, "s")
+    rolled = moments.where(T < 10.0, moments - pd.Timedelta(weeks=1024))
+    log.assign(time=rolled.strftime("%Y-%m-%dT%H:%M:%S.%fZ")).to_csv(tmp_path / "log.csv", index=False)
+    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
+    message = "from 2019-04-06 23:59:59 UTC to 1999-08-22 00:00:00 UTC .1,024 weeks apart: .*, add 619315200 s"
+    with pytest.raises(DataError, match=message):
+        import_log(read_mapping(mapping), tmp_path / "log.csv")
+    with pytest.raises(DataError, match=message):
+        sniff(tmp_path / "log.csv")
+
+
 @pytest.mark.parametrize("style", ["%Y-%m-%dT%H:%M:%S.%f%z", "%H:%M:%S.%f"])
 def test_the_end_of_daylight_saving_in_times_that_say_their_zone_or_are_utc(style: str) -> None:
     zone = "Europe/Berlin" if "z" in style else "UTC"
@@ -197,6 +209,48 @@ def test_a_second_that_rounds_to_midnight_keeps_its_date() -> None:
     days = date_texts([np.array([2024.0, 2024.0]), np.array([5.0, 5.0]), np.array([14.0, 15.0])])
     times = time_texts([np.array([23.0, 0.0]), np.array([59.0, 0.0]), np.array([59.9999999, 0.1])])
     assert np.diff(seconds(dated(days, times))) == pytest.approx([0.1], abs=2e-6)
+
+
+DAYS = ("%Y%m%d", "%d%m%Y", "%d%m%y", "%y%m%d", "day of Excel")
+
+
+@pytest.mark.parametrize("numbers", [True, False])
+@pytest.mark.parametrize("time", ["%H:%M:%S", "%H%M%S"])
+@pytest.mark.parametrize("day", DAYS)
+def test_a_date_in_one_number_beside_a_time_of_day(
+    day: str, time: str, numbers: bool, log: pd.DataFrame, tmp_path: Path
+) -> None:
+    """Two sessions on two days, drawn: a day goes over, and numbers lose their leading zeros."""
+    random = np.random.default_rng([DAYS.index(day), numbers])
+    first = pd.Timestamp("2024-01-01") + pd.Timedelta(days=int(random.integers(0, 360)), seconds=86_385)
+    later = np.where(np.arange(len(T)) < 60, 0, int(random.integers(3, 9)) * 86_400 - 3_600)
+    moments = pd.Series(first + pd.to_timedelta(10 * T + later, unit="s"))
+    days, times = moments.dt.strftime(day), moments.dt.strftime(time)
+    if day == "day of Excel":
+        since = (moments - pd.Timestamp("1899-12-30")) / pd.Timedelta("1D")
+        days, times = np.floor(since).astype(int), (since % 1).round(12)
+    log = log.assign(Date=days.astype(int) if numbers else days)
+    log["time"] = times.astype(int) if numbers and time == "%H%M%S" and day != DAYS[-1] else times
+    log.to_parquet(tmp_path / "log.parquet") if numbers else log.to_csv(tmp_path / "log.csv", index=False)
+    file, form = (tmp_path / "log.parquet", 'kind = "parquet"') if numbers else (tmp_path / "log.csv", "")
+    since = (moments - pd.Timestamp(0)) / pd.Timedelta("1s")
+    mapping = mapping_with(tmp_path, form, ('from = "time"', 'from = "time"\nunit = "date"\ndate = "Date"'))
+    np.testing.assert_allclose(import_log(read_mapping(mapping), file).frame["t"], since, atol=1e-5)
+    sniffed = sniff(file)
+    assert sniffed.clock == {"from": "time", "unit": "date", "date": "Date"}
+    np.testing.assert_allclose(sniffed.t, since, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("day", "other"), [("140524", "2014-05-24"), ("240514", "2024-05-14"), ("50624", "2024-05-06")]
+)
+def test_a_date_of_six_digits_that_may_be_another_is_asked(
+    day: str, other: str, log: pd.DataFrame, tmp_path: Path
+) -> None:
+    times = pd.to_datetime(T, unit="s").strftime("%H:%M:%S.%f")
+    log.assign(time=times, Date=day).to_csv(tmp_path / "log.csv", index=False)
+    (asked,) = sniff(tmp_path / "log.csv").doubts
+    assert other in asked
 
 
 def test_times_of_day_that_go_back_are_of_the_next_day() -> None:

@@ -154,6 +154,43 @@ def test_a_fix_is_of_the_day_that_the_sentences_say(fixes: list[str], hours: lis
     assert 0 <= t[0] - begin < 86400
 
 
+@pytest.mark.parametrize("who", ["beside ZDA", "second", "from midnight"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_week_number_that_rolled_over_changes_no_time(who: str, seed: int, tmp_path: Path) -> None:
+    """A receiver is 1,024 weeks behind: beside a right ZDA, or a right receiver, or after the night of the rollover."""
+    random = np.random.default_rng(seed)
+    day = datetime(2019, 4, 6, tzinfo=UTC) + timedelta(days=int(random.integers(0, 2500)) * (who != "from midnight"))
+    since = day + timedelta(hours=24 if who == "from midnight" else int(random.integers(1, 23)), seconds=-20)
+
+    def lines(weeks: int) -> list[str]:
+        said = []
+        for k in range(40):
+            moment = since + timedelta(seconds=k)
+            behind = weeks if who != "from midnight" or moment.day != since.day else 0
+            old = moment - timedelta(weeks=behind)
+            fix = f"RMC,{moment:%H%M%S},A,4807.0,N,01131.{k:02d},E,5.0,84.0,{{:%d%m%y}},,,A"
+            said += [f"GP{fix.format(old)}", f"GPGGA,{moment:%H%M%S},4807.0,N,01131.{k:02d},E,1,8,0.9,5.0,M,46.9,M,,"]
+            said = [*said[:-2], f"GN{fix.format(moment)}", *said[-2:-1]] if who == "second" else said
+            said += [f"GPZDA,{moment:%H%M%S.00,%d,%m,%Y},00,00"] * (who == "beside ZDA")
+        return [sentence(one) for one in said]
+
+    right, rolled = (read(lines(weeks), tmp_path / "log") for weeks in (0, 1024))
+    np.testing.assert_array_equal(right["time"], since.timestamp() + np.arange(40.0))
+    pd.testing.assert_frame_equal(right, rolled)
+    assert "40 dates are 1,024 weeks" in " ".join(rolled.attrs["notes"]) or who == "from midnight"
+    assert not right.attrs["notes"] or who == "second"
+
+
+def test_a_second_receiver_of_another_day_says_no_last_time(tmp_path: Path) -> None:
+    lines = []
+    for k in range(30):
+        fix = f"RMC,0800{k:02d},A,4807.0,N,01131.0,E,5.0,84.0,{{}},,,A"
+        lines += [f"GN{fix.format(140524)}", f"GNGGA,0800{k:02d},4807.0,N,01131.0,E,1,8,0.9,5.0,M,46.9,M,,"]
+        lines += [f"GP{fix.format(150524)}"]
+    table = read([sentence(line) for line in lines], tmp_path / "log")
+    np.testing.assert_array_equal(np.diff(table["time"]), 1.0)
+
+
 @pytest.mark.parametrize("speed", ["10.0,N,,M", ",N,5.1444,M", "10.0,N,5.1444,M"])
 def test_the_true_wind_is_read_in_knots_too(speed: str, tmp_path: Path) -> None:
     fixes = [f"GPRMC,12000{k},A,4807.0,N,01131.0,E,5.0,84.0,271022,,,A" for k in (0, 1)]

@@ -17,6 +17,7 @@ from shipid.errors import DataError
 from shipid.logs.dates import (
     DAY,
     DAY_OF,
+    DAY_OF_EXCEL,
     HALF_DAY,
     HOUR,
     LAST_DATE,
@@ -27,10 +28,12 @@ from shipid.logs.dates import (
     date_texts,
     dated,
     days_by,
+    days_with_marks,
     hour_twice,
     in_one_number,
     moment_of,
     other_zone,
+    rolled_over,
     seconds,
     time_texts,
     ways_of,
@@ -44,6 +47,7 @@ Rows = NDArray[np.bool_]
 LONG = 1e4  # rows between two runs that have a clock each
 FEWEST_TIMES = 10  # of a second clock that are compared with the first
 APART, OFF = 10, 0.02  # steps of the first clock, and share of its span, by which a second one may go otherwise
+ROWS = 10  # of a day in a column of dates that are numbers, at least
 FEWEST, NEARLY = 0.3, 0.9  # shares of the rows of a clock with a fault that have a time, and that rise, at least
 LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
 REPEATED = 0.05  # share of the rows that may repeat the row before, at most
@@ -212,15 +216,8 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         column = column_called(table, name)
         of_day = column.dropna().astype(str).str.fullmatch(TIME_OF_DAY)
         whole = len(of_day) and of_day.all()
-        day = (_dates(table, texts) or _day_in(_fields(columns))) if whole else None
-        if day:
-            of_date = column_called(table, day) if isinstance(day, str) else date_texts([columns[one] for one in day])
-            with_date = seconds(dated(of_date, column))
-            if np.isfinite(with_date).all():
-                if np.all(np.diff(with_date) > 0):
-                    return {"from": name, "unit": "date", "date": day}, with_date
-                if (rate := _rate(with_date)) is not None:
-                    return {"from": name, "unit": "date", "date": day, "every": rate[0]}, rate[1]
+        if whole and (with_date := _with_date(table, columns, name)):
+            return with_date
         since = seconds(column) if is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
         times[name] = since
         if not np.isfinite(since).all():
@@ -232,7 +229,7 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         if rate is not None:
             return {"from": name, "unit": "date", "every": rate[0]}, rate[1]
         called.append(name)
-    in_columns = _in_columns(table, columns, _dates(table, texts))
+    in_columns = _in_columns(table, columns, _dates(table, columns))
     if in_columns is not None:
         return in_columns
     if not any(name in called for name in rising):  # another column that happens to rise is no clock then
@@ -242,7 +239,7 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
                 if twice is not None:
                     raise DataError(twice[1], file=file, path=f"row {twice[0] + 1}")
                 raise DataError(f"no column can be the clock: {name!r} {_fault(since)}", file=file)
-        dates = _dates(table, texts)
+        dates = _dates(table, columns)
         called = [name for name in called if name != dates] or called  # that repeat: the times beside them are at fault
         for name in called if dates is not None else ():
             if name in texts:
@@ -255,6 +252,9 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     rounded = [name for name in called or unnamed if name in finite and name not in rising]
     for name in [*candidates[:1], *rounded] if candidates and candidates[0] in called else [*rounded, *candidates[:1]]:
         unit, t = _read_clock(table, name, finite[name], file)
+        within_day = unit == "hhmmss" or (finite[name].min() >= 0 and finite[name].max() < 1)
+        if within_day and (with_date := _with_date(table, columns, name)):
+            return with_date
         rises = bool(np.all(np.diff(t) > 0))  # after midnight, too
         rate = _rate(t) if not rises or _is_coarse(t) else None
         if rate is not None:
@@ -365,13 +365,32 @@ def column_called(table: pd.DataFrame, name: str) -> pd.Series[Any]:
     return table.iloc[:, list(map(str, table.columns)).index(name)]
 
 
-def _dates(table: pd.DataFrame, names: list[str]) -> str | None:
-    """Return the first of these columns that holds a date in every row, without a time."""
-    for name in names:
-        cells = column_called(table, name).astype(str).str.strip()
-        if cells.str.fullmatch(DAY_OF).all():
+def _dates(table: pd.DataFrame, columns: dict[str, Array]) -> str | None:
+    """Return the first column that holds a date in every row, without a time; one of numbers is called a clock."""
+    for name in sorted(filter(None, map(str, table.columns)), key=lambda name: name in columns):
+        if name in columns and not (is_clock(name) and len(np.unique(columns[name])) <= max(1, len(table) // ROWS)):
+            continue
+        days = days_with_marks(column_called(table, name))
+        form = rf"{DAY_OF}|{DAY_OF_EXCEL}" if name in columns else DAY_OF
+        if days.str.fullmatch(form).fillna(False).all():
             return name
     return None
+
+
+def _with_date(table: pd.DataFrame, columns: dict[str, Array], name: str) -> tuple[dict[str, Any], Array] | None:
+    """Return the clock of a column of times of day beside dates; None where there are none, or it does not rise."""
+    day = _dates(table, columns) or _day_in(_fields(columns))
+    if not day:
+        return None
+    of_date = column_called(table, day) if isinstance(day, str) else date_texts([columns[one] for one in day])
+    t = seconds(dated(of_date, column_called(table, name)))
+    keys = {"from": name, "unit": "date", "date": day}
+    if not np.isfinite(t).all():
+        return None
+    if np.all(np.diff(t) > 0):
+        return keys, t
+    rate = _rate(t)
+    return None if rate is None else (keys | {"every": rate[0]}, rate[1])
 
 
 def is_clock(name: str) -> bool:
@@ -583,9 +602,8 @@ def _fault(values: Array) -> str:
     row = int(np.argmax(np.diff(values) < 0)) + 1
     if values[row] < values[row - 1]:  # rows of one time alone may be a rounded clock
         before, after = moment_of(values[row - 1]), moment_of(values[row])
-        return (
-            f"goes back from {before} to {after} in row {row + 1}: sort the log, or split it there, and join the parts"
-        )
+        back = f"goes back from {before} to {after}{rolled_over(values[row] - values[row - 1])} in row {row + 1}"
+        return f"{back}: sort the log, or split it there, and join the parts"
     return f"repeats in row {int(np.argmax(np.diff(values) == 0)) + 2}"
 
 

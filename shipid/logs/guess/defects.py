@@ -9,13 +9,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.checks import Delay, delay_of
-from shipid.data.dataset import Array
-from shipid.logs.dates import date_of
+from shipid.data.dataset import DATED, Array
+from shipid.logs.dates import LAST_DATE, date_of, rolled_over
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import Sniffed
-from shipid.logs.mapping import is_date, to_si
+from shipid.logs.mapping import to_si
 from shipid.physics.signals import is_shaft
 
 POSITIONS = ("latitude", "longitude", "north", "east")
@@ -189,6 +189,7 @@ def _ask_for_set_clock(state: State) -> None:
     near = float(np.percentile(way[steps < evidence.GAP * usual], 99))
     for row in np.flatnonzero((steps > evidence.GAP * usual) & (way <= near) & (speed * steps > FARTHER * near))[:1]:
         times = " comes ".join(when(state, float(state.t[row + one])) for one in (0, 1))
+        times += rolled_over(steps[row])
         words = f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
         state.ask(("clock", "t"), f"{words}Then split the log there")
 
@@ -308,7 +309,7 @@ def _jumps(state: State, path: Complex, spikes: bool = True) -> None:
 
 def when(state: State, t: float) -> str:
     """A time [s] as the clock of the log has it: a date, or a number."""
-    return date_of(t) if is_date(t, state.clock_unit) else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
+    return date_of(t) if DATED < t < LAST_DATE else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
 
 
 def _heading_offset(state: State) -> None:

@@ -57,8 +57,8 @@ def windows(t: Array, duration: float = WINDOW) -> Windows:
     last = np.searchsorted(t, t + duration)
     inside = last < len(t)
     first, last = first[inside], last[inside]
-    holes = np.append(0, np.cumsum(np.diff(t) > GAP * usual))
-    whole = (holes[last] == holes[first]) & (last - first >= STEPS)
+    stretch = _stretches(t)
+    whole = (stretch[last] == stretch[first]) & (last - first >= STEPS)
     first, last = first[whole], last[whole]
     thin = max(1, len(first) // MOST)
     return Windows(first[::thin], last[::thin])
@@ -173,7 +173,8 @@ def answer(t: Array, r: Array, order: Array, duration: float) -> tuple[NDArray[n
     thin = max(1, len(chosen.first) // 400)
     chosen = Windows(chosen.first[::thin], chosen.last[::thin])
     width = max(1, round(duration / 2 / float(np.median(np.diff(t)))))
-    smooth = [_boxcar(x, width) for x in (cumulative_integral(t, order), cumulative_integral(t, r), t, r)]
+    signals, stretch = (cumulative_integral(t, order), cumulative_integral(t, r), t, r), _stretches(t)
+    smooth = [_boxcar(x, width, stretch) for x in signals]
     *columns, change = (chosen.change(x).real for x in smooth)  # the equation holds for means, too
     design = np.stack(columns, axis=1)
     wild = np.zeros(len(change), dtype=bool)
@@ -194,8 +195,8 @@ def solved(design: Array, change: Array) -> tuple[Array, Array, float]:
         return none
     rest = change - design / sizes @ solution
     left = float(rest @ rest)
-    spread = np.linalg.inv((design / sizes).T @ (design / sizes)) * left / max(1, len(rest) - len(sizes))
-    return solution / sizes, np.sqrt(np.diag(spread)) / sizes, left
+    spread = np.sum(np.linalg.pinv(design / sizes) ** 2, axis=1) * left / max(1, len(rest) - len(sizes))
+    return solution / sizes, np.sqrt(spread) / sizes, left
 
 
 def follows(t: Array, r: Array, order: Array, duration: float) -> float:
@@ -215,9 +216,16 @@ def follows(t: Array, r: Array, order: Array, duration: float) -> float:
     return best
 
 
-def _boxcar(values: Array, width: int) -> Array:
-    """Return the centred mean over `width` rows, of fewer at the ends, (N,)."""
-    return np.asarray(pd.Series(values).rolling(width, center=True, min_periods=1).mean())
+def _boxcar(values: Array, width: int, stretch: NDArray[np.int_] | None = None) -> Array:
+    """Return the centred mean over `width` rows, of fewer at the ends of the log, or of each stretch (N,), (N,)."""
+    series = pd.Series(values)
+    rows = series if stretch is None else series.groupby(stretch)
+    return np.asarray(rows.rolling(width, center=True, min_periods=1).mean())
+
+
+def _stretches(t: Array) -> NDArray[np.int_]:
+    """Return the number of the stretch without a hole that each row at t (N,) [s] is in."""
+    return np.append(0, np.cumsum(np.diff(t) > GAP * np.median(np.diff(t))))
 
 
 def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float, float, float]]:
@@ -232,7 +240,7 @@ def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float,
     drift = position - integrated
     miss = np.abs(drift[reach:] - drift[:-reach])
     limit = max(5.0 * float(np.percentile(miss, 98)), 2.0 * usual)
-    holes = np.append(0, np.cumsum(np.diff(t) > GAP * usual))
+    holes = _stretches(t)
     wild = (miss > limit) & (holes[reach:] == holes[:-reach])
     if not wild.any() or wild.mean() > 0.05:
         return []

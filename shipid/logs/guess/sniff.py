@@ -130,6 +130,8 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     else:
         table = read_table(file, model, "time")
         notes = tuple(table.attrs.get("notes", ()))
+        if READERS[form["kind"]].scattered:  # a time alone, before the first fix, is no row
+            table = table.loc[table.drop(columns="time").notna().any(axis=1)].reset_index(drop=True)
     _refuse_ships(table, file)
     table, in_units, mixed = _without_units(table)
     columns, words = _numbers(table, form.get("decimal", "."), form.get("thousands"))

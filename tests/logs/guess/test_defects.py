@@ -172,6 +172,14 @@ def test_a_clock_that_was_set_forward_is_asked(forward: bool, cut: bool, tmp_pat
     assert all("after t = 269.5 comes t = 290" in one for one in asked)
 
 
+@pytest.mark.parametrize("rows", [1, 5, 40])
+def test_a_receiver_that_began_in_1980_is_asked_by_its_dates(rows: int, tmp_path: Path) -> None:
+    since = CLEAN["time"] + np.where(np.arange(len(CLEAN)) < rows, 315_964_800.0, 1_715_673_600.0)
+    times = [pd.to_datetime(1e9 * since[rows - 1 + k]).strftime("%Y-%m-%d %H:%M:%S") for k in (0, 1)]
+    (asked,) = (one.sentence for one in guessed(tmp_path, CLEAN.assign(time=since)).questions if "set" in one.sentence)
+    assert f"after {times[0]} comes {times[1]}, but" in asked
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_log_with_drawn_spikes_is_healed_by_its_draft(seed: int, tmp_path: Path) -> None:
     """Imported by its draft, without an edit, it is the clean log imported by the same draft."""

@@ -17,7 +17,7 @@ from shipid.logs.mapping import UNITS, Segment
 from shipid.logs.segments import kind_of
 from tests.logs.conftest import DATES, stamps
 from tests.logs.simulated import KNOT, SCHEDULE, as_bridge, si_log
-from tests.logs.test_nmea import bridge_log
+from tests.logs.test_nmea import bridge_log, sentence
 
 
 def test_the_draft_of_a_clean_log_imports_to_the_motion(tmp_path: Path) -> None:
@@ -184,6 +184,17 @@ def test_hostile_names_stay_in_their_strings(name: str, tmp_path: Path) -> None:
     log.to_parquet(tmp_path / "log.parquet")
     mapping = write_new(draft_mapping(guess(tmp_path / "log.parquet")), tmp_path / "draft.toml")
     assert len(import_log(read_mapping(mapping), tmp_path / "log.parquet").frame) > 2000
+
+
+def test_times_before_the_first_fix_are_no_part_of_a_draft(tmp_path: Path) -> None:
+    """The clock of a receiver begins in 1980, and is set with its first fix."""
+    text, motion = bridge_log("fix", 0.0, si_log(0, 10))
+    early = "\n".join(sentence(f"GPZDA,0000{k:02d}.00,06,01,1980,00,00") for k in range(5))
+    (tmp_path / "bridge.nmea").write_text(f"{early}\n{text}")
+    proposal = guess(tmp_path / "bridge.nmea")
+    assert proposal.findings == ()
+    mapping = write_new(draft_mapping(proposal), tmp_path / "draft.toml")
+    assert len(import_log(read_mapping(mapping), tmp_path / "bridge.nmea").frame) == len(motion)
 
 
 def test_sentences_of_nmea(tmp_path: Path) -> None:

@@ -97,6 +97,19 @@ def test_the_sign_of_an_order_is_its_effect_on_the_yaw_rate(sign: int) -> None:
     assert evidence.effect(T, r, np.zeros(len(T))) == 0.0
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_a_clock_that_was_set_does_not_hide_the_sign_of_a_rudder(seed: int) -> None:
+    """No mean reaches over the hole in time, of decades, that it leaves."""
+    order = 120.0 + np.sin(2 * np.pi * T / 90.0) * (T > 40.0)
+    r = np.zeros(len(T))
+    for row in range(1, len(T)):
+        r[row] = r[row - 1] + 0.5 * (-0.1 * r[row - 1] + 0.01 * (order[row - 1] - 120.0))
+    first = int(np.random.default_rng(seed).integers(2, 40))
+    late = T + np.where(np.arange(len(T)) < first, 315_964_800.0, 1_715_673_600.0)
+    assert evidence.effect(late, r, order) == pytest.approx(evidence.effect(T, r, order), rel=0.05)
+    assert evidence.effect(T, r, order) > 20
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_a_heading_that_stood_still_in_a_turn_does_not_turn_the_sign_of_the_rudder(seed: int) -> None:
     """It jumps when it goes on: of 60 such logs 14 had a rudder of wrong sign, with t values up to 8."""
