@@ -173,6 +173,53 @@ def test_the_number_of_a_wrong_line_counts_the_comments_before_it(tmp_path: Path
     assert table.attrs["ragged"] == [6]
 
 
+CELLS = (
+    "",
+    "7",
+    "63°26'24.000\"N",
+    "10°24'00.5\"E",
+    '"a, b; c\td"',
+    '"two\nlines"',
+    '"three\n\n# lines"',
+    '"a ""word"""',
+)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_rows_are_counted_as_the_reader_of_csv_does(seed: int, tmp_path: Path) -> None:
+    """Good rows beside a remark of several lines were left out, and marks of seconds taken for quotes."""
+    draw = np.random.default_rng(seed)
+    separator, comment = str(draw.choice([",", ";", "\t"])), str(draw.choice(["#", ""])) or None
+    lines, wrong, good = [separator.join(["time", "x", "remark"])], {}, []
+    for k in range(1000):
+        lines += ["# a comment"] * int(comment is not None and draw.random() < 0.02)
+        row = [str(k), *(str(cell) for cell in draw.choice(CELLS, 2))]
+        if draw.random() < 0.01:
+            row = row[:2] if draw.random() < 0.5 else [*row, "1", "2"]
+            wrong["\n".join(lines).count("\n") + 2] = len(row)
+        else:
+            good.append(str(k))
+        lines.append(separator.join(row))
+    file = tmp_path / "log.csv"
+    file.write_text("\n".join(lines) + "\n")
+    form = TextFormat(separator=separator, comment=comment, ragged="drop")
+    table = read_table(file, form, "time")
+    assert [*table["time"]] == good
+    assert table.attrs["ragged"] == [*wrong]
+    if wrong:
+        first, count = next(iter(wrong.items()))
+        with pytest.raises(DataError, match=f"{count} cells, where the header has 3") as caught:
+            read_table(file, form.model_copy(update={"ragged": "refuse"}), "time")
+        assert caught.value.path == f"line {first}"
+
+
+def test_a_quote_that_is_never_closed_is_named(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text('time,x\n0,1\n1,"2\n' + "".join(f"{k},{k}\n" for k in range(2, 20_000)))
+    with pytest.raises(DataError, match="is its closing quote lacking") as caught:
+        read_table(tmp_path / "log.csv", TextFormat(), "time")
+    assert caught.value.path == "line 3"
+
+
 @pytest.mark.parametrize(("kind", "remedy"), [("parquet", "not a Parquet file"), ("mat", "not a MATLAB file")])
 def test_another_format_than_declared(kind: str, remedy: str, log: pd.DataFrame, tmp_path: Path) -> None:
     log.to_csv(tmp_path / "log")
