@@ -52,6 +52,8 @@ def read_table(
 ) -> pd.DataFrame:
     """Read a log as its format says; `attrs["unreadable"]` counts the skipped lines, `attrs["notes"]` has sentences.
 
+    `attrs["other"]` says of each column that cannot be read what it is, and the remedy.
+
     Parameters
     ----------
     clock : name of the column of time. columns : names of the others that are needed; a large text is read for them
@@ -97,25 +99,39 @@ def grouped_by(decimal: str, thousands: str) -> str:
     return rf"[+-]?[1-9]\d{{0,2}}(?:{mark}\d{{3}})+(?:{point}\d*)?"
 
 
-def _is_binary(head: bytes, form: TextFormat) -> bool:
-    """Whether a file that begins so is no text in the encoding of the format: it has NUL bytes."""
-    return b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32"))
+def has_nul(content: bytes, form: TextFormat) -> bool:
+    """Whether the bytes of a file have NUL bytes that no character of its encoding has."""
+    return b"\0" in content and not form.encoding.startswith(("utf-16", "utf-32"))
+
+
+def refuse_power_cut(content: bytes, file: Path) -> None:
+    """Raise DataError at the first line with NUL bytes, where most lines have none and all else is text."""
+    lines = content.splitlines()
+    damaged = [number for number, line in enumerate(lines, start=1) if b"\0" in line]
+    if damaged and len(damaged) < len(lines) / 2 and not re.search(rb"[\x01-\x08\x0e-\x1a]", content):
+        message = "holds NUL bytes, as after a power cut: remove them"
+        raise DataError(message, file=file, path=f"line {damaged[0]}")
 
 
 def _text(file: Path, form: TextFormat, *_: object) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
     if form.skip_rows == 0:
         refuse_foreign(file)
-    with file.open("rb") as stream:
-        head = stream.read(LONGEST_LINE)
-    if _is_binary(head, form):
-        kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, head[:4096])), None)
+    _refuse_binary(file, form)
+    return parse_text(file, form, file)
+
+
+def _refuse_binary(file: Path, form: TextFormat) -> None:
+    """Raise DataError where a file is no text in the encoding of its format, or has lines of too many cells."""
+    content = file.read_bytes()
+    if has_nul(content, form):
+        kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, content[:ENOUGH])), None)
         message = "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding"
         if kind is not None:
             raise DataError(f"is no text: set [format] kind = {kind!r}", file=file, path="format.kind")
+        refuse_power_cut(content, file)
         raise DataError(message, file=file, path="format.encoding")
-    widest(head, form.separator, file)
-    return parse_text(file, form, file)
+    widest(content[:LONGEST_LINE], form.separator, file)
 
 
 def widest(head: bytes, separator: str, file: Path) -> None:
@@ -325,7 +341,7 @@ def _large_text(
         return None
     with file.open("rb") as stream:
         head = stream.read(1_000_000)
-    if _is_binary(head, form):
+    if has_nul(head, form):
         return None
     widest(head, form.separator, file)
     text = head.decode(form.encoding, "replace").rpartition("\n")[0]
@@ -442,12 +458,18 @@ def _parquet(file: Path, *_: object) -> pd.DataFrame:
     refuse_foreign(file)
     try:
         stored = read_arrow(file)
-        plain = [place for place, field in enumerate(stored.schema) if not pyarrow.types.is_nested(field.type)]
+        nested = {field.name: field.type for field in stored.schema if pyarrow.types.is_nested(field.type)}
+        plain = [place for place, field in enumerate(stored.schema) if field.name not in nested]
         # an index is a column
         table: pd.DataFrame = stored.select(plain).to_pandas(ignore_metadata=True, use_threads=False)
-        return table
     except (pyarrow.ArrowException, ValueError):
         raise DataError("not a Parquet file, or damaged: set [format] kind", file=file, path="format.kind") from None
+    table.attrs["other"] = {
+        name: f"nested ({str(kind)[:60]}): write each of its values as a column of numbers"
+        for name, kind in nested.items()
+    }
+    table.attrs["notes"] = [f"{name!r} is {what}" for name, what in table.attrs["other"].items()]
+    return table
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,10 @@ from scipy.io import savemat
 
 from shipid.errors import DataError
 from shipid.logs import readers
+from shipid.logs.cells import column_of
 from shipid.logs.dates import seconds
 from shipid.logs.formats import ParquetFormat, TextFormat
+from shipid.logs.guess.sniff import sniff
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.readers import read_table, require_file, widest
 from shipid.logs.workbook import WIDEST
@@ -213,6 +215,23 @@ def test_rows_are_counted_as_the_reader_of_csv_does(seed: int, tmp_path: Path) -
         assert caught.value.path == f"line {first}"
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_what_a_power_cut_leaves_is_named(seed: int, tmp_path: Path) -> None:
+    """A whole log was said to be binary; later in the file a cell ended at its NUL, and 111.1 became 11."""
+    draw = np.random.default_rng(seed)
+    lines = ["time,x,y", *(f"{k},{111.1 * k},{k % 7}" for k in range(2000))]
+    hit = int(draw.integers(1, len(lines) + 1))
+    nul = "\0" * int(draw.integers(1, 5000))
+    place = int(draw.integers(0, len(lines[hit]) + 1)) if hit < len(lines) else 0
+    lines[hit : hit + 1] = [lines[hit][:place] + nul + lines[hit][place:] if hit < len(lines) else nul]
+    file = tmp_path / "log.csv"
+    file.write_text("\n".join(lines) + "\n")
+    for read in (lambda: read_table(file, TextFormat(ragged="drop"), "time"), lambda: sniff(file)):
+        with pytest.raises(DataError, match="holds NUL bytes, as after a power cut: remove them") as caught:
+            read()
+        assert caught.value.path == f"line {hit + 1}"
+
+
 def test_a_quote_that_is_never_closed_is_named(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text('time,x\n0,1\n1,"2\n' + "".join(f"{k},{k}\n" for k in range(2, 20_000)))
     with pytest.raises(DataError, match="is its closing quote lacking") as caught:
@@ -248,3 +267,6 @@ def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: 
     table = read_table(tmp_path / "log.parquet", ParquetFormat(kind="parquet"), "t")
     assert list(table.columns) == ["t", "u"]
     np.testing.assert_allclose(seconds(table["t"]), steps)
+    assert [*table.attrs["other"]] == ["cells", "box"]
+    with pytest.raises(DataError, match=r"'box' is nested \(struct<a: int64>\): write each of its values as a column"):
+        column_of(table, "box", tmp_path / "log.parquet", "columns.psi.from")

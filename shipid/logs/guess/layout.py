@@ -21,7 +21,8 @@ from shipid.logs.formats import LOOKED_AT, SheetFormat, TextFormat
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.words import NO_VALUE, fits, known_words
 from shipid.logs.mapping import is_position
-from shipid.logs.readers import READERS, grouped_by
+from shipid.logs.nmea import is_nmea
+from shipid.logs.readers import READERS, grouped_by, refuse_power_cut
 from shipid.logs.workbook import SEPARATOR, check_width, sheet_text, sheets_of
 
 ELSEWHERE = ("cp932", "gb18030", "cp949", "cp1251")  # encodings of texts whose words no other one shows
@@ -58,7 +59,10 @@ def format_of(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]
         if form is not None:
             return form
     encoding = _encoding(head, file)
-    return _text_format(head.decode(encoding, "ignore").splitlines()[:LOOKED_AT], encoding, file, names)
+    text = head.decode(encoding, "ignore")
+    if is_nmea(file, text.encode("latin-1", "replace")) is not None:
+        raise DataError(f"NMEA 0183 in {encoding}: save it in utf-8", file=file)
+    return _text_format(text.splitlines()[:LOOKED_AT], encoding, file, names)
 
 
 def format_of_sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], str, tuple[str, ...]]:
@@ -91,6 +95,7 @@ def _encoding(head: bytes, file: Path) -> str:
         if zeros.count(b"\0") > WIDE * len(zeros) and b"\0" not in others:  # without the mark of its order
             return order
     if b"\0" in head:
+        refuse_power_cut(head, file)
         raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
     begin = head[:-4] if len(head) > 4 else head  # the last character may be cut
     utf8 = "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8"

@@ -347,3 +347,11 @@ def test_a_header_longer_than_its_rows_keeps_its_names(tmp_path: Path) -> None:
     lines = text().splitlines()
     sniffed = sniff(log_of(tmp_path, [f"{lines[0]},,Comment", *lines[1:]]))
     assert list(sniffed.columns) == ["N", "psi"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_sentences_of_two_bytes_a_character_are_named(encoding: str, tmp_path: Path) -> None:
+    lines = [f"$HEHDT,{k},T" for k in range(40)]
+    (tmp_path / "log.nmea").write_bytes("\r\n".join(lines).encode(encoding))
+    with pytest.raises(DataError, match=f"NMEA 0183 in {encoding}: save it in utf-8"):
+        sniff(tmp_path / "log.nmea")
