@@ -110,17 +110,17 @@ def search(
     with uninterrupted() as held, np.errstate(all="ignore"):
         begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
         watch = _Watch(progress, held, before)
-        run = _Search(problem, begin, deepest(problem, begin, point), free, watch)
+        run = _Search(problem, evaluate(problem, begin, deepest(problem, begin, point)), free, watch)
         if not np.isfinite(run.start.objective):
             return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
         word = run.to_the_end(tolerance, most)
         best = run.best
-        for _ in range(VALLEYS):
-            if word != "ok":
+        for _ in range(VALLEYS if set(CURRENT) <= set(problem.names) else 0):
+            there = evaluate(problem, best.factors, deepest(problem, best.factors, best.point))
+            if word != "ok" or there.objective >= best.objective * (1 - FALL):
                 break
-            again = _Search(problem, best.factors, deepest(problem, best.factors, best.point), free, watch)
-            if again.start.objective >= best.objective * (1 - FALL):
-                break
+            watch.iterations += 1
+            again = _Search(problem, there, free, watch)
             word = again.to_the_end(tolerance, most)
             best = again.best
     return Result(best.factors, best.at, best.objective, watch.iterations, word)
@@ -189,9 +189,9 @@ class _Watch:
 class _Search:
     """State of one search: the last, the best and the first evaluation, and which factors are free."""
 
-    def __init__(self, problem: Problem, factors: Array, point: Point, free: NDArray[np.bool_], watch: _Watch) -> None:
+    def __init__(self, problem: Problem, start: _Value, free: NDArray[np.bool_], watch: _Watch) -> None:
         self.problem, self.free, self.watch = problem, free, watch
-        self.last = self.best = self.start = evaluate(problem, factors, point)
+        self.last = self.best = self.start = start
         self._stopped = np.isfinite(self.start.objective) and watch.stops(self.start.objective)
 
     def stops(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from shipid.logs.amounts import is_unit, parted
 from shipid.logs.formats import Format, SheetFormat, TableFormat, TextFormat
 from shipid.logs.mapping import (
     OF_SHIP,
+    SIDES,
     degrees_in_parts,
     degrees_in_text,
     degrees_of,
@@ -151,6 +153,9 @@ def numbers_of(
     if len(bad):
         kind = "angle" if sides == OF_SHIP else "position"
         what = f"no number and no {kind} with {' or '.join(sides)}" if sides else "no number"
+        below = re.sub(r"(?<!\.)60(?!\d)", "59", plain.iloc[bad[0]])  # as receivers write that round up
+        if sides in SIDES.values() and np.isfinite(degrees_in_text(pd.Series([below]), sides)).all():
+            what = "60 minutes or seconds, and the most are 59"
         message = (
             f"{text.iloc[bad[0]]!r} is {what} (column {source!r}; {len(bad)} such rows): "
             "correct it, or list it in [format] missing, or check decimal and thousands"

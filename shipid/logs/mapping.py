@@ -407,6 +407,12 @@ def degrees_in_text(texts: pd.Series[Any], sides: str) -> NDArray[np.float64]:
     return np.asarray(np.where(right, np.where(minus, -degrees, degrees), np.nan), dtype=np.float64)
 
 
+def is_position(text: str) -> bool:
+    """Whether a text is a latitude or longitude in degrees and minutes with its letter, such as N 63 26.4012."""
+    angle = _ANGLE.fullmatch(text.strip().upper())
+    return angle is not None and angle[4] is not None and angle[1] + angle[6] != ""
+
+
 def sides_of(name: str) -> str:
     """Letters of the sides that an angle may have in a text, by its column of the dataset; empty where it has none."""
     row = row_of(name)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import struct
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -13,12 +16,16 @@ from shipid.errors import DataError
 from shipid.logs.foreign import refuse_foreign
 from shipid.logs.formats import MatFormat
 
+ENOUGH_VECTORS = 4  # of one length: clock, position and heading
+MOST_SIGNALS = 100  # columns of a matrix that has fewer rows: more are times
+
 
 def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
     """Return the vectors of a MATLAB file that are as long as the clock, as a table.
 
-    `attrs["other"]` says of every other variable what it is, and how to make a vector of it; `attrs["notes"]` are
-    sentences on those that MATLAB must save otherwise.
+    Without a clock of that name they are as long as the longest of which there are enough for a log. `attrs["other"]`
+    says of every other variable what it is, and how to make a vector of it; `attrs["notes"]` are sentences on those
+    that MATLAB must save otherwise, and on vectors of another length.
     """
     from scipy.io import loadmat
 
@@ -39,8 +46,7 @@ def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
         first = next(iter(other), None)
         which = f"; {first!r} is {other[first]}" if first is not None else ""
         raise DataError(f"no variable of this MATLAB file is a vector of numbers{which}", file=file)
-    longest = max(vectors, key=lambda name: len(vectors[name]))
-    measure = clock if clock in vectors else longest
+    measure = clock if clock in vectors else _measure(vectors)
     length = len(vectors[measure])
     for name, values in vectors.items():
         if len(values) != length:
@@ -48,8 +54,16 @@ def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
     table = pd.DataFrame({name: values for name, values in vectors.items() if len(values) == length})
     table.attrs["other"] = other
     anew = dict.fromkeys(name for name, _, remedy in further if remedy)
+    anew |= dict.fromkeys(name for name in vectors if name not in table)
     table.attrs["notes"] = [f"{name!r} is {other[name]}" for name in anew]
     return table
+
+
+def _measure(vectors: dict[str, np.ndarray[Any, Any]]) -> str:
+    """Name of the first of the longest vectors that are enough for a log, such as those of one of two recorders."""
+    counts = Counter(map(len, vectors.values()))
+    longest = max([length for length in counts if counts[length] >= ENOUGH_VECTORS] or counts)
+    return next(name for name in vectors if len(vectors[name]) == longest)
 
 
 def _vectors(variables: dict[str, Any]) -> Iterable[tuple[str, np.ndarray[Any, Any]]]:
@@ -58,19 +72,32 @@ def _vectors(variables: dict[str, Any]) -> Iterable[tuple[str, np.ndarray[Any, A
         if isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.number) and not np.iscomplexobj(value):
             if value.ndim == 1:
                 yield name, value.astype(float)
-            elif value.ndim == 2:
+            elif value.ndim == 2 and not _is_transposed(value):
                 yield from (
                     (f"{name}.{column + 1}", value[:, column].astype(float)) for column in range(value.shape[1])
                 )
 
 
+def _is_sparse(value: object) -> bool:
+    """Whether a value is a sparse matrix: scipy, which defines them, takes long to import."""
+    return hasattr(value, "toarray")
+
+
+def _is_transposed(matrix: np.ndarray[Any, Any]) -> bool:
+    """Whether a matrix has a row for each signal and a column for each time."""
+    rows, columns = matrix.shape
+    return bool(columns > max(rows, MOST_SIGNALS))
+
+
 def _opened(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
-    """Dotted name and value of every variable, structs opened."""
+    """Dotted name and value of every variable, structs and sparse vectors opened."""
     for key, value in variables.items():
         if key.startswith("__"):
             continue
         if isinstance(value, dict):
             yield from _opened(value, f"{prefix}{key}.")
+        elif _is_sparse(value) and min(value.shape) == 1:
+            yield f"{prefix}{key}", value.toarray().squeeze()
         else:
             yield f"{prefix}{key}", value
 
@@ -87,6 +114,8 @@ def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str, str]]:
             about = [text.decode() if isinstance(text, bytes) else str(text) for text in value.ravel()[0]][:3]
             remedy = "save seconds(t - t(1)) of a datetime, table2struct(T, 'ToScalar', true) of a table"
             yield about[0], f"an object of class {about[2]}, not a vector of numbers", remedy
+        elif _is_sparse(value):
+            yield name, "a sparse matrix, not a vector or full matrix", f"save {last} = full({last})"
         elif isinstance(cells, list) and cells and isinstance(cells[0], dict):
             field = next(iter(cells[0]), "x")
             remedy = f"save a struct of vectors, such as s.{field} = [{name}.{field}]"
@@ -104,10 +133,25 @@ def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str, str]]:
             yield name, f"an array of {shape}, not a vector or matrix", f"save squeeze({last}), or one part of it"
         elif np.ndim(value) == 0:
             yield name, "a single number, not a vector", ""
+        elif np.ndim(value) == 2 and _is_transposed(value):
+            rows, columns = value.shape
+            yield name, f"a matrix of {rows} x {columns}, a row for each signal", f"save {last} = {last}.'"
         elif np.ndim(value) == 2:
             yield name, f"a matrix: its columns are {name}.1 to {name}.{value.shape[1]}", ""
 
 
 def is_mat(_: Path, head: bytes) -> dict[str, Any] | None:
-    """Recognise a MATLAB file by its first words; one of version 7.3, too, which has a remedy."""
-    return {"kind": "mat"} if head.startswith((b"MATLAB 5.0", b"MATLAB 7.3")) else None
+    """Recognise a MATLAB file by its first words, or of version 4; one of version 7.3, too, which has a remedy."""
+    return {"kind": "mat"} if head.startswith((b"MATLAB 5.0", b"MATLAB 7.3")) or _is_version_4(head) else None
+
+
+def _is_version_4(head: bytes) -> bool:
+    """Whether a file begins with the type, size and name of a matrix as MATLAB 4 writes them: five integers, a word."""
+    if len(head) < 20:
+        return False
+    for order, machine in (("<", 0), (">", 1)):
+        kind, rows, columns, is_complex, length = struct.unpack(f"{order}5i", head[:20])
+        known = kind in {1000 * machine + 10 * number + shape for number in range(6) for shape in range(3)}
+        if known and min(rows, columns) >= 0 and is_complex in (0, 1) and 1 < length <= 64:
+            return re.fullmatch(rb"[A-Za-z]\w*\0", head[20 : 20 + length]) is not None
+    return False

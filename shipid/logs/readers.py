@@ -6,12 +6,14 @@ are returned as written, as text or numbers; the mapping gives units and meaning
 
 from __future__ import annotations
 
+import csv
 import io
 import re
 import stat
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +51,8 @@ def read_table(
     file: Path, form: Format, clock: str, columns: Iterable[str] = (), progress: Progress | None = None
 ) -> pd.DataFrame:
     """Read a log as its format says; `attrs["unreadable"]` counts the skipped lines, `attrs["notes"]` has sentences.
+
+    `attrs["other"]` says of each column that cannot be read what it is, and the remedy.
 
     Parameters
     ----------
@@ -95,25 +99,39 @@ def grouped_by(decimal: str, thousands: str) -> str:
     return rf"[+-]?[1-9]\d{{0,2}}(?:{mark}\d{{3}})+(?:{point}\d*)?"
 
 
-def _is_binary(head: bytes, form: TextFormat) -> bool:
-    """Whether a file that begins so is no text in the encoding of the format: it has NUL bytes."""
-    return b"\0" in head[:4096] and not form.encoding.startswith(("utf-16", "utf-32"))
+def has_nul(content: bytes, form: TextFormat) -> bool:
+    """Whether the bytes of a file have NUL bytes that no character of its encoding has."""
+    return b"\0" in content and not form.encoding.startswith(("utf-16", "utf-32"))
+
+
+def refuse_power_cut(content: bytes, file: Path) -> None:
+    """Raise DataError at the first line with NUL bytes, where most lines have none and all else is text."""
+    lines = content.splitlines()
+    damaged = [number for number, line in enumerate(lines, start=1) if b"\0" in line]
+    if damaged and len(damaged) < len(lines) / 2 and not re.search(rb"[\x01-\x08\x0e-\x1a]", content):
+        message = "holds NUL bytes, as after a power cut: remove them"
+        raise DataError(message, file=file, path=f"line {damaged[0]}")
 
 
 def _text(file: Path, form: TextFormat, *_: object) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
     if form.skip_rows == 0:
         refuse_foreign(file)
-    with file.open("rb") as stream:
-        head = stream.read(LONGEST_LINE)
-    if _is_binary(head, form):
-        kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, head[:4096])), None)
+    _refuse_binary(file, form)
+    return parse_text(file, form, file)
+
+
+def _refuse_binary(file: Path, form: TextFormat) -> None:
+    """Raise DataError where a file is no text in the encoding of its format, or has lines of too many cells."""
+    content = file.read_bytes()
+    if has_nul(content, form):
+        kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, content[:ENOUGH])), None)
         message = "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding"
         if kind is not None:
             raise DataError(f"is no text: set [format] kind = {kind!r}", file=file, path="format.kind")
+        refuse_power_cut(content, file)
         raise DataError(message, file=file, path="format.encoding")
-    widest(head, form.separator, file)
-    return parse_text(file, form, file)
+    widest(content[:LONGEST_LINE], form.separator, file)
 
 
 def widest(head: bytes, separator: str, file: Path) -> None:
@@ -130,22 +148,13 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
     Lines without any value are left out. A line with more or fewer cells than the header is an error, or left out and
     counted in `attrs["ragged"]` (their line numbers) if `form.ragged` says so.
     """
-    width = _width(source, form)
     try:
-        table = pd.read_csv(
-            source,
-            sep=r"\s+" if form.separator == "whitespace" else form.separator,
-            encoding=form.encoding,
-            skiprows=form.skip_rows,
-            comment=form.comment,
-            header=None,
-            names=range(width),
-            index_col=False,
-            dtype=str,
-            keep_default_na=False,
-            skip_blank_lines=False,
-            on_bad_lines="error" if form.ragged == "refuse" else "skip",
-        )
+        try:
+            table = _cells(source, form, _width(source, form, file))
+        except pd.errors.ParserError:  # a later line has more cells
+            width = max(len(row) for _, row in _rows(source, form, file))
+            check_width(width, file)
+            table = _cells(source, form, width)
     except UnicodeDecodeError as error:
         message = f"not {form.encoding} text (byte {error.start}): set the encoding it was saved in, often cp1252"
         raise DataError(message, file=file, path="format.encoding") from None
@@ -168,18 +177,33 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
     return table.reset_index(drop=True)
 
 
-def _width(source: Path | io.StringIO, form: TextFormat) -> int:
-    """Return the largest number of cells in the first lines after those that are skipped."""
+def _cells(source: Path | io.StringIO, form: TextFormat, width: int) -> pd.DataFrame:
+    """Read all rows as text, also empty ones; raises ParserError where one has more than `width` cells."""
+    if isinstance(source, io.StringIO):
+        source.seek(0)
+    return pd.read_csv(
+        source,
+        sep=r"\s+" if form.separator == "whitespace" else form.separator,
+        encoding=form.encoding,
+        skiprows=form.skip_rows,
+        comment=form.comment,
+        header=None,
+        names=range(width),
+        index_col=False,
+        dtype=str,
+        keep_default_na=False,
+        skip_blank_lines=False,
+    )
+
+
+def _width(source: Path | io.StringIO, form: TextFormat, file: Path) -> int:
+    """Return the largest number of cells in the first rows."""
     if isinstance(source, Path):
         with source.open("rb") as stream:
-            lines = stream.read(LONGEST_LINE // 8).decode(form.encoding, "replace").splitlines()
+            source = io.StringIO(stream.read(LONGEST_LINE // 8).decode(form.encoding, "replace"))
     else:
-        lines = source.getvalue()[: LONGEST_LINE // 8].splitlines()
-    lines = lines[form.skip_rows : form.skip_rows + LOOKED_AT]
-    if form.separator == "whitespace":
-        return max((len(line.split()) for line in lines), default=1) or 1
-    counts = [len(re.sub(r'"[^"]*"', "", line).split(form.separator)) for line in lines]
-    return max(counts, default=1)
+        source = io.StringIO(source.getvalue()[: LONGEST_LINE // 8])
+    return max([1, *(len(row) for _, row in islice(_rows(source, form, file), LOOKED_AT))])
 
 
 def _nothing_left(form: TextFormat, file: Path) -> DataError:
@@ -219,7 +243,7 @@ def _without_headers(
         again = again & table.iloc[:, index].str.strip().eq(names[index]).to_numpy(dtype=bool, na_value=False)
     if not again.any():
         return table, []
-    lines = _line_numbers(table.index[again], source, form)
+    lines = _line_numbers(table.index[again], source, form, file)
     if form.ragged == "refuse":
         more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
         message = f"repeats the header{more}: remove the line, split the log there, or set [format] ragged = 'drop'"
@@ -237,11 +261,11 @@ def _without_ragged(
     short: dict[int, int] = {}
     for index in named[-1:]:  # a short line lacks the last cells
         empty = table.iloc[:, index].fillna("").eq("").to_numpy()
-        short = _short_lines(source, form, {int(number) for number in table.index[empty]}, index + 1)
+        short = _short_rows(source, form, {int(number) for number in table.index[empty]}, index + 1, file)
         wrong |= np.isin(table.index, list(short))
     for index in beyond:
         wrong |= table.iloc[:, index].fillna("").str.strip().ne("").to_numpy()
-    lines = _line_numbers(table.index[wrong], source, form)
+    lines = _line_numbers(table.index[wrong], source, form, file)
     if len(lines) > len(table) / 2:
         message = f"not a table with this separator: {len(lines)} of {len(table)} lines have another number of cells "
         raise DataError(f"{message}than the header: check separator and skip_rows", file=file, path="format.separator")
@@ -259,36 +283,50 @@ def _without_ragged(
     return (table.loc[~wrong] if lines else table), lines
 
 
-def _short_lines(source: Path | io.StringIO, form: TextFormat, asked: set[int], width: int) -> dict[int, int]:
-    """Return number -> count of cells of the lines asked for that have fewer than `width` cells.
+def _short_rows(
+    source: Path | io.StringIO, form: TextFormat, asked: set[int], width: int, file: Path
+) -> dict[int, int]:
+    """Return place -> count of cells of the rows asked for that have fewer than `width` cells.
 
-    Lines are counted as by `_lines`. To pandas, a cell that is not there is an empty one.
+    Places are those among `_rows`. To pandas, a cell that is not there is an empty one.
     """
-    short = {}
-    for place, (_, line) in enumerate(_lines(source, form) if asked else ()):
-        if place in asked:
-            whole = re.sub(r'"[^"]*"', "", line)
-            count = len(whole.split() if form.separator == "whitespace" else whole.split(form.separator))
-            if count < width:
-                short[place] = count
-    return short
+    rows = enumerate(_rows(source, form, file) if asked else ())
+    return {place: len(row) for place, (_, row) in rows if place in asked and len(row) < width}
 
 
-def _line_numbers(places: Iterable[int], source: Path | io.StringIO, form: TextFormat) -> list[int]:
-    """Return the numbers in the log, from 1, of lines counted as by `_lines`."""
-    if form.comment is None:
-        return [int(place) + 1 + form.skip_rows for place in places]
+def _line_numbers(places: Iterable[int], source: Path | io.StringIO, form: TextFormat, file: Path) -> list[int]:
+    """Return the numbers in the log, from 1, of the first lines of rows at these places among `_rows`."""
     asked = set(places)
-    return [number for place, (number, _) in enumerate(_lines(source, form) if asked else ()) if place in asked]
+    return [number for place, (number, _) in enumerate(_rows(source, form, file) if asked else ()) if place in asked]
 
 
-def _lines(source: Path | io.StringIO, form: TextFormat) -> Iterator[tuple[int, str]]:
-    """Yield number, from 1, and text of the lines that pandas takes for rows: neither skipped nor a comment."""
-    text = io.StringIO(source.getvalue()) if isinstance(source, io.StringIO) else source.open(encoding=form.encoding)
-    with text:
+def _rows(source: Path | io.StringIO, form: TextFormat, file: Path) -> Iterator[tuple[int, list[str]]]:
+    """Yield number, from 1, of the first line and cells of what pandas takes for rows: neither skipped nor a comment.
+
+    Quotes count only where a cell begins with one; lines may end between them. Raises DataError where they never close.
+    """
+    blanks = form.separator == "whitespace"
+    if isinstance(source, Path):
+        text: io.TextIOBase = source.open(encoding=form.encoding, errors="replace", newline="")
+    else:
+        text = io.StringIO(source.getvalue(), newline="")
+    numbers: list[int] = []  # of the lines of a row
+
+    def lines() -> Iterator[str]:
         for number, line in enumerate(text, start=1):
-            if number > form.skip_rows and (form.comment is None or not line.startswith(form.comment)):
-                yield number, line
+            comment = not numbers and form.comment is not None and line.startswith(form.comment)
+            if number > form.skip_rows and not comment:
+                numbers.append(number)
+                yield re.sub(r"[ \t]+", " ", line.strip(" \t\r\n")) if blanks else line
+
+    with text:
+        try:
+            for row in csv.reader(lines(), delimiter=" " if blanks else form.separator):
+                yield numbers[0], row
+                numbers.clear()
+        except csv.Error as error:
+            message = f"a cell without an end ({error}): is its closing quote lacking?"
+            raise DataError(message, file=file, path=f"line {numbers[0]}") from None
 
 
 def _large_text(
@@ -303,13 +341,16 @@ def _large_text(
         return None
     with file.open("rb") as stream:
         head = stream.read(1_000_000)
-    if _is_binary(head, form):
+    if has_nul(head, form):
         return None
     widest(head, form.separator, file)
     text = head.decode(form.encoding, "replace").rpartition("\n")[0]
     if not text:  # lines end with a carriage return alone
         return None
-    first = parse_text(io.StringIO(text), form.model_copy(update={"ragged": "drop"}), file)
+    try:
+        first = parse_text(io.StringIO(text), form.model_copy(update={"ragged": "drop"}), file)
+    except DataError:  # such as where the last line ends between quotes
+        return None
     names = [str(name) for name in first.columns]
     places = [index for index, name in enumerate(names) if name in wanted]
     if {names[index] for index in places} != wanted or len(places) != len(wanted):
@@ -417,12 +458,18 @@ def _parquet(file: Path, *_: object) -> pd.DataFrame:
     refuse_foreign(file)
     try:
         stored = read_arrow(file)
-        plain = [place for place, field in enumerate(stored.schema) if not pyarrow.types.is_nested(field.type)]
+        nested = {field.name: field.type for field in stored.schema if pyarrow.types.is_nested(field.type)}
+        plain = [place for place, field in enumerate(stored.schema) if field.name not in nested]
         # an index is a column
         table: pd.DataFrame = stored.select(plain).to_pandas(ignore_metadata=True, use_threads=False)
-        return table
     except (pyarrow.ArrowException, ValueError):
         raise DataError("not a Parquet file, or damaged: set [format] kind", file=file, path="format.kind") from None
+    table.attrs["other"] = {
+        name: f"nested ({str(kind)[:60]}): write each of its values as a column of numbers"
+        for name, kind in nested.items()
+    }
+    table.attrs["notes"] = [f"{name!r} is {what}" for name, what in table.attrs["other"].items()]
+    return table
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import savemat
+from scipy.sparse import csc_matrix
 
 from shipid.errors import DataError
 from shipid.logs.formats import MatFormat
+from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.mat import _no_vectors, read_mat
+from shipid.logs.mat import _no_vectors, is_mat, read_mat
 from shipid.logs.readers import read_table
 from tests.logs.conftest import NAMES, T, assert_is_the_motion, mapping_with
 
@@ -37,6 +39,8 @@ NO_VECTORS: dict[str, tuple[Any, str]] = {
     "of another length": (T[:7], "'rpm' is of 7 values, and 'time' has 120"),
     "a single number": (2.0, "'rpm' is a single number, not a vector"),
     "a matrix": (np.stack([T, T], axis=1), r"'rpm' is a matrix: its columns are rpm\.1 to rpm\.2"),
+    "a row for each signal": (np.zeros((2, 120)), r"'rpm' is a matrix of 2 x 120, a row for each signal: .* rpm\.'"),
+    "sparse": (csc_matrix(np.stack([T, T], axis=1)), r"'rpm' is a sparse matrix, .*: save rpm = full\(rpm\)"),
     "of three axes": (np.zeros((120, 2, 2)), "'rpm' is an array of 120 x 2 x 2, not a vector or matrix"),
 }
 
@@ -95,3 +99,67 @@ def test_what_the_system_lacks_is_no_damage(
     monkeypatch.setattr("scipy.io.loadmat", lacking)
     with pytest.raises(kind, match="lacking"):
         read_mat(tmp_path / "log.mat", MatFormat(kind="mat"), "t")
+
+
+def test_a_sparse_vector_is_a_column(log: pd.DataFrame, tmp_path: Path) -> None:
+    """As MATLAB stores a rudder that is mostly amidships; it was lost without a word."""
+    vectors = {name: log[name].to_numpy() for name in log}
+    savemat(tmp_path / "log.mat", {**vectors, "rpm": csc_matrix(vectors["rpm"][:, None])})
+    assert_is_the_motion(mapping_with(tmp_path, 'kind = "mat"'), tmp_path / "log.mat")
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_a_file_of_matlab_4_is_recognised(order: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    """It begins with no word, but with five integers: type, rows, columns, whether complex, length of the name."""
+    content = b""
+    for name in log:
+        sizes = [1000 * (order == ">"), len(log), 1, 0, len(name) + 1]
+        content += np.array(sizes, f"{order}i4").tobytes() + name.encode() + b"\0"
+        content += log[name].to_numpy().astype(f"{order}f8").tobytes()
+    (tmp_path / "log.mat").write_bytes(content)
+    assert is_mat(tmp_path / "log.mat", content) == {"kind": "mat"}
+    assert_is_the_motion(mapping_with(tmp_path, 'kind = "mat"'), tmp_path / "log.mat")
+    for seed in range(200):
+        draw = np.random.default_rng(seed)
+        assert is_mat(Path("x"), draw.integers(0, 256, 200, dtype=np.uint8).tobytes()) is None
+
+
+PLACES = {"lat": 63.44 + 1e-4 * np.sin(T / 9.0), "lon": 10.4 + 2e-4 * np.cos(T / 9.0)}
+VECTORS = {"t": T, **PLACES, "heading": (90.0 + np.degrees(T / 9.0)) % 360.0, "rpm": 120.0 + T % 7}
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"heading": cells(T)}, r"can be the heading: 'heading' is an array of 120 cells.*: save heading = cell2mat"),
+        ({"t": np.array([f"08:{k // 60:02d}:{k % 60:02d}" for k in range(120)])}, r"can be the clock: 't' is text"),
+        ({"lat": T[:-1]}, r"can be the position .*: 'lat' is of 119 values, and 't' has 120"),
+        ({"heading": T + 1j}, r"can be the heading: 'heading' is complex, .*: save real\(heading\)"),
+    ],
+)
+def test_a_draft_that_stops_says_why_a_variable_cannot_be_read(
+    changed: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    savemat(tmp_path / "log.mat", {**VECTORS, **changed})
+    with pytest.raises(DataError, match=message):
+        guess(tmp_path / "log.mat")
+
+
+@pytest.mark.parametrize("signals", [2, 9, 60])
+def test_a_matrix_with_a_row_for_each_signal_is_refused_at_once(signals: int, tmp_path: Path) -> None:
+    """A column for each of its thousands of times took minutes."""
+    savemat(tmp_path / "log.mat", {"data": np.zeros((signals, 50_000))})
+    with pytest.raises(DataError, match=rf"a matrix of {signals} x 50000, a row for each signal: save data = data\.'"):
+        guess(tmp_path / "log.mat")
+
+
+def test_a_draft_takes_the_vectors_that_are_enough_for_a_log(tmp_path: Path) -> None:
+    """A second recorder, with a longer clock, was taken for the log."""
+    fast = np.arange(2400) / 10.0
+    savemat(tmp_path / "log.mat", {**VECTORS, "t_rudder": fast, "rudder": np.sin(fast)})
+    table = read_mat(tmp_path / "log.mat", MatFormat(kind="mat"), "time")
+    assert [*table] == [*VECTORS]
+    assert table.attrs["notes"] == [
+        f"{name!r} is of 2400 values, and 't' has 120: a column has a value for every time"
+        for name in ("t_rudder", "rudder")
+    ]

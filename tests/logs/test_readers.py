@@ -12,8 +12,10 @@ from scipy.io import savemat
 
 from shipid.errors import DataError
 from shipid.logs import readers
+from shipid.logs.cells import column_of
 from shipid.logs.dates import seconds
 from shipid.logs.formats import ParquetFormat, TextFormat
+from shipid.logs.guess.sniff import sniff
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.readers import read_table, require_file, widest
 from shipid.logs.workbook import WIDEST
@@ -173,6 +175,70 @@ def test_the_number_of_a_wrong_line_counts_the_comments_before_it(tmp_path: Path
     assert table.attrs["ragged"] == [6]
 
 
+CELLS = (
+    "",
+    "7",
+    "63°26'24.000\"N",
+    "10°24'00.5\"E",
+    '"a, b; c\td"',
+    '"two\nlines"',
+    '"three\n\n# lines"',
+    '"a ""word"""',
+)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_rows_are_counted_as_the_reader_of_csv_does(seed: int, tmp_path: Path) -> None:
+    """Good rows beside a remark of several lines were left out, and marks of seconds taken for quotes."""
+    draw = np.random.default_rng(seed)
+    separator, comment = str(draw.choice([",", ";", "\t"])), str(draw.choice(["#", ""])) or None
+    lines, wrong, good = [separator.join(["time", "x", "remark"])], {}, []
+    for k in range(1000):
+        lines += ["# a comment"] * int(comment is not None and draw.random() < 0.02)
+        row = [str(k), *(str(cell) for cell in draw.choice(CELLS, 2))]
+        if draw.random() < 0.01:
+            row = row[:2] if draw.random() < 0.5 else [*row, "1", "2"]
+            wrong["\n".join(lines).count("\n") + 2] = len(row)
+        else:
+            good.append(str(k))
+        lines.append(separator.join(row))
+    file = tmp_path / "log.csv"
+    file.write_text("\n".join(lines) + "\n")
+    form = TextFormat(separator=separator, comment=comment, ragged="drop")
+    table = read_table(file, form, "time")
+    assert [*table["time"]] == good
+    assert table.attrs["ragged"] == [*wrong]
+    if wrong:
+        first, count = next(iter(wrong.items()))
+        with pytest.raises(DataError, match=f"{count} cells, where the header has 3") as caught:
+            read_table(file, form.model_copy(update={"ragged": "refuse"}), "time")
+        assert caught.value.path == f"line {first}"
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_a_power_cut_leaves_is_named(seed: int, tmp_path: Path) -> None:
+    """A whole log was said to be binary; later in the file a cell ended at its NUL, and 111.1 became 11."""
+    draw = np.random.default_rng(seed)
+    lines = ["time,x,y", *(f"{k},{111.1 * k},{k % 7}" for k in range(2000))]
+    hit = int(draw.integers(1, len(lines) + 1))
+    nul = "\0" * int(draw.integers(1, 5000))
+    place = int(draw.integers(0, len(lines[hit]) + 1)) if hit < len(lines) else 0
+    lines[hit : hit + 1] = [lines[hit][:place] + nul + lines[hit][place:] if hit < len(lines) else nul]
+    file = tmp_path / "log.csv"
+    file.write_text("\n".join(lines) + "\n")
+    for read in (lambda: read_table(file, TextFormat(ragged="drop"), "time"), lambda: sniff(file)):
+        with pytest.raises(DataError, match="holds NUL bytes, as after a power cut: remove them") as caught:
+            read()
+        assert caught.value.path == f"line {hit + 1}"
+
+
+def test_a_quote_that_is_never_closed_is_named(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text('time,x\n0,1\n1,"2\n' + "".join(f"{k},{k}\n" for k in range(2, 20_000)))
+    with pytest.raises(DataError, match="is its closing quote lacking") as caught:
+        read_table(tmp_path / "log.csv", TextFormat(), "time")
+    assert caught.value.path == "line 3"
+
+
 @pytest.mark.parametrize(("kind", "remedy"), [("parquet", "not a Parquet file"), ("mat", "not a MATLAB file")])
 def test_another_format_than_declared(kind: str, remedy: str, log: pd.DataFrame, tmp_path: Path) -> None:
     log.to_csv(tmp_path / "log")
@@ -201,3 +267,6 @@ def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: 
     table = read_table(tmp_path / "log.parquet", ParquetFormat(kind="parquet"), "t")
     assert list(table.columns) == ["t", "u"]
     np.testing.assert_allclose(seconds(table["t"]), steps)
+    assert [*table.attrs["other"]] == ["cells", "box"]
+    with pytest.raises(DataError, match=r"'box' is nested \(struct<a: int64>\): write each of its values as a column"):
+        column_of(table, "box", tmp_path / "log.parquet", "columns.psi.from")

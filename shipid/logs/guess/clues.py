@@ -152,6 +152,7 @@ class State:
     scaled : column -> factor by which `columns` has it already, and why. units : column -> unit of the log, where
     `columns` has it in another. sides : letters, N, S, E or W, that columns beside positions hold. negated : columns
     whose sign `columns` has turned. words : columns that hold words, with their first.
+    other : columns that cannot be read, and why.
     commands : names of those of the vessel that the log is of, where it is known.
     turning : column that steers -> sign with which a positive value turns the ship to starboard, where that is seen.
     astern : whether the ship goes astern nearly always. changed : columns of the dataset that seem to have another
@@ -171,6 +172,7 @@ class State:
     sides: frozenset[str] = frozenset()
     negated: set[str] = field(default_factory=set)
     words: dict[str, str] = field(default_factory=dict)
+    other: dict[str, str] = field(default_factory=dict)
     taken: set[str] = field(default_factory=set)
     suggestions: list[Suggestion] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)

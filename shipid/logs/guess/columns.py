@@ -109,7 +109,7 @@ def guess(
     spiky = take_spikes(sniffed.t, columns)
     joined = len(source.files) > 1 or bool(sniffed.runs)
     state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), joined, spiky)
-    state.sides, state.words = sniffed.sides, sniffed.words
+    state.sides, state.words, state.other = sniffed.sides, sniffed.words, sniffed.other
     state.units |= {name: "quaternion" for name, parts in sniffed.in_parts.items() if len(parts) == 4}
     state.commands = () if vessel is None else dynamics(vessel).commands
     numbering = tuple(

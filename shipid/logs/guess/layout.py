@@ -20,7 +20,9 @@ from shipid.logs.foreign import foreign
 from shipid.logs.formats import LOOKED_AT, SheetFormat, TextFormat
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.words import NO_VALUE, fits, known_words
-from shipid.logs.readers import READERS, grouped_by
+from shipid.logs.mapping import is_position
+from shipid.logs.nmea import is_nmea
+from shipid.logs.readers import READERS, grouped_by, refuse_power_cut
 from shipid.logs.workbook import SEPARATOR, check_width, sheet_text, sheets_of
 
 ELSEWHERE = ("cp932", "gb18030", "cp949", "cp1251")  # encodings of texts whose words no other one shows
@@ -57,7 +59,10 @@ def format_of(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]
         if form is not None:
             return form
     encoding = _encoding(head, file)
-    return _text_format(head.decode(encoding, "ignore").splitlines()[:LOOKED_AT], encoding, file, names)
+    text = head.decode(encoding, "ignore")
+    if is_nmea(file, text.encode("latin-1", "replace")) is not None:
+        raise DataError(f"NMEA 0183 in {encoding}: save it in utf-8", file=file)
+    return _text_format(text.splitlines()[:LOOKED_AT], encoding, file, names)
 
 
 def format_of_sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], str, tuple[str, ...]]:
@@ -90,6 +95,7 @@ def _encoding(head: bytes, file: Path) -> str:
         if zeros.count(b"\0") > WIDE * len(zeros) and b"\0" not in others:  # without the mark of its order
             return order
     if b"\0" in head:
+        refuse_power_cut(head, file)
         raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
     begin = head[:-4] if len(head) > 4 else head  # the last character may be cut
     utf8 = "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8"
@@ -171,17 +177,20 @@ def _marks(lines: list[str], separators: tuple[str, ...]) -> tuple[float, str, s
     Before them stands their share of numbers, less for lines of another length; 0 where there are none.
     """
     best: tuple[float, str, str, str | None] = (0.0, "", "", None)
+    alike = 0  # lines of one length with the best
     quoted = any('"' in line for line in lines)  # between quotes a decimal comma separates nothing
     for separator in separators:
         rows = [cells(line, separator) for line in lines if line.strip()]
         width, count = Counter(len(row) for row in rows).most_common(1)[0]
+        if separator == "whitespace" and best[1] == "\t" and best[0] >= NUMERIC / 2 and count < alike:
+            continue  # the header, too, has as many cells between tabs as the data: blanks are in cells
         for decimal in (".", ",") if separator != "," or quoted else (".",):
             mark = _thousands(rows, decimal)
             share = float(np.mean([_number_share(row, decimal, mark) for row in rows if len(row) == width]))
             score = share * count / len(rows) * (width > 1) * (1 + width / 1000)
             score *= 0.97 if separator == "whitespace" else 1.0  # names may have blanks
             if score > best[0]:  # the first of equals: tabs are blanks, too
-                best = (score, separator, decimal, mark)
+                best, alike = (score, separator, decimal, mark), count
     return best
 
 
@@ -310,12 +319,13 @@ def _places_of_numbers(rows: list[list[str]], decimal: str, thousands: str | Non
 
 
 def _number_share(row: list[str], decimal: str, thousands: str | None = None) -> float:
-    """Return the share of cells that are numbers, with a unit or without; empty cells are not counted."""
+    """Return the share of cells that are numbers, with a unit or without, or positions; empty ones are not counted."""
     cells = [cell for cell in row if not NO_VALUE.fullmatch(cell.lower())]
     grouped = re.compile(grouped_by(decimal, thousands)) if thousands is not None else None
     cells = [cell.replace(str(thousands), "") if grouped and grouped.fullmatch(cell) else cell for cell in cells]
     cells = [cell.replace(",", ".") if decimal == "," else cell for cell in cells]
-    return sum(_is_number(cell) or is_amount(cell) for cell in cells) / len(cells) if cells else 0.0
+    known = [_is_number(cell) or is_amount(cell) or is_position(cell) for cell in cells]
+    return sum(known) / len(known) if known else 0.0
 
 
 def _is_number(cell: str) -> bool:

@@ -105,6 +105,9 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         both = [one for one, text in state.words.items() if re.search(r"\d.*[NS].*\d.*[EWO]|[NS].*\d.*[EWO].*\d", text)]
         if both and not pairs:
             remedy = f"{both[0]!r} holds {state.words[both[0]][:40]!r}: write latitude and longitude in two columns"
+        lost = next((one for one in state.other if any(fits(one).get(meant, 0.0) > 0.6 for meant in asked)), None)
+        if lost is not None:
+            remedy = f"{lost!r} is {state.other[lost]}"
         raise DataError(f"no column can be the {missing}: {remedy}", file=file)
     if is_magnetic(best.heading):
         how = f"{best.heading!r} is of a magnetic compass: where are its variation and deviation taken out?"

@@ -31,7 +31,17 @@ from shipid.logs.guess.clock import (
 from shipid.logs.guess.layout import format_of, format_of_sheet, table_below
 from shipid.logs.guess.words import NO_VALUE, fits, is_run, parts_of, units_in
 from shipid.logs.mapping import SIDES, degrees_in_parts, degrees_in_text, degrees_to_sides, names_of, size_of, yaw_of
-from shipid.logs.readers import LONGEST_LINE, READERS, in_points, parse_text, read_table, require_file, widest
+from shipid.logs.readers import (
+    LONGEST_LINE,
+    READERS,
+    has_nul,
+    in_points,
+    parse_text,
+    read_table,
+    refuse_power_cut,
+    require_file,
+    widest,
+)
 from shipid.logs.workbook import NOT_CALCULATED
 
 SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looked at in its head and that many blocks
@@ -68,7 +78,8 @@ class Sniffed:
     that were left out. `seams` counts the places where rows of a large log were not read, or runs begin. `runs` has the
     column that says the run, and the number of runs, where the clock begins again with each; `t` goes on then. `sides`
     are the letters, N, S, E or W, that columns beside positions hold. `words` are columns of words, with their first.
-    `doubts` are questions on what the dates of the clock mean. `in_parts` are columns made of several, with those.
+    `other` are columns that cannot be read, and why. `doubts` are questions on what the dates of the clock mean.
+    `in_parts` are columns made of several, with those.
     """
 
     form: dict[str, Any]
@@ -80,6 +91,7 @@ class Sniffed:
     runs: dict[str, int] = field(default_factory=dict)
     sides: frozenset[str] = frozenset()
     words: dict[str, str] = field(default_factory=dict)
+    other: dict[str, str] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
     in_parts: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
@@ -111,6 +123,8 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         form, lines, notes = format_of_sheet(file, names)
     model = READERS[form.get("kind", "text")].options.model_validate(form)
     if isinstance(model, TextFormat):
+        if has_nul(head, model):
+            refuse_power_cut(head, file)
         widest(head, model.separator, file)
         sampled = size > SAMPLE
         lines = _sample(file, model.encoding, size)
@@ -132,6 +146,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         notes = tuple(table.attrs.get("notes", ()))
         if READERS[form["kind"]].scattered:  # a time alone, before the first fix, is no row
             table = table.loc[table.drop(columns="time").notna().any(axis=1)].reset_index(drop=True)
+    other: dict[str, str] = table.attrs.get("other", {})
     _refuse_ships(table, file)
     table, in_units, mixed = _without_units(table)
     columns, words = _numbers(table, form.get("decimal", "."), form.get("thousands"))
@@ -156,12 +171,15 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     try:
         clock, t, once = clock_once(table, columns if since is None else columns | since, file)
     except DataError:
+        lost = next(filter(is_clock, other), None)
+        if lost is not None and not any(map(is_clock, columns)):
+            raise DataError(f"no column can be the clock: {lost!r} is {other[lost]}", file=file) from None
         below = table_below(lines, model.text(), form.get("missing", ())) if isinstance(model, TableFormat) else None
         if below is None or sampled:
             raise
-        place, other = ("row", "sheet") if isinstance(model, SheetFormat) else ("line", "file")
+        place, apart = ("row", "sheet") if isinstance(model, SheetFormat) else ("line", "file")
         message = (
-            f"another table begins below the log, with {below[1][:40]!r}: move it to another {other}. Its columns "
+            f"another table begins below the log, with {below[1][:40]!r}: move it to another {apart}. Its columns "
         )
         message += "can be joined to these ([file.<name>] of a mapping), and other runs can be files of one folder"
         raise DataError(message, file=file, path=f"{place} {below[0]}") from None
@@ -190,7 +208,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     doubts += tuple(_minus_ones(columns))
     doubts += () if runs else tuple(other_clocks(table.loc[once], columns, clock, t))
     return Sniffed(
-        form, clock, t, kept, notes + empty, seams, runs, letters | _sides(table, words), says, doubts, in_parts
+        form, clock, t, kept, notes + empty, seams, runs, letters | _sides(table, words), says, other, doubts, in_parts
     )
 
 

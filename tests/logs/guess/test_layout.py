@@ -130,6 +130,40 @@ def test_a_separator_between_quotes_is_part_of_a_name(separator: str, tmp_path: 
     assert "header" not in sniffed.form
 
 
+POSITIONS = {
+    "letter before": "{letter} {degrees} {minutes:07.4f}",
+    "letter behind": "{degrees} {minutes:07.4f} {letter}",
+    "seconds": "{degrees}°{whole}'{seconds:06.3f}\"{letter}",
+    "no letter": "{degrees} {minutes:07.4f}",
+}
+
+
+@pytest.mark.parametrize("above", ["", "Trial of the ship, 14 May\n\n"])
+@pytest.mark.parametrize("separator", ["\t", ",", ";"])
+@pytest.mark.parametrize(("style", "others"), [*((style, 6) for style in POSITIONS), ("letter before", 1)])
+def test_blanks_in_positions_separate_nothing(
+    style: str, separator: str, others: int, above: str, tmp_path: Path
+) -> None:
+    """With tabs between the columns, the minutes were read as the position; with commas, few columns as no table."""
+    draw = np.random.default_rng([*style.encode(), others])
+    places = np.array([63.44, 10.4]) + np.cumsum(draw.normal(0.0, 1e-5, (80, 2)), axis=0)
+    lines = [separator.join(["Time", "Lat", "Lon", *(f"value {k}" for k in range(others))])]
+    for k, pair in enumerate(places):
+        written = []
+        for angle, letter, digits in zip(pair, "NE", (2, 3), strict=True):
+            minutes = angle % 1 * 60
+            parts = {"letter": letter, "degrees": f"{int(angle):0{digits}d}", "minutes": minutes}
+            parts |= {"whole": int(minutes), "seconds": minutes % 1 * 60}
+            written.append(POSITIONS[style].format(**parts))
+        lines.append(separator.join([f"2024-05-14 08:0{k // 60}:{k % 60:02d}", *written, *["1.5"] * others]))
+    file = tmp_path / "log.csv"
+    file.write_text(above + "\n".join(lines) + "\n")
+    sniffed = sniff(file)
+    assert sniffed.form["separator"] == separator
+    assert "header" not in sniffed.form
+    np.testing.assert_allclose(np.stack([sniffed.columns["Lat"], sniffed.columns["Lon"]]).T, places, atol=1e-6)
+
+
 def test_one_name_over_a_date_and_a_time(tmp_path: Path) -> None:
     lines = ["  time            east  north", "  -                 m      m"]
     lines += [f"2023-11-12 08:17:{k:02d}.5  {k}  {2 * k}" for k in range(30)]
@@ -313,3 +347,11 @@ def test_a_header_longer_than_its_rows_keeps_its_names(tmp_path: Path) -> None:
     lines = text().splitlines()
     sniffed = sniff(log_of(tmp_path, [f"{lines[0]},,Comment", *lines[1:]]))
     assert list(sniffed.columns) == ["N", "psi"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_sentences_of_two_bytes_a_character_are_named(encoding: str, tmp_path: Path) -> None:
+    lines = [f"$HEHDT,{k},T" for k in range(40)]
+    (tmp_path / "log.nmea").write_bytes("\r\n".join(lines).encode(encoding))
+    with pytest.raises(DataError, match=f"NMEA 0183 in {encoding}: save it in utf-8"):
+        sniff(tmp_path / "log.nmea")
