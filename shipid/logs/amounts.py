@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
@@ -37,7 +38,7 @@ UNIT_WORDS = {
 }
 """Unit -> regular expression of how logs write it, in lower case."""
 _AMOUNT = re.compile(r"([+-]?\d[\d.,'’ \u00a0\u202f]*?(?:[eE][+-]?\d+)?)\s*([^\d\s.,'’+-].{0,14}?)\s*")
-_NORTH = re.compile(r"(?:°|deg)? ?(t|m)")
+_NORTH = re.compile(r"(?:°|deg)? ?(t|m|true|mag)")
 """Behind an angle: of true, or of magnetic north."""
 
 
@@ -51,20 +52,29 @@ def parted(texts: pd.Series[Any]) -> tuple[pd.Series[Any], pd.Series[Any]]:
 @cache
 def _as_written(text: str) -> str:
     """Return a unit as a name would have it in brackets; empty where it is none."""
-    north = _NORTH.fullmatch(text.lower())
-    if north and (north[1] == "t" or len(text) > 1):  # m alone is metres
-        return f"deg {north[1].upper()}"
+    north = north_of(text)
+    if north == "T" or (north and len(text) > 1):  # m alone is metres
+        return f"deg {north}"
     if text in ("N", "n"):  # of a latitude
         return ""
     return text if any(re.fullmatch(words, text.lower()) for words in UNIT_WORDS.values()) else ""
 
 
+def north_of(text: str) -> str:
+    """Return T or M for a text behind an angle that says true or magnetic north; empty for any other one."""
+    found = _NORTH.fullmatch(text.lower())
+    return found[1][0].upper() if found else ""
+
+
 def is_unit(text: str, unit: str) -> bool:
     """Whether a text behind a number says a unit of a mapping."""
     known = {"Nm": "N m", "kNm": "kN m"}.get(unit, unit)
-    return bool(re.fullmatch(UNIT_WORDS.get(known, "(?!)"), text.lower())) or (
-        unit == "deg" and _NORTH.fullmatch(text.lower()) is not None
-    )
+    return bool(re.fullmatch(UNIT_WORDS.get(known, "(?!)"), text.lower())) or (unit == "deg" and north_of(text) != "")
+
+
+def are_one(texts: Iterable[str], unit: str) -> bool:
+    """Whether all texts behind the numbers of a column say the same unit, and not two kinds of north."""
+    return all(is_unit(text, unit) for text in texts) and len({*map(north_of, texts)} - {""}) < 2
 
 
 def is_amount(cell: str) -> bool:

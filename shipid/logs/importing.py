@@ -80,9 +80,9 @@ def import_log(
 
     Order: units, resampling of channels, repair of wrapping channels, unwrapping, `despike` and `scale` of speed,
     course, latitude or longitude, `despike` of a heading that turns velocities over ground, position on the Earth to
-    north and east, gaps, speed and course or earth-fixed to body velocities, the other repairs in the order of the
-    mapping, estimation of u, v, r, apparent to true wind, runs, resampling. `metadata["repairs"]` counts every repair,
-    `flags` marks its rows.
+    north and east, and directions to the north of that plane, gaps, speed and course or earth-fixed to body velocities,
+    the other repairs in the order of the mapping, estimation of u, v, r, apparent to true wind, runs, resampling.
+    `metadata["repairs"]` counts every repair, `flags` marks its rows.
 
     Parameters
     ----------

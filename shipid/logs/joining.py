@@ -23,8 +23,8 @@ PAUSE = 3600.0  # s put between recordings whose clocks overlap but count from n
 def join(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
     """Return one dataset with all runs, and notes on what was changed.
 
-    Positions have the origin of the first dataset. Columns that not all have are left out, unless they are commands.
-    Names of runs that clash get the name of their file before them.
+    Positions have the origin of the first dataset, and directions the north of its plane. Columns that not all have are
+    left out, unless they are commands. Names of runs that clash get the name of their file before them.
 
     Parameters
     ----------

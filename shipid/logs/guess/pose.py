@@ -14,6 +14,7 @@ from pymap3d import geodetic2ned
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
+from shipid.logs.amounts import is_amount
 from shipid.logs.frames import PARALLEL, convergence
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
@@ -103,6 +104,8 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         remedy = "name the columns with --names, or map by hand"
         if name is not None:
             remedy = f"{name!r} holds {state.words[name][:40]!r}, no number: write it as a number with a sign"
+            if is_amount(state.words[name]):
+                remedy = f"{name!r} holds {state.words[name][:40]!r}, and other units: write one unit"
         both = [one for one, text in state.words.items() if re.search(r"\d.*[NS].*\d.*[EWO]|[NS].*\d.*[EWO].*\d", text)]
         if both and not pairs:
             remedy = f"{both[0]!r} holds {state.words[both[0]][:40]!r}: write latitude and longitude in two columns"
