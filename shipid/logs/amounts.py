@@ -37,6 +37,10 @@ UNIT_WORDS = {
     "%": r"%|percent|pct|prozent",
 }
 """Unit -> regular expression of how logs write it, in lower case."""
+PREFIXED = ("deg", "rad", "deg/s", "deg/min", "rad/s", "rpm")
+"""Units of which logs write parts or multiples with a prefix, as in mrad."""
+_PREFIXES = {"kilo": 1e3, "k": 1e3, "deci": 0.1, "d": 0.1, "centi": 0.01, "c": 0.01, "milli": 1e-3, "m": 1e-3}
+_PREFIX = re.compile(r"(kilo|deci|centi|milli|[kdcm])([a-z].*)")
 _AMOUNT = re.compile(r"([+-]?\d[\d.,'’ \u00a0\u202f]*?(?:[eE][+-]?\d+)?)\s*([^\d\s.,'’+-].{0,14}?)\s*")
 _NORTH = re.compile(r"(?:°|deg)? ?(t|m|true|mag)")
 """Behind an angle: of true, or of magnetic north."""
@@ -57,7 +61,21 @@ def _as_written(text: str) -> str:
         return f"deg {north}"
     if text in ("N", "n"):  # of a latitude
         return ""
-    return text if any(re.fullmatch(words, text.lower()) for words in UNIT_WORDS.values()) else ""
+    return text if is_known(text) else ""
+
+
+@cache
+def without_prefix(text: str) -> tuple[str, float]:
+    """Return a unit without its prefix, and what that multiplies it by: mrad is rad and 0.001; 1 where it has none."""
+    found = _PREFIX.fullmatch(text.strip().lower())
+    if found and not is_known(found[0]) and any(re.fullmatch(UNIT_WORDS[unit], found[2]) for unit in PREFIXED):
+        return found[2], _PREFIXES[found[1]]
+    return text, 1.0
+
+
+def is_known(text: str) -> bool:
+    """Whether a text is a unit of the list."""
+    return any(re.fullmatch(words, text.strip().lower()) for words in UNIT_WORDS.values())
 
 
 def north_of(text: str) -> str:

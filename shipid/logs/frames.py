@@ -13,7 +13,7 @@ from shipid.errors import DataError
 from shipid.logs.dates import moment_of
 from shipid.logs.mapping import Column, Mapping
 from shipid.logs.repairs import Despike, Records, despike, interpolate_at
-from shipid.physics.signals import is_command, row_of, wraps
+from shipid.physics.signals import is_command, row_of, turns_round, wraps
 
 BLOCK = 200_000  # rows that are projected at once
 JUMP, JUMPY = np.radians(1.0), 20.0  # rad of a meridian; s, for half of which positions may jump: repairs come later
@@ -64,7 +64,19 @@ def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: flo
     if len(places):
         count = "once" if len(places) == 1 else f"{len(places)} times, first"
         sentence = f"{column.source!r} jumps by a whole turn, {count} at {moment_of(times[places[0] + 1])}"
-        raise DataError(f"{sentence}: write wrap = true", file=file, path=f"columns.{name}")
+        remedy = "write wrap = true"
+        if ordered and not begins_again(values[known], name):
+            low, high = np.degrees(np.min(values[known])), np.degrees(np.max(values[known]))
+            remedy = f"an angle that begins again does not go from {low:.4g} to {high:.4g} deg: is the unit right?"
+        elif ordered and not turns_round(name):
+            remedy = "is the unit right? If it counts from 0 to 360 deg, write wrap = true"
+        raise DataError(f"{sentence}: {remedy}", file=file, path=f"columns.{name}")
+
+
+def begins_again(values: Array, command: str) -> bool:
+    """Whether angles (N,) [rad] of a command may begin again after a whole turn; a rudder does so about amidships."""
+    near = turns_round(command) or bool(np.all(np.cos(values) > 0.0))
+    return near and float(np.ptp(values)) < 1.02 * TURN
 
 
 def is_turn(jumps: Array) -> NDArray[np.bool_]:
