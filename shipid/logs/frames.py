@@ -45,13 +45,15 @@ def unwrapped(rows: pd.DataFrame, mapping: Mapping, file: Path) -> pd.DataFrame:
 
 
 def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: float, file: Path) -> None:
-    """Raise DataError where an angle jumps by a whole turn: the mean of 359 and 1 deg is 180.
+    """Raise DataError where an angle jumps by a whole turn, for the mean of 359 and 1 deg is 180, or cannot wrap.
 
     It does so from row to row, or over a gap of at most `max_gap` [s], which will be interpolated. An order is not
     interpolated, but a gear that follows it would go the whole turn back.
     """
     row = row_of(name)
     ordered = row is not None and row.angle and is_command(name)
+    if column.wrap and ordered and not turns_round(name) and not begins_again(values[np.isfinite(values)], name):
+        raise DataError(f"{column.source!r} {_not_of_turns(values)}", file=file, path=f"columns.{name}")
     if column.wrap or not (wraps(name) or name == "course" or ordered):
         return
     if not np.nanmax(values, initial=-np.inf) - np.nanmin(values, initial=np.inf) > TURN - ABOUT:
@@ -66,17 +68,21 @@ def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: flo
         sentence = f"{column.source!r} jumps by a whole turn, {count} at {moment_of(times[places[0] + 1])}"
         remedy = "write wrap = true"
         if ordered and not begins_again(values[known], name):
-            low, high = np.degrees(np.min(values[known])), np.degrees(np.max(values[known]))
-            remedy = f"an angle that begins again does not go from {low:.4g} to {high:.4g} deg: is the unit right?"
+            remedy = f"it {_not_of_turns(values)}"
         elif ordered and not turns_round(name):
             remedy = "is the unit right? If it counts from 0 to 360 deg, write wrap = true"
         raise DataError(f"{sentence}: {remedy}", file=file, path=f"columns.{name}")
 
 
+def _not_of_turns(values: Array) -> str:
+    low, high = np.degrees(np.nanmin(values)), np.degrees(np.nanmax(values))
+    return f"goes from {low:.4g} to {high:.4g} deg, as no such angle does that begins again: is the unit right?"
+
+
 def begins_again(values: Array, command: str) -> bool:
     """Whether angles (N,) [rad] of a command may begin again after a whole turn; a rudder does so about amidships."""
     near = turns_round(command) or bool(np.all(np.cos(values) > 0.0))
-    return near and float(np.ptp(values)) < 1.02 * TURN
+    return near and bool(np.max(values, initial=-np.inf) - np.min(values, initial=np.inf) < 1.02 * TURN)
 
 
 def is_turn(jumps: Array) -> NDArray[np.bool_]:

@@ -444,9 +444,9 @@ def test_a_folder_for_a_mapping_of_one_file_says_what_to_write(plain_mapping: Wr
     [
         (358.0, 2.0, r"is the unit right\? If it counts from 0 to 360 deg, write wrap = true"),
         (-11.0, 349.0, r"is the unit right\? If it counts from 0 to 360 deg, write wrap = true"),
-        (436.0, 96.0, r"an angle that begins again does not go from 96 to 436 deg: is the unit right\?"),
+        (436.0, 96.0, r"it goes from 96 to 436 deg, as no such angle does that begins again: is the unit"),
         (-349.0, 0.0, r"is the unit right\? If it counts"),
-        (-262.0, 98.0, r"an angle that begins again does not go from -262 to 98 deg: is the unit right\?"),
+        (-262.0, 98.0, r"it goes from -262 to 98 deg, as no such angle does that begins again: is the unit"),
     ],
 )
 def test_a_rudder_that_jumps_is_asked_for_its_unit(
@@ -458,6 +458,10 @@ def test_a_rudder_that_jumps_is_asked_for_its_unit(
     mapping = plain_mapping('[columns."rudder.delta"]\nfrom = "rudder"\nunit = "deg"\n')
     with pytest.raises(DataError, match=rf"rudder.delta: 'rudder' jumps by a whole turn, once at 20 s: {remedy}"):
         import_log(read_mapping(mapping), file)
+    if remedy.startswith("it"):  # nor is it imported as an angle that wraps
+        mapping = plain_mapping('[columns."rudder.delta"]\nfrom = "rudder"\nunit = "deg"\nwrap = true\n')
+        with pytest.raises(DataError, match=f"rudder.delta: 'rudder' {remedy[3:]}"):
+            import_log(read_mapping(mapping), file)
 
 
 def test_a_heading_that_counts_on_or_begins_anew_needs_no_wrap(tmp_path: Path) -> None:
