@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
@@ -36,8 +37,12 @@ UNIT_WORDS = {
     "%": r"%|percent|pct|prozent",
 }
 """Unit -> regular expression of how logs write it, in lower case."""
+PREFIXED = ("deg", "rad", "deg/s", "deg/min", "rad/s", "rpm")
+"""Units of which logs write parts or multiples with a prefix, as in mrad."""
+_PREFIXES = {"kilo": 1e3, "k": 1e3, "deci": 0.1, "d": 0.1, "centi": 0.01, "c": 0.01, "milli": 1e-3, "m": 1e-3}
+_PREFIX = re.compile(r"(kilo|deci|centi|milli|[kdcm])([a-z].*)")
 _AMOUNT = re.compile(r"([+-]?\d[\d.,'’ \u00a0\u202f]*?(?:[eE][+-]?\d+)?)\s*([^\d\s.,'’+-].{0,14}?)\s*")
-_NORTH = re.compile(r"(?:°|deg)? ?(t|m)")
+_NORTH = re.compile(r"(?:°|deg)? ?(t|m|true|mag)")
 """Behind an angle: of true, or of magnetic north."""
 
 
@@ -51,20 +56,43 @@ def parted(texts: pd.Series[Any]) -> tuple[pd.Series[Any], pd.Series[Any]]:
 @cache
 def _as_written(text: str) -> str:
     """Return a unit as a name would have it in brackets; empty where it is none."""
-    north = _NORTH.fullmatch(text.lower())
-    if north and (north[1] == "t" or len(text) > 1):  # m alone is metres
-        return f"deg {north[1].upper()}"
+    north = north_of(text)
+    if north == "T" or (north and len(text) > 1):  # m alone is metres
+        return f"deg {north}"
     if text in ("N", "n"):  # of a latitude
         return ""
-    return text if any(re.fullmatch(words, text.lower()) for words in UNIT_WORDS.values()) else ""
+    return text if is_known(text) else ""
+
+
+@cache
+def without_prefix(text: str) -> tuple[str, float]:
+    """Return a unit without its prefix, and what that multiplies it by: mrad is rad and 0.001; 1 where it has none."""
+    found = _PREFIX.fullmatch(text.strip().lower())
+    if found and not is_known(found[0]) and any(re.fullmatch(UNIT_WORDS[unit], found[2]) for unit in PREFIXED):
+        return found[2], _PREFIXES[found[1]]
+    return text, 1.0
+
+
+def is_known(text: str) -> bool:
+    """Whether a text is a unit of the list."""
+    return any(re.fullmatch(words, text.strip().lower()) for words in UNIT_WORDS.values())
+
+
+def north_of(text: str) -> str:
+    """Return T or M for a text behind an angle that says true or magnetic north; empty for any other one."""
+    found = _NORTH.fullmatch(text.lower())
+    return found[1][0].upper() if found else ""
 
 
 def is_unit(text: str, unit: str) -> bool:
     """Whether a text behind a number says a unit of a mapping."""
     known = {"Nm": "N m", "kNm": "kN m"}.get(unit, unit)
-    return bool(re.fullmatch(UNIT_WORDS.get(known, "(?!)"), text.lower())) or (
-        unit == "deg" and _NORTH.fullmatch(text.lower()) is not None
-    )
+    return bool(re.fullmatch(UNIT_WORDS.get(known, "(?!)"), text.lower())) or (unit == "deg" and north_of(text) != "")
+
+
+def are_one(texts: Iterable[str], unit: str) -> bool:
+    """Whether all texts behind the numbers of a column say the same unit, and not two kinds of north."""
+    return all(is_unit(text, unit) for text in texts) and len({*map(north_of, texts)} - {""}) < 2
 
 
 def is_amount(cell: str) -> bool:

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.errors import DataError, choices
-from shipid.logs.amounts import is_unit, parted
+from shipid.logs.amounts import is_unit, north_of, parted
 from shipid.logs.formats import Format, SheetFormat, TableFormat, TextFormat
 from shipid.logs.mapping import (
     OF_SHIP,
@@ -109,7 +109,7 @@ def numbers_of(
     """Turn a column into numbers, NaN where it is missing; text that is no number raises with its row.
 
     With the letters of its `sides` it is an angle in degrees, which may be written as 59°26'12.3"N, or P12.5. A number
-    may have one of its `units` behind it, and no other one.
+    may have one of its `units` behind it, and no other one; nor true north in some rows and magnetic north in others.
     """
     column = column_of(log, source, file, path)
     if pd.api.types.is_numeric_dtype(column.dtype):
@@ -138,6 +138,15 @@ def numbers_of(
             message = (
                 f"{text.iloc[other[0]]!r} is not in {units[0]}, as the mapping has it (column {source!r}; {len(other)} "
                 "such rows): write one unit in the whole column"
+            )
+            raise DataError(message, file=file, path=row_in_words(log, other[0]))
+        north = behind.where(own, "").map(north_of)
+        if {"T", "M"} <= {*north}:
+            kind = {"T": "true", "M": "magnetic"}[north[north.ne("")].iloc[0]]
+            other = np.flatnonzero(north.isin({"T", "M"} - {kind[0].upper()}))
+            message = (
+                f"{text.iloc[other[0]]!r} is not of {kind} north, as those before it (column {source!r}; {len(other)} "
+                "such rows): write one north in the whole column"
             )
             raise DataError(message, file=file, path=row_in_words(log, other[0]))
         text = bare.where(own, text)

@@ -6,15 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from shipid.data.dataset import Array, clock_slack
 from shipid.errors import DataError
 from shipid.logs.dates import moment_of
 from shipid.logs.mapping import Column, Mapping
-from shipid.physics.signals import is_command, row_of, wraps
+from shipid.logs.repairs import Despike, Records, despike, interpolate_at
+from shipid.physics.signals import is_command, row_of, turns_round, wraps
 
 BLOCK = 200_000  # rows that are projected at once
+JUMP, JUMPY = np.radians(1.0), 20.0  # rad of a meridian; s, for half of which positions may jump: repairs come later
+PARALLEL = np.radians(0.05)  # rad: meridians that differ by less are parallel
 NEAR = 3.0  # usual steps: rows further apart are no neighbours
 TURN, ABOUT = 2 * np.pi, np.pi / 4  # rad: a jump of an angle that counts from 0 again, and how far from it one may be
 
@@ -42,13 +45,15 @@ def unwrapped(rows: pd.DataFrame, mapping: Mapping, file: Path) -> pd.DataFrame:
 
 
 def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: float, file: Path) -> None:
-    """Raise DataError where an angle jumps by a whole turn: the mean of 359 and 1 deg is 180.
+    """Raise DataError where an angle jumps by a whole turn, for the mean of 359 and 1 deg is 180, or cannot wrap.
 
     It does so from row to row, or over a gap of at most `max_gap` [s], which will be interpolated. An order is not
     interpolated, but a gear that follows it would go the whole turn back.
     """
     row = row_of(name)
     ordered = row is not None and row.angle and is_command(name)
+    if column.wrap and ordered and not turns_round(name) and not begins_again(values[np.isfinite(values)], name):
+        raise DataError(f"{column.source!r} {_not_of_turns(values)}", file=file, path=f"columns.{name}")
     if column.wrap or not (wraps(name) or name == "course" or ordered):
         return
     if not np.nanmax(values, initial=-np.inf) - np.nanmin(values, initial=np.inf) > TURN - ABOUT:
@@ -61,7 +66,23 @@ def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: flo
     if len(places):
         count = "once" if len(places) == 1 else f"{len(places)} times, first"
         sentence = f"{column.source!r} jumps by a whole turn, {count} at {moment_of(times[places[0] + 1])}"
-        raise DataError(f"{sentence}: write wrap = true", file=file, path=f"columns.{name}")
+        remedy = "write wrap = true"
+        if ordered and not begins_again(values[known], name):
+            remedy = f"it {_not_of_turns(values)}"
+        elif ordered and not turns_round(name):
+            remedy = "is the unit right? If it counts from 0 to 360 deg, write wrap = true"
+        raise DataError(f"{sentence}: {remedy}", file=file, path=f"columns.{name}")
+
+
+def _not_of_turns(values: Array) -> str:
+    low, high = np.degrees(np.nanmin(values)), np.degrees(np.nanmax(values))
+    return f"goes from {low:.4g} to {high:.4g} deg, as no such angle does that begins again: is the unit right?"
+
+
+def begins_again(values: Array, command: str) -> bool:
+    """Whether angles (N,) [rad] of a command may begin again after a whole turn; a rudder does so about amidships."""
+    near = turns_round(command) or bool(np.all(np.cos(values) > 0.0))
+    return near and bool(np.max(values, initial=-np.inf) - np.min(values, initial=np.inf) < 1.02 * TURN)
 
 
 def is_turn(jumps: Array) -> NDArray[np.bool_]:
@@ -83,8 +104,11 @@ def unwrap_in_place(values: NDArray[np.float64]) -> None:
         values += np.cumsum(corrections, out=corrections)
 
 
-def projected(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.DataFrame, tuple[float, float]]:
-    """North and east [m] in the plane that touches the ellipsoid (WGS 84) at the origin, instead of positions on it."""
+def projected(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records, tuple[float, float]]:
+    """North and east [m] in the plane that touches the ellipsoid (WGS 84) at the origin, instead of positions on it.
+
+    What counts from true north is turned to the north of the plane. Also the record of that, and the origin [deg].
+    """
     from pymap3d import geodetic2ned
 
     latitude, longitude = np.degrees(rows["latitude"].to_numpy()), np.degrees(rows["longitude"].to_numpy())
@@ -100,10 +124,53 @@ def projected(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Data
     else:
         first = known[0] if len(known) else 0
         origin = float(latitude[first]), float(longitude[first])
+    turn = np.empty(len(rows))
     for first in range(0, len(rows), BLOCK):  # of a large log there is no room for all steps of the projection
         part = slice(first, first + BLOCK)
+        turn[part] = convergence(latitude[part], longitude[part], *origin)
         latitude[part], longitude[part], _ = geodetic2ned(latitude[part], longitude[part], 0.0, *origin, 0.0)
-    return rows.drop(columns=["latitude", "longitude"]).assign(north=latitude, east=longitude), origin
+    rows, records = turned_to_plane(rows, turn, mapping.columns)
+    return rows.drop(columns=["latitude", "longitude"]).assign(north=latitude, east=longitude), records, origin
+
+
+def convergence(latitude: ArrayLike, longitude: ArrayLike, latitude_0: float, longitude_0: float) -> Array:
+    """Angle [rad] of true north at positions [deg], clockwise from the north of the plane that touches at the origin.
+
+    gamma = atan2(-sin(lat) sin(d), sin(lat) sin(lat_0) cos(d) + cos(lat) cos(lat_0)), d = lon - lon_0: the horizontal
+    parts of the unit vector to the north there; about -d sin(lat).
+    """
+    lat, lat_0, d = np.radians(latitude), np.radians(latitude_0), np.radians(np.subtract(longitude, longitude_0))
+    ahead = np.sin(lat) * np.sin(lat_0) * np.cos(d) + np.cos(lat) * np.cos(lat_0)
+    return np.asarray(np.arctan2(-np.sin(lat) * np.sin(d), ahead))
+
+
+def turned_to_plane(
+    rows: pd.DataFrame, turn: NDArray[np.float64], columns: dict[str, Column]
+) -> tuple[pd.DataFrame, Records]:
+    """Turn psi, course, true wind and earth-fixed velocities of rows (N,) by the angles `turn` (N,) [rad].
+
+    Also the record of that. Where no angle is above `PARALLEL`, nothing is turned. A position that is missing or jumps
+    has the angle of those about it.
+    """
+    t, known = rows["t"].to_numpy(), np.isfinite(turn)
+    turn[known] = np.unwrap(turn[known])
+    if np.any(np.abs(turn[known]) > PARALLEL):
+        window = max(JUMPY, 2 * float(np.median(np.diff(t))))
+        jumps = Despike(kind="despike", reason="of positions", columns=("turn",), window=window, threshold=JUMP)
+        turn = despike(rows[["t", "flags"]].assign(turn=turn), jumps).rows["turn"].to_numpy()
+        turn = interpolate_at(t, turn, ~np.isfinite(turn))
+    if not np.any(np.abs(turn) > PARALLEL):
+        return rows, []
+    turned = {name: rows[name].to_numpy() + turn for name in ("psi", "course") if name in rows}
+    if "beta_w" in rows and not columns["beta_w"].relative:
+        turned["beta_w"] = rows["beta_w"].to_numpy() + turn
+    if "u" in rows and columns["u"].frame == "earth":
+        ground = (rows["u"].to_numpy() + 1j * rows["v"].to_numpy()) * np.exp(1j * turn)
+        turned |= {"u": ground.real, "v": ground.imag}
+    most = np.degrees(np.max(np.abs(turn)))
+    note = f"by up to {most:.2f} deg, from true north to the north of the plane of the origin"
+    record = {"kind": "turned", "column": ", ".join(turned), "count": len(rows), "note": note}
+    return rows.assign(**turned), [record]
 
 
 def in_body(rows: pd.DataFrame, columns: dict[str, Column]) -> pd.DataFrame:

@@ -37,7 +37,7 @@ from shipid.logs.dates import ZONE_REMEDY, moment_of, other_zone, span_of
 from shipid.logs.formats import TextFormat
 from shipid.logs.frames import check_wraps, in_body, projected, true_wind, unwrapped
 from shipid.logs.instants import instants_of, times_of, without_repeats
-from shipid.logs.mapping import Mapping, Parts, Segment, Source, names_of, read_mapping, sides_of, to_si
+from shipid.logs.mapping import Mapping, Origin, Parts, Segment, Source, names_of, read_mapping, sides_of, to_si
 from shipid.logs.readers import Progress, read_table, require_file
 from shipid.logs.repairs import (
     FLAGS,
@@ -80,9 +80,9 @@ def import_log(
 
     Order: units, resampling of channels, repair of wrapping channels, unwrapping, `despike` and `scale` of speed,
     course, latitude or longitude, `despike` of a heading that turns velocities over ground, position on the Earth to
-    north and east, gaps, speed and course or earth-fixed to body velocities, the other repairs in the order of the
-    mapping, estimation of u, v, r, apparent to true wind, runs, resampling. `metadata["repairs"]` counts every repair,
-    `flags` marks its rows.
+    north and east, and directions to the north of that plane, gaps, speed and course or earth-fixed to body velocities,
+    the other repairs in the order of the mapping, estimation of u, v, r, apparent to true wind, runs, resampling.
+    `metadata["repairs"]` counts every repair, `flags` marks its rows.
 
     Parameters
     ----------
@@ -109,7 +109,13 @@ def import_log(
             path="source.sha256",
         )
     logs = runs_of(mapping.source, source)
-    each = [(run, _imported(mapping, log, table, off)) for run, log, table in _tables(mapping, logs, progress)]
+    each: list[tuple[str, Imported]] = []
+    for run, log, table in _tables(mapping, logs, progress):
+        each.append((run, _imported(mapping, log, table, off)))
+        if mapping.origin is None and (first := each[0][1].origin) is not None:  # that of all runs
+            mapping = mapping.model_copy(
+                update={"origin": Origin.model_construct(latitude=first[0], longitude=first[1])}
+            )
     parts, alone = [part for _, part in each], mapping.source.runs is not None or len(each) > 1
     rows = parts[0].rows
     metadata = {
@@ -271,7 +277,10 @@ def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, .
     rows = unwrapped(rows, mapping, file)
     rows, mended = apply_repairs(rows, early, off, file)
     records += mended
-    rows, origin = projected(rows, mapping, file) if "latitude" in rows else (rows, None)
+    origin = None
+    if "latitude" in rows:
+        rows, turned, origin = projected(rows, mapping, file)
+        records += turned
     rows, gaps = close_gaps(rows, mapping.clock.max_gap, file)
     rows = in_body(rows, mapping.columns)
     others = [

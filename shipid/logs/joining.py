@@ -12,6 +12,7 @@ import pandas as pd
 
 from shipid.data.dataset import DATED, Dataset, units_of
 from shipid.errors import DataError
+from shipid.logs.frames import PARALLEL, convergence
 from shipid.units import percent
 
 FARTHEST = 1e5  # m between origins
@@ -22,8 +23,8 @@ PAUSE = 3600.0  # s put between recordings whose clocks overlap but count from n
 def join(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
     """Return one dataset with all runs, and notes on what was changed.
 
-    Positions have the origin of the first dataset. Columns that not all have are left out; commands must be the same.
-    Names of runs that clash get the name of their file before them.
+    Positions have the origin of the first dataset, and directions the north of its plane. Columns that not all have are
+    left out; commands must be the same. Names of runs that clash get the name of their file before them.
 
     Parameters
     ----------
@@ -45,12 +46,16 @@ def join(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
     flags = list(dict.fromkeys(name for one in datasets.values() for name in one.metadata.get("flags", [])))
     frames = []
     for file, one in datasets.items():
-        north, east = _moved(datasets, file)
+        north, east, turn = _moved(datasets, file)
         frame = one.frame[columns].assign(run=one.frame["run"].map(names[file]), flags=_flags(one, flags))
-        frame = frame.assign(north=frame["north"] + north, east=frame["east"] + east, t=frame["t"] + delays[file])
+        place = (frame["north"] + 1j * frame["east"]).to_numpy() * np.exp(1j * turn)
+        turned = {name: frame[name] + turn for name in ("psi", "beta_w") if name in frame}
+        frame = frame.assign(north=place.real + north, east=place.imag + east, t=frame["t"] + delays[file], **turned)
         frames.append(frame.astype({"run": "str"}))
         if np.hypot(north, east) > 0:
-            notes.append(f"{file.name}: positions moved by {north:.1f} m north, {east:.1f} m east, to the first origin")
+            angle = f", and turned with all directions by {np.degrees(turn):+.2f} deg" if abs(turn) > PARALLEL else ""
+            moved = f"positions moved by {north:.1f} m north, {east:.1f} m east{angle}"
+            notes.append(f"{file.name}: {moved}, to the first origin")
     frame = pd.concat(frames, ignore_index=True)
     return Dataset(frame, _metadata(datasets, names, flags, clock, list(frame.columns))), notes
 
@@ -146,23 +151,24 @@ def _check_apart(file: Path, one: Dataset) -> None:
         raise DataError(f"{sentence}: cut the segments of this mapping apart, and import again", file=file)
 
 
-def _moved(datasets: Mapping[Path, Dataset], file: Path) -> tuple[float, float]:
-    """North and east [m] of the origin of a dataset, seen from that of the first."""
+def _moved(datasets: Mapping[Path, Dataset], file: Path) -> tuple[float, float, float]:
+    """North and east [m] of the origin of a dataset, seen from that of the first, and the angle of its north [rad]."""
     (first, wanted), *_ = datasets.items()
     here, there = (one.metadata.get("origin") for one in (datasets[file], wanted))
     if here == there:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     if not here or not there:
         bare = file if here is None else first
         sentence = "positions have no origin on the Earth, those of the other datasets have"
         raise DataError(f"{sentence}: import all with latitude and longitude, or none", file=bare, path="origin")
     from pymap3d import geodetic2ned
 
-    north, east, _ = geodetic2ned(here["latitude"], here["longitude"], 0.0, there["latitude"], there["longitude"], 0.0)
+    places = here["latitude"], here["longitude"], there["latitude"], there["longitude"]
+    north, east, _ = geodetic2ned(*places[:2], 0.0, *places[2:], 0.0)
     if np.hypot(north, east) > FARTHEST:
         away = f"{np.hypot(north, east) / 1e3:.0f} km from that of {first.name}"
         raise DataError(f"its origin is {away}: a plane holds {FARTHEST / 1e3:.0f} km", file=file, path="origin")
-    return float(north), float(east)
+    return float(north), float(east), float(convergence(*places))
 
 
 def _flags(one: Dataset, flags: list[str]) -> np.ndarray:

@@ -117,7 +117,7 @@ def test_a_search_goes_on_along_a_kink(slope: float, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(fit, "evaluate", kinked)
     unknown = SimpleNamespace(low=np.full(2, -10.0), high=np.full(2, 10.0))
-    end = search(SimpleNamespace(unknown=unknown), np.zeros(2), Point(np.zeros(0), np.zeros(0)))  # type: ignore[arg-type]
+    end = search(SimpleNamespace(unknown=unknown, names=()), np.zeros(2), Point(np.zeros(0), np.zeros(0)))  # type: ignore[arg-type]
     assert end.status == "ok"
     assert end.objective < 1.05
     np.testing.assert_allclose(end.factors, 3, atol=0.7)

@@ -10,7 +10,7 @@ import pytest
 
 from shipid.errors import DataError
 from shipid.files import write_new
-from shipid.logs.amounts import is_unit, parted
+from shipid.logs.amounts import is_unit, parted, without_prefix
 from shipid.logs.guess.columns import Guess, guess
 from shipid.logs.guess.draft import untried
 from shipid.logs.importing import import_log, read_mapping
@@ -69,6 +69,23 @@ def test_several_units_in_a_column_are_refused(tmp_path: Path) -> None:
         import_log(read_mapping(mapping), tmp_path / "log.csv")
 
 
+@pytest.mark.parametrize(("first", "second"), [(" T", " M"), ("°M", "°T"), (" deg true", " mag")])
+def test_true_and_magnetic_north_in_a_column_are_refused(first: str, second: str, tmp_path: Path) -> None:
+    """Both are degrees, but in places 20 deg apart: headings of a half of the log were wrong."""
+    frame = written()
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    _, mapping = drafted(tmp_path / "log.csv")
+    mapping.write_text(mapping.read_text().replace("sha256", "# sha256"))
+    frame["psi"] = BRIDGE["psi"].astype(str) + np.where(BRIDGE.index < 300, first, second)
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=r"no column can be the heading: 'psi' holds .*, and other units: write one"):
+        guess(tmp_path / "log.csv")
+    kind = "magnetic" if "M" in first else "true"
+    said = rf"row 301: .* is not of {kind} north, as .* \(column 'psi'; {len(frame) - 300} such rows\): write one north"
+    with pytest.raises(DataError, match=said):
+        import_log(read_mapping(mapping), tmp_path / "log.csv")
+
+
 @pytest.mark.parametrize(
     ("text", "number", "unit"),
     [
@@ -99,6 +116,22 @@ def test_a_unit_is_that_of_a_mapping_in_any_of_its_words() -> None:
     assert all(is_unit(text, "kNm") for text in ("kNm", "kN m"))
     assert not is_unit("m/s", "kn")
     assert not is_unit("kn", "no unit")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "factor"),
+    [
+        ("krpm", "rpm", 1e3),
+        ("mrad", "rad", 1e-3),
+        ("mrad/s", "rad/s", 1e-3),
+        ("millidegrees", "degrees", 1e-3),
+        ("cdeg", "deg", 0.01),
+        ("ddeg/min", "deg/min", 0.1),
+        *((unit, unit, 1.0) for unit in ("deg", "dpm", "kn", "cm/s", "mm/s", "ms", "mph", "kg", "mV", "dB", "m°", "")),
+    ],
+)
+def test_a_prefix_is_that_of_a_unit_of_an_angle_or_a_shaft(text: str, unit: str, factor: float) -> None:
+    assert without_prefix(text) == (unit, factor)
 
 
 def test_per_cent_may_stand_where_a_factor_says_of_what(tmp_path: Path) -> None:

@@ -1,9 +1,44 @@
-"""Angles that wrap."""
+"""Angles that wrap, and angles from true north far from the origin, where meridians are not parallel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+from pymap3d import geodetic2ned, ned2geodetic
 
-from shipid.logs.frames import unwrap_in_place
+from shipid.data.dataset import Dataset
+from shipid.logs.frames import PARALLEL, convergence, unwrap_in_place
+from shipid.logs.importing import import_log, read_mapping
+from shipid.logs.joining import join
+from tests.logs.conftest import turning
+
+T = np.arange(0.0, 60.0, 0.5)
+SPEEDS = {
+    "body": 'u = { from = "u", unit = "m/s" }\nv = { from = "v", unit = "m/s" }\n',
+    "earth": 'u = { from = "vn", unit = "m/s", frame = "earth" }\nv = { from = "ve", unit = "m/s", frame = "earth" }\n',
+    "ground": 'speed = { from = "sog", unit = "m/s" }\ncourse = { from = "cog", unit = "deg", wrap = true }\n',
+}
+WINDS = {
+    "true": '{ from = "twd", unit = "deg", wrap = true, direction = "from" }',
+    "bow": '{ from = "twa", unit = "deg", wrap = true, direction = "from", relative = "angle" }',
+}
+MAPPING = """
+name = "m"
+[clock]
+from = "t"
+unit = "s"
+max_gap = 3
+[columns]
+latitude = { from = "lat", unit = "deg" }
+longitude = { from = "lon", unit = "deg" }
+psi = { from = "psi", unit = "deg", wrap = true }
+r = { from = "r", unit = "rad/s" }
+V_w = { from = "tws", unit = "m/s" }
+"""
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -18,3 +53,137 @@ def test_angles_are_unwrapped_as_numpy_does(seed: int) -> None:
         expected = np.unwrap(values)
         unwrap_in_place(values)
         np.testing.assert_allclose(values, expected, atol=1e-9)
+
+
+def bearing(way: Any, psi: Any, place: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Latitude and longitude [deg] of points (N,), north + i east [m] in the plane at a place, and true heading [rad].
+
+    The heading is that of psi (N,) [rad]: the direction, in the plane at the point, to another one 10 m ahead.
+    """
+    here, ahead = (ned2geodetic(z.real, z.imag, 0.0, *place, 0.0)[:2] for z in (way, way + 10.0 * np.exp(1j * psi)))
+    north, east, _ = geodetic2ned(*ahead, 0.0, *here, 0.0)
+    return np.asarray(here[0]), np.asarray(here[1]), np.asarray(np.arctan2(east, north))
+
+
+def away(place: tuple[float, float], distance: float, towards: float) -> tuple[float, float]:
+    lat, lon, _ = ned2geodetic(distance * np.cos(towards), distance * np.sin(towards), 0.0, *place, 0.0)
+    return float(lat), float(lon)
+
+
+def recorded(place: tuple[float, float], u: float = 4.0, begin: float = 0.0) -> pd.DataFrame:
+    """A steady turn at a place as a bridge logs it; the wind comes from 50 deg on the bow all the time."""
+    motion = turning(T, u=u)
+    lat, lon, true = bearing((motion["north"] + 1j * motion["east"]).to_numpy(), motion["psi"].to_numpy(), place)
+    ground = u + 1j * motion["v"].to_numpy()
+    velocity = ground * np.exp(1j * true)
+    log = motion.assign(t=T + begin, lat=lat, lon=lon, psi=np.degrees(true) % 360.0, sog=np.abs(ground))
+    log = log.assign(cog=np.degrees(true + np.angle(ground)) % 360.0, vn=velocity.real, ve=velocity.imag)
+    return log.assign(tws=9.0, twd=(log["psi"] + 50.0) % 360.0, twa=50.0).drop(columns=["north", "east", "port.n"])
+
+
+def imported(log: pd.DataFrame, folder: Path, speeds: str = "body", wind: str = "true", more: str = "") -> Dataset:
+    log.to_csv(folder / "log.csv", index=False)
+    (folder / "m.toml").write_text(f"{MAPPING}beta_w = {WINDS[wind]}\n{SPEEDS[speeds]}{more}")
+    return import_log(read_mapping(folder / "m.toml"), folder / "log.csv")
+
+
+def origin(place: tuple[float, float]) -> str:
+    return f"[origin]\nlatitude = {place[0]!r}\nlongitude = {(place[1] + 180.0) % 360.0 - 180.0!r}\n"
+
+
+def told(dataset: Dataset) -> list[str]:
+    return [f"{one['column']}: {one['note']}" for one in dataset.metadata["repairs"] if one["kind"] == "turned"]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_true_north_is_seen_in_the_plane_where_a_step_to_the_north_leads(seed: int) -> None:
+    """Also over the date line and about a pole; a plane is a picture of the Earth but for (distance / radius)^2."""
+    random = np.random.default_rng(seed)
+    latitude = random.choice([random.uniform(0.0, 85.0), 89.99]) * random.choice([-1.0, 1.0])
+    place = float(latitude), float(random.uniform(170.0, 190.0))
+    way = random.uniform(0.0, 1e5, 50) * np.exp(1j * random.uniform(-np.pi, np.pi, 50))
+    lat, lon, true = bearing(way, random.uniform(-np.pi, np.pi, 50), place)
+    ahead = ned2geodetic(10.0 * np.cos(true), 10.0 * np.sin(true), 0.0, lat, lon, 0.0)[:2]
+    steps = [geodetic2ned(*one, 0.0, *place, 0.0) for one in ((lat, lon), ahead)]
+    seen = np.arctan2(steps[1][1] - steps[0][1], steps[1][0] - steps[0][0])
+    lon %= 360.0
+    off = np.angle(np.exp(1j * (seen - true - convergence(lat, lon, *place))))
+    np.testing.assert_allclose(off, 0.0, atol=(1e5 / 6.37e6) ** 2)
+    assert convergence(*place, *place) == 0.0
+
+
+@pytest.mark.parametrize("speeds", SPEEDS)
+@pytest.mark.parametrize("wind", WINDS)
+@pytest.mark.parametrize("seed", range(4))
+def test_far_from_the_origin_a_ship_moves_as_near_it(speeds: str, wind: str, seed: int, tmp_path: Path) -> None:
+    """Its path is that of its velocities along its heading, and the wind is where it was from the bow."""
+    random = np.random.default_rng(seed)
+    place = float(random.choice([-1, 1]) * random.uniform(40, 80)), float(random.uniform(-180, 180))
+    log = recorded(place)
+    far = imported(log, tmp_path, speeds, wind, origin(away(place, random.uniform(5e4, 2e5), np.pi / 2)))
+    rows = far.frame
+    np.testing.assert_allclose(rows[["u", "v"]], [(4.0, -0.5)] * len(rows), atol=1e-6)
+    middle = np.interp(T[:-1] + 0.25, T, rows["psi"])
+    path = np.diff(rows["north"] + 1j * rows["east"]) / 0.5
+    assert abs(np.angle(np.mean(path * np.exp(-1j * middle)) / (4.0 - 0.5j))) < np.radians(0.02)
+    np.testing.assert_allclose(np.exp(1j * (rows["beta_w"] - rows["psi"])), np.exp(1j * np.radians(230.0)), atol=1e-6)
+    (said,) = told(far)
+    columns = ["psi", *["course"] * (speeds == "ground"), *["beta_w"] * (wind == "true")]
+    columns += ["u", "v"] * (speeds == "earth")
+    assert said.startswith(f"{', '.join(columns)}: by up to ")
+    turned = np.radians(float(said.split()[-14]))
+    assert abs(turned) > PARALLEL
+    np.testing.assert_allclose(np.abs(np.angle(np.exp(1j * (rows["psi"] - np.radians(log["psi"]))))), turned, atol=5e-4)
+
+
+def test_near_the_origin_directions_stay_as_they_are_logged(tmp_path: Path) -> None:
+    log = recorded((63.4, 10.4))
+    near = imported(log, tmp_path)
+    np.testing.assert_allclose(near.frame["psi"], np.unwrap(np.radians(log["psi"])), atol=1e-12)
+    assert told(near) == []
+
+
+def test_a_ship_that_passes_the_pole_keeps_her_heading(tmp_path: Path) -> None:
+    """She goes straight on 300 m beside it: the compass turns by 150 deg."""
+    lat, lon, true = bearing(300.0 + 20j * (T - 30.0), np.full(len(T), np.pi / 2), (90.0, 0.0))
+    log = recorded((63.4, 10.4)).assign(lat=lat, lon=lon, psi=np.degrees(true) % 360.0, u=20.0, v=0.0, r=0.0)
+    rows = imported(log, tmp_path).frame
+    ways = np.angle(np.diff(rows["north"] + 1j * rows["east"]))
+    np.testing.assert_allclose(np.angle(np.exp(1j * (rows["psi"][1:] - ways))), 0.0, atol=1e-3)
+    assert np.ptp(np.unwrap(true)) > 2.0
+
+
+def test_a_position_that_jumps_or_is_missing_does_not_turn_the_heading(tmp_path: Path) -> None:
+    log = recorded((63.4, 10.4))
+    log.loc[20:25, ["lat", "lon"]] = 0.0
+    log.loc[60:62, "lat"] = np.nan
+    near = imported(log, tmp_path)
+    np.testing.assert_allclose(near.frame["psi"], np.unwrap(np.radians(log["psi"])), atol=1e-12)
+    assert told(near) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_recordings_joined_are_one_recording(seed: int, tmp_path: Path) -> None:
+    """Two days at places up to 100 km apart, imported alone and joined, or with the origin of the first."""
+    random = np.random.default_rng(seed)
+    place = float(random.choice([-1, 1]) * random.uniform(40, 80)), float(random.uniform(-175, 175))
+    other = away(place, random.uniform(2e4, 9e4), random.uniform(0.5, 2.5))
+    logs = recorded(place), recorded(other, u=5.0, begin=500.0)
+    days = [imported(log, tmp_path) for log in logs]
+    named = [Dataset(day.frame.assign(run=name), day.metadata) for day, name in zip(days, "ab", strict=True)]
+    whole, notes = join({Path(f"{name}.parquet"): day for name, day in zip("ab", named, strict=True)})
+    far = imported(logs[1], tmp_path, more=origin((days[0].metadata["origin"]["latitude"], place[1])))
+    rows = whole.select(["b"]).frame
+    assert "and turned with all directions by" in notes[0]
+    np.testing.assert_allclose(rows["psi"], far.frame["psi"], atol=2e-4)
+    np.testing.assert_allclose(rows["beta_w"] - rows["psi"], far.frame["beta_w"] - far.frame["psi"], atol=1e-9)
+    np.testing.assert_allclose(rows[["north", "east"]], far.frame[["north", "east"]], atol=0.1)
+
+
+def test_runs_whose_clock_begins_again_have_one_origin(tmp_path: Path) -> None:
+    places = (63.4, 10.4), (63.45, 10.6)
+    logs = [recorded(place).assign(test=name) for place, name in zip(places, "ab", strict=True)]
+    whole = imported(pd.concat(logs), tmp_path, more='[parts]\nfrom = "test"\n')
+    north, east, _ = geodetic2ned(*places[1], 0.0, *places[0], 0.0)
+    first = whole.frame.groupby("run")[["north", "east"]].first()
+    np.testing.assert_allclose(first, [(0.0, 0.0), (north, east)], atol=0.01)

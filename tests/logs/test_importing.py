@@ -439,6 +439,31 @@ def test_a_folder_for_a_mapping_of_one_file_says_what_to_write(plain_mapping: Wr
         import_log(read_mapping(plain_mapping()), tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "remedy"),
+    [
+        (358.0, 2.0, r"is the unit right\? If it counts from 0 to 360 deg, write wrap = true"),
+        (-11.0, 349.0, r"is the unit right\? If it counts from 0 to 360 deg, write wrap = true"),
+        (436.0, 96.0, r"it goes from 96 to 436 deg, as no such angle does that begins again: is the unit"),
+        (-349.0, 0.0, r"is the unit right\? If it counts"),
+        (-262.0, 98.0, r"it goes from -262 to 98 deg, as no such angle does that begins again: is the unit"),
+    ],
+)
+def test_a_rudder_that_jumps_is_asked_for_its_unit(
+    first: float, second: float, remedy: str, plain_mapping: Write, tmp_path: Path
+) -> None:
+    """In mrad, read as degrees, it jumps by 349 when it goes hard over; `wrap = true` made it a rudder of 98 deg."""
+    file = as_log(turning(T), tmp_path / "log.csv")
+    pd.read_csv(file).assign(rudder=np.where(T < 20.0, first, second)).to_csv(file, index=False)
+    mapping = plain_mapping('[columns."rudder.delta"]\nfrom = "rudder"\nunit = "deg"\n')
+    with pytest.raises(DataError, match=rf"rudder.delta: 'rudder' jumps by a whole turn, once at 20 s: {remedy}"):
+        import_log(read_mapping(mapping), file)
+    if remedy.startswith("it"):  # nor is it imported as an angle that wraps
+        mapping = plain_mapping('[columns."rudder.delta"]\nfrom = "rudder"\nunit = "deg"\nwrap = true\n')
+        with pytest.raises(DataError, match=f"rudder.delta: 'rudder' {remedy[3:]}"):
+            import_log(read_mapping(mapping), file)
+
+
 def test_a_heading_that_counts_on_or_begins_anew_needs_no_wrap(tmp_path: Path) -> None:
     """Two turns in one run, then from 0 in the next: no jump of one turn within a run."""
     one = turning(T, r=0.11)

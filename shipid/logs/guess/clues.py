@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
-from shipid.logs.amounts import UNIT_WORDS
+from shipid.logs.amounts import UNIT_WORDS, is_known, north_of, without_prefix
 from shipid.logs.guess.evidence import Complex, Windows, effect
 from shipid.logs.guess.words import (
     fits,
     how_much_says,
+    is_note,
     is_order,
     may_be_measured,
     parts_of,
@@ -33,6 +34,7 @@ FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db
 
 PART = 0.4  # of the windows of the guess: about a quarter of a usual turn
 SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which it is taken to turn the ship
+LONGEST_UNIT = 6  # letters of a unit that is not known
 LIKELY = 0.6  # confidence from which a suggestion is not marked as unsure
 OF_POSE = ("latitude", "longitude", "north", "east", "x", "y", "psi")
 NEARLY, STRONG = 0.1, 0.65  # how much worse than its best meaning a name may fit another; a name that says something
@@ -82,8 +84,30 @@ class Question:
 def unit_in_name(name: str, si: str) -> str | None:
     """Return the unit in the name of a column; None if there is none, or none that converts to the SI unit `si`.
 
-    A unit is in brackets, or it is the last part or the last two parts of a name.
+    A unit is in brackets, or it is the last part or the last two parts of a name. It has no prefix: `factor_in_name`.
     """
+    return _unit_and_factor(name, si)[0]
+
+
+def factor_in_name(name: str) -> float:
+    """Return what the prefix of a unit in a name multiplies it by, 1000 of `Engine [krpm]`; 1 where there is none."""
+    return next((factor for si in ("rad", "rad/s", "rev/s") if (factor := _unit_and_factor(name, si)[1]) != 1.0), 1.0)
+
+
+def unknown_unit(name: str) -> str:
+    """Return what a name has in brackets where it looks like a unit and is none known here; empty where it does not.
+
+    A single letter is the name of a channel, but for volts, and a known or a longer word is a note.
+    """
+    for text in map(str.strip, units_in(name)):
+        known = is_known(without_prefix(text)[0]) or north_of(text) or is_note(text)
+        short = len(text) <= LONGEST_UNIT and (text == "V" or len(re.findall(r"[^\W\d_]", text)) > 1)
+        if not known and (short or re.search(r"\w[/^]\w", text)):
+            return text
+    return ""
+
+
+def _unit_and_factor(name: str, si: str) -> tuple[str | None, float]:
     inside = units_in(name)
     bare = re.sub(r"[\[(].*", "", name).strip()
     parts = [part for part in re.split(r"[_ ]|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", bare) if part]
@@ -91,15 +115,16 @@ def unit_in_name(name: str, si: str) -> str | None:
     ends = [] if alone else ["_".join(parts[-2:]), *parts[-1:]]
     if si == "rev/s" and not inside and re.search("rpm|rps", bare.lower()):
         ends.append("rpm" if "rpm" in bare.lower() else "rps")
+        ends = ["krpm"] if re.search("(?<![a-z])krpm", bare.lower()) else ends
     if si in ("N", "N m") and (force := re.search(r"[kK]?N[mM]?$", bare)):  # `thrust_kN` is cut before the N
         ends = [force[0]]
-    for candidate in [*reversed(inside), *ends]:
+    for candidate, factor in map(without_prefix, [*reversed(inside), *ends]):
         for unit, expected in UNIT_WORDS.items():
             if (unit in UNITS[si] or (unit == "%" and si == "rev/s")) and re.fullmatch(
                 expected, candidate.strip().lower()
             ):
-                return unit
-    return None
+                return unit, factor
+    return None, 1.0
 
 
 def unit_of_another(name: str, meaning: str) -> str | None:
@@ -114,8 +139,11 @@ def unit_of_another(name: str, meaning: str) -> str | None:
     said = units_in(name) or ([last] if last in ("kN", "kNm", "Nm", "kW") or shaft_unit(name) else [])
     for word in said:
         text = word.strip().lower()
-        known = any(re.fullmatch(expected, text) for expected in UNIT_WORDS.values())
-        if known or (si != "rev/s" and FOREIGN.fullmatch(text)) or word in ("kN", "Nm", "kNm", "N"):
+        if (
+            is_known(without_prefix(text)[0])
+            or (si != "rev/s" and FOREIGN.fullmatch(text))
+            or word in ("kN", "Nm", "kNm", "N")
+        ):
             return word
     return None
 
@@ -263,6 +291,14 @@ class State:
     def ask(self, about: tuple[str, ...], sentence: str) -> None:
         """Add a question."""
         self.questions.append(Question(about, sentence))
+
+    def ask_for_unit(self, about: str, name: str, unit: str) -> bool:
+        """Ask where a name has a unit that is not known here; return whether it does."""
+        said = "" if name in self.scaled or name in self.units else unknown_unit(name)
+        if said:
+            words = f"{name!r} says {said!r}, no unit that is known here: write `unit` and `factor`"
+            self.ask((about,), f"{words}. {unit} is a guess")
+        return said != ""
 
     def suggest(self, name: str, source: str, unit: str, confidence: float, why: str, **extra: Any) -> None:
         """Suggest column `source` of the log for column `name` of the dataset; it is then taken."""

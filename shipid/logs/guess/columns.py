@@ -181,6 +181,7 @@ def _others(state: State) -> None:
         steep = {name for name in state.called(meaning) if _is_steep(state, name, meaning)}
         for name in [name for name in state.called(meaning) if name not in steep][:1]:
             unit, sign = likely_unit(state, name, meaning), "by its name; the log does not show its sign"
+            state.ask_for_unit(meaning, name, unit)
             state.suggest(meaning, name, unit, 0.5, "by its name" if meaning in further else sign)
     _ask_if_exchanged(state)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import Array
+from shipid.logs.frames import begins_again
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import SEEN, State, unit_in_name
 from shipid.logs.guess.twins import choose_twins, twins
@@ -97,10 +98,10 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
                 extra["sign"] = -1
                 sentence = f"positive {name!r} turns to {sides[0]} ({seen}); here to {sides[1]}"
                 state.find("wrong sign of rudder", (name,), confidence, sentence)
-        share = _ask_for_share(state, name, signal)
+        share = _ask_for_share(state, name, signal, unit)
         if share or (signal == "delta" and name not in turned and _ask_for_side(state, name, r)):
             confidence, why = 0.3, f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
-            why += " of an angle that the log does not say" if share else ", and never negative"
+            why += share or ", and never negative"
             if not share:
                 extra.pop("sign", None)
                 state.findings[:] = [one for one in state.findings if one.columns != (name,)]
@@ -126,25 +127,30 @@ def _ask_if_opposite(state: State) -> None:
             state.ask((port.name, starboard.name), f"{count}: do they count so, or is the sign of one wrong?")
 
 
-def _ask_for_share(state: State, name: str, signal: str) -> bool:
-    """Ask where an angle that steers may be a share of its largest one; return whether its name says that it is."""
+def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
+    """Ask where an angle that steers may be a share of its largest one, or has a unit that is not known.
+
+    unit : a guess. Returned is what its name says of that, in words; empty where it says nothing.
+    """
     top = float(np.abs(state.columns[name]).max())
     said = {part for text in units_in(name) for part in [text.strip().lower()]} | set(parts_of(name)[-1:])
     for words, full in SHARES.items():
         if said & set(words):
             remedy = f"Write factor = (deg at {full:g}) / {full:g}"
             state.ask((signal,), f"{name!r} is in {words[0]}: of which angle? {remedy}")
-            return True
+            return " of an angle that the log does not say"
     if unit_in_name(name, SIGNALS[signal].unit) is not None or not steers(signal):
-        return False
+        return ""
+    if state.ask_for_unit(signal, name, unit):
+        return " in a unit that is not known"
     others = next((one.unit for one in state.suggestions if one.name == "psi"), None)
-    if likely_unit(state, name, signal) == "rad" and (others == "deg" or top == 1.0) and top <= 1.0:
+    if unit == "rad" and (others == "deg" or top == 1.0) and top <= 1.0:
         text = f"{name!r}, up to {top:.4g}, has no unit: rad, deg, or a share (-1 to 1) of the largest angle?"
         state.ask((signal,), f"{text} rad is a guess")
     elif signal == "delta" and top > LARGEST:
         text = f"{name!r}, up to {top:.4g}, has no unit: deg, or per cent or per mille of the largest angle?"
         state.ask((signal,), f"{text} deg is a guess")
-    return False
+    return ""
 
 
 def _ask_for_side(state: State, name: str, r: Array | None) -> bool:
@@ -186,9 +192,10 @@ def _screws(state: State) -> set[str]:
 def _centred(state: State, name: str, signal: str) -> bool:
     """Put an angle that jumps at a whole turn within half a turn of zero; return whether it does."""
     values = state.columns[name]
-    turn = 2 * np.pi / to_si(likely_unit(state, name, signal), f"x.{signal}")
+    size = to_si(likely_unit(state, name, signal), f"x.{signal}")
+    turn = 2 * np.pi / size
     jumps = np.abs(np.diff(values)) > 0.8 * turn
-    if not jumps.any() or np.ptp(values) > 1.02 * turn:
+    if not jumps.any() or not begins_again(size * values, f"x.{signal}"):
         return False
     state.columns[name] = np.asarray((values + turn / 2) % turn - turn / 2)
     return True
@@ -259,6 +266,7 @@ def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
             else:
                 written = unit_in_name(name, SIGNALS[signal].unit)
                 unit, confidence, extra = likely_unit(state, name, signal), 0.9 if written else 0.7, {}
+                confidence = 0.3 if not written and state.ask_for_unit(signal, name, unit) else confidence
                 why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
             state.suggest(_command(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
 
@@ -321,6 +329,8 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
             sentence = f"{name!r}, up to {top:.4g} {written}, is the speed of an engine: is there a gear?"
             state.ask(("n",), f"{sentence} Write factor = 1 / its ratio")
         return written, 0.9, why, {}
+    if state.ask_for_unit("n", name, by_motion):
+        return by_motion, 0.3, f"{why} in a unit that is not known", {}
     if top <= 130.0 and off[by_motion] < NEAR and (by_motion == "rpm" or top > QUICK):
         state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: {by_motion}, or per cent of a shaft speed?")
     if off[by_motion] > NEAR or not np.isfinite(off[by_motion]):

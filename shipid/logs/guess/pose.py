@@ -14,6 +14,8 @@ from pymap3d import geodetic2ned
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
+from shipid.logs.amounts import is_amount
+from shipid.logs.frames import PARALLEL, convergence
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
@@ -102,6 +104,8 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         remedy = "name the columns with --names, or map by hand"
         if name is not None:
             remedy = f"{name!r} holds {state.words[name][:40]!r}, no number: write it as a number with a sign"
+            if is_amount(state.words[name]):
+                remedy = f"{name!r} holds {state.words[name][:40]!r}, and other units: write one unit"
         both = [one for one, text in state.words.items() if re.search(r"\d.*[NS].*\d.*[EWO]|[NS].*\d.*[EWO].*\d", text)]
         if both and not pairs:
             remedy = f"{both[0]!r} holds {state.words[both[0]][:40]!r}: write latitude and longitude in two columns"
@@ -396,11 +400,20 @@ def _unwrapped(values: Array, t: Array) -> Array:
 
 
 def plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
-    """Return a position as north + i east [m], in the plane that touches the Earth at the first one."""
+    """Return a position as north + i east [m], in the plane that touches the Earth at the first one.
+
+    Where the meridians are not parallel to its own, the way from row to row is along them.
+    """
     a, b = state.columns[north], state.columns[east]
-    if on_globe:
-        a, b, _ = geodetic2ned(a, b, 0.0, float(a[0]), float(b[0]), 0.0)
-    return np.asarray(a + 1j * b)
+    if not on_globe:
+        return np.asarray(a + 1j * b)
+    origin = float(a[0]), float(b[0])
+    turn = np.unwrap(convergence(a, b, *origin))
+    a, b, _ = geodetic2ned(a, b, 0.0, origin[0], origin[1], 0.0)
+    place = np.asarray(a + 1j * b)
+    if np.max(np.abs(turn)) <= PARALLEL:
+        return place
+    return np.append(0.0, np.cumsum(np.diff(place) * np.exp(-0.5j * (turn[1:] + turn[:-1]))))
 
 
 def _take(state: State, best: Pose, sure: list[str]) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from pymap3d import geodetic2ned
 
 from shipid.data.dataset import Array
-from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.clues import State, factor_in_name, unit_in_name
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.words import fits, units_in
 from shipid.logs.mapping import UNITS, degrees_of
@@ -23,8 +23,8 @@ TURNS = {400.0: "gon", 3600.0: "tenths of a degree", 36000.0: "hundredths of a d
 """A whole turn in other numbers -> what they are."""
 WRITTEN = {
     400.0: r"gons?|gradians?|neugrad|grades?|centesimal(es|i)?",
-    3600.0: r"ddeg|decidegs?|0[.,]1 ?(deg|°)|1/10 ?(deg|°)|(deg|°) ?[*x] ?10|deg_?e-?1",
-    36000.0: r"cdeg|centidegs?|0[.,]01 ?(deg|°)|1/100 ?(deg|°)|(deg|°) ?[*x] ?100|deg_?e-?2",
+    3600.0: r"0[.,]1 ?(deg|°)|1/10 ?(deg|°)|(deg|°) ?[*x] ?10|deg_?e-?1",
+    36000.0: r"0[.,]01 ?(deg|°)|1/100 ?(deg|°)|(deg|°) ?[*x] ?100|deg_?e-?2",
 }
 """A whole turn -> regular expression of how logs write its unit, in lower case."""
 ANGLES = ("psi", "course", "alpha", "beta_w")
@@ -51,9 +51,13 @@ OFF, BETTER, AGREES = 0.02, 4.0, 0.2  # misfit of a course and a heading, 1 - co
 def take_scales(state: State) -> None:
     """Put into degrees, in place, what is in other numbers; `state.scaled` and `state.unit_of` say so to the draft."""
     for name, values in state.columns.items():
+        if (factor := factor_in_name(name)) != 1.0:
+            _scale(state, name, factor, f"its unit has a prefix: times {factor:g}")
+            continue
         scores = fits(name)
-        if max(scores, key=lambda one: scores[one], default="") in ANGLES:
-            turn = _written(name) or _turn(values)
+        best = max(scores, key=lambda one: scores[one], default="")
+        if best in ANGLES or best in ("delta", "phi", "theta"):
+            turn = _written(name) or (_turn(values) if best in ANGLES else None)
             if turn is not None:
                 _scale(state, name, 360.0 / turn, f"a whole turn is {turn:g}: {TURNS[turn]}")
     _take_positions(state)

@@ -14,7 +14,7 @@ import pandas as pd
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.amounts import UNIT_WORDS, is_amount, is_unit, parted
+from shipid.logs.amounts import UNIT_WORDS, are_one, is_amount, parted
 from shipid.logs.cells import OFF_ONE
 from shipid.logs.formats import LOOKED_AT, SheetFormat, TableFormat, TextFormat
 from shipid.logs.guess.clock import (
@@ -270,7 +270,7 @@ def _without_units(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, tuple[s
             continue
         bare, units = parted(column.fillna("").astype(str).str.strip())
         said = [*units[units.ne("")].value_counts().index]
-        if not any(all(is_unit(one, unit) for one in said) for unit in UNIT_WORDS):
+        if not any(are_one(said, unit) for unit in UNIT_WORDS):
             mixed[name] = " and ".join(map(repr, said[:3]))
             continue
         result.isetitem(place, bare.to_numpy(dtype=object))

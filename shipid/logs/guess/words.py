@@ -352,7 +352,7 @@ WHOLE = dict.fromkeys(
 )
 WHOLE |= dict.fromkeys(("heckstrahler", "heckstrahlruder", "hekschroef", "hekkpropell"), ("stern", "thruster"))
 """Words that are cut into parts of another language."""
-_OF_SHAFT = re.compile(rf"{UNIT_WORDS['rpm']}|rps|rev/s")
+_OF_SHAFT = re.compile(rf"k?({UNIT_WORDS['rpm']})|rps|rev/s")
 """Units of a shaft speed, in lower case, that no other quantity has."""
 _EDGE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])")
 _AFTER = re.compile(r"(?:\s+/\s*|,\s*)([^\s,]{1,9})\s*$")
@@ -421,6 +421,12 @@ def shaft_unit(name: str) -> str:
     """Return the unit of a shaft speed that a name has, set off or as its last word; empty where it has none."""
     said = units_in(name) or re.split(r"[_ ]", name.translate(WIDE).strip())[-1:]
     return next((unit for unit in said if _OF_SHAFT.fullmatch(unit.strip().lower())), "")
+
+
+def is_note(text: str) -> bool:
+    """Whether a text in brackets has a word that says a quantity, a side, a source or an order, and so is no unit."""
+    known = _vocabulary() | MAGNETIC | NOT_MAGNETIC
+    return bool(known & {*parts_of(text)}) or side_of(f"x {text}") is not None
 
 
 def wind_kind(name: str) -> str:

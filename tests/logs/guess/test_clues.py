@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, names_another, si_of, unit_in_name, unit_of_another
+from shipid.logs.guess.clues import (
+    State,
+    factor_in_name,
+    names_another,
+    si_of,
+    unit_in_name,
+    unit_of_another,
+    unknown_unit,
+)
 
 
 @pytest.mark.parametrize(
@@ -31,10 +39,38 @@ from shipid.logs.guess.clues import State, names_another, si_of, unit_in_name, u
         ("主机转速(转/分)", "rev/s", "rpm"),
         ("sog [kn]", "rad", None),
         ("deg", "rad", None),
+        ("Rudder [mrad]", "rad", "rad"),
+        ("Engine [krpm]", "rev/s", "rpm"),
     ],
 )
 def test_a_unit_is_read_only_where_the_column_can_have_it(name: str, si: str, unit: str | None) -> None:
     assert unit_in_name(name, si) == unit
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [
+        *(("Engine [krpm]", 1e3), ("kRPM", 1e3), ("shaft_krpm", 1e3), ("Rudder [mrad]", 1e-3), ("r_mdeg/s", 1e-3)),
+        *(("rpm", 1.0), ("Tank RPM", 1.0), ("TankRPM", 1.0), ("Rudder [deg]", 1.0), ("Depth [cm]", 1.0), ("sog", 1.0)),
+    ],
+)
+def test_the_prefix_of_a_unit_is_a_factor(name: str, factor: float) -> None:
+    assert factor_in_name(name) == factor
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        *(("Rudder [mV]", "mV"), ("Rudder [V]", "V"), ("Shaft [counts]", "counts")),
+        *(
+            (f"Rudder {note}", "")
+            for note in ("[deg]", "[mrad]", "[-]", "(stbd)", "(P)", "(order)", "(feedback)", "(2)")
+        ),
+        *((f"Heading {note}", "") for note in ("[deg M]", "(deg T)", "(mag)", "(gyro)", "")),
+    ],
+)
+def test_a_unit_that_is_not_known_is_told_from_a_note(name: str, unit: str) -> None:
+    assert unknown_unit(name) == unit
 
 
 @pytest.fixture
@@ -92,6 +128,8 @@ def test_findings_are_kept_in_order(state: State) -> None:
         ("Ruder Bb U/min", "delta", "U/min"),
         ("Azimut Bb min-1", "alpha", "min-1"),
         ("Wendegeschw. 1/s", "r", None),
+        ("Drive [krpm]", "delta", "krpm"),
+        ("Drive [mrad]", "n", "mrad"),
         ("speed", "speed", None),
     ],
 )

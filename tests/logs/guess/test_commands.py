@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.logs.guess.clues import State
+from shipid.logs.guess.clues import LIKELY, State
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from tests.logs.simulated import si_log, state_with_pose
 
@@ -249,3 +249,24 @@ def test_a_rudder_that_is_no_angle_is_asked_for_its_largest_angle(name: str, fac
 def test_a_rudder_in_degrees_is_not_doubted(name: str) -> None:
     state = chosen({name: RUDDER})
     assert not any("angle" in question.sentence for question in state.questions)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "column"),
+    [("Rudder [mV]", 100.0 * RUDDER, "rudder.delta"), ("Shaft [counts]", 100.0 * N, "propeller.n")],
+)
+def test_a_unit_that_is_not_known_is_asked(name: str, values: np.ndarray, column: str) -> None:
+    state = chosen({name: values})
+    (found,) = (one for one in state.suggestions if one.name == column)
+    assert found.confidence < LIKELY
+    assert [one.sentence.partition(":")[0] for one in state.questions if name in one.sentence] == [
+        f"{name!r} says {name.partition('[')[2][:-1]!r}, no unit that is known here"
+    ]
+
+
+@pytest.mark.parametrize(("unsigned", "wraps"), [(RUDDER % 360.0, True), (2.0 * np.abs(RUDDER) * 180.0 / 50.0, False)])
+def test_a_rudder_that_goes_far_from_amidships_does_not_wrap(unsigned: np.ndarray, wraps: bool) -> None:
+    steps = np.where(np.arange(len(T)) > len(T) // 2, unsigned, 0.0)
+    steps[-1] = 359.0
+    extra = next(one.extra for one in chosen({"rudder": steps}).suggestions if one.name == "rudder.delta")
+    assert extra.get("wrap", False) == wraps

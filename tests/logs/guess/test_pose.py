@@ -38,6 +38,16 @@ def assert_motion(state: State) -> None:
     np.testing.assert_allclose(state.position - state.position[0], NORTH + 1j * EAST - NORTH[0] - 1j * EAST[0])
 
 
+@pytest.mark.parametrize("latitude", [63.4, -63.4])
+def test_far_from_the_first_place_the_way_is_along_the_meridians_there(latitude: float) -> None:
+    """Manoeuvres 200 km away seemed turned by 3.6 deg, and an offset of the heading was drafted for that."""
+    lat, lon = ned2geodetic(NORTH, EAST, 0.0, latitude, 14.4, 0.0)[:2]
+    first = np.arange(len(T)) < 20
+    columns = {"lat": np.where(first, latitude, lat), "lon": np.where(first, 10.4, lon)}
+    way = np.diff(plane(state_of(columns, T), "lat", "lon", on_globe=True))[20:]
+    np.testing.assert_allclose(way, np.diff(NORTH + 1j * EAST)[20:], rtol=2e-3)
+
+
 def test_named_columns_in_degrees_or_radians() -> None:
     for values in (DEG, PSI):
         state = chosen({"N": NORTH, "E": EAST, "heading": values})

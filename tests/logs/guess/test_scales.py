@@ -90,6 +90,29 @@ def test_a_unit_in_the_name_decides_where_a_heading_never_jumps(tmp_path: Path) 
     assert turned(dataset).max() < np.radians(0.3)
 
 
+@pytest.mark.parametrize(
+    ("column", "name", "size"),
+    [
+        ("rpm", "Engine [krpm]", 1e-3),
+        ("rpm", "Shaft speed [krpm]", 1e-3),
+        ("rudder", "Rudder [mrad]", 1e3 * np.pi / 180.0),
+        ("rudder", "rudder_cdeg", 1e2),
+        ("rudder", "Rudder [0.1 deg]", 10.0),
+        ("r", "ROT [mrad/s]", 1e3 * np.pi / 180.0),
+        ("psi", "Heading [mrad]", 1e3 * np.pi / 180.0),
+    ],
+)
+def test_a_prefix_of_a_unit_is_read(column: str, name: str, size: float, tmp_path: Path) -> None:
+    """A shaft in krpm was read as rev/s, and a rudder in mrad as degrees, both without a question."""
+    (tmp_path / "plain").mkdir()
+    plain = drafted(BRIDGE, tmp_path / "plain")[1].frame
+    frame = BRIDGE.assign(**{column: (BRIDGE[column] * size).round(5)}).rename(columns={column: name})
+    proposal, dataset = drafted(frame, tmp_path)
+    assert name not in asked(proposal)
+    for one in plain.columns.drop(["run", "flags"]):
+        np.testing.assert_allclose(dataset.frame[one], plain[one], atol=2e-4, err_msg=one)
+
+
 @pytest.mark.parametrize(("turn", "first"), [(400.0, 260.0), (36000.0, 120.0), (3600.0, 200.0), (6400.0, 250.0)])
 def test_a_heading_that_never_jumps_is_read_as_it_keeps_to_the_track(turn: float, first: float, tmp_path: Path) -> None:
     frame = turned_round(first).drop(columns="psi")
