@@ -18,10 +18,7 @@ from shipid.logs.repairs import FLAGS, Records, interpolate_at
 from shipid.physics.signals import is_command
 
 Channel = tuple[NDArray[np.float64], NDArray[np.float64]]  # instants [s] and values, (N,) each
-MANY, FAR_MORE = (
-    10_000_000,
-    100,
-)  # instants, and those for each row of a log: beyond both its clock or its step is wrong
+MANY, FAR_MORE = 10_000_000, 100  # instants, and those for each row: beyond both the clock or the step is wrong
 
 
 def common_instants(

@@ -9,6 +9,7 @@ import re
 from array import array
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from datetime import datetime
 from itertools import islice
 from pathlib import Path
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.dates import DAY, HALF_DAY, NEXT_DAY, WEEKS
+from shipid.logs.dates import COMPACT, DAY, HALF_DAY, NEXT_DAY, WEEKS
 from shipid.logs.foreign import refuse_foreign
 from shipid.logs.formats import LOOKED_AT, NmeaFormat
 from shipid.logs.sentences import NMEA_COLUMNS, SENTENCES, TIMES, has_checksum, parsed
@@ -249,7 +250,8 @@ class _Clock:
 def _stamp(text: str) -> float:
     """Time before a sentence: a number, a date as seconds since 1970, or the time of an NMEA 4.10 TAG block.
 
-    Dates are year-month-day, or day.month.year with dots. ValueError where it is none, or a date that may be two days.
+    Dates are year-month-day, also in one number with the time of day, or day.month.year with dots. ValueError where it
+    is none, or a date that may be two days.
     """
     words = text.strip().rstrip(",;")
     if words.startswith("\\"):
@@ -257,10 +259,11 @@ def _stamp(text: str) -> float:
         if tag is None:
             raise ValueError("no time in the TAG block before the sentence")
         return float(tag[1]) / (1000.0 if len(tag[1]) > 11 else 1.0)  # some write milliseconds
-    try:
-        return float(words)
-    except ValueError:
-        pass
+    if compact := re.match(COMPACT, words):  # 20240514080000 is a number, too
+        with suppress(ValueError):
+            return pd.Timestamp(f"{compact[1]}T{compact[2]}.{compact[3] or 0}Z").timestamp()
+    with suppress(ValueError):
+        return float(words.replace("_", "?"))  # Python would pass over it
     shown = repr(words[:30])
     if _DOTTED.match(words):
         words = _DOTTED.sub(r"\3-\2-\1", words)

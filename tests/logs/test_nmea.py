@@ -233,6 +233,8 @@ def test_nmea(time: str, midnight: float, tmp_path: Path) -> None:
         lambda moment: f"{moment:%d.%m.%Y %H:%M:%S.%f},",
         lambda moment: f"{moment:%Y-%m-%dT%H:%M:%S.%f}Z ",
         lambda moment: f"{moment:%Y%m%dT%H%M%S.%f} ",
+        lambda moment: f"{moment:%Y%m%d%H%M%S.%f},",  # a number, too: minutes were of 100 s
+        lambda moment: f"{moment:%Y%m%d_%H%M%S.%f} ",
         lambda moment: f"{moment:%Y/%m/%d %H:%M:%S.%f},",
         lambda moment: f"\\g:1-1-1234,s:r3669961,c:{round(1000 * moment.timestamp())}*5F\\",
     ],

@@ -28,7 +28,7 @@ PILE, ABOVE, RETURNS = 0.03, 4.0, 3  # of the rows, at a limit; times as many as
 HELD_SHARE, STAY = 0.2, 3.0  # of the rows; times the usual repeats in a row, from which on the ship rests
 TOGETHER = 0.5  # share of the steps of a held position that both of its columns make, at least
 VISITS = 6  # to its largest value, before a signal counts as clipped
-LEVELS = 20  # values of a shaft that is held at what was ordered, the largest among them
+ORDERED = 20  # values of a shaft that is held at what was ordered, the largest among them
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 CLEAR = 0.008  # rad: standard error of a heading that is off, at most
 ONE_WAY = 0.9  # length of the mean of all directions, at most, of a ship on many courses
@@ -86,7 +86,7 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
         values = state.columns[column.source]
         if is_shaft(column.name):
             top = float(np.mean(values == values.max()))
-            ordered = len(np.unique(values)) <= LEVELS
+            ordered = len(np.unique(values)) <= ORDERED
             if 0.05 < top < 0.9 and evidence.visits(values) >= VISITS and not ordered:
                 rows = f"{100 * top:.0f} % of the rows of {column.source!r}"
                 sentence = f"{rows} have exactly the largest value, {values.max():g}"

@@ -13,6 +13,7 @@ from pymap3d import ned2geodetic
 
 from shipid.logs.guess import sniff
 from shipid.logs.guess.columns import Guess, guess
+from shipid.logs.guess.defects import LEVELS, _piles_up
 from shipid.logs.guess.draft import draft_mapping, untried
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.simulated import as_bridge, si_log
@@ -291,3 +292,13 @@ def test_positions_of_0_north_0_east_are_no_fix(rows: slice, tmp_path: Path) -> 
     for name in ("north", "east"):
         off = dataset[name].to_numpy() - log[name].to_numpy()[kept]
         assert np.ptp(off) < 1.0, "centimetres of rounding, and a plane that touches the Earth elsewhere"
+
+
+@pytest.mark.parametrize("count", [LEVELS - 6, LEVELS + 6])
+def test_a_signal_of_few_levels_is_not_clipped(count: int) -> None:
+    """A speed logged to 0.1 m/s rests at its largest value; the fewest levels were those of a shaft, by one name."""
+    rng = np.random.default_rng(0)
+    rise = [np.round(np.linspace(3.0, 3.0 + 0.1 * (count - 2), 6 * count) + rng.normal(0, 0.02, 6 * count), 1)] * 8
+    values = np.concatenate([np.concatenate([part, np.full(5 * count, part.max() + 0.1)]) for part in rise])
+    assert abs(len(np.unique(values)) - count) <= 2
+    assert _piles_up(values, float(values.max())) == (count > LEVELS)
