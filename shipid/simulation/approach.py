@@ -17,7 +17,7 @@ from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import Unit, course_keeping
 from shipid.physics.signals import ACTUAL, is_shaft, neutral, steers
-from shipid.units import GRAVITY
+from shipid.units import GRAVITY, listed
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
 
@@ -32,13 +32,11 @@ PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose spe
 SETTLED = 1e-3  # m/s, rad/s: greatest change of a velocity over the last chunk, and greatest yaw rate
 SLOW = 0.02  # s: the same in U^2 / L, for a large and slow ship: her speed is then right to about 1 %
 STRAIGHT = 0.02  # rad in a ship length: a large and slow ship that turns less goes straight
-CREEPING, AT_REST = (
-    0.02,
-    1e-4,
-)  # Froude numbers: a ship below the second, or astern, is taken for one of the first
+CREEPING, AT_REST = 0.02, 1e-4  # Froude numbers: a ship below the second, or astern, is taken for one of the first
 KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
 LENGTH, FASTEST = 100.0, 100.0  # m, of a ship whose document does not say; m/s
 REMEDY = 'let a helmsman hold the course (approach = "helmsman"), or start from rest (approach = "rest")'
+SWINGING = {"w", "p", "q"}  # velocities that nothing but damping ends
 WORST_CONDITION = 1e5  # of the thrusts that the accelerations ask for
 
 
@@ -294,8 +292,9 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
                 f"take a smaller step than {step:g} s"
             )
         velocities = model.state[model.num_dof :]
-        changed = np.max([np.abs(path[name][-1, 0] - state[name][moving]) for name in velocities], axis=0)
-        unsettled = changed >= settled[moving]
+        changes = {name: np.abs(path[name][-1, 0] - state[name][moving]) for name in velocities}
+        unsettled = np.max(list(changes.values()), axis=0) >= settled[moving]
+        restless = [name for name, change in changes.items() if (change >= settled[moving]).any()]
         if held:  # on course, too: a slow integral part changes the velocities little
             unsettled |= np.abs(path["psi"][-1, 0]) >= SETTLED
         for name in names:
@@ -312,10 +311,11 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
             kept = {name: values for name, values in memory.items() if not name.startswith(f"{HELM}.")}
             return Approach(state | {name: np.zeros(count) for name in anew}, kept, helm)
     remedy = 'start from rest (approach = "rest")' if held else REMEDY
-    raise NotStraight(
-        f"{vessel.name} is not steady after {longest:.0f} s straight ahead at {_rpm(n[moving], moving >= 0)} rpm: "
-        f"{remedy}"
-    )
+    if restless and set(restless) <= SWINGING:
+        remedy = f"its hull damps {listed(restless)} too little (Z_w, K_p and M_q do so), or {remedy}"
+    still = f", {listed(restless)} still {'changes' if len(restless) == 1 else 'change'}" if restless else ""
+    ahead = f"straight ahead at {_rpm(n[moving], moving >= 0)} rpm{still}"
+    raise NotStraight(f"{vessel.name} is not steady after {longest:.0f} s {ahead}: {remedy}")
 
 
 def _course(controls: Controls, n: Array) -> dict[str, Array]:

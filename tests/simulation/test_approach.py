@@ -132,14 +132,19 @@ def test_hidden_states_and_actuators_are_steady_too() -> None:
     assert state["w"][0] == pytest.approx(state["u"][0] * np.tan(state["theta"][0]), abs=1e-3)  # trimmed, not heaving
 
 
-def test_an_approach_that_never_settles_or_diverges_is_reported() -> None:
+def test_an_approach_that_never_settles_or_diverges_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     gains = Controls.of(SHIP.with_values({"hull.derivatives.X_u|u|": 1e5}))
     with pytest.raises(ShipidError, match=r"at 145 rpm diverges: take a smaller step"):
         steady(gains, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
     ponderous = Controls.of(
         SHIP.with_values({"added_mass.X_udot": -1e9, "hull.derivatives.X_u|u|": -2.1, "unusual": ["added_mass.X_udot"]})
     )
-    with pytest.raises(ShipidError, match=r"not steady after 3600 s straight ahead at 145 rpm: let a helmsman"):
+    with pytest.raises(ShipidError, match=r"after 3600 s straight ahead at 145 rpm, u still changes: let a helmsman"):
+        steady(ponderous, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
+    monkeypatch.setattr("shipid.simulation.approach.SWINGING", {"u", "w"})  # as where heave alone swings on
+    with pytest.raises(
+        NotStraight, match=r"still changes: its hull damps u too little \(Z_w, K_p and M_q do so\), or let"
+    ):
         steady(ponderous, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
 
 
