@@ -66,6 +66,14 @@ def reference() -> tuple[Path, dict[str, bytes], int]:
     return folder / "run", stored(folder / "run"), count[0]
 
 
+@cache
+def donor() -> Path:
+    """A finished run of another world, whose files have the names of those of the reference."""
+    place = reference()[0].parent
+    run_here(tiny_plan(place, {"truth.seed": 7}), place / "donor")
+    return place / "donor"
+
+
 @contextmanager
 def intercepted(instead: Callable[..., Any]) -> Iterator[None]:
     """Give every call of `CALLS` to `instead`: (name, call, arguments, named arguments) -> result."""
@@ -85,8 +93,10 @@ def intercepted(instead: Callable[..., Any]) -> Iterator[None]:
 
 def stored(folder: Path) -> dict[str, bytes]:
     """What a run has computed: bytes of the predictors, and the rows without the seconds they took."""
-    files = {f"cells/{file.name}": file.read_bytes() for file in (folder / "cells").glob("*.npz")}
+    files = {f"cells/{file.name}": file.read_bytes() for file in (folder / "cells").glob("*.npz") if not _is_copy(file)}
     for file in (folder / "batches").glob("*.json"):
+        if _is_copy(file):
+            continue
         rows = json.loads(file.read_text())
         for row in rows:
             row.pop("seconds")
@@ -94,6 +104,11 @@ def stored(folder: Path) -> dict[str, bytes]:
         files[f"batches/{file.name}"] = json.dumps(rows).encode()
     files["study.toml"] = (folder / "study.toml").read_bytes()
     return files
+
+
+def _is_copy(file: Path) -> bool:
+    """Whether a file is one that a program made which synchronises folders."""
+    return " (1)" in file.name
 
 
 def child(work: Callable[[], Any], limit: float = 60.0) -> int:
@@ -301,12 +316,15 @@ def _damage(folder: Path, rng: random.Random) -> str:
     files = sorted(file for file in folder.rglob("*") if file.is_file() and file.parent.name != claims.FOLDER)
     file = rng.choice(files)
     name = f"{file.relative_to(folder)}"
-    kind = rng.choice(
-        ["gone", "empty", "half", "byte", "swapped", "rubbish", "folder", "link", "grown", "edited", "edited"]
-    )
+    kinds = ["gone", "empty", "half", "byte", "swapped", "rubbish", "folder", "link", "grown", "edited", "edited"]
+    kind = rng.choice([*kinds, "foreign", "foreign", "copied"])
     content = file.read_bytes()
     if kind == "gone":
         file.unlink()
+    elif kind == "foreign":
+        _take_over(folder, name, rng)
+    elif kind == "copied":
+        shutil.copyfile(file, file.with_name(f"{file.stem} (1){file.suffix}"))
     elif kind in ("empty", "half", "rubbish", "grown"):
         changed = {"empty": b"", "half": content[: len(content) // 2], "rubbish": rng.randbytes(300)}
         file.write_bytes(changed.get(kind, content + b"\0" * 9))
@@ -328,6 +346,20 @@ def _damage(folder: Path, rng: random.Random) -> str:
         with suppress(ValueError, OSError, EOFError, zipfile.BadZipFile):  # an earlier damage made it unreadable
             _edit(file, rng)
     return f"{name} {kind}"
+
+
+def _take_over(folder: Path, name: str, rng: random.Random) -> None:
+    """Put a file of another world in the place of one, alone or with all that its seal names, as in a merged folder."""
+    names = {name}
+    if rng.random() < 0.7:
+        for seal in (donor() / seals.FOLDER).iterdir():
+            group = {line.split("  ")[1] for line in seal.read_text().splitlines() if not line.startswith("#")}
+            names |= (
+                {f"{seals.FOLDER}/{seal.name}", *group} if name in {*group, f"{seals.FOLDER}/{seal.name}"} else set()
+            )
+    for one in names:
+        if (donor() / one).is_file() and (folder / one).parent.is_dir() and not (folder / one).is_dir():
+            shutil.copyfile(donor() / one, folder / one, follow_symlinks=False)
 
 
 def _edit(file: Path, rng: random.Random) -> None:
