@@ -116,8 +116,10 @@ def search(
         word = run.to_the_end(tolerance, most)
         best = run.best
         for _ in range(VALLEYS if set(CURRENT) <= set(problem.names) else 0):
+            if word != "ok":
+                break
             there = evaluate(problem, best.factors, deepest(problem, best.factors, best.point))
-            if word != "ok" or there.objective >= best.objective * (1 - FALL):
+            if there.objective >= best.objective * (1 - FALL):
                 break
             watch.iterations += 1
             again = _Search(problem, there, free, watch)
