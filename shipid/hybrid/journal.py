@@ -4,7 +4,7 @@ There is one Optuna study for each cell. A process that works on a unit is alone
 looks whether it still is, and of trials that two have written all the same each number counts once. `merge` makes one
 file of those of a run. A trial is written when it has ended, in one line: a search has no trial that is half done, and
 the order of the lines is the order of the trials. A last line that a killed process left behind half written, or that
-is damaged, is cut off by the next one that writes. Each trial carries a checksum.
+is damaged, is cut off by the next one that writes. Each trial carries a checksum and the digest of its study.
 """
 
 from __future__ import annotations

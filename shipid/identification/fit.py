@@ -110,15 +110,16 @@ def search(
     with uninterrupted() as held, np.errstate(all="ignore"):
         begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
         watch = _Watch(progress, held, before)
-        run = _Search(problem, evaluate(problem, begin, deepest(problem, begin, point)), free, watch)
+        run = _Search(problem, evaluate(problem, begin, deepest(problem, begin, point) or point), free, watch)
         if not np.isfinite(run.start.objective):
             return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
         word = run.to_the_end(tolerance, most)
         best = run.best
-        for _ in range(VALLEYS if set(CURRENT) <= set(problem.names) else 0):
-            if word != "ok":
+        for _ in range(VALLEYS):
+            deeper = deepest(problem, best.factors, best.point) if word == "ok" else None
+            if deeper is None:
                 break
-            there = evaluate(problem, best.factors, deepest(problem, best.factors, best.point))
+            there = evaluate(problem, best.factors, deeper)
             if there.objective >= best.objective * (1 - FALL):
                 break
             watch.iterations += 1
@@ -128,13 +129,14 @@ def search(
     return Result(best.factors, best.at, best.objective, watch.iterations, word)
 
 
-def deepest(problem: Problem, factors: Array, point: Point) -> Point:
+def deepest(problem: Problem, factors: Array, point: Point) -> Point | None:
     """Unknowns of the runs in the deepest valley of several: each run may have one for each guess of its current.
 
     Each run is begun from its unknowns as they are, from the median current of all runs, and from currents around 0.
+    None where currents are no unknowns.
     """
     if not set(CURRENT) <= set(problem.names):
-        return point
+        return None
     places = [problem.names.index(name) for name in CURRENT]
     angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     guesses = [FAR * np.array([np.cos(angle), np.sin(angle)]) for angle in angles]

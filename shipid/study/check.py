@@ -42,12 +42,12 @@ def check_folder(folder: Path) -> Checked:
         every = [fault for _, found in faults for fault in found]
         counted = f"{len(every)} {plural(len(every), 'fault')}; how far the run is cannot be said: {error}"
         return Checked([*(line for lines, _ in faults for line in lines), counted], every)
-    names = [name for name in plan.parts if store.part_folder(folder, name).is_dir()]
-    checked = [_checked(store.check_part(folder, name, (p := plan.parts[name].plan)), p, name) for name in names]
+    parts = {name: part.plan for name, part in plan.parts.items() if store.part_folder(folder, name).is_dir()}
+    checked = [_checked(store.check_part(folder, name, part), part, name) for name, part in parts.items()]
     checked.append(_checked(folder, plan))
     lines = [line for one in checked for line in one.lines]
     if plan.parts:
-        lines += [f"{name}: not begun" for name in plan.parts if name not in names]
+        lines += [f"{name}: not begun" for name in plan.parts if name not in parts]
     return Checked(lines, [fault for one in checked for fault in one.faults])
 
 

@@ -88,7 +88,7 @@ def faults(folder: Path, among: str = "") -> list[Fault]:
 
 
 def check(folder: Path, among: str = "") -> None:
-    """Raise ResultError for the first sealed file that is not as it was written; nothing is mended."""
+    """Raise ResultError for the first of the `faults` of a folder; nothing is mended."""
     for fault in faults(folder, among):
         raise wrong(folder, fault)
 
