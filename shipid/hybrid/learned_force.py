@@ -224,7 +224,8 @@ class _Trainer:
     ) -> None:
         self.physics = physics.with_values({BLOCK: plain(block)})
         assert self.physics.vessel is not None
-        sound = np.flatnonzero(~self.physics.variant_paths(instants)[1][0])
+        lost = self.physics.variant_paths(instants)[1][0]
+        sound = np.flatnonzero(~lost | lost.all())  # where all are lost, no force makes the error finite
         self.instants, self.future = instants.select(sound), future[:, sound]
         self.first, self.iterations = dict(block), iterations
         self.names = [f"{BLOCK}.{key}.{unit}" for key in (*HIDDEN, *OUTPUT) for unit in range(len(block["w_0"]))]

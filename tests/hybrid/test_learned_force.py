@@ -152,6 +152,10 @@ def test_windows_that_the_physics_cannot_follow_do_not_train(windows: Windows) -
     trainer = _Trainer(WRONG, block(weight=0.0), broken, windows.future, 5)
     assert len(trainer.instants) == len(every) - 1
     np.testing.assert_array_equal(trainer.future, windows.future[:, every != 4])
+    none = replace(instants, columns={**instants.columns, "u": np.full(len(every), 1e9)})
+    hopeless = _Trainer(WRONG, block(weight=0.0), none, windows.future, 5)
+    np.testing.assert_array_equal(hopeless.solve(0.1, None)[0], hopeless.start)
+    assert not np.isfinite(hopeless.error(hopeless.start, none, windows.future))
     alone = _Trainer(WRONG, block(weight=0.0), instants.select(every[every != 4]), windows.future[:, every != 4], 5)
     np.testing.assert_array_equal(trainer.solve(0.1, None)[0], alone.solve(0.1, None)[0])
 
