@@ -134,7 +134,6 @@ def intervals_frame(results: Results) -> pd.DataFrame:
     Columns: model, N_D, low, high [m]; not numbers with fewer than five test manoeuvres. H is the mean over seeds; what
     another training would give is in the interval of every model that learns.
     """
-    learning = {way.name for way in results.plan.methods if way.method.compensates}
     _, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
     cells = results.cells[results.cells["cell"].map(results.paths.__contains__)]
     parts, weights, true = [], counts / counts.sum(), results.test.future
@@ -146,8 +145,8 @@ def intervals_frame(results: Results) -> pd.DataFrame:
             for model, same in mine.groupby("model", sort=False)
         }
         means = np.stack([each.mean(axis=0) for each in errors.values()])
-        learns = (mine["method"].isin(learning) | mine["family"].isin(results.plan.fitted)).groupby(mine["model"]).any()
-        trained = np.array([bool(learns[model]) for model in errors])
+        of_model = {row.model: results.plan.learns(str(row.family), str(row.method)) for row in mine.itertuples()}
+        trained = np.array([of_model[model] for model in errors])
         noise = training_noise([each @ weights for each, moved in zip(errors.values(), trained, strict=True) if moved])
         seeds = np.array([len(each) for each in errors.values()])
         judged = mean_errors(means, counts.astype(float), trained * noise * (means @ weights) / np.sqrt(seeds))

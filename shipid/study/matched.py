@@ -179,8 +179,8 @@ def _cells(results: Results) -> pd.DataFrame:
     good = results.cells[results.cells["status"] == "ok"].reindex(
         columns=["cell", "foundation", *KEYS, "H", "coverage"]
     )
-    learning = {way.name for way in results.plan.methods if way.method.compensates}
-    good = good.assign(seed=good["seed"] - WORLDS * results.plan.seed, trained=good["method"].isin(learning))
+    trained = list(map(results.plan.learns, good["family"], good["method"]))
+    good = good.assign(seed=good["seed"] - WORLDS * results.plan.seed, trained=trained)
     every = results.cells.drop_duplicates("foundation")
     known = every["foundation"].isin([name for name, path in results.physics.items() if np.isfinite(path).all()])
     alone = every[known & (every["family"] != NO_MODEL)].reindex(columns=good.columns)

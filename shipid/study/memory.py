@@ -128,10 +128,13 @@ def memory_frame(results: Results) -> pd.DataFrame:
     rows, differences, training = list[dict[str, Any]](), list[Array](), list[float]()
     runs, place = np.unique(results.test.run, return_inverse=True)
     counts = np.bincount(place).astype(float)
-    learns = {way.name for way in results.plan.methods if way.method.compensates}
+    family = {one.name: one.family for one in results.plan.foundations}
     for pair, N_D, first, second in _errors(results):
         before, after, seeds = first.mean(axis=0), second.mean(axis=0), len(first)
-        apart = [training_error([one.mean(axis=1)]) for one in (first, second)] if pair.without[1] in learns else [0.0]
+        learns = [results.plan.learns(family[name], method) for name, method in (pair.without, pair.remembering)]
+        apart = (
+            training_error([one.mean(axis=1)]) for one, moved in zip((first, second), learns, strict=True) if moved
+        )
         training.append(math.hypot(*apart))
         sums = np.bincount(place, after - before)
         differences.append(sums / counts)

@@ -49,11 +49,10 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
     """A row per cell, as `compared` takes it.
 
     Columns: condition, world, foundation, family, method, N_D, seed, status, H, H_90, end (mean error at the end of the
-    horizon) [m], seconds (core-seconds), trials, trained (whether the method learns), saw_test (whether the numbers of
-    the family rest on test runs), and `sums`, `counts`: test run -> sum over its windows of the mean error over the
-    horizon [m], and number of windows. Without a result the errors are not numbers.
+    horizon) [m], seconds (core-seconds), trials, trained (whether other training runs would change the prediction),
+    saw_test (whether the numbers of the family rest on test runs), and `sums`, `counts`: test run -> sum over its
+    windows of the mean error over the horizon [m], and number of windows. Without a result the errors are not numbers.
     """
-    learns = {way.name: way.method.compensates for way in results.plan.methods}
     runs, place = np.unique(results.test.run, return_inverse=True)
     saw = results.saw_test
     counts = {str(run): int(count) for run, count in zip(runs, np.bincount(place), strict=True)}
@@ -61,8 +60,8 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
     for row in results.rows:
         kept = {name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")}
         kept |= {"condition": condition, "world": world, "end": np.nan, "sums": {}, "counts": counts}
-        kept |= {"seconds": row["seconds"], "trials": len(row["trials"]), "trained": learns[row["method"]]}
-        kept["saw_test"] = row["family"] in saw
+        kept |= {"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw}
+        kept["trained"] = results.plan.learns(row["family"], row["method"])
         if row["cell"] in results.paths:
             error = position_error(results.paths[row["cell"]], results.test.future)
             sums = np.bincount(place, over_time(error))

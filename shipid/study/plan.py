@@ -199,6 +199,10 @@ class Plan:
         """Families whose numbers or observer, and so their A, depend on the data of the batch."""
         return {foundation.family for foundation in self.foundations if foundation.fitted}
 
+    def learns(self, family: str, method: str) -> bool:
+        """Whether other training runs would change what a method predicts with a family: either of them is fitted."""
+        return family in self.fitted or any(way.method.compensates for way in self.methods if way.name == method)
+
     @property
     def aside(self) -> set[str]:
         """Families that are shown, but that no claim and no sentence of the answer counts."""

@@ -314,9 +314,8 @@ def kinds_frame(results: Results) -> pd.DataFrame:
         if model != NO_MODEL and np.isfinite(path).all():
             errors[model, "physics", 0] = [position_error(path, results.test.future)]
     largest = int(results.cells["N_D"].max()) if len(results.cells) else 0
-    learning = {way.name for way in results.plan.methods if way.method.compensates}
     for row in results.rows:
-        with_data = row["method"] in learning or row["family"] in results.plan.fitted
+        with_data = results.plan.learns(row["family"], row["method"])
         if row["cell"] in results.paths and row["N_D"] == largest and with_data:
             one = position_error(results.paths[row["cell"]], results.test.future)
             errors.setdefault((row["model"], "cooperative", largest), []).append(one)

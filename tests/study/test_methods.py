@@ -11,8 +11,11 @@ import pandas as pd
 import pytest
 
 import shipid
-from shipid.study.methods import COLUMNS, EVERY, compared
+from shipid.study.matched import _cells
+from shipid.study.methods import COLUMNS, EVERY, compared, method_cells
+from shipid.study.results import read_results
 from shipid.study.schema import Claims
+from tests.study.tiny import MIXED, mixed_plan, run_here, without_figures
 
 
 def cells(
@@ -152,3 +155,20 @@ def test_a_failed_cell_is_counted_and_not_averaged() -> None:
     assert lost.pairs == 0
     assert np.isnan(lost.H)
     assert np.isnan(lost.difference)
+
+
+def test_what_learns_is_what_other_training_runs_change(tmp_path: Path) -> None:
+    """The noise of training is in the intervals of these cells, `alone` on an identified family among them."""
+    methods = [one for one in MIXED if one["name"] in ("drawn", "alone")]
+    plan = mixed_plan(tmp_path, {"method": methods, "grid": {"N_D": [4], "seeds": [0, 1]}})
+    with without_figures():
+        run_here(plan, tmp_path / "run")
+    results = read_results(tmp_path / "run")
+    cells = results.cells[results.cells["status"] == "ok"]
+    changes = cells.groupby(["foundation", "family", "method"])["H"].nunique() > 1
+    assert {key: plan.learns(*key[1:]) for key in changes.index} == changes.to_dict()
+    assert changes.xs(("fitted", "alone"), level=("family", "method")).all()
+    assert not changes.xs("alone", level="method").all()
+    for frame in (method_cells(results), _cells(results)):
+        learns = frame[frame["N_D"] > 0].set_index(["foundation", "family", "method"])["trained"]
+        assert (learns == changes.reindex(learns.index)).all()
