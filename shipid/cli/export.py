@@ -25,13 +25,13 @@ def export(
     from shipid.document import bundled
     from shipid.errors import DocumentError, choices
     from shipid.export.write import EXAMPLE, export_predictor, export_vessel
-    from shipid.predictor import Predictor
+    from shipid.study.store import read_predictor
     from shipid.vessel.load import load_vessel
 
     if what.endswith(".npz") or (what not in bundled("models") and Path(what).is_dir()):
         if integrator is not None:
             raise DocumentError("a predictor keeps that of its study: leave it out", path="--integrator")
-        written = export_predictor(Predictor.load(what), to, out, single=single, name=name)
+        written = export_predictor(read_predictor(Path(what)), to, out, single=single, name=name)
     else:
         integrator = integrator or "rk4"
         if integrator not in ("euler", "rk4"):

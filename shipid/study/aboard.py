@@ -33,6 +33,7 @@ from shipid.predictor import Predictor
 from shipid.study.apply import Band, along_run
 from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
+from shipid.study.store import read_predictor
 from shipid.units import length_text, percent, plural
 
 Array = np.ndarray
@@ -92,7 +93,7 @@ def play(
     Raises DataError where a command is missing, no run is as long as the past that is needed, or no band of the level
     can be promised.
     """
-    predictor = Predictor.load(file)
+    predictor = read_predictor(file)
     if level is not None:
         predictor.check_level(level, kind)
     band = None if level is None else Band(level, kind, rate)

@@ -259,6 +259,18 @@ def cell_file(folder: Path, cell: str) -> Path:
     return folder / "cells" / f"{cell}.npz"
 
 
+def read_predictor(file: Path) -> Predictor:
+    """Read the predictor of a cell; one that is in no folder of a run has no seal.
+
+    Raises ResultError for a file that is not as the study wrote it.
+    """
+    folder = file.absolute().parent.parent
+    for fault in seals.faults(folder, f"cells/{file.name}"):
+        if fault.file == f"cells/{file.name}":
+            raise seals.wrong(folder, fault)
+    return Predictor.load(file)
+
+
 def paths_file(folder: Path, cell: str) -> Path:
     """Where the predicted test paths of a cell are."""
     return folder / "predictions" / f"{cell}.npz"

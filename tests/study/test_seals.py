@@ -17,6 +17,7 @@ from shipid.files import read_json, write_json
 from shipid.study import seals, store
 from shipid.study.check import check_folder
 from shipid.study.results import read_cells
+from tests.cli.running import ended
 from tests.study.tiny import run_here, tiny_plan
 
 
@@ -149,6 +150,26 @@ def test_two_cells_swapped_are_refused(folder: Path) -> None:
     other.write_bytes(content)
     with pytest.raises(ResultError, match="was changed after it was written"):
         seals.check(folder)
+
+
+def test_every_command_that_reads_a_cell_asks_its_seal(folder: Path, tmp_path: Path) -> None:
+    """`aboard` and `export` took a cell that had been changed; one that was copied elsewhere has no seal."""
+    one, other = sorted((folder / "cells").glob("right+*"))[:2]
+    log, out = folder / "dataset.parquet", tmp_path / "out"
+    commands = [
+        ["predict", folder, log, "--cell", one.stem, "--out", f"{out}.csv"],
+        ["aboard", log, "--predictor", one],
+        ["export", one, "--to", "c", "--out", out],
+    ]
+    for command in commands:
+        assert ended(*command)[0] == 0
+    shutil.copyfile(other, one)
+    for command in commands:
+        code, _, error = ended(*command)
+        assert code == 1
+        assert re.fullmatch(rf"error: {re.escape(str(one))}: was changed after it was written: [^\n]*\n", error)
+    shutil.move(one, tmp_path / "mine.npz")
+    assert ended("export", tmp_path / "mine.npz", "--to", "c", "--out", out)[0] == 0
 
 
 def test_a_cell_of_another_study_is_refused_though_its_seal_came_with_it(folder: Path) -> None:
