@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 from pathlib import Path
@@ -18,6 +19,16 @@ def processor() -> str:
         lines = []
     names = (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
     return next(names, platform.processor() or platform.machine())
+
+
+def cores() -> int:
+    """Number of cores that this process may use, by its affinity and by its container."""
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    try:
+        quota, period = map(int, (_GROUP / "cpu.max").read_text().split())
+    except (OSError, ValueError):  # no such limit, or the word "max"
+        return count
+    return min(count, max(math.ceil(quota / period), 1)) if quota > 0 < period else count
 
 
 def memory() -> int:

@@ -37,7 +37,7 @@ def decimals_for(value: float, digits: int) -> int:
 
 def digits(value: float, most: int = 3, sign: str = "") -> str:
     """Format with so many significant digits, but never round digits before the decimal point."""
-    return f"{value:{sign}.0f}" if abs(value) >= 10**most else f"{value:{sign}.{most}g}"
+    return f"{value:{sign}.0f}" if abs(value) >= 10**most - 0.5 else f"{value:{sign}.{most}g}"
 
 
 def interval_text(low: float, high: float, between: str = " ... ") -> str:
@@ -50,6 +50,11 @@ def interval_text(low: float, high: float, between: str = " ... ") -> str:
 def percent(share: float, decimals: int = 0, *, signed: bool = False) -> str:
     """A share as text, with a space before the sign as after any number (ISO 80000-1): 0.284 is 28 %."""
     return f"{100 * share:{'+' if signed else ''}.{decimals}f} %"
+
+
+def level_text(level: float) -> str:
+    """The level of a band as text, with the decimals that it has: 0.9 is 90 %, and 0.975 is 97.5 %."""
+    return f"{100 * level:.10g} %"
 
 
 def plural(count: int, one: str, many: str | None = None) -> str:

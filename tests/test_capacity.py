@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,18 @@ def test_the_limit_of_a_container_counts(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert capacity.memory() == whole
     (tmp_path / "memory.max").write_text("1048576\n")
     assert capacity.memory() == 1048576
+
+
+@pytest.mark.parametrize(("limit", "cores"), [("max 100000", 64), ("150000 100000", 2), ("5000 100000", 1), ("no", 64)])
+def test_cores_are_those_that_this_process_may_use(
+    limit: str, cores: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A batch job with some cores of a node started a worker for each core of it."""
+    monkeypatch.setattr(capacity, "_GROUP", tmp_path)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(64)), raising=False)
+    assert capacity.cores() == 64
+    (tmp_path / "cpu.max").write_text(f"{limit}\n")
+    assert capacity.cores() == cores
 
 
 def test_the_processor_has_a_name() -> None:

@@ -6,11 +6,24 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import shipid
 from shipid.logs.mapping import UNITS
-from shipid.units import DEGREE, KNOT, MINUTE, RPM, decimals_for, digits, interval_text, length_text, listed, percent
+from shipid.units import (
+    DEGREE,
+    KNOT,
+    MINUTE,
+    RPM,
+    decimals_for,
+    digits,
+    interval_text,
+    length_text,
+    level_text,
+    listed,
+    percent,
+)
 
 
 @pytest.mark.parametrize(
@@ -101,3 +114,19 @@ def test_digits_before_the_point_are_never_rounded() -> None:
     values = (0.012345, 12.345, 999.4, 1234.5, -4321.0)
     assert [digits(value) for value in values] == ["0.0123", "12.3", "999", "1234", "-4321"]
     assert digits(12.345, 2, "+") == "+12"
+
+
+def test_digits_have_no_exponent_above_one() -> None:
+    """Nor is 999.7, which has three digits, written 1e+03."""
+    for value in [*10.0 ** np.arange(-6, 8), 999.4, 999.5, 999.7, 99.97, 123456.7, 0.0123456]:
+        for most in (2, 3):
+            for signed in (value, -value):
+                text = digits(signed, most)
+                assert "e+" not in text
+                assert float(text) == pytest.approx(signed, rel=0.5 * 10.0 ** (1 - most))
+                assert abs(value) < 10**most or abs(float(text) - signed) <= 0.5
+
+
+def test_a_level_has_all_its_decimals() -> None:
+    levels = {0.9: "90 %", 0.975: "97.5 %", 0.125: "12.5 %", 0.29: "29 %", 0.57: "57 %", 0.999: "99.9 %"}
+    assert {level: level_text(level) for level in levels} == levels

@@ -16,7 +16,7 @@ from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyN
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import counted, digits, draw, ended_by, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import decimals_for, decimals_of, length_text, percent
+from shipid.units import decimals_for, decimals_of, length_text, level_text, percent
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -245,7 +245,7 @@ def study_rotate(
         name = plan.label(row["foundation"], row["method"])
         inside = "-" if row["coverage"] != row["coverage"] else percent(row["coverage"])
         rows.append([name, *(digits(row[column]) for column in columns), inside, better])
-    band = f"in band of {percent(plan.level)}"
+    band = f"in band of {level_text(plan.level)}"
     heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
     verdicts = rotate.turn_findings(frame, plan)
     naive = frame.groupby("test")["naive"].first().mean()
@@ -455,7 +455,8 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     if len(bands):
         level = worlds[0].plan.level
         answer.say(
-            f"bands of {percent(level)}: share of whole test paths inside, and mean radius [m], mean [least, greatest]:"
+            f"bands of {level_text(level)}: share of whole test paths inside, and mean radius [m], "
+            "mean [least, greatest]:"
         )
     rows = [
         [

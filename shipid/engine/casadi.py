@@ -9,7 +9,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
+from shipid.engine.integrate import Array, Batch, Job, Method, integrate, num_threads
 from shipid.interrupts import uninterrupted
 from shipid.vessel.dynamics import Dynamics, dynamics
 from shipid.vessel.load import Vessel
@@ -90,7 +90,7 @@ def run_casadi(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
         return full.transpose(1, 2, 0).reshape(held.shape[1], num_samples * num_steps)
 
     inputs = [start, over_time(batch.commands), over_time(batch.environment), over_time(batch.tau_extra)]
-    mapped = scan.map(num_samples, "thread", min(cores(), num_samples))
+    mapped = scan.map(num_samples, "thread", min(num_threads(), num_samples))
     drawn = [part.transpose(2, 0, 1).reshape(-1, num_samples) for part in batch.components]
     records, worst = [], []
     for values in batch.parameters:

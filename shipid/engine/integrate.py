@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from shipid.arguments import one_of, positive
+from shipid.capacity import cores
 
 Array = np.ndarray
 Method = Literal["euler", "rk4"]
@@ -53,9 +54,9 @@ class Job:
         object.__setattr__(self, "step", positive("step", self.step))  # engines write it into their code
 
 
-def cores() -> int:
-    """Number of cores that this process may use, at most `OMP_NUM_THREADS`."""
-    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def num_threads() -> int:
+    """Number of threads of a rollout: of the cores that this process may use, at most `OMP_NUM_THREADS`."""
+    count = cores()
     limit = os.environ.get("OMP_NUM_THREADS", "")
     return min(count, int(limit)) if limit.isdecimal() and int(limit) > 0 else count
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from shipid.engine import libraries
 from shipid.engine.collect import collect_terms
-from shipid.engine.integrate import Array, Batch, Job, Method, cores, integrate
+from shipid.engine.integrate import Array, Batch, Job, Method, integrate, num_threads
 from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_compiler
 from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, Printed, print_function
 from shipid.engine.tables import Table, even_tables, find_tables
@@ -523,7 +523,7 @@ def width(batch: Batch, precision: Precision = DOUBLE) -> int:
 
 def num_parts(batch: Batch, precision: Precision = DOUBLE) -> int:
     """Number of parts of the samples of a variant, each a task: enough for an even load on all cores."""
-    return min(PARTS * cores() // len(batch.parameters) + 1, width(batch, precision) // target(precision).lanes)
+    return min(PARTS * num_threads() // len(batch.parameters) + 1, width(batch, precision) // target(precision).lanes)
 
 
 def _run(model: Dynamics, batch: Batch, job: Job, precision: Precision, **wanted: Array) -> None:

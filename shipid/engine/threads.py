@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.engine.integrate import cores
+from shipid.engine.integrate import num_threads
 
 STACK = 8 << 20  # bytes of a thread
 AT_ONCE = 2_000_000  # units of work in one call of C, a fraction of a second: an interrupt waits for its end
@@ -56,7 +56,7 @@ def in_parallel(
     After an interrupt no further call is made. sizes, arrays : in the order of `threaded`; None is a null pointer.
     work : of one task, in units of a tenth of a microsecond or so.
     """
-    held, threads = list(arrays), cores()
+    held, threads = list(arrays), num_threads()
     # as `array.ctypes.data`, in a quarter of the time
     pointers = [None if array is None else array.__array_interface__["data"][0] for array in held]
     numbers = list(sizes)

@@ -20,7 +20,7 @@ from pydantic import PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.document import LEAST_NUMBER
-from shipid.errors import DataError, ResultError
+from shipid.errors import ResultError
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
@@ -110,6 +110,17 @@ class LearnedForce(Searched):
         """Train a force for every foundation: the ridge that validates best, then all windows with it."""
         return {name: self._fit(task, name) for name in task.cases}
 
+    def unfit(self, vessel: Vessel) -> str:
+        """Return why there is no scale of the force, no place for it or no gradient; empty where all is there."""
+        if vessel.length is None:
+            return "the vessel has no particulars.L_pp, which scales the learned force: give it"
+        if "learned" in vessel.document.get("hull", {}):
+            return f"the vessel has a learned force already: take the block {BLOCK} out"
+        if drawn := dynamics(vessel).drawn:
+            remedy = "take a base that extends the vessel, with `off = true` in that block"
+            return f"{drawn[0].path} is a sum over drawn waves, which has no gradient: {remedy}"
+        return ""
+
     def ridges(self) -> list[float]:
         """Return the values of the ridge that are tried."""
         return ridges_of(self.ridge, self.trials)
@@ -120,11 +131,6 @@ class LearnedForce(Searched):
             return diverged(self, ({"ridge": ridge} for ridge in self.ridges()))
         search = Search(task, [name], self, again=True)  # a trial starts from the one before
         assert case.physics.vessel is not None
-        if "learned" in case.physics.vessel.document.get("hull", {}):
-            raise DataError("the vessel has a learned force already: take the block out", path=BLOCK)
-        if drawn := dynamics(case.physics.vessel).drawn:
-            remedy = "take a base that extends the vessel, with `off = true` in that block"
-            raise DataError(f"{drawn[0].path} is a sum over drawn waves, which has no gradient: {remedy}")
         measured = replace(
             case, physics=replace(case.physics, observer=None)
         )  # single steps start from measured states
@@ -204,7 +210,8 @@ def mass(vessel: Vessel) -> Array:
 
 def limits(vessel: Vessel, speed: float, factor: float) -> dict[str, Array]:
     """Bounds of the force: factor times m U^2 / L [N] and I_z (U / L)^2 [N m], by name."""
-    inertia, length = vessel.document["inertia"], float(vessel.document["particulars"]["L_pp"])
+    assert vessel.length is not None
+    inertia, length = vessel.document["inertia"], vessel.length
     force = factor * float(inertia["m"]) * max(speed, LEAST_SCALE) ** 2 / length
     moment = factor * float(inertia["I_z"]) * (max(speed, LEAST_SCALE) / length) ** 2
     return {"X_max": np.array([force]), "Y_max": np.array([force]), "N_max": np.array([moment])}

@@ -20,6 +20,7 @@ from shipid.errors import DataError, ShipidError
 from shipid.files import json_text
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.physics import Physics
+from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -183,6 +184,11 @@ class Method(Checked, BaseModel, ABC):
         """Whether several foundations cost much less in one fit than in a fit each: then they are one unit of work."""
         return False
 
+    def unfit(self, vessel: Vessel) -> str:
+        """Why this method cannot work with a vessel, and what to do, in words; empty where it can."""
+        del vessel
+        return ""
+
     def varied(self) -> tuple[str, ...]:
         """Names of the hyperparameters that differ between trials."""
         return ()
@@ -204,10 +210,13 @@ TAKEN = ("cell", "model", "N_D", "seed", "chosen", *TRIAL)  # columns of a table
 def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
     """Fit every foundation of a task; DataError where a method that somebody wrote gives something else.
 
-    ShipidError where it ends the process, for what runs it would else be taken for killed, and where the code of the
-    user makes a mistake.
+    DataError for a vessel that the method cannot work with. ShipidError where it ends the process, for what runs it
+    would else be taken for killed, and where the code of the user makes a mistake.
     """
     name, shape = type(method).__name__, task.windows.future.shape
+    for vessel in (case.physics.vessel for case in task.cases.values()):
+        if vessel is not None and (words := method.unfit(vessel)):
+            raise DataError(words)
     with placed(f"{name}.fit", type(method)):
         given = method.fit(task)
     if not isinstance(given, Mapping):

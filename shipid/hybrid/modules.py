@@ -34,6 +34,7 @@ from shipid.hybrid.stepping import TrueSteps, free, stepped_paths, true_steps
 from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
 from shipid.hybrid.units import Seen, Units, solve, taken
 from shipid.physics import TERMS
+from shipid.vessel.load import Vessel
 from shipid.vessel.schema import behind, term_blocks
 
 Array = NDArray[np.float64]
@@ -41,10 +42,10 @@ MOST = 2000  # moments from which the radius of the alarm is taken, about
 ORDER = ("rudders", "thrusters", "hull")  # in which modules are switched off: a rudder needs the wash of its propeller
 
 
-def modules_of(physics: Physics) -> dict[str, tuple[str, ...]]:
+def modules_of(vessel: Vessel | None) -> dict[str, tuple[str, ...]]:
     """Module -> dotted paths of its blocks, in the order in which they are switched off; none without a vessel."""
     modules: dict[str, list[str]] = {name: [] for name in ORDER}
-    for path, key, _ in () if physics.vessel is None else term_blocks(physics.vessel.document):
+    for path, key, _ in () if vessel is None else term_blocks(vessel.document):
         if key.startswith("hull."):
             modules["hull"].append(path)
         elif key.startswith("thruster."):
@@ -57,7 +58,7 @@ def without(physics: Physics) -> list[Physics]:
     """The physics without the first module, without the first two, ... of `modules_of`."""
     reduced: list[Physics] = []
     off: dict[str, bool] = {}
-    for paths in modules_of(physics).values():
+    for paths in modules_of(physics.vessel).values():
         off |= {f"{path}.off": True for path in paths}
         reduced.append(physics.with_values(off))
     return reduced
@@ -130,7 +131,7 @@ class ModulesCorrector:
 
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
         """Return paths (T, S, 2) [m] in the frame (11) of the physics with these factors."""
-        if tuple(modules_of(physics)) != self.modules:
+        if tuple(modules_of(physics.vessel)) != self.modules:
             raise ResultError(f"the physics has other modules than {', '.join(self.modules)}", path="modules")
         reduced = without(physics)
 
@@ -227,14 +228,15 @@ class Modules(Searched):
         """Solve the factors for every foundation; the best trial, solved with all windows, is the corrector."""
         return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name))
 
+    def unfit(self, vessel: Vessel) -> str:
+        """Return why there is no factor to learn; empty where there is."""
+        lacks = "the vessel has no hull, thruster or rudder whose factor could be learned: give one"
+        return "" if modules_of(vessel) else lacks
+
     def _fit(self, task: Task, name: str) -> Fitted:
         search, physics = Search(task, [name], self), task.cases[name].physics
         steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
-        modules = tuple(modules_of(physics))
-        if not modules:
-            raise ResultError(
-                "the vessel has no hull, thruster or rudder whose factor could be learned", path="modules"
-            )
+        modules = tuple(modules_of(physics.vessel))
         parts = shares(without(physics), steps.at, steps.free, steps.step)
         for number, point in search.left(points_of(self)):
             start = time.process_time()

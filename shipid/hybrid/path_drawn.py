@@ -8,9 +8,10 @@ Rahimi and Recht (2007); leave-one-out from the hat matrix: Allen (1974).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, PositiveInt
+from pydantic import model_validator as validator
 
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
@@ -20,8 +21,10 @@ from shipid.hybrid.trials import ridges_of, value_at
 
 RIDGES = 9  # of a range
 KINDS = ("history", "error", "observer")  # of memory
-CHOICES = ((), ("error",), ("history", "error"))  # that validation chooses from
+CHOICES = ((), ("error",), ("history", "error"))  # that validation chooses from, as far as a memory has them
 OBSERVED = (("observer",), KINDS)  # and with estimates of an observer
+MEMORIES = (*CHOICES, *OBSERVED, ("history",), ("error", "observer"), ("history", "observer"))
+"""What a trial may take, by the number that its record has."""
 Ridge = Annotated[float, Field(ge=1e-8)]  # below it rounding decides
 
 
@@ -47,7 +50,8 @@ class PathDrawn(Searched):
         best are then judged, and solved, with all windows.
     memory : what the inputs hold of the past; `history_scale`, `error_scale`, `observer_scale` are their scales.
     choose : whether validation chooses between no memory, the error of the physics, and that with history; with
-        `memory.observer` also between its estimates alone and everything. Each has an equal share of the trials.
+        `memory.observer` also between its estimates alone and everything; all without what `memory` lacks. Each choice
+        has an equal share of the trials.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = (
@@ -102,13 +106,24 @@ class PathDrawn(Searched):
 
     def left_out(self, point: Mapping[str, float]) -> frozenset[str]:
         """Return the kinds of memory that a trial does without."""
-        taken = self.memories[int(point["memory"])] if "memory" in point else KINDS
+        taken = MEMORIES[int(point["memory"])] if "memory" in point else KINDS
         return frozenset(set(KINDS) - set(taken))
 
     @property
-    def memories(self) -> tuple[tuple[str, ...], ...]:
-        """Kinds of memory that validation chooses from."""
-        return (*CHOICES, *OBSERVED) if self.memory.observer else CHOICES
+    def memories(self) -> tuple[int, ...]:
+        """What validation chooses from, as places in `MEMORIES`: each of `CHOICES` without what the memory lacks."""
+        memory = self.memory
+        of_kind = dict(zip(KINDS, (memory.history or memory.turned, memory.error, memory.observer), strict=True))
+        choices = (*CHOICES, *OBSERVED) if self.memory.observer else CHOICES
+        kept = (tuple(kind for kind in choice if of_kind[kind]) for choice in choices)
+        return tuple(dict.fromkeys(map(MEMORIES.index, kept)))
+
+    @validator(mode="after")
+    def _something_to_choose(self) -> Self:
+        """Refuse a choice where nothing is remembered."""
+        if self.choose and len(self.memories) < 2:
+            raise ValueError("choose: there is no memory to choose from: give `memory`, or leave `choose` out")
+        return self
 
     def varied(self) -> tuple[str, ...]:
         """Return the names of the hyperparameters that differ between trials."""
@@ -121,7 +136,7 @@ class PathDrawn(Searched):
     def choices(self) -> dict[str, tuple[float, ...]]:
         """Return what is searched among some values: the mirror, and which memory is taken."""
         mirror = {"mirror": (0.0, 1.0)} if 0 < self.mirror < 1 else {}
-        memory = {"memory": tuple(float(i) for i in range(len(self.memories)))} if self.choose else {}
+        memory = {"memory": tuple(map(float, self.memories))} if self.choose else {}
         return {**mirror, **memory}
 
     def points(self) -> Iterator[dict[str, float]]:
@@ -131,7 +146,7 @@ class PathDrawn(Searched):
         for number, shares in enumerate(spread(len(ranges) + 1, None if self.budget else self.trials)):
             point = {**fixed, "mirror": float(shares[0] < self.mirror)}
             if self.choose:
-                point["memory"] = float(number % len(self.memories))
+                point["memory"] = float(self.memories[number % len(self.memories)])
             yield point | {name: value_at(self, name, share) for share, name in zip(shares[1:], ranges, strict=True)}
 
     def path(self) -> list[float]:

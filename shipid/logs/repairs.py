@@ -125,12 +125,33 @@ def interpolate_at(t: NDArray[np.float64], values: NDArray[np.float64], missing:
     return filled
 
 
+def _mended(rows: pd.DataFrame, values: NDArray[np.float64], missing: Mask) -> NDArray[np.float64]:
+    """`interpolate_at` within each unbroken stretch of rows: nothing after a break says what was before it."""
+    filled, t, stretch = values.copy(), rows["t"].to_numpy(), _stretch(rows)
+    for number in np.unique(stretch[missing]):
+        here = stretch == number
+        filled[here] = interpolate_at(t[here], values[here], missing[here])
+    return filled
+
+
+def _between(rows: pd.DataFrame, known: Mask) -> Mask:
+    """Whether each row (N,) has a `known` one before it and one after it in its unbroken stretch."""
+    before = pd.Series(known).groupby(_stretch(rows)).cummax()
+    after = pd.Series(known)[::-1].groupby(_stretch(rows)[::-1]).cummax()[::-1]
+    return before.to_numpy() & after.to_numpy()
+
+
+def _stretch(rows: pd.DataFrame) -> NDArray[np.int64]:
+    """Number of the unbroken stretch of each row (N,)."""
+    return np.cumsum((rows["flags"].to_numpy() >> FLAGS.index(BREAK)) & 1)
+
+
 def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
     """Drop both neighbours of every step |d psi| > threshold, unwrap the rest, interpolate the dropped.
 
     Both neighbours are dropped, because nothing shows which of the two samples is false.
     """
-    t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
+    touched, count = np.zeros(len(rows), dtype=bool), 0
     healed: dict[str, NDArray[np.float64]] = {}
     for name in repair.columns:
         values = rows[name].to_numpy().copy()
@@ -138,17 +159,18 @@ def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
         dropped = np.append(false, False) | np.insert(false, 0, False)
         known = ~dropped & np.isfinite(values)
         values[known] = np.unwrap(values[known])
-        healed[name] = interpolate_at(t, values, dropped)
+        healed[name] = _mended(rows, values, dropped)
         touched |= dropped
         count += int(false.sum())
     return Outcome(rows.assign(**healed), touched, count, f"{int(touched.sum())} rows interpolated")
 
 
 def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
-    """Replace x where |x - median(x over the window)| > threshold by interpolation of the rest.
+    """Replace x where |x - median(x over the window)| > threshold by interpolation of the rest of its stretch.
 
     Windows are whole and do not reach over a break: the median of half a window is biased for a moving ship. In the
-    half window at each end of a stretch a line through the whole window there takes its place, where it fits the rest.
+    half window at each end of a stretch a line through the whole window there takes its place, where it fits the rest;
+    the first or last rows of a stretch are put on it.
     Missing values in them are interpolated for the median. Raises DataError for a window of a single row.
     """
     t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
@@ -157,13 +179,14 @@ def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
     if width == 1:
         message = f"its window, {repair.window:g} s, holds one row, which is its own median"
         raise DataError(f"{message}: rows are {step:.3g} s apart, give {2 * step:.3g} s or more", path="repair.despike")
-    stretch = np.cumsum((rows["flags"].to_numpy() >> FLAGS.index(BREAK)) & 1)
-    healed = {}
+    stretch, healed = _stretch(rows), {}
     for name in repair.columns:
         pieces = rows[name].interpolate(limit_area="inside").groupby(stretch)
         median = pieces.transform(lambda piece: _expected(piece, width, repair.threshold))
         spikes = (rows[name] - median).abs().to_numpy() > repair.threshold
-        healed[name] = interpolate_at(t, rows[name].to_numpy(), spikes)
+        values = rows[name].to_numpy()
+        known = ~spikes & np.isfinite(values)
+        healed[name] = np.where(spikes & ~_between(rows, known), median, _mended(rows, values, spikes))
         touched |= spikes
         count += int(spikes.sum())
     return Outcome(rows.assign(**healed), touched, count, f"median of {width} rows")

@@ -16,7 +16,7 @@ from shipid.report.section import Section
 from shipid.report.selection import exemplars, sizes
 from shipid.report.tables import Cell, Table, figure, length_places, text
 from shipid.report.wording import counted, listed, metres
-from shipid.units import percent, plural
+from shipid.units import level_text, percent, plural
 
 WORST = 12  # test runs in the table of those that pay
 BY = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
@@ -60,7 +60,9 @@ def coverage(content: ReportContent) -> Figure | None:
             points.update(error_y=reach, customdata=[_words(row) for row in mine.to_dict("records")])
             points.update(hovertemplate=f"{label(name)}: %{{customdata}}<extra></extra>")
             traces.append(points)
-        x_axis = axis("share promised [1]", range=[0.45, 1.0], tickvals=sorted(set(frame.level)))
+        x_axis = axis(
+            "share promised [1]", range=[min(0.5, frame.level.min()) - 0.05, 1.0], tickvals=sorted(set(frame.level))
+        )
         y_axis = axis("share of whole test paths in the band [1]", range=[0, 1.02])
         views[str(place)] = [Panel(Plot(traces, layout(x_axis, y_axis, hovermode="closest")))]
     return Figure(
@@ -86,7 +88,7 @@ def coverage(content: ReportContent) -> Figure | None:
 
 
 def _words(row: dict[Hashable, Any]) -> str:
-    inside = f"{percent(row['coverage'])} [{percent(row['low'])}, {percent(row['high'])}] of {percent(row['level'])}"
+    inside = f"{percent(row['coverage'])} [{percent(row['low'])}, {percent(row['high'])}] of {level_text(row['level'])}"
     return f"{inside}, mean radius {metres(row['width'])}"
 
 
@@ -99,7 +101,8 @@ def _takeaway(frame: pd.DataFrame, size: int) -> str:
     by_width = mine.sort_values("width")
     least, most = by_width.iloc[0], by_width.iloc[-1]
     text = (
-        f"With N_D = {size}, bands of {percent(level)} hold {percent(float(mine.coverage.mean()))} of the test paths "
+        f"With N_D = {size}, bands of {level_text(level)} hold {percent(float(mine.coverage.mean()))} of the test "
+        "paths "
     )
     text += f"on average over {counted(len(mine), 'model')}; "
     text += f"the mean radius is {metres(least.width)} ({least.model})"
@@ -143,7 +146,7 @@ def table(content: ReportContent) -> Table | None:
         [
             text(row["model"]),
             figure(row["N_D"], 0),
-            Cell(percent(row["level"]), row["level"]),
+            Cell(level_text(row["level"]), row["level"]),
             _share(row),
             figure(row["width"], width),
             figure(row["end"], end),

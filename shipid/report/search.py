@@ -25,7 +25,10 @@ CEILING = 4.0  # times the best of the cell: farther off is drawn here
 FAILED = CEILING * 1.25  # where diverged trials lie
 UNITS = {"delays": "s"}  # of hyperparameters; others have none
 # The kinds of memory that a trial may have, by number.
-MEMORIES = ("none", "the error of the physics", "that and history", "estimates of the observer", "everything")
+MEMORIES = (
+    "none", "the error of the physics", "that and history", "estimates of the observer", "everything",
+    "history", "the error of the physics and estimates of the observer", "history and estimates of the observer",
+)  # fmt: skip
 
 
 def search(content: ReportContent) -> Figure | None:
@@ -166,13 +169,13 @@ def _stopped(frame: pd.DataFrame) -> str:
 
 def _memories(frame: pd.DataFrame, names: list[str]) -> str:
     """Sentence on what the numbers of `memory` mean, if it is searched."""
-    most = int(frame.memory.max()) if "memory" in names else -1
-    words = [f"{i} {word}" for i, word in enumerate(MEMORIES[: most + 1])]
+    tried = sorted({int(number) for number in frame.memory.dropna()}) if "memory" in names else []
+    words = [f"{number} {MEMORIES[number]}" for number in tried]
     return f" Memory: {', '.join(words)}." if words else ""
 
 
 def _medians(frame: pd.DataFrame, name: str) -> Floats:
-    """Median ratio per value of a hyperparameter, or per eighth of its values where there are many: (n, 2)."""
+    """Median ratio per value of a hyperparameter, or of `BINS` parts of them where there are many: (n, 2)."""
     values = frame[name].astype(float)
     if frame.empty or values.nunique() < 2:
         return np.empty((0, 2))

@@ -34,7 +34,7 @@ from shipid.study.apply import Band, along_run
 from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
 from shipid.study.store import read_predictor
-from shipid.units import length_text, percent, plural
+from shipid.units import length_text, level_text, percent, plural
 
 Array = np.ndarray
 TRACK = ["run", "t", "north", "east"]
@@ -289,7 +289,7 @@ def _held(instants: pd.DataFrame, band: Band, bands: Bands, why: str) -> list[st
     judged = np.isfinite(reach)
     promised = judged & ~outside
     if not judged.any():
-        return [f"band of {percent(band.level)}: no whole path can be judged, the log ends before"]
+        return [f"band of {level_text(band.level)}: no whole path can be judged, the log ends before"]
     held = reach <= instants["factor"].to_numpy()
     of = "" if band.kind is None else f" of the kind {band.kind!r}"
     adapts = "" if band.rate is None else f", adapting at {band.rate:g}"
@@ -297,7 +297,7 @@ def _held(instants: pd.DataFrame, band: Band, bands: Bands, why: str) -> list[st
     if promised.any():
         inside = f"{percent(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
     lines = [
-        f"band of {percent(band.level)}{of}{adapts}: it held {percent(held[judged].mean())} of the {judged.sum()} "
+        f"band of {level_text(band.level)}{of}{adapts}: it held {percent(held[judged].mean())} of the {judged.sum()} "
         f"whole paths that can be judged, {inside}"
     ]
     if promised.any():
@@ -307,7 +307,7 @@ def _held(instants: pd.DataFrame, band: Band, bands: Bands, why: str) -> list[st
             share = percent(share_of(held[promised], run))
             same = share == percent(held[promised].mean())
             what = "that is" if same else f"in the mean over runs {share}, which is"
-            lines[0] += f"; {what} fewer than {percent(band.level)} by more than chance: {why}"
+            lines[0] += f"; {what} fewer than {level_text(band.level)} by more than chance: {why}"
         lines += _by_level(reach[promised], band, bands)
     return lines
 
@@ -320,7 +320,8 @@ def _by_level(reach: Array, band: Band, bands: Bands) -> list[str]:
         return []
     levels = sorted(level for level in {*STANDARD, band.level} if bands.promises(level, band.kind))
     shares = (
-        f"{percent(level)} held {percent((reach <= float(at_level(table, level) / usual)).mean())}" for level in levels
+        f"{level_text(level)} held {percent((reach <= float(at_level(table, level) / usual)).mean())}"
+        for level in levels
     )
     return [f"  by level, without alarm: {', '.join(shares)}"] if levels else []
 

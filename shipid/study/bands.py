@@ -20,7 +20,7 @@ from shipid.predictor import NO_BAND
 from shipid.report.wording import listed
 from shipid.study.results import Results
 from shipid.study.verdict import metres, named, runs, span
-from shipid.units import percent
+from shipid.units import level_text, percent
 
 Array = np.ndarray
 SHOWN = (0.5, 0.8, 0.9, 0.95)
@@ -167,7 +167,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
     amount = int(top["N_D"].iloc[0])
     mean = f"mean of {len(top)} models with {amount} runs; 95 % interval of a single model" if len(top) > 1 else ""
     spread = f"{mean or f'with {amount} runs; 95 % interval'} {percent(low)} to {percent(high)}"
-    sentence = f"Bands of {percent(level)} held {percent(share)} of the whole test paths ({spread}); "
+    sentence = f"Bands of {level_text(level)} held {percent(share)} of the whole test paths ({spread}); "
     sentence += f"their mean radius is {radius}."
     sentences = [(sentence, "coverage")]
     groups = groups_frame(results)
@@ -178,7 +178,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
         )
     few = sorted({*groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]} - {*new})
     if few:
-        text = f"Too few runs calibrate a band of {percent(level)} for one kind of manoeuvre alone: {listed(few)}."
+        text = f"Too few runs calibrate a band of {level_text(level)} for one kind of manoeuvre alone: {listed(few)}."
         sentences.append((text, "coverage-groups"))
     return sentences
 

@@ -195,6 +195,10 @@ def methods_of(study: Study, foundations: Sequence[Foundation], file: Path) -> t
             met -= {NO_MODEL}
         left_out = tuple(f.name for f in foundations if f.family in met & refused)
         taken = tuple(f.name for f in foundations if f.family in met - refused)
+        bases = {f.family: f.base for f in foundations if f.name in taken and f.base is not None}
+        for family, base in bases.items():
+            if words := method.unfit(base):
+                raise DocumentError(f"{family} with {block.kind}: {words}", file=file, path=path)
         ways.append(Way(block.name, block.kind, method, taken, left_out))
     met_by_any = {name for way in ways for name in way.foundations} | {NO_MODEL}
     idle = next((foundation.name for foundation in foundations if foundation.name not in met_by_any), None)

@@ -42,7 +42,7 @@ from shipid.study.verdict import (
     undecided,
     verdict,
 )
-from shipid.units import percent
+from shipid.units import level_text, percent
 
 Array = NDArray[np.float64]
 CLAIMS = {
@@ -79,7 +79,7 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     table = _width_table(results, physics, {cell: width for cell, (width, _) in bands.items()})
     sound = tuple(name for name in physics if name in table.H and name in table.A)
     if not table.amounts or len(sound) < 2:
-        return undecided(CLAIMS, f"no two models with physics have a band of {percent(level)}")
+        return undecided(CLAIMS, f"no two models with physics have a band of {level_text(level)}")
     cells = judged_cells(results)
     judged = [name for name in (*sound, NO_MODEL) if name in table.H]  # a model with a failed cell may have no band
     cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin(judged)]
@@ -157,9 +157,10 @@ def kept_promise(held: Array, run: NDArray[np.str_], level: float) -> Finding:
     count = len(sizes)
     interval = "" if too_few(count) else f" [{percent(low)}, {percent(high)}]"
     each = "" if (sizes == sizes[0]).all() else ", each counts the same"
-    evidence = f"bands of {percent(level)} hold {percent(share)}{interval} of whole paths ({manoeuvres(count)}{each})"
+    hold = f"bands of {level_text(level)} hold {percent(share)}{interval} of whole paths"
+    evidence = f"{hold} ({manoeuvres(count)}{each})"
     decided = verdict(low >= level - SHORT, high < level)
-    numbers = {f"share at {percent(level)}": share}
+    numbers = {f"share at {level_text(level)}": share}
     return finding(CLAIMS, "B2", decided if not too_few(count) else "undecided", evidence, **numbers)
 
 

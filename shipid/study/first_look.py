@@ -18,7 +18,7 @@ import tomlkit
 from numpy.typing import NDArray
 from tomlkit.items import KeyType, SingleKey
 
-from shipid.data.dataset import Dataset, pieces
+from shipid.data.dataset import Dataset, clock_slack, pieces
 from shipid.data.windows import Instants, PathSource, Windows, cut_windows
 from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError
@@ -316,7 +316,8 @@ def _between(trial: _Trial) -> _Trial:
     middle = windows.t + windows.step * (np.arange(windows.horizon)[:, None] + 0.5)
     for run, rows in pieces(trial.dataset):
         t = rows["t"].to_numpy()
-        inside = (windows.run == run) & (windows.t >= t[0] - 1e-9) & (windows.t <= t[-1] + 1e-9)
+        slack = clock_slack(t)
+        inside = (windows.run == run) & (windows.t >= t[0] - slack) & (windows.t <= t[-1] + slack)
         columns = {name: rows[name].to_numpy() for name in ("t", *trial.dataset.commands)}
         for name, values in between_rows(trial.vessel, columns, middle[:, inside]).items():
             planned[name][:, inside] = values

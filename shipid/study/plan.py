@@ -42,6 +42,7 @@ from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, resolve
 
 WITH = "+"  # between a foundation and a method
+OF_PART = "/"  # between the name of a part and that of its source
 OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
 USER_SCRIPT = "my.py"  # a user's script with a method, where its name is unknown
 FEEDBACK = ("zigzag", "reverse_spiral", "station_keeping")  # kinds of manoeuvres whose orders react to the ship
@@ -101,7 +102,8 @@ class Plan:
     study : the checked document with the seeds of its world; `document` holds them as written.
     truth : the vessel that makes the truth, with the blocks that the study adds; None where runs were recorded.
     vessels : every vessel that the document names, by that name.
-    sources : digests of the mapping, log or dataset that recorded runs come from.
+    sources : digests of the mapping, log or dataset that recorded runs come from; `PART/dataset` where a part has
+        another one.
     changes : what `--set` changed, already in the document.
     parts : name -> a complete study for every repetition in every condition; empty where there is neither. If there
         are parts, they are run in place of this study.
@@ -142,7 +144,9 @@ class Plan:
         data, here = self.study.data, Path(self.file)
         named = [] if data is None else [mapping_of(data, here), data.log, data.dataset]
         vessels = [Path(vessel.file) for vessel in self.vessels.values()]
-        return [here, *vessels, *(beside(here.parent, name) for name in named if name is not None)]
+        of_parts = (name for part in self.parts.values() for name in part.plan.inputs)
+        mine = (beside(here.parent, name) for name in named if name is not None)
+        return list(dict.fromkeys([here, *vessels, *mine, *of_parts]))
 
     @property
     def digest(self) -> str:
@@ -469,16 +473,22 @@ def _built(
             check_truth(study.truth, truth)
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=error.path) from None
-    digests = _sources(study.data, file) if sources is None and study.data is not None else sources
-    plan = Plan(
-        file.stem, str(file), document, study, foundations, methods, batches, truth, known, digests or {}, changes or {}
-    )
+    digests = _sources(study.data, file) if sources is None else sources
+    mine = {name: digest for name, digest in digests.items() if OF_PART not in name}
+    plan = Plan(file.stem, str(file), document, study, foundations, methods, batches, truth, known, mine, changes or {})
     _check_names(plan)
     _check_memory(plan)
-    return replace(plan, parts=_parts(plan, file, known))
+    plan = replace(plan, parts=_parts(plan, file, known, sources))
+    theirs = {
+        f"{name}{OF_PART}{source}": digest
+        for name, part in plan.parts.items()
+        if part.plan.study.data != study.data
+        for source, digest in part.plan.sources.items()
+    }
+    return replace(plan, sources={**mine, **theirs})
 
 
-def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
+def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[str, str] | None) -> dict[str, Part]:
     """Every repetition in every condition: `constant-1`, ...; DocumentError with the path of the cause."""
     repeat, conditions = plan.study.repeat, plan.study.condition
     if not repeat and not conditions:
@@ -500,8 +510,14 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel]) -> dict[str, Part]:
             words = [*([condition.name] if condition else []), *([str(number)] if repeat else [])]
             name = "-".join(words)
             mine: dict[str, Any] = {} if condition is None else condition.set
-            part = build_plan(_changed(bare, mine, f"condition.{place}.set", file), file, known, plan.sources or None)
-            part = build_plan(_changed(part.document, turn, "repeat", file), file, known, plan.sources or None)
+            part = build_plan(_changed(bare, mine, f"condition.{place}.set", file), file, known, plan.sources)
+            part = build_plan(_changed(part.document, turn, "repeat", file), file, known, plan.sources)
+            if part.study.data != plan.study.data:
+                begins = f"{name}{OF_PART}"
+                stored = {
+                    key.removeprefix(begins): value for key, value in (sources or {}).items() if key.startswith(begins)
+                }
+                part = replace(part, sources=_sources(part.study.data, file) if sources is None else stored)
             twin = next((other for other, done in parts.items() if done.plan.study == part.study), None)
             if twin is not None:
                 message = f"{name} has the settings of {twin}: equal studies are no more evidence than one"
@@ -565,8 +581,10 @@ def mapping_of(data: Data, file: Path) -> str | None:
     return str(beside(file.parent, named)) if named is not None and named.endswith(".toml") else named
 
 
-def _sources(data: Data, file: Path) -> dict[str, str]:
+def _sources(data: Data | None, file: Path) -> dict[str, str]:
     """Digests of what the runs come from, every file of it; a missing file is reported when it is read."""
+    if data is None:
+        return {}
     source, digests = mapping_of(data, file), dict[str, str]()
     if source is not None:
         mapping = read_mapping(source)

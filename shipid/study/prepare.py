@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shipid.data.causal import causal_columns
 from shipid.data.checks import copies, repeated
-from shipid.data.dataset import Dataset, kept_rows, outside_spans, pieces, read_dataset
+from shipid.data.dataset import Dataset, clock_slack, kept_rows, outside_spans, pieces, read_dataset
 from shipid.data.windows import (
     Instants,
     PathSource,
@@ -530,11 +530,12 @@ def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[st
         if states is None:
             return None
         tracks.setdefault(run, []).append((rows["t"].to_numpy(), states))
-    result = {name: np.empty(len(windows)) for name in next(iter(tracks.values()))[0][1]}
+    result = {name: np.full(len(windows), np.nan) for name in next(iter(tracks.values()))[0][1]}
     for run in windows.spans:
         mask = windows.run == run
         for t, states in tracks[run]:
-            inside = mask & (windows.t >= t[0] - 1e-9) & (windows.t <= t[-1] + 1e-9)
+            slack = clock_slack(t)
+            inside = mask & (windows.t >= t[0] - slack) & (windows.t <= t[-1] + slack)
             for name, values in states.items():
                 result[name][inside] = np.interp(windows.t[inside], t, values)
     return result

@@ -131,7 +131,8 @@ def _computed(
 
 def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:
     """Folder of the finished turns of an interrupted rotation: one for each study, dataset, device and code."""
-    decides = [plan.digest, dataset.digest, device, code_digest(), plan.code]
+    vessels = {name: vessel.digest for name, vessel in plan.vessels.items()}  # the digest has them without their names
+    decides = [plan.digest, vessels, dataset.digest, device, code_digest(), plan.code]
     return file.with_name(f"{file.name}.turns") / documents.digest(decides)
 
 

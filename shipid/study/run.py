@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.arguments import of_class, path_of, whole_number
-from shipid.capacity import processor
+from shipid.capacity import cores, processor
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.engines import check_device
@@ -552,7 +552,7 @@ def machine() -> dict[str, Any]:
         with suppress(PackageNotFoundError):  # an extra that is not installed
             packages[name] = version(name)
     system = {"python": sys.version.split()[0], "system": platform.platform(terse=True), "machine": platform.machine()}
-    return {**system, "processor": f"{processor()}, {vectors()}", "cores": os.cpu_count(), "packages": packages}
+    return {**system, "processor": f"{processor()}, {vectors()}", "cores": cores(), "packages": packages}
 
 
 def _accuracy(foundation: Foundation, prepared: Prepared) -> dict[str, Any]:
@@ -606,7 +606,7 @@ def _compute(
     trials = (folder / store.JOURNALS).absolute()
     if scheduler is None:
         work = partial(_claimed, plan, prepared, device=device, trials=trials, holder=holder)
-        yield from on_workers(work, units, workers or os.cpu_count() or 1)
+        yield from on_workers(work, units, workers or cores())
         return
     from shipid.study.cluster import on_dask  # takes time to import, and memory in every worker
 

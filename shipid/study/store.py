@@ -318,15 +318,17 @@ def write_unit(folder: Path, unit: Unit, results: Sequence[Cell]) -> None:
 
 
 def note_session(folder: Path, session: Mapping[str, Any]) -> list[str]:
-    """Note in the provenance what a run is computed with; returns a sentence per difference to the one noted last.
+    """Note in the provenance what a run is computed with; returns a sentence per difference to the session before.
 
-    session : entries such as `shipid`, `engine`, `processor` and `packages`, as plain data; each kind is noted once.
+    session : entries such as `shipid`, `engine`, `processor` and `packages`, as plain data; each kind is noted once,
+        the latest last.
     """
-    record = provenance(folder)
+    record, now = provenance(folder), dict(session)
     before = record.get("sessions", [])
-    if dict(session) not in before:
-        write_json(folder / PROVENANCE, {**record, "sessions": [*before, dict(session)]})
-    return differences(before[-1], session) if before else []
+    if now not in before[-1:]:
+        others = [one for one in before if one != now]
+        write_json(folder / PROVENANCE, {**record, "sessions": [*others, now]})
+    return differences(before[-1], now) if before else []
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:

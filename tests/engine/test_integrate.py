@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from shipid.engine.integrate import cores, integrate
+from shipid.engine.integrate import integrate, num_threads
 
 
 def end(method: str, num_steps: int) -> float:
@@ -32,6 +32,6 @@ def test_stages_of_rk4_use_the_memory_at_their_time() -> None:
 
 def test_cores_respect_the_thread_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    assert cores() == 1
+    assert num_threads() == 1
     monkeypatch.setenv("OMP_NUM_THREADS", "none")
-    assert cores() >= 1
+    assert num_threads() >= 1

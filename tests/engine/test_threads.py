@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipid.engine import native, threads
-from shipid.engine.integrate import cores
+from shipid.engine.integrate import num_threads
 from shipid.engine.native import compiled, compiler
 from shipid.engine.threads import in_parallel, threaded
 from tests.engine.conftest import QUICK
@@ -33,7 +33,7 @@ def count(libraries_kept: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 def test_every_task_is_done_once(
     count: Any, monkeypatch: pytest.MonkeyPatch, num_cores: int, work: float, num_tasks: int
 ) -> None:
-    monkeypatch.setattr(threads, "cores", lambda: num_cores)
+    monkeypatch.setattr(threads, "num_threads", lambda: num_cores)
     done = np.zeros(40, dtype=np.intc)
     in_parallel(count, [3], [done, None], num_tasks, work)
     assert done.tolist() == [0, 0, 0, *[1] * num_tasks, *[0] * (37 - num_tasks)]
@@ -49,4 +49,4 @@ def test_after_an_interrupt_nothing_more_is_begun(count: Any) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         in_parallel(interrupted, [3], [done, None], 1000, threads.AT_ONCE)
-    assert 0 < done.sum() <= 2 * cores()
+    assert 0 < done.sum() <= 2 * num_threads()

@@ -204,7 +204,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
         names = [name for name in table if not name.endswith("_rw")]
         count = int(rng.integers(0, 6))
         units = _units(rng, names, table, count)
-        modules = tuple(modules_of(physics))
+        modules = tuple(modules_of(physics.vessel))
         centres = units.normaliser.apply(table)[: max(2, size // 3)]
         weights = rng.normal(0, 0.3, (len(modules), count + 1))
         alarm = Alarm(units.normaliser, centres, 1.0)

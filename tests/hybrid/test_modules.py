@@ -37,9 +37,9 @@ def test_home_a_wrong_propeller(here, corrector):
 
 def test_modules_are_switched_off_behind_before_ahead():
     physics = Physics(load_vessel("kvlcc2-l7"), 1, 1.0)
-    assert list(modules_of(physics)) == ["rudders", "thrusters", "hull"]
+    assert list(modules_of(physics.vessel)) == ["rudders", "thrusters", "hull"]
     assert len(without(physics)) == 3
-    assert modules_of(Physics(None, 1, 1.0)) == {}
+    assert modules_of(None) == {}
 
 
 def test_the_share_of_a_module_is_what_its_factor_changes(here):

@@ -10,11 +10,12 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows, cut_windows
+from shipid.errors import DocumentError
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory, choose_features, group_of
 from shipid.hybrid.method import Case, Task
 from shipid.hybrid.mirror import reflection
-from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.path_drawn import KINDS, MEMORIES, PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer, observe
 from shipid.study.prepare import at_instants
@@ -114,11 +115,29 @@ def test_choose_takes_the_memory_that_validates_best(dataset: Dataset, group: st
     best = min(fit.trials, key=lambda row: row["value"])
     assert fit.corrector is not None
     assert fit.corrector.hyperparameters == best["params"]
-    assert group in method.memories[int(best["params"]["memory"])]
-    without = [row["value"] for row in fit.trials if group not in method.memories[int(row["params"]["memory"])]]
+    assert group in MEMORIES[int(best["params"]["memory"])]
+    without = [row["value"] for row in fit.trials if group not in MEMORIES[int(row["params"]["memory"])]]
     assert best["value"] < 0.9 * min(without)
     seen = {"history", "error"}  # without an observer its estimates are no inputs
-    assert kinds(fit.corrector) & seen == seen & set(method.memories[int(best["params"]["memory"])])
+    assert kinds(fit.corrector) & seen == seen & set(MEMORIES[int(best["params"]["memory"])])
+
+
+@pytest.mark.parametrize("history", [0.0, 2.0])
+@pytest.mark.parametrize("error", [0.0, 2.0])
+@pytest.mark.parametrize("observer", [False, True])
+def test_choose_chooses_between_what_the_memory_has(history: float, error: float, observer: bool) -> None:
+    """Each choice once, one of them no memory: of a memory with history alone two thirds of the trials had none."""
+    memory = {"history": history, "error": error, "observer": observer}
+    there = {kind for kind, value in memory.items() if value}
+    if not there:
+        with pytest.raises(DocumentError, match="choose: there is no memory to choose from"):
+            PathDrawn(choose=True, memory=memory)
+        return
+    method = PathDrawn(choose=True, memory=memory, trials=20)
+    taken = [frozenset(KINDS) - method.left_out(point) for point in method.points()]
+    assert set().union(*taken) == there
+    assert frozenset() in taken
+    assert max(map(taken.count, taken)) - min(map(taken.count, taken)) <= 1
 
 
 @pytest.mark.parametrize("known", [False, True])
@@ -179,5 +198,5 @@ def test_scales_of_a_memory_that_is_not_taken_are_no_hyperparameters() -> None:
     assert "error_scale" not in PathDrawn(memory=Memory(history=(2.0,))).ranges()
     assert PathDrawn(memory=EVERYTHING).past == 6.0
     assert PathDrawn().past == 0.0
-    assert "memory" in PathDrawn(choose=True).varied()
+    assert "memory" in PathDrawn(choose=True, memory=EVERYTHING).varied()
     assert "memory" not in PathDrawn().varied()

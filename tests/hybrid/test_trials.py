@@ -75,7 +75,8 @@ def test_trials_fill_their_ranges_and_ridges_go_from_low_to_high():
     assert {point["offset"] for point in points} == {1.5}
     assert all(1 <= point["motion_scale"] <= 16 for point in points)
     assert len({point["motion_scale"] for point in points}) == 16
-    assert len(list(points_of(Modules(motion_scale=2.0, command_scale=2.0, offset=1.0)))) == 1
+    fixed = points_of(Modules(motion_scale=2.0, command_scale=2.0, offset=1.0, trials=5))
+    assert len(list(fixed)) == 5, "they differ in the hidden units that are drawn"
     np.testing.assert_allclose(ridges_of((1e-4, 1e-1), 4), [1e-4, 1e-3, 1e-2, 1e-1])
     assert ridges_of(0.5, 4) == [0.5]
 

@@ -128,6 +128,26 @@ def test_break_removes_what_lies_between_and_despike_does_not_reach_over(
     assert [record["count"] for record in dataset.metadata["repairs"]] == [1, 0]
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_a_spike_is_mended_by_its_own_stretch(seed: int) -> None:
+    """Wherever it is, and wherever the ship was before and after the break: on a line the mended value is the true."""
+    rng = np.random.default_rng(seed)
+    size = int(rng.integers(30, 60))
+    slopes, begins = rng.uniform(-8, 8, 3), rng.uniform(-1e4, 1e4, 3)
+    true = np.concatenate([begin + slope * np.arange(size) for begin, slope in zip(begins, slopes, strict=True)])
+    t = np.concatenate([1000.0 * k + np.arange(size) for k in range(3)])
+    flags = np.zeros(3 * size, dtype=np.int64)
+    flags[[size, 2 * size]] = 1 << FLAGS.index(BREAK)
+    ends = [size - 1, size, 2 * size - 1, 2 * size]
+    wrong = true.copy()
+    spikes = np.unique([*rng.choice(ends, 2, replace=False), *rng.choice(3 * size, 3, replace=False)])
+    wrong[spikes] += rng.choice([-500.0, 500.0], len(spikes))
+    repair = Despike(kind="despike", reason="a test", columns=("north",), window=10.0, threshold=50.0)
+    outcome = despike(pd.DataFrame({"t": t, "north": wrong, "flags": flags}), repair)
+    assert np.flatnonzero(outcome.touched).tolist() == spikes.tolist()
+    np.testing.assert_allclose(outcome.rows["north"], true, atol=1e-6)
+
+
 def test_a_break_outside_the_log_is_refused(plain_mapping: Callable[..., Path], tmp_path: Path) -> None:
     """It was written for another clock; left out, it needs no row."""
     repairs = '\n[[repair]]\nkind = "break"\nintervals = [[99.0, 101.0], [86499.0, 86501.0]]\nreason = "a test"\n'

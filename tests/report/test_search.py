@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from scipy.stats import spearmanr
 
-from shipid.hybrid.path_drawn import CHOICES, OBSERVED, PathDrawn
+from shipid.hybrid.path_drawn import MEMORIES as KINDS_BY_NUMBER
 from shipid.report.search import CEILING, FAILED, MEMORIES, importance, searched, table
 from shipid.report.search import search as drawn_anew
 from shipid.report.wording import short
@@ -151,11 +151,13 @@ def test_delays_are_seconds_and_kinds_of_memory_are_named(simulation):
     assert "Memory:" not in search(simulation).how
 
 
-@pytest.mark.parametrize("memory", [{}, {"observer": True}])
-def test_every_kind_of_memory_has_its_words(memory):
-    kinds = PathDrawn(choose=True, memory={"history": [2.0], "error": 8.0, **memory}).memories
-    assert len(kinds) <= len(MEMORIES)
-    assert (*CHOICES, *OBSERVED)[: len(kinds)] == kinds
+def test_every_kind_of_memory_has_its_words():
+    """The words of what a trial takes name its kinds, and a page those that were tried."""
+    assert len(MEMORIES) == len(KINDS_BY_NUMBER) == len(set(KINDS_BY_NUMBER))
+    names = {"history": "history", "error": "the error of the physics", "observer": "estimates of the observer"}
+    for kinds, words in zip(KINDS_BY_NUMBER, MEMORIES, strict=True):
+        everything = words.replace("that", names["error"]) if len(kinds) < len(names) else " ".join(names.values())
+        assert {kind for kind, name in names.items() if name in everything} == set(kinds), words
 
 
 def test_trials_that_all_diverged_stand(simulation):

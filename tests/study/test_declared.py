@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tomlkit
 
 from shipid.errors import DocumentError
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import build_plan, read_plan
+from shipid.vessel.load import load_vessel
 from tests.study.tiny import tiny_plan
 
 FOLDER = Path(__file__).parents[1] / "bad" / "studies"
@@ -39,6 +41,30 @@ def test_what_is_identified_is_integrated_as_it_predicts(tmp_path: Path, integra
     settings = next(one.identify for one in plan.foundations if one.name == "fit")
     assert settings is not None
     assert (settings.method, settings.step, settings.horizon) == (integrator, 0.5, plan.study.prediction.ahead)
+
+
+@pytest.mark.parametrize(
+    ("kind", "drop", "words"),
+    [
+        ("learned-force", "particulars", "the vessel has no particulars.L_pp, which scales the learned force: give it"),
+        ("modules", "hull", "the vessel has no hull, thruster or rudder whose factor could be learned: give one"),
+    ],
+)
+def test_what_a_method_cannot_work_with_is_said_before_anything_is_computed(
+    tmp_path: Path, kind: str, drop: str, words: str
+) -> None:
+    """A bare KeyError ended the study, or its cells failed, after the truth was made."""
+    document = tiny_plan(tmp_path).document
+    vessel = dict(load_vessel("gunnerus-28.9").document)
+    for key in {drop, *({"thruster", "wind"} if drop == "hull" else {"wind"})}:
+        vessel.pop(key, None)
+    (tmp_path / "odd.toml").write_text(tomlkit.dumps(vessel))
+    document["family"] = [{"name": "odd", "base": "odd.toml"}]
+    document["method"] = [{"name": "mine", "kind": kind, "families": ["odd"]}, {"name": "alone", "kind": "alone"}]
+    with pytest.raises(DocumentError) as caught:
+        build_plan(document, tmp_path / "tiny.toml")
+    assert caught.value.message == f"odd with {kind}: {words}"
+    assert caught.value.path == "method.mine"
 
 
 def test_an_observer_measures_no_position_where_velocities_make_the_path(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import ast
 import re
 import tomllib
 import warnings
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -422,3 +423,38 @@ def test_the_judged_method_is_the_first_that_learns_beside_physics(tmp_path: Pat
     still = {"name": "still", "kind": "alone"}
     both = tiny_plan(tmp_path, {"method": [alone, {"name": "drawn", **drawn}]})
     assert (both.judged, tiny_plan(tmp_path, {"method": [alone, still]}).judged) == ("drawn", "plain")
+
+
+def test_a_digest_says_what_is_in_every_file_that_a_study_reads(tmp_path: Path) -> None:
+    """Each part's digest those of its files, the whole one those of all: results are never taken for another log's."""
+    vessel = Path(bundled("models")["gunnerus-28.9"]).read_text()
+    files = {f"{name}.parquet": name for name in ("first", "second")} | {f"{name}.toml": vessel for name in ("p", "q")}
+    document = {
+        "question": "What of it?",
+        "data": {"dataset": "first.parquet"},
+        "split": {"test": ["Z"]},
+        "prediction": {"ahead": 15.0, "step": 1.0},
+        "grid": {"N_D": [1]},
+        "method": [{"name": "alone", "kind": "alone"}],
+        "family": [{"name": name, "base": f"{name}.toml"} for name in ("p", "q")],
+        "condition": [{"name": "one", "set": {}}, {"name": "two", "set": {"data.dataset": "second.parquet"}}],
+    }
+    reads = {"one": {"first.parquet", "p.toml", "q.toml"}, "two": {"second.parquet", "p.toml", "q.toml"}}
+
+    def digests(changed: Mapping[str, str]) -> dict[str, str]:
+        for name, text in (files | changed).items():
+            (tmp_path / name).write_text(text)
+        plan = build_plan(document, tmp_path / "study.toml")
+        assert {str(tmp_path / name) for name in files} <= set(map(str, plan.inputs))
+        again = build_plan(document, tmp_path / "study.toml", plan.vessels, plan.sources)  # as of a stored run
+        every = {"": plan.digest, **{name: part.plan.digest for name, part in plan.parts.items()}}
+        assert every == {"": again.digest, **{name: part.plan.digest for name, part in again.parts.items()}}
+        return every
+
+    before = digests({})
+    for name in files:
+        other = "other" if name.endswith(".parquet") else vessel.replace("L_oa = 31.25", "L_oa = 31.3")
+        assert other != files[name]
+        now = digests({name: other})
+        assert now[""] != before[""]
+        assert {part for part in reads if now[part] != before[part]} == {part for part in reads if name in reads[part]}

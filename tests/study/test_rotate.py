@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -138,18 +139,25 @@ def test_two_rotations_to_one_file_share_the_work(
 def test_what_is_kept_belongs_to_one_question(
     recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Other settings, data, devices or code have another folder; a damaged or edited file is computed again."""
+    """Other settings, data, devices or code have another folder; a damaged or edited file is computed again.
+
+    So have two vessels that are exchanged, whose digests are the same two.
+    """
     plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
     file = tmp_path / "rows.csv"
     other, _ = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 6.0}, grid={"N_D": [5]})
     moved = Dataset(dataset.frame.assign(u=dataset.frame["u"] + 0.1), dataset.metadata)
+    here = next(iter(plan.vessels.values()))
+    two = {"here": here, "there": here.with_values({"inertia.m": 1.1 * here.parameters["inertia.m"]})}
+    placed = [replace(plan, vessels=dict(zip(two, pair, strict=True))) for pair in permutations(two.values())]
     folders = [
         rotate_module.kept_folder(file, *one)
         for one in ((plan, dataset), (other, dataset), (plan, moved), (plan, dataset, "cuda"))
     ]
+    folders += [rotate_module.kept_folder(file, each, dataset) for each in placed]
     monkeypatch.setattr(rotate_module, "code_digest", lambda: "another commit")
     folders.append(rotate_module.kept_folder(file, plan, dataset))
-    assert len(set(folders)) == 5
+    assert len(set(folders)) == 7
     first = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
     next(folders[0].glob("*.parquet")).write_bytes(b"PAR1 no more")
     again = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
