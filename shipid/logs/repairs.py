@@ -138,7 +138,8 @@ def _between(rows: pd.DataFrame, known: Mask) -> Mask:
     """Whether each row (N,) has a `known` one before it and one after it in its unbroken stretch."""
     before = pd.Series(known).groupby(_stretch(rows)).cummax()
     after = pd.Series(known)[::-1].groupby(_stretch(rows)[::-1]).cummax()[::-1]
-    return before.to_numpy() & after.to_numpy()
+    between: Mask = before.to_numpy() & after.to_numpy()
+    return between
 
 
 def _stretch(rows: pd.DataFrame) -> NDArray[np.int64]:
