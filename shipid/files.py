@@ -13,8 +13,8 @@ import time
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -159,23 +159,28 @@ def write_new(text: str, file: Path, kind: str = "mapping") -> Path:
     return file
 
 
-def write_together(texts: Mapping[Path, str]) -> list[Path]:
-    """Write text files of one folder that belong together.
+def write_together(texts: Mapping[Path, str], former: Iterable[Path] = ()) -> list[Path]:
+    """Write text files of one folder that belong together, whole; `former` are files of an earlier set that go.
 
-    A process that is killed leaves the old set, the new one or a set with files missing, never files of both.
+    An error before all are on the disk leaves what was there. A process that is killed leaves the old set, the new one
+    or a set with files missing, never files of both. Raises OSError, as `whole`.
     """
     folder = next(iter(texts)).parent
-    make_folder(folder)
-    with temporary_folder(folder) as above:
-        for file, text in texts.items():
-            (above / file.name).write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
-            sync(above / file.name)
-        for file in texts:
-            file.unlink(missing_ok=True)
-        sync(folder)
-        for file in texts:
-            os.replace(above / file.name, file)
-    sync(folder)
+    absent = [one for one in (folder, *folder.parents) if not one.exists()]
+    try:
+        with ExitStack() as replaced:
+            for file, text in texts.items():
+                temporary = replaced.enter_context(whole(file))
+                temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+                sync(temporary)
+            for file in (*texts, *former):
+                Path(os.path.realpath(file)).unlink(missing_ok=True)
+            sync(folder)
+    except BaseException:
+        for one in absent:
+            with suppress(OSError):  # not one with a file in it
+                one.rmdir()
+        raise
     return list(texts)
 
 
