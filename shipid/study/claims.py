@@ -206,13 +206,14 @@ class Claims:
 
     def _write(self, file: Path, mode: str) -> None:
         """Write the words of this process; on a full disk nothing is left, which others would take for alive."""
-        with file.open(mode, encoding="utf-8") as stream:
-            try:
+        stream = file.open(mode, encoding="utf-8")  # noqa: SIM115: one that is there already is not removed
+        try:
+            with stream:
                 stream.write(self._words)
-                stream.flush()
-            except OSError:
-                file.unlink(missing_ok=True)
-                raise
+        except OSError as error:
+            file.unlink(missing_ok=True)
+            error.filename = str(file)
+            raise
 
     def _made(self, file: Path) -> bool:
         """Make the file of a claim; False if it is there already."""
