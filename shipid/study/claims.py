@@ -205,8 +205,11 @@ class Claims:
                 return
 
     def _write(self, file: Path, mode: str) -> None:
-        """Write the words of this process; on a full disk nothing is left, which others would take for alive."""
-        stream = file.open(mode, encoding="utf-8")  # noqa: SIM115: one that is there already is not removed
+        """Write the words of this process; on a full disk nothing is left, which others would take for alive.
+
+        A file that is there already stays.
+        """
+        stream = file.open(mode, encoding="utf-8")  # noqa: SIM115
         try:
             with stream:
                 stream.write(self._words)
