@@ -39,7 +39,8 @@ _SWEPT: set[Path] = set()  # folders that this process has looked through: one o
 def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path with the target's name: after the block it replaces the target; on an error it is removed.
 
-    The folder of the target is made if it is absent. Data are synced to disk before the target is replaced, and the
+    The path is alone in its folder, which is removed with all that the block makes there, and lies in that of the
+    target, which is made if it is absent. Data are synced to disk before the target is replaced, and the
     folder after it, so that a power cut leaves the old file or the new one. A process that is killed leaves a
     temporary folder, which the next one that writes there removes. A link stays, and the file that it leads to is
     replaced. Raises OSError where the place cannot be written, and for a device or a pipe, which a file would replace.

@@ -209,7 +209,7 @@ class Claims:
 
         A file that is there already stays.
         """
-        stream = file.open(mode, encoding="utf-8")  # noqa: SIM115
+        stream = file.open(mode, encoding="utf-8")
         try:
             with stream:
                 stream.write(self._words)
