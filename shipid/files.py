@@ -174,8 +174,9 @@ def write_together(texts: Mapping[Path, str], former: Iterable[Path] = ()) -> li
                 temporary = replaced.enter_context(whole(file))
                 temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
                 sync(temporary)
-            for file in (*texts, *former):
-                Path(os.path.realpath(file)).unlink(missing_ok=True)
+            gone = [file for file in former if file not in texts]
+            for file in (*gone, *(Path(os.path.realpath(file)) for file in texts)):
+                file.unlink(missing_ok=True)
             sync(folder)
     except BaseException:
         for one in absent:

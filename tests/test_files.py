@@ -136,8 +136,10 @@ def test_where_one_of_files_that_belong_together_cannot_be_written_all_stay(
     assert {file.name: file.read_text() for file in tmp_path.glob("deep/er/*")} == dict.fromkeys(names * old, "old")
     assert old or not list(tmp_path.iterdir())
     monkeypatch.undo()
-    files.write_together({folder / name: "new" for name in names})
-    assert {file.read_text() for file in folder.iterdir()} == {"new"}
+    (folder / "former").parent.mkdir(parents=True, exist_ok=True)
+    (folder / "former").symlink_to(tmp_path)
+    files.write_together({folder / name: "new" for name in names}, [folder / first, folder / "former"])
+    assert {file.name: file.read_text() for file in folder.iterdir()} == dict.fromkeys(names, "new")
     assert (folder / first).is_symlink() == old
 
 
