@@ -22,17 +22,17 @@ def open_streams() -> None:
 
 def run() -> None:
     """Run the command line; Ctrl-C while it is being imported ends it as quietly as later."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by NumPy's import; on a busy machine waits cost half
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # to look for them through all packages takes 8 ms
-    gc.set_threshold(FEW_LOOKS)
-    open_streams()
     try:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by NumPy's import; on a busy machine waits cost half
+        os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # to look for them in all packages takes 8 ms
+        gc.set_threshold(FEW_LOOKS)
+        open_streams()
         from shipid.cli import main
-    except KeyboardInterrupt:
+
+        main()
+    except KeyboardInterrupt:  # in the lines above, or in the last ones of `main`
         sys.stderr.write("interrupted\n")
         sys.exit(130)
-    try:
-        main()
     finally:
         gc.freeze()  # the end of the process looks for garbage once more: it frees all in any case
 

@@ -13,8 +13,8 @@ import time
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -39,7 +39,8 @@ _SWEPT: set[Path] = set()  # folders that this process has looked through: one o
 def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path with the target's name: after the block it replaces the target; on an error it is removed.
 
-    The folder of the target is made if it is absent. Data are synced to disk before the target is replaced, and the
+    The path is alone in its folder, which is removed with all that the block makes there, and lies in that of the
+    target, which is made if it is absent. Data are synced to disk before the target is replaced, and the
     folder after it, so that a power cut leaves the old file or the new one. A process that is killed leaves a
     temporary folder, which the next one that writes there removes. A link stays, and the file that it leads to is
     replaced. Raises OSError where the place cannot be written, and for a device or a pipe, which a file would replace.
@@ -159,23 +160,29 @@ def write_new(text: str, file: Path, kind: str = "mapping") -> Path:
     return file
 
 
-def write_together(texts: Mapping[Path, str]) -> list[Path]:
-    """Write text files of one folder that belong together.
+def write_together(texts: Mapping[Path, str], former: Iterable[Path] = ()) -> list[Path]:
+    """Write text files of one folder that belong together, whole; `former` are files of an earlier set that go.
 
-    A process that is killed leaves the old set, the new one or a set with files missing, never files of both.
+    An error before all are on the disk leaves what was there. A process that is killed leaves the old set, the new one
+    or a set with files missing, never files of both. Raises OSError, as `whole`.
     """
     folder = next(iter(texts)).parent
-    make_folder(folder)
-    with temporary_folder(folder) as above:
-        for file, text in texts.items():
-            (above / file.name).write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
-            sync(above / file.name)
-        for file in texts:
-            file.unlink(missing_ok=True)
-        sync(folder)
-        for file in texts:
-            os.replace(above / file.name, file)
-    sync(folder)
+    absent = [one for one in (folder, *folder.parents) if not one.exists()]
+    try:
+        with ExitStack() as replaced:
+            for file, text in texts.items():
+                temporary = replaced.enter_context(whole(file))
+                temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+                sync(temporary)
+            gone = [file for file in former if file not in texts]
+            for file in (*gone, *(Path(os.path.realpath(file)) for file in texts)):
+                file.unlink(missing_ok=True)
+            sync(folder)
+    except BaseException:
+        for one in absent:
+            with suppress(OSError):  # not one with a file in it
+                one.rmdir()
+        raise
     return list(texts)
 
 

@@ -51,13 +51,17 @@ def test_imports_and_the_end_look_for_no_garbage() -> None:
     assert said_after_help("(gc.get_threshold()[0] == m.FEW_LOOKS, gc.get_freeze_count() > 1000)") == "(True, True)"
 
 
-def test_ctrl_c_during_the_imports_ends_quietly() -> None:
+@pytest.mark.parametrize("stage", ["gc.set_threshold", "shipid.__main__.open_streams", "shipid.cli", "shipid.cli.main"])
+def test_ctrl_c_before_the_first_line_of_the_command_ends_quietly(stage: str) -> None:
     code = (
-        "import sys, builtins; real = builtins.__import__\n"
+        "import builtins, unittest.mock, shipid.__main__ as m\n"
+        "real = builtins.__import__\n"
         "def stop(name, *rest):\n"
-        "    if name == 'shipid.cli': raise KeyboardInterrupt\n"
+        f"    if name == {stage!r}: raise KeyboardInterrupt\n"
         "    return real(name, *rest)\n"
-        "import shipid.__main__ as m; builtins.__import__ = stop; m.run()"
+        "builtins.__import__ = stop\n"
+        f"if {stage!r} != 'shipid.cli': unittest.mock.patch({stage!r}, side_effect=KeyboardInterrupt).start()\n"
+        "m.run()"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
     assert (result.returncode, result.stderr) == (130, "interrupted\n")

@@ -81,13 +81,14 @@ def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path: Path) -> Non
     assert file.read_text() == "new"
 
 
-@pytest.mark.parametrize("moment", range(12))
+@pytest.mark.parametrize("moment", range(18))
 def test_of_files_that_belong_together_none_is_old_beside_a_new_one(
     moment: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Killed at any call that changes the folder."""
     old, new = ({tmp_path / name: f"{age} {name}" for name in ("a.c", "a.h")} for age in ("old", "new"))
-    files.write_together(old)
+    former = {tmp_path / "a-band.c": "old a-band.c"}
+    files.write_together(old | former)
     calls = iter(range(100))
 
     def killed(call: Callable[..., Any]) -> Callable[..., Any]:
@@ -101,7 +102,7 @@ def test_of_files_that_belong_together_none_is_old_beside_a_new_one(
     for place, name in ((Path, "write_text"), (Path, "unlink"), (os, "replace"), (files, "sync")):
         monkeypatch.setattr(place, name, killed(getattr(place, name)))
     try:
-        files.write_together(new)
+        files.write_together(new, former)
         done = True
     except KeyboardInterrupt:
         done = False
@@ -109,6 +110,37 @@ def test_of_files_that_belong_together_none_is_old_beside_a_new_one(
     assert len({text.split()[0] for text in left.values()}) <= 1
     assert not done or left == {file.name: text for file, text in new.items()}
     assert done == (next(calls) <= moment)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_where_one_of_files_that_belong_together_cannot_be_written_all_stay(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The error names the file; before, it named none, and left a folder behind that it had made."""
+    rng = np.random.default_rng(seed)
+    names = [f"{n}.c" for n in range(rng.integers(1, 5))]
+    first, failing, folder = rng.choice(names), rng.choice(names), tmp_path / "deep" / "er"
+    if old := bool(rng.integers(2)):
+        files.write_together({folder / name: "old" for name in names})
+        (folder / first).rename(tmp_path / "elsewhere")
+        (folder / first).symlink_to(tmp_path / "elsewhere")  # a link stays
+    write = Path.write_text
+
+    def limited(file: Path, *arguments: Any, **options: Any) -> int:
+        return full() if file.name == failing else write(file, *arguments, **options)
+
+    monkeypatch.setattr(Path, "write_text", limited)
+    with pytest.raises(OSError, match="No space") as caught:
+        files.write_together({folder / name: "new" for name in names}, [folder / "former"])
+    assert Path(caught.value.filename).resolve() == (folder / failing).resolve()
+    assert {file.name: file.read_text() for file in tmp_path.glob("deep/er/*")} == dict.fromkeys(names * old, "old")
+    assert old or not list(tmp_path.iterdir())
+    monkeypatch.undo()
+    (folder / "former").parent.mkdir(parents=True, exist_ok=True)
+    (folder / "former").symlink_to(tmp_path)
+    files.write_together({folder / name: "new" for name in names}, [folder / first, folder / "former"])
+    assert {file.name: file.read_text() for file in folder.iterdir()} == dict.fromkeys(names, "new")
+    assert (folder / first).is_symlink() == old
 
 
 def test_only_an_empty_folder_is_new(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import sys
 from collections.abc import Callable, Collection, Sequence
 from typing import Annotated, Any
@@ -34,8 +35,9 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 NAMELESS = {  # errors of the system that name no file -> what helps
     errno.EAGAIN: "this user has too many processes and threads: end some, raise `ulimit -u`, or take fewer --workers",
     errno.EMFILE: "raise `ulimit -n`",
-    errno.ENOENT: "the working folder was removed: change to another one",
+    errno.ENOENT: "set TMPDIR to a folder that can be written",
 }
+REMOVED = "the working folder was removed: change to another one"
 GROUPS = {"vessel": vessel.app, "data": data.app, "study": study.app}
 
 
@@ -52,6 +54,10 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         sys.exit(130)
+    except SystemExit as end:
+        if isinstance(getattr(end.__context__, "__cause__", None), KeyboardInterrupt):  # Typer ends without a word
+            sys.stderr.write("interrupted\n")
+        raise
     except MemoryError:
         sys.stderr.write("error: out of memory: longer steps, fewer runs, members or --workers take less\n")
         sys.exit(1)
@@ -70,9 +76,18 @@ def main() -> None:
     except OSError as error:  # a full disk, a folder that is a file, a place where one may not write
         words = error.strerror or str(error)
         if not error.filename and error.errno in NAMELESS:
-            words = f"{words}: {NAMELESS[error.errno]}"
+            lost = error.errno == errno.ENOENT and not _is_anywhere()
+            words = f"{words}: {REMOVED if lost else NAMELESS[error.errno]}"
         sys.stderr.write(f"error: {error.filename or 'system'}: {words}\n")
         sys.exit(1)
+
+
+def _is_anywhere() -> bool:
+    """Whether the working folder of this process is still there."""
+    try:
+        return bool(os.getcwd())
+    except FileNotFoundError:
+        return False
 
 
 def _check_utf_8(arguments: Sequence[str]) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from shipid.cli.options import Adaptive, Kind, check_band, command_line
-from shipid.cli.outputs import check_ending
+from shipid.cli.outputs import check_ending, check_output
 
 
 def export(
@@ -24,10 +24,14 @@ def export(
     """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""
     from shipid.document import bundled
     from shipid.errors import DocumentError, choices
+    from shipid.export.casadi import files_of
     from shipid.export.write import EXAMPLE, export_predictor, export_vessel
     from shipid.study.store import read_predictor
     from shipid.vessel.load import load_vessel
 
+    if to == "casadi" and out.name:
+        for file in files_of(out):
+            check_output(file, [Path(what)], "--out")
     if what.endswith(".npz") or (what not in bundled("models") and Path(what).is_dir()):
         if integrator is not None:
             raise DocumentError("a predictor keeps that of its study: leave it out", path="--integrator")

@@ -1,9 +1,8 @@
-"""What every command refuses before it begins, such as to write over what it reads; and how Ctrl-C ends it."""
+"""What every command refuses before it begins, such as to write over what it reads."""
 
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterable, Iterator
 from math import isfinite
 from pathlib import Path
@@ -45,7 +44,7 @@ class Guarded(typer.core.TyperCommand):
     def invoke(self, ctx: Any) -> Any:
         """Run the command; ShipidError for a number that is not finite, or for a file that must not be written.
 
-        Ctrl-C is answered here: Typer ends a command without a word.
+        An error of compiled code that Ctrl-C became is KeyboardInterrupt again.
         """
         for one in self.params:
             values = ctx.params.get(one.name)
@@ -59,12 +58,8 @@ class Guarded(typer.core.TyperCommand):
         for name, value in written.items():
             check_output(Path(value), read, f"--{name}")
             read.append(Path(value))
-        try:
-            with recognised():
-                return super().invoke(ctx)
-        except KeyboardInterrupt:
-            sys.stderr.write("interrupted\n")
-            raise typer.Exit(130) from None
+        with recognised():
+            return super().invoke(ctx)
 
 
 def check_output(file: Path, read: Iterable[Path], option: str) -> None:

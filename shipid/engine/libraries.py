@@ -101,6 +101,8 @@ def build(command: Sequence[str], source: str, library: Path, limit: float = LIM
             complaint, _ = run_compiler([places.get(word, word) for word in command], folder, limit)
             if complaint is not None:
                 return complaint
+            if not fresh.is_file() or not fresh.stat().st_size:
+                return "it ended without an error and without a library"
             with fresh.open("ab") as stream:
                 stream.write(_seal(fresh.read_bytes(), library.name))
             fresh.chmod(0o700)
@@ -184,7 +186,8 @@ def folder(wanted: str, probe: bytes) -> Path | None:
                 if reason is None:
                     ctypes.CDLL(str(trial))
         except OSError as error:
-            reason = f"{wanted}: {error.strerror or str(error).rpartition(': ')[2]}"
+            words = error.strerror or str(error).rpartition(": ")[2]
+            reason = f"{wanted}: {words}" if kept else f"a temporary folder: {words}: set TMPDIR to one that serves"
         if reason is None:
             if reasons:
                 log.warning("compiled equations are not kept for the next run: %s", visible(reasons[0]))

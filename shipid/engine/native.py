@@ -14,7 +14,6 @@ import platform
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -31,6 +30,8 @@ from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, Printed, p
 from shipid.engine.tables import Table, even_tables, find_tables
 from shipid.engine.threads import in_parallel, threaded
 from shipid.engine.vectors import DOUBLE, SINGLE, Precision, Target, head
+from shipid.errors import visible
+from shipid.files import TEMPORARY
 from shipid.metrics import BINS, BINS_AN_OCTAVE, LEAST, OCTAVES, SHIFT
 from shipid.vessel.dynamics import Dynamics
 
@@ -89,15 +90,33 @@ def _probed() -> tuple[str, bytes] | None:
         if command is None or os.path.realpath(command) in tried:
             continue
         tried.add(os.path.realpath(command))
-        with suppress(OSError), tempfile.TemporaryDirectory() as folder:
-            library = Path(folder) / "probe.so"
-            failure = build(_command(command, Target(1)), trial, library, PROBE_LIMIT)
-            if failure is None:
-                return command, library.read_bytes()
-            log.warning("the C compiler %s cannot be used (%s)", command, failure.splitlines()[0])
+        try:
+            with _trials() as folder:
+                library = Path(folder) / "probe.so"
+                failure = build(_command(command, Target(1)), trial, library, PROBE_LIMIT)
+                if failure is None:
+                    return command, library.read_bytes()
+        except OSError as error:
+            place = f"no temporary folder can be made ({error.strerror}): set TMPDIR to a folder that can be written"
+            log.warning("engine 'native' is not used, others are slower: %s", place)
+            return None
+        log.warning("the C compiler %s cannot be used (%s)", visible(command), visible(failure.splitlines()[0]))
     if not tried:
         log.warning("engine 'native' is not used, others are slower: there is no C compiler (gcc, cc or clang)")
     return None
+
+
+def _trials() -> tempfile.TemporaryDirectory[str]:
+    """A folder to try a compiler in: where the system has no temporary ones, one in the user's cache. OSError if none.
+
+    What is compiled there is not loaded.
+    """
+    try:
+        return tempfile.TemporaryDirectory()
+    except FileNotFoundError:
+        place = os.path.join(_cache(), "shipid")
+        os.makedirs(place, 0o700, exist_ok=True)
+        return tempfile.TemporaryDirectory(dir=place, prefix=TEMPORARY)
 
 
 _refused: list[str] = []  # why this process compiles no more, if so
@@ -123,17 +142,20 @@ def engine() -> str:
 def refuse(reason: str) -> None:
     """Say once that this process compiles no more, and why: from now on there is no compiler."""
     if not _refused:
-        log.warning("engine 'native' is not used, others are slower: %s", reason)
+        log.warning("engine 'native' is not used, others are slower: %s", visible(reason))
     _refused.append(reason)
+
+
+def _cache() -> str:
+    """The user's folder for what can be made anew."""
+    wanted = os.environ.get("XDG_CACHE_HOME", "")
+    return wanted if os.path.isabs(wanted) else os.path.join(os.path.expanduser("~"), ".cache")  # as it is specified
 
 
 def _folder() -> Path | None:
     """Folder of compiled libraries in the user's cache; None if none can be loaded here."""
     probed = _probed()
-    wanted = os.environ.get("XDG_CACHE_HOME", "")
-    if not os.path.isabs(wanted):  # as its specification says
-        wanted = os.path.join(os.path.expanduser("~"), ".cache")
-    return None if probed is None else libraries.folder(wanted, probed[1])
+    return None if probed is None else libraries.folder(_cache(), probed[1])
 
 
 @cache
@@ -163,7 +185,7 @@ def target(precision: Precision = DOUBLE) -> Target:
     called = f"{best.prefix}v_tanh{precision.letter}"
     probe = f"typedef {precision.real} V __attribute__((vector_size({precision.bits // 8 * best.lanes}))); "
     probe += f"V {called}(V); V run(V x) {{ return {called}(x); }}"
-    with tempfile.TemporaryDirectory() as folder:
+    with _trials() as folder:
         failure = build(_command(command, best), probe, Path(folder) / "probe.so", PROBE_LIMIT)
     return best if failure is None else replace(best, prefix="")
 
@@ -447,7 +469,7 @@ def compiled(source: str, further: Sequence[str] = ()) -> Any:
     except OSError:
         pass  # not there
     except NoLibrary as error:
-        log.warning("%s: compiled anew", error.message)
+        log.warning("%s: compiled anew", visible(error.message))
     failure = build(_command(command, target(), further), source, library)
     if failure is not None:
         raise NoLibrary(f"the C compiler failed ({failure.splitlines()[0]})")

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +16,7 @@ from shipid.export.band import CHOICE, COLUMNS
 from shipid.export.blocks import Precision
 from shipid.export.c_vessel import VesselParts
 from shipid.export.model import Model
-from shipid.files import whole, write_json
+from shipid.files import json_text, write_together
 from shipid.hybrid.bands import FEWEST, LEVELS
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
@@ -98,21 +96,33 @@ def band_function(model: Model, name: str) -> tuple[ca.Function, dict[str, Any]]
     }
 
 
-def listing_of(file: Path) -> Path:
+def band_file(file: Path) -> Path:
+    """Where the band of a predictor is written, beside its function."""
+    return file.with_name(f"{file.stem}-band{file.suffix}")
+
+
+def files_of(file: Path) -> list[Path]:
+    """Every file that an export to `file` may write or replace: functions, and the names of their entries."""
+    return [place for one in (file, band_file(file)) for place in (one, _listing(one))]
+
+
+def write_functions(
+    functions: Mapping[Path, tuple[ca.Function, Mapping[str, Any]]], former: Iterable[Path] = ()
+) -> list[Path]:
+    """Write files for `casadi.Function.load`, each with a `.json` of the names of inputs and outputs; `former` go.
+
+    All are on the disk before one of an earlier export is replaced. Raises OSError.
+    """
+    texts: dict[Path, str] = {}
+    for file, (function, names) in functions.items():
+        packed = ca.StringSerializer()  # `Function.save` does not say where a disk is full
+        packed.pack(function)
+        texts[file] = packed.encode()
+        described = json.loads(json.dumps(names, default=str))
+        texts[_listing(file)] = json_text({"shipid": __version__, "casadi": str(ca.CasadiMeta.version()), **described})
+    return write_together(texts, former)
+
+
+def _listing(file: Path) -> Path:
     """Where the names of the inputs and outputs of a written function are."""
     return file.with_name(file.name + ".json")
-
-
-def write_function(function: ca.Function, names: Mapping[str, Any], file: Path) -> list[Path]:
-    """Write `file` (for `casadi.Function.load`) and `file.json` with the names of inputs and outputs."""
-    listing = listing_of(file)
-    listing.unlink(missing_ok=True)  # never the names of another function
-    with whole(file) as temporary, tempfile.TemporaryDirectory() as folder:
-        plain = Path(folder, "function.casadi")  # CasADi takes no name that is not UTF-8
-        function.save(str(plain))
-        shutil.copyfile(plain, temporary)
-    write_json(
-        listing,
-        {"shipid": __version__, "casadi": str(ca.CasadiMeta.version()), **json.loads(json.dumps(names, default=str))},
-    )
-    return [file, listing]

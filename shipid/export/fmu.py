@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import platform
 import re
-import tempfile
 import uuid
 import zipfile
 from dataclasses import dataclass
@@ -166,17 +165,13 @@ def write_fmu(unit: Packed, file: Path) -> list[str]:
     texts["modelDescription.xml"] = description(unit, f"{{{digest}}}")
     texts[f"sources/{unit.files.name}.c"] = source.replace("@GUID@", f"{{{digest}}}")
     place = BINARIES.get((platform.system(), platform.machine())) if compiler() is not None else None
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        whole(file) as temporary,
-        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
-    ):
+    with whole(file) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():
             archive.writestr(_entry(name), text)
         if place is not None:
             for name in (f"{unit.files.name}.c", f"{unit.files.name}.h"):
-                (Path(folder) / name).write_text(texts[f"sources/{name}"], encoding="utf-8")
-            built = _compiled(Path(folder), unit.files.name)
+                (temporary.parent / name).write_text(texts[f"sources/{name}"], encoding="utf-8")
+            built = _compiled(temporary.parent, unit.files.name)
             archive.writestr(_entry(f"binaries/{place[0]}/{unit.identifier}{place[1]}", 0o755), built.read_bytes())
     return [] if place is None else [place[0]]
 

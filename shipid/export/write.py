@@ -17,7 +17,14 @@ from shipid.export.blocks import Precision
 from shipid.export.c import Files, c_name
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
-from shipid.export.casadi import band_function, listing_of, predictor_function, vessel_function, write_function
+from shipid.export.casadi import (
+    band_file,
+    band_function,
+    files_of,
+    predictor_function,
+    vessel_function,
+    write_functions,
+)
 from shipid.export.fmu import Packed, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import Exportable, Model, model
 from shipid.export.onnx import write_onnx
@@ -130,12 +137,10 @@ def _fmu(unit: Packed, file: Path) -> list[Path]:
 
 def _functions(kept: Model, title: str, file: Path) -> list[Path]:
     """Write a predictor as a CasADi function and, in a file beside it, its band; that of an earlier one is removed."""
-    band = band_function(kept, f"{title}_band")
-    band_file = file.with_name(f"{file.stem}-band{file.suffix}")
-    for old in (band_file, listing_of(band_file)):
-        old.unlink(missing_ok=True)
-    written = write_function(*predictor_function(kept, title), file)
-    return written if band is None else [*written, *write_function(*band, band_file)]
+    functions, band = {file: predictor_function(kept, title)}, band_function(kept, f"{title}_band")
+    if band is not None:
+        functions[band_file(file)] = band
+    return write_functions(functions, files_of(file))
 
 
 TARGETS: dict[str, Target] = {
@@ -151,7 +156,7 @@ TARGETS: dict[str, Target] = {
     ),
     "casadi": Target(
         lambda kept, title, file, _: _functions(kept, title, file),
-        lambda ship, title, rule, file, _: write_function(*vessel_function(ship, title, rule), file),
+        lambda ship, title, rule, file, _: write_functions({file: vessel_function(ship, title, rule)}),
         ".casadi",
     ),
     "onnx": Target(

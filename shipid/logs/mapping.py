@@ -269,7 +269,11 @@ class Mapping(Strict):
 def read_mapping(name: str | Path) -> Mapping:
     """Read a mapping: a bundled one by name, any other by path; raises DocumentError with file, path and remedy."""
     file = document.find(str(name), "studies/mappings")
-    raw = document.read(file)
+    return parse_mapping(document.read(file), file)
+
+
+def parse_mapping(raw: document.Document, file: Path) -> Mapping:
+    """Make a mapping of the content of a document; `file` is what errors name."""
     if "digest" in raw:
         raise DocumentError("the digest is computed, not written: remove it", file=file, path="digest")
     parts: dict[str, Any] = {"repair": list(_repairs(raw.get("repair", []), file)), "digest": document.digest(raw)}

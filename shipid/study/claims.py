@@ -205,14 +205,18 @@ class Claims:
                 return
 
     def _write(self, file: Path, mode: str) -> None:
-        """Write the words of this process; on a full disk nothing is left, which others would take for alive."""
-        with file.open(mode, encoding="utf-8") as stream:
-            try:
+        """Write the words of this process; on a full disk nothing is left, which others would take for alive.
+
+        A file that is there already stays.
+        """
+        stream = file.open(mode, encoding="utf-8")
+        try:
+            with stream:
                 stream.write(self._words)
-                stream.flush()
-            except OSError:
-                file.unlink(missing_ok=True)
-                raise
+        except OSError as error:
+            file.unlink(missing_ok=True)
+            error.filename = str(file)
+            raise
 
     def _made(self, file: Path) -> bool:
         """Make the file of a claim; False if it is there already."""

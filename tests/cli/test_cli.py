@@ -50,6 +50,20 @@ def test_help_reads_the_same_whatever_is_built_for_it() -> None:
     assert cli._named(["no-such"]) is cli._named([]) is app
 
 
+def test_a_working_folder_that_was_removed_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before, this was said as well where it was there, and no temporary folder."""
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    monkeypatch.setattr(cli, "_named", lambda _: os.getcwd())
+    with pytest.raises(SystemExit, match="1"):
+        cli.main()
+    words = "error: system: No such file or directory: the working folder was removed: change to another one\n"
+    assert capsys.readouterr().err == words
+
+
 @pytest.mark.parametrize(
     ("raised", "line"),
     [
@@ -59,7 +73,7 @@ def test_help_reads_the_same_whatever_is_built_for_it() -> None:
             "error: system: Busy: this user has too many processes and threads: end some.*",
         ),
         (OSError(errno.EMFILE, "Too many"), "error: system: Too many: raise `ulimit -n`"),
-        (OSError(errno.ENOENT, "None"), "error: system: None: the working folder was removed: change to another one"),
+        (OSError(errno.ENOENT, "None"), "error: system: None: set TMPDIR to a folder that can be written"),
         (OSError(errno.ENOENT, "None", "a.toml"), r"error: a\.toml: None"),
     ],
 )

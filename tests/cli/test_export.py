@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
@@ -30,7 +31,24 @@ def test_a_cell_that_is_not_there_is_one_line(tmp_path):
     assert "--integrator: a predictor keeps that of its study" in str(CliRunner().invoke(app, words).exception)
 
 
+def test_a_function_is_not_written_to_a_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, ["export", "mariner", "--to", "casadi", "--out", "."])
+    assert "is a folder: the target casadi takes a file" in str(result.exception)
+
+
 def test_a_folder_is_no_cell_but_has_some(tmp_path):
     result = CliRunner().invoke(app, ["export", str(tmp_path), "--to", "c", "--out", str(tmp_path / "ship")])
     assert result.exit_code == 1
     assert "name one of its cells, FOLDER/cells/NAME.npz" in str(result.exception)
+
+
+@pytest.mark.parametrize("name", ["a.casadi", "a.casadi.json", "a-band.casadi", "a-band.casadi.json"])
+def test_no_file_beside_a_function_takes_the_place_of_what_is_read(name, tmp_path):
+    """Before, the names of its inputs were written over the vessel."""
+    vessel = tmp_path / name
+    vessel.write_text('base = "gunnerus-28.9"\nname = "mine"\n')
+    before = vessel.read_bytes()
+    result = CliRunner().invoke(app, ["export", str(vessel), "--to", "casadi", "--out", str(tmp_path / "a.casadi")])
+    assert "is named twice, and would be written over" in str(result.exception)
+    assert (list(tmp_path.iterdir()), vessel.read_bytes()) == ([vessel], before)

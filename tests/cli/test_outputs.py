@@ -216,6 +216,28 @@ def test_every_command_is_guarded() -> None:
     assert {name for one in leaves for param in one.params for name in [param.name] if name in OUTPUTS} == set(OUTPUTS)
 
 
+STAGES = (  # what a command calls one after the other, before its own work
+    "shipid.cli._check_utf_8",
+    "shipid.cli._named",
+    "shipid.cli.log_to_stderr",
+    "shipid.cli.outputs.Guarded.parse_args",
+    "shipid.cli.outputs.isfinite",
+    "shipid.cli.outputs.check_output",
+    "shipid.cli.outputs.recognised",
+)
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_ctrl_c_before_a_command_begins_is_one_line(stage: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before, it ended without a word there."""
+
+    def pressed(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stage, pressed)
+    assert ended("manoeuvre", "mariner", "zigzag", "10", "10", "--out", "a.html") == (130, "", "interrupted\n")
+
+
 def test_ctrl_c_is_one_line_in_every_command(monkeypatch: pytest.MonkeyPatch) -> None:
     def pressed(*_: object) -> None:
         raise KeyboardInterrupt

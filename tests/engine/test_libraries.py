@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import shutil
 import stat
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -232,6 +234,57 @@ def test_a_full_disk_is_one_line(
     (line,) = [record.getMessage() for record in caplog.records]
     assert "No space left" in line
     assert compiler() is None
+
+
+@pytest.mark.parametrize("cached", [True, False])
+def test_where_there_is_no_temporary_folder_the_cache_serves_or_a_line_says_so(
+    cached: bool,
+    tmp_path: Path,
+    numbers: Callable[..., np.ndarray],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """Before, the engine was not used there, and nothing said so."""
+    sound = numbers()
+    forget()
+
+    def none() -> str:
+        raise FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/tmp']")
+
+    monkeypatch.setattr(tempfile, "gettempdir", none)
+    if not cached:
+        (tmp_path / "file").touch()
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    with caplog.at_level(logging.WARNING):
+        np.testing.assert_allclose(numbers(), sound, rtol=1e-9)
+        assert native.engine().startswith("native" if cached else "casadi")
+    lines = [record.getMessage() for record in caplog.records]
+    assert [line[-45:] for line in lines] == ([] if cached else ["): set TMPDIR to a folder that can be written"])
+    assert not list(tmp_path.rglob(".shipid-*"))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_a_strange_compiler_says_is_one_line_that_names_it_and_controls_no_terminal(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Also of one that ends without an error, and without a library: before, the cache was named."""
+    words = bytes(np.random.default_rng(seed).integers(1, 256, 40, dtype=np.uint8)) + b"\x1b[31m"
+    (tmp_path / "said").write_bytes(b"error: " + words.replace(b"\n", b" "))
+    (tmp_path / "tools").mkdir()
+    empty = 'while [ "$1" != -o ]; do shift; done; : > "$2"'
+    ends = (f"/bin/cat {tmp_path / 'said'} >&2; exit 1", "exit 0", empty)[seed % 3]
+    (tmp_path / "tools" / "gcc").write_text(f"#!/bin/sh\n{ends}\n")
+    (tmp_path / "tools" / "gcc").chmod(0o700)
+    monkeypatch.setenv("PATH", str(tmp_path / "tools"))
+    forget()
+    with caplog.at_level(logging.WARNING):
+        assert native.engine() == "casadi"
+        native.refuse((tmp_path / "said").read_bytes().decode(errors="replace"))
+    first, second = (record.getMessage() for record in caplog.records)
+    assert first.startswith(f"the C compiler {tmp_path / 'tools' / 'gcc'} cannot be used (")
+    assert ("without a library" in first) == bool(seed % 3)
+    assert first.isprintable()
+    assert second.isprintable()
 
 
 def test_a_compiler_that_never_returns_is_ended(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tempfile
 
 import numpy as np
 import pytest
@@ -64,6 +65,35 @@ def test_the_band_of_an_earlier_predictor_does_not_stay(simple, tmp_path):
         (tmp_path / name).write_text("of another predictor")
     written = simple.export("casadi", tmp_path / "ship.casadi")
     assert set(tmp_path.iterdir()) == set(written)
+
+
+@pytest.mark.parametrize(("to", "seed"), [(to, seed) for to in ("c", "casadi") for seed in range(3)])
+def test_on_a_full_disk_the_export_that_was_there_stays(simple, tmp_path, monkeypatch, to, seed):
+    """Before, CasADi wrote a part of its function and said nothing, and the names of the old one were gone."""
+    resource = pytest.importorskip("resource")
+    file = tmp_path / f"ship{TARGETS[to].ending}"
+    old = {one: one.read_bytes() for one in simple.export(to, file)}
+    monkeypatch.setattr("shipid.export.write.EXAMPLE", "none")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    least = int(np.random.default_rng(seed).integers(max(map(len, old.values()))))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (least, hard))
+    try:
+        with pytest.raises(OSError, match="too large") as caught:
+            simple.export(to, file)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert caught.value.filename in map(str, old)
+    assert {one: one.read_bytes() for one in tmp_path.rglob("*") if one.is_file()} == old
+
+
+@pytest.mark.parametrize("to", ["c", "fmu", "casadi"])
+def test_no_export_needs_a_temporary_folder_of_the_system(to, simple, tmp_path, monkeypatch):
+    """Before, a full one ended the export, and the error named another disk."""
+    expected = [file.name for file in simple.export(to, tmp_path / f"first/ship{TARGETS[to].ending}")]
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    written = simple.export(to, tmp_path / f"second/ship{TARGETS[to].ending}")
+    assert [file.name for file in written] == expected
+    assert all(file.stat().st_size for file in written)
 
 
 @pytest.mark.parametrize(

@@ -41,10 +41,11 @@ def test_a_full_disk_leaves_no_sign_of_a_process(tmp_path: Path) -> None:
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
     try:
-        with pytest.raises(OSError, match="File too large"), Claims(tmp_path):
+        with pytest.raises(OSError, match="File too large") as caught, Claims(tmp_path):
             pass
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert Path(caught.value.filename).parent == tmp_path / "claims", "before, the error named no file"
     assert not list(tmp_path.rglob(".*"))
     with Claims(tmp_path) as here:
         assert not here.others()

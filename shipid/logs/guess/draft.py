@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,13 +10,14 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from shipid import document
 from shipid.errors import ShipidError
 from shipid.logs import segments as cutting
 from shipid.logs.dates import date_of
 from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
 from shipid.logs.guess.columns import Guess
 from shipid.logs.importing import import_log, sha256_of
-from shipid.logs.mapping import Mapping, Segment, degrees_of, is_date, is_dated, read_mapping, to_si
+from shipid.logs.mapping import Mapping, Segment, degrees_of, is_date, is_dated, parse_mapping, to_si
 from shipid.logs.readers import LARGE
 from shipid.physics.signals import is_command
 
@@ -91,10 +91,9 @@ def moment(value: float, unit: str) -> str:
 
 
 def _read(text: str) -> Mapping:
-    with tempfile.TemporaryDirectory(prefix="shipid-") as folder:
-        file = Path(folder) / "draft.toml"
-        file.write_text(text, encoding="utf-8")
-        return read_mapping(file)
+    raw = document.loads(text)
+    document.check_values(raw, None)
+    return parse_mapping(raw, Path("draft.toml"))
 
 
 def _lines(values: dict[str, Any]) -> Iterator[str]:

@@ -1,5 +1,6 @@
 """A draft is a mapping that imports, says why, and lists the manoeuvres of the log."""
 
+import tempfile
 import tomllib
 from pathlib import Path
 
@@ -33,6 +34,14 @@ def test_the_draft_of_a_clean_log_imports_to_the_motion(tmp_path: Path) -> None:
     assert "99 %" in text
     assert "lever_arm" in text  # the questions that no log answers
     assert "Is the wind" not in text  # which this log does not have
+
+
+def test_a_draft_needs_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before, its text was written there to be read again."""
+    log = tmp_path / "trial.csv"
+    as_bridge(si_log()).to_csv(log, index=False)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    assert "[[segment]]" in draft_mapping(guess(log))
 
 
 def test_a_log_with_a_wind_is_asked_which(tmp_path: Path) -> None:
