@@ -432,10 +432,11 @@ def _with_ends(mean: float, low: float, high: float) -> str:
 
 
 def _to_three_digits(mean: float, low: float, high: float) -> str:
-    """A number with an interval, in the decimals that give the largest of them three digits."""
+    """A number with its interval, if it has one, in the decimals that give the largest of them three digits."""
     size = max((abs(value) for value in (mean, low, high) if math.isfinite(value)), default=0.0)
     places = decimals_for(size, 3)
-    return f"{mean:z.{places}f} [{low:z.{places}f}, {high:z.{places}f}]"
+    interval = f" [{low:z.{places}f}, {high:z.{places}f}]" if math.isfinite(low) else ""
+    return f"{mean:z.{places}f}{interval}"
 
 
 def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:

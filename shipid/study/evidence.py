@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 LEVEL = 0.025  # of one side: an interval of 95 % is free of 0
 RESAMPLES, SEED = 1999, 0
 FEWEST_RUNS = 5  # test manoeuvres below which no interval is given
+FEWEST_WORLDS = 3  # below which no interval over worlds is given
 LEAST_SPREAD, ROUNDING = 0.01, 1e-9  # of training and of the mean: a smaller spread between manoeuvres is none
 FEWEST_MODELS = 5  # whose order by A says anything: that of fewer comes by chance too often
 TRAINING, WORTH = 0.03, 4  # relative sd of H between trainings, and how many observations this number counts for
@@ -183,12 +184,15 @@ def resampled_means(values: Array, counts: Array) -> Array:
     return means / (draws @ counts).reshape(-1, *[1] * (values.ndim - 1))
 
 
-def over_worlds(values: Array) -> tuple[float, float]:
-    """Student's 95 % interval of a mean over worlds, which are independent; no numbers from fewer than two."""
-    if len(values) < 2:
+def over_worlds(values: Array, least: float = -np.inf, greatest: float = np.inf) -> tuple[float, float]:
+    """Student's 95 % interval of a mean over worlds, which are independent; no numbers from fewer than `FEWEST_WORLDS`.
+
+    least, greatest : what such a number can be; what lies beyond is cut off, which costs no coverage.
+    """
+    if len(values) < FEWEST_WORLDS:
         return np.nan, np.nan
     wide = float(stdtrit(len(values) - 1, 1 - LEVEL) * values.std(ddof=1) / len(values) ** 0.5)
-    return float(values.mean()) - wide, float(values.mean()) + wide
+    return max(float(values.mean()) - wide, least), min(float(values.mean()) + wide, greatest)
 
 
 def doubling(x: Array) -> Array:

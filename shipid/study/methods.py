@@ -16,7 +16,6 @@ from shipid.study.evidence import ROUNDING, contrasts, mean_errors, over_worlds,
 from shipid.study.results import Results
 
 EVERY = "with physics"  # all families but `none` and those that saw the test runs
-LEAST = 3  # worlds from which an interval over worlds is given
 COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
     *("H", "H_low", "H_high", "H_90", "end", "seconds", "trials"),
@@ -160,8 +159,7 @@ def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapp
     row |= {"difference": float(values.sum() / weights.sum()), "worlds": len(worlds)}
     row |= {"low": float(judged.low[0]), "high": float(judged.high[0])}
     row |= {"better": int((values < 0).sum()), "least": float(means.min()), "greatest": float(means.max())}
-    if len(worlds) >= LEAST:
-        row["world_low"], row["world_high"] = over_worlds(means)
+    row["world_low"], row["world_high"] = over_worlds(means)
     return row
 
 

@@ -232,4 +232,4 @@ def test_a_number_over_worlds_and_its_interval_have_the_same_decimals() -> None:
     assert _to_three_digits(0.86, 0.8121, 0.9) == "0.860 [0.812, 0.900]"
     assert _to_three_digits(12.34, -0.0451, 24.66) == "12.3 [0.0, 24.7]"
     assert _to_three_digits(1234.4, 1200.0, 1300.2) == "1234 [1200, 1300]"
-    assert _to_three_digits(0.0, np.nan, np.nan) == "0.00 [nan, nan]"
+    assert _to_three_digits(0.0, np.nan, np.nan) == "0.00", "no interval from two worlds"

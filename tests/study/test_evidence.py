@@ -227,6 +227,8 @@ def test_the_error_that_training_gives_a_mean_over_cells() -> None:
 
 
 def test_worlds() -> None:
-    assert np.isnan(over_worlds(np.array([1.0]))).all()
-    wide = 12.706 * 0.5**0.5 / 2**0.5
-    assert over_worlds(np.array([1.0, 2.0])) == pytest.approx((1.5 - wide, 1.5 + wide), abs=1e-3)
+    for few in (1, 2):
+        assert np.isnan(over_worlds(np.arange(1.0, 1.0 + few))).all()
+    wide = 4.3027 / 3**0.5
+    assert over_worlds(np.array([1.0, 2.0, 3.0])) == pytest.approx((2 - wide, 2 + wide), abs=1e-3)
+    assert over_worlds(np.array([1.0, 2.0, 3.0]), 0.0, 3.5) == (0.0, 3.5)
