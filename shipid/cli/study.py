@@ -208,9 +208,9 @@ def study_screen(
             answer.say("what drives A: rank correlation with a factor, and with its distance from 1:")
         shown = table(["family", "parameter", "factor", "distance"], pairs)
         answer.rows("drivers", correlations, shown if pairs else None)
-        for row in spread[~spread["family"].isin(correlations["family"])].itertuples():
-            count = int(row.members - row.diverged)
-            answer.say(f"{row.family}: {count} {plural(count, 'member shows', 'members show')} no driver of A")
+        for row in spread[~spread["family"].isin(correlations["family"])].to_dict("records"):
+            count = row["members"] - row["diverged"]
+            answer.say(f"{row['family']}: {count} {plural(count, 'member shows', 'members show')} no driver of A")
         answer.say(f"{len(frame)} members -> {file}", file=file)
 
 

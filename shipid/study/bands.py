@@ -166,7 +166,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
     radius = span(metres(top["width"].min()), metres(top["width"].max()))
     amount = int(top["N_D"].iloc[0])
     cells = results.cells[results.cells["model"].isin(top["model"])]
-    data = f"{of_methods(results, cells['method'].unique())} with {amount} runs; 95 % interval"
+    data = f"{of_methods(results, [*cells['method'].unique()])} with {amount} runs; 95 % interval"
     mean = f"mean of {len(top)} models{data} of a single model" if len(top) > 1 else data.lstrip()
     spread = f"{mean} {percent(low)} to {percent(high)}"
     sentence = f"Bands of {level_text(level)} held {percent(share)} of the whole test paths ({spread}); "

@@ -178,9 +178,9 @@ def drivers(frame: pd.DataFrame) -> pd.DataFrame:
                 alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
         pairs = {", ".join(paths): (part[paths[0]], (part[paths[0]] - 1).abs()) for paths in alike.values()}
         chances = [kendalltau(A, values).pvalue for pair in pairs.values() for values in pair]
-        shown = (holm(np.array(chances)) <= 2 * LEVEL).reshape(-1, 2).any(axis=1)  # of both sides
-        for (named, pair), driver in zip(pairs.items(), shown, strict=True):
-            if driver:
+        chance = holm(np.nan_to_num(chances, nan=1.0)).reshape(-1, 2).min(axis=1)  # nan: all are as far from 1
+        for (named, pair), least in zip(pairs.items(), chance, strict=True):
+            if least <= 2 * LEVEL:  # of both sides
                 strength = [rank_correlation(A, values.to_numpy()) for values in pair]
                 rows.append((name, named, *strength, max(map(abs, strength))))
     effects = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])

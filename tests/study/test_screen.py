@@ -152,6 +152,16 @@ def test_chance_drives_nothing(members: int) -> None:
     assert members < 100 or (len(driven), set(driven)) == (200, {"p3"})
 
 
+def test_a_factor_of_two_values_may_drive() -> None:
+    """All its values are as far from 1, so the distance has no rank."""
+    factor = np.tile([0.5, 1.5], 50)
+    A = factor + np.random.default_rng(0).uniform(0, 0.1, 100)
+    frame = pd.DataFrame({"family": "f", "member": "f", "A": A, "A_90": A, "diverged": 0.0, "p": factor})
+    (row,) = drivers(frame).to_dict("records")
+    assert (row["paths"], row["away"]) == ("p", 0.0)
+    assert row["factor"] > 0.8
+
+
 def test_a_parameter_left_alone_has_the_factor_one(tmp_path: Path) -> None:
     rules = [{"parameters": ["inertia.m"], "factor": [0.9, 1.1]}]
     more = [{"parameters": ["inertia.I_z"], "factor": [0.9, 1.1]}]
