@@ -16,7 +16,7 @@ from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyN
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import counted, digits, draw, ended_by, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import decimals_for, decimals_of, length_text, level_text, percent
+from shipid.units import decimals_for, decimals_of, length_text, level_text, percent, plural
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -204,8 +204,13 @@ def study_screen(
     with answering(as_json) as answer:
         answer.say("accuracy A [m] that so many of the members reach:")
         answer.rows("accuracy", spread, table(["family", "members", "diverged", *shares], rows))
-        answer.say("what drives A: rank correlation with a factor, and with its distance from 1:")
-        answer.rows("drivers", correlations, table(["family", "parameter", "factor", "distance"], pairs))
+        if pairs:
+            answer.say("what drives A: rank correlation with a factor, and with its distance from 1:")
+        shown = table(["family", "parameter", "factor", "distance"], pairs)
+        answer.rows("drivers", correlations, shown if pairs else None)
+        for row in spread[~spread["family"].isin(correlations["family"])].to_dict("records"):
+            count = row["members"] - row["diverged"]
+            answer.say(f"{row['family']}: {count} {plural(count, 'member shows', 'members show')} no driver of A")
         answer.say(f"{len(frame)} members -> {file}", file=file)
 
 
@@ -427,10 +432,11 @@ def _with_ends(mean: float, low: float, high: float) -> str:
 
 
 def _to_three_digits(mean: float, low: float, high: float) -> str:
-    """A number with an interval, in the decimals that give the largest of them three digits."""
+    """A number with its interval, if it has one, in the decimals that give the largest of them three digits."""
     size = max((abs(value) for value in (mean, low, high) if math.isfinite(value)), default=0.0)
     places = decimals_for(size, 3)
-    return f"{mean:z.{places}f} [{low:z.{places}f}, {high:z.{places}f}]"
+    interval = f" [{low:z.{places}f}, {high:z.{places}f}]" if math.isfinite(low) else ""
+    return f"{mean:z.{places}f}{interval}"
 
 
 def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:

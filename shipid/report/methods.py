@@ -16,6 +16,7 @@ from shipid.report.palette import INK, OKABE_ITO, SYMBOLS, Style, category
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, figure, length_places, text
 from shipid.report.wording import counted, difference, ends, listed, number, shortened
+from shipid.units import plural
 
 EVERY = "with physics"
 STEPS = (  # greatest by least error below which an axis has these ticks in a decade: two at least are within it
@@ -24,6 +25,7 @@ STEPS = (  # greatest by least error below which an axis has these ticks in a de
     (100.0, (1, 2, 5)),
 )
 ROW, MARGIN = 34, 96  # heights of a method in a panel, and around them [px]
+ALIKE = 1e-9  # relative: errors that differ by rounding
 LONGEST = 20  # characters of a name at the axis: half of a narrow window
 
 
@@ -62,11 +64,18 @@ def _verdict(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
     whole = mine[mine.missing.eq(0)].sort_values("H", kind="stable")
     if whole.empty:
         return f"with N_D = {N_D} no method has a result in every cell with physics"
-    best = whole.iloc[0]
-    over = " over all cells with physics" if first else ""
-    text = f"with N_D = {N_D} {best.method} errs least{over}, {number(best.H)} m"
-    if best.method != best.reference and math.isfinite(best.low):
-        text += f" (its difference to {best.reference} is {difference(best.difference, best.low, best.high)})"
+    best, alike = whole.iloc[0], whole.H.iloc[0] * (1 + ALIKE) >= whole.H
+    tied, over = [str(name) for name in whole.method[alike]], " over all cells with physics" if first else ""
+    err = plural(len(tied), "errs", "err alike,")
+    text = f"with N_D = {N_D} {listed(tied)} {err} least{over}, {number(best.H)} m"
+    leads = best.reference in tied
+    for row in whole[~alike if leads else alike][:1].itertuples():
+        if math.isfinite(row.low):
+            its = f"{row.method} is next, its" if leads else plural(len(tied), "its", "their")
+            text += f" ({its} difference to {row.reference} is {difference(row.difference, row.low, row.high)})"
+    partial = set(mine.method[mine.missing.gt(0)])
+    if ahead := [name for name in best.ahead.split(", ") if name in partial]:
+        text += f", but over the cells that both have {listed(ahead)} {plural(len(ahead), 'errs', 'err')} less"
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in mine[mine.failed.gt(0)].itertuples()]
     text += f", without a result: {listed(failed)}" if failed else ""
     partly = [str(row.method) for row in mine[mine.missing.gt(mine.failed)].itertuples()]

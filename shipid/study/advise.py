@@ -143,6 +143,12 @@ class Case:
         names = names[~names["family"].isin(self.results.plan.fitted)]
         return [str(m) for m in names["model"] if m in self.table.H and m in self.table.A]
 
+    @property
+    def whole(self) -> str:
+        """What `fixed` models have, where other models were tried too: the worst of these may be worse."""
+        tried = self.rows[~self.rows["family"].isin([NO_MODEL, *self.results.plan.fitted])]
+        return "" if set(tried["model"]) <= set(self.fixed) else " with a result in every cell"
+
 
 def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str]]:
     """A few sentences built from the results, each with the anchor of the figure that carries it.
@@ -256,7 +262,7 @@ def _good_enough(case: Case) -> str:
         elif limit is None:
             parts.append(_uncrossed(case, sides))
         else:
-            parts.append(_limit(limit) + _but(case, limit, sides))
+            parts.append(_limit(limit, case.whole) + _but(case, limit, sides))
             limits = True
     begins = f"How good must the physics be, {_ahead(case.results)} ahead? " if limits else ""
     if len(parts) == 2 and (once := _once(parts, list(every))):
@@ -309,8 +315,8 @@ def _any(count: int) -> str:
     return "the physics model" if count == 1 else f"any of {count} physics models"
 
 
-def _limit(estimate: Estimate) -> str:
-    """Up to which error A physics pays, in words."""
+def _limit(estimate: Estimate, whole: str = "") -> str:
+    """Up to which error A physics pays, in words; whole : what else is said of the models that were tried."""
     least, most = estimate.limits
     bounds = ""
     if np.isfinite(estimate.low):
@@ -319,11 +325,11 @@ def _limit(estimate: Estimate) -> str:
     if estimate.above:
         low = f" [at least {_length(estimate.low)}]" if np.isfinite(estimate.low) and estimate.low < most else ""
         low = bounds if estimate.unknown else low
-        return f"physics pays even with an error A of {metres(most)}, the worst tried{low}"
+        return f"physics pays even with an error A of {metres(most)}, the worst tried{whole}{low}"
     if estimate.below:
         high = f" [at most {_length(estimate.high)}]" if np.isfinite(estimate.high) and estimate.high > least else ""
         high = bounds if estimate.unknown else high
-        return f"physics does not pay even with an error A of {metres(least)}, the best tried{high}"
+        return f"physics does not pay even with an error A of {metres(least)}, the best tried{whole}{high}"
     return f"physics pays if its error A is below about {_length(estimate.value)} m{bounds}"
 
 

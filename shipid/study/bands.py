@@ -20,7 +20,7 @@ from shipid.predictor import NO_BAND
 from shipid.report.wording import listed
 from shipid.study.results import Results
 from shipid.study.verdict import metres, named, runs, span
-from shipid.units import level_text, percent
+from shipid.units import level_text, percent, plural
 
 Array = np.ndarray
 SHOWN = (0.5, 0.8, 0.9, 0.95)
@@ -165,8 +165,10 @@ def answer(results: Results) -> list[tuple[str, str]]:
     share, low, high = (float(top[name].mean()) for name in ("coverage", "low", "high"))
     radius = span(metres(top["width"].min()), metres(top["width"].max()))
     amount = int(top["N_D"].iloc[0])
-    mean = f"mean of {len(top)} models with {amount} runs; 95 % interval of a single model" if len(top) > 1 else ""
-    spread = f"{mean or f'with {amount} runs; 95 % interval'} {percent(low)} to {percent(high)}"
+    cells = results.cells[results.cells["model"].isin(top["model"])]
+    data = f"{of_methods(results, [*cells['method'].unique()])} with {amount} runs; 95 % interval"
+    mean = f"mean of {len(top)} models{data} of a single model" if len(top) > 1 else data.lstrip()
+    spread = f"{mean} {percent(low)} to {percent(high)}"
     sentence = f"Bands of {level_text(level)} held {percent(share)} of the whole test paths ({spread}); "
     sentence += f"their mean radius is {radius}."
     sentences = [(sentence, "coverage")]
@@ -181,6 +183,13 @@ def answer(results: Results) -> list[tuple[str, str]]:
         text = f"Too few runs calibrate a band of {level_text(level)} for one kind of manoeuvre alone: {listed(few)}."
         sentences.append((text, "coverage-groups"))
     return sentences
+
+
+def of_methods(results: Results, names: Sequence[str]) -> str:
+    """Say whose bands are meant, ` of the method 'drawn'`; nothing in a study of one method."""
+    if len(results.plan.methods) == 1:
+        return ""
+    return f" of the {plural(len(names), 'method')} {listed([repr(str(name)) for name in names])}"
 
 
 def worst_frame(results: Results) -> pd.DataFrame:

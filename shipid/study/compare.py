@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from shipid.errors import ResultError, ShipidError
@@ -18,6 +19,12 @@ from shipid.study.store import stored_plan
 
 ALONE = "alone"
 """Method of the rows of A, which no data improve."""
+POSSIBLE = {
+    "rank correlation": (-1.0, 1.0),
+    "share": (0.0, 1.0),
+    **dict.fromkeys(("H ", "gap", "ratio", "roughness", "variation", "verdicts"), (0.0, np.inf)),
+}
+"""What a key number of a finding can be, by a word in its name; others can be any."""
 
 
 def are_worlds(folders: Sequence[Path]) -> bool:
@@ -55,7 +62,7 @@ def read_worlds(folders: Sequence[Path]) -> list[Results]:
 def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
     """One row per finding and key number: id, claim, verdicts, number, mean over the worlds that have it, low, high.
 
-    low and high are Student's 95 % interval over worlds, not a number from fewer than two.
+    low and high are Student's 95 % interval over worlds, as of `over_worlds`, within what the number can be.
     """
     by_world = [findings(results) for results in worlds]
     rows = []
@@ -66,7 +73,8 @@ def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
         for name in names or [""]:
             values = pd.Series([one["numbers"][name] for one in same if name in one["numbers"]], dtype=float)
             row = {"id": same[0]["id"], "claim": same[0]["claim"], "verdicts": verdicts, "number": name}
-            low, high = over_worlds(values.to_numpy())
+            within = next((limits for word, limits in POSSIBLE.items() if word in name), (-np.inf, np.inf))
+            low, high = over_worlds(values.to_numpy(), *within)
             rows.append({**row, "mean": values.mean(), "low": low, "high": high})
     return pd.DataFrame(rows, columns=["id", "claim", "verdicts", "number", "mean", "low", "high"])
 

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 LEVEL = 0.025  # of one side: an interval of 95 % is free of 0
 RESAMPLES, SEED = 1999, 0
 FEWEST_RUNS = 5  # test manoeuvres below which no interval is given
+FEWEST_WORLDS = 3  # below which no interval over worlds is given
+LEAST_SPREAD, ROUNDING = 0.01, 1e-9  # of training and of the mean: a smaller spread between manoeuvres is none
 FEWEST_MODELS = 5  # whose order by A says anything: that of fewer comes by chance too often
 TRAINING, WORTH = 0.03, 4  # relative sd of H between trainings, and how many observations this number counts for
 
@@ -60,7 +62,8 @@ def contrasts(differences: Array, counts: Array, training: Array | float = 0.0) 
         return Contrasts(mean, blank, blank, blank, blank)
     away, spreads, spread = _bootstrap(differences, weights)
     error, alike = np.hypot(spread, training), np.hypot(_alike(differences, weights), training)
-    return _judged(mean, _distances(away, spreads, spread), error, alike, len(counts) - 1)
+    drawn = _distances(away, spreads, spread, _least(mean, training))
+    return _judged(mean, drawn, error, alike, len(counts) - 1)
 
 
 def mean_errors(errors: Array, counts: Array, training: Array | float = 0.0) -> Contrasts:
@@ -99,7 +102,7 @@ def contrasts_apart(
         1 / (shares[0] ** 2 / (len(one_counts) - 1) + shares[1] ** 2 / (len(other_counts) - 1) + 1e-12), least
     )
     alike = np.hypot(*(_alike(*side) for side in sides))
-    drawn = _distances(here - there, np.hypot(spreads, more), error)
+    drawn = _distances(here - there, np.hypot(spreads, more), error, _least(mean, training))
     return _judged(mean, drawn, np.hypot(error, training), np.hypot(alike, training), freedom)
 
 
@@ -142,11 +145,19 @@ def _bootstrap(values: Array, weights: Array, seed: int = SEED) -> tuple[Array, 
     return means - mean, spread, here
 
 
-def _distances(away: Array, spread: Array, here: Array) -> Array:
-    """(B, J) distances from the mean in standard errors (bootstrap-t)."""
-    tiny = spread <= 1e-6 * np.maximum(here, 1e-300)  # one manoeuvre drawn again and again
-    distances: Array = np.where(tiny, np.sign(away) * 1e6, away / np.where(tiny, 1.0, spread))
+def _distances(away: Array, spread: Array, here: Array, least: Array) -> Array:
+    """(B, J) distances from the mean in standard errors (bootstrap-t); 0 where that of the mean is at most `least`.
+
+    One manoeuvre drawn again and again has no spread: its distance is very large.
+    """
+    distances: Array = np.where(here <= least, 0.0, away / np.maximum(spread, np.maximum(1e-6 * here, 1e-300)))
     return distances
+
+
+def _least(mean: Array, training: Array | float) -> Array:
+    """(J,) standard error [m] up to which manoeuvres count as alike: of rounding, or far below that of training."""
+    least: Array = np.maximum(ROUNDING * np.abs(mean), LEAST_SPREAD * np.asarray(training))
+    return least
 
 
 def _beyond(drawn: Array, ahead: Array, apart: Array, freedom: Array | int) -> Array:
@@ -173,12 +184,15 @@ def resampled_means(values: Array, counts: Array) -> Array:
     return means / (draws @ counts).reshape(-1, *[1] * (values.ndim - 1))
 
 
-def over_worlds(values: Array) -> tuple[float, float]:
-    """Student's 95 % interval of a mean over worlds, which are independent; no numbers from fewer than two."""
-    if len(values) < 2:
+def over_worlds(values: Array, least: float = -np.inf, greatest: float = np.inf) -> tuple[float, float]:
+    """Student's 95 % interval of a mean over worlds, which are independent; no numbers from fewer than `FEWEST_WORLDS`.
+
+    least, greatest : what such a number can be; what lies beyond is cut off, which costs no coverage.
+    """
+    if len(values) < FEWEST_WORLDS:
         return np.nan, np.nan
     wide = float(stdtrit(len(values) - 1, 1 - LEVEL) * values.std(ddof=1) / len(values) ** 0.5)
-    return float(values.mean()) - wide, float(values.mean()) + wide
+    return max(float(values.mean()) - wide, least), min(float(values.mean()) + wide, greatest)
 
 
 def doubling(x: Array) -> Array:

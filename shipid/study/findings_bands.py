@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from shipid.metrics import rank_correlation, share_of
 from shipid.report.wording import listed
-from shipid.study.bands import regions, share_interval
+from shipid.study.bands import of_methods, regions, share_interval
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable, error_table
 from shipid.study.evidence import FEWEST_MODELS, by_chance, doubling
@@ -72,6 +72,7 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     if not results.complete:
         return undecided(CLAIMS, results.missing)
     level, run = results.plan.level, results.test.run
+    of = of_methods(results, [results.plan.judged])
     bands = {
         str(row["cell"]): (by_level[level].radius.mean(axis=0), by_level[level].holds(errors))
         for row, by_level, errors in regions(results, [level])
@@ -79,7 +80,7 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     table = _width_table(results, physics, {cell: width for cell, (width, _) in bands.items()})
     sound = tuple(name for name in physics if name in table.H and name in table.A)
     if not table.amounts or len(sound) < 2:
-        return undecided(CLAIMS, f"no two models with physics have a band of {level_text(level)}")
+        return undecided(CLAIMS, f"no two models with physics{of} have a band of {level_text(level)}")
     cells = judged_cells(results)
     judged = [name for name in (*sound, NO_MODEL) if name in table.H]  # a model with a failed cell may have no band
     cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin(judged)]
@@ -89,9 +90,8 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     first["evidence"] += f"; these bands hold {span(percent(min(shares)), percent(max(shares)))} of whole paths"
     whole = np.mean([one for ones in held.values() for one in ones], axis=0)
     second = _of_known_kinds(whole, run, level, results.kinds, [results.bands[cell].kinds for cell in cells["cell"]])
-    note = too_few(table.runs)
-    few = f"; {note}" if note else ""
-    return [Finding(**{**one, "evidence": one["evidence"] + few}) for one in (first, second)]
+    notes = "".join(f"; {note}" for note in (f"bands{of}" if of else "", too_few(table.runs)) if note)
+    return [Finding(**{**one, "evidence": one["evidence"] + notes}) for one in (first, second)]
 
 
 def _of_known_kinds(

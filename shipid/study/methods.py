@@ -12,16 +12,16 @@ import pandas as pd
 from shipid.arguments import of_class
 from shipid.metrics import over_time, position_error
 from shipid.study.declared import NO_MODEL
-from shipid.study.evidence import contrasts, mean_errors, over_worlds, training_error
+from shipid.study.evidence import ROUNDING, contrasts, mean_errors, over_worlds, training_error
 from shipid.study.results import Results
 
 EVERY = "with physics"  # all families but `none` and those that saw the test runs
-LEAST = 3  # worlds from which an interval over worlds is given
 COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
     *("H", "H_low", "H_high", "H_90", "end", "seconds", "trials"),
     *("reference", "pairs", "difference", "low", "high", "runs", "better"),
     *("worlds", "least", "greatest", "world_low", "world_high"),
+    "ahead",
 ]
 
 
@@ -81,14 +81,14 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     95 % interval `low`, `high` as of `contrasts`, over test runs: all windows and cells of a run, in its world, are
     drawn together, and what another training would give is in it. `better` counts test runs with a lower error.
     `least`, `greatest`: the difference by world; `world_low`, `world_high`: Student's 95 % interval over worlds, from
-    three on. The family `with physics` is all of
+    three on. `ahead` names the methods that err less over the cells that both have. The family `with physics` is all of
     them but `none` and those that saw the test runs.
     """
     frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=EVERY)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
     rows = []
     for (condition, family, N_D), group in every.groupby(["condition", "family", "N_D"], sort=False):
-        theirs = _by_key(group[group["method"] == reference])
+        by_method = {str(name): _by_key(mine) for name, mine in group.groupby("method", sort=False)}
         every_cell = len(group.drop_duplicates(["world", "foundation", "seed"]))
         for method, mine in group.groupby("method", sort=False):
             good = mine[mine["status"] == "ok"]
@@ -97,14 +97,21 @@ def compared(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
             row["reference"] = reference
             row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
             row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
-            errors = _by_key(mine)
-            rows.append(row | _interval(errors) | _difference(errors, theirs))
+            errors = by_method[str(method)]
+            row["ahead"] = ", ".join(name for name, theirs in by_method.items() if _errs_less(theirs, errors))
+            rows.append(row | _interval(errors) | _difference(errors, by_method.get(reference, {})))
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def _by_key(cells: pd.DataFrame) -> dict[tuple[str, str, int], Mapping[str, Any]]:
     good = cells[cells["status"] == "ok"].to_dict("records")
     return {(row["world"], row["foundation"], row["seed"]): {str(k): v for k, v in row.items()} for row in good}
+
+
+def _errs_less(one: Mapping[Any, Mapping[str, Any]], other: Mapping[Any, Mapping[str, Any]]) -> bool:
+    """Whether the mean H of one method is lower over the cells that both have, by more than rounding."""
+    both = one.keys() & other.keys()
+    return math.fsum(one[key]["H"] for key in both) < (1 - ROUNDING) * math.fsum(other[key]["H"] for key in both)
 
 
 def _interval(mine: Mapping[Any, Mapping[str, Any]]) -> dict[str, float]:
@@ -152,8 +159,7 @@ def _difference(mine: Mapping[Any, Mapping[str, Any]], theirs: Mapping[Any, Mapp
     row |= {"difference": float(values.sum() / weights.sum()), "worlds": len(worlds)}
     row |= {"low": float(judged.low[0]), "high": float(judged.high[0])}
     row |= {"better": int((values < 0).sum()), "least": float(means.min()), "greatest": float(means.max())}
-    if len(worlds) >= LEAST:
-        row["world_low"], row["world_high"] = over_worlds(means)
+    row["world_low"], row["world_high"] = over_worlds(means)
     return row
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.stats import kendalltau
 
 from shipid.arguments import of_class, one_of, whole_number
 from shipid.data.dataset import Dataset
@@ -20,6 +21,7 @@ from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError, choices
 from shipid.hybrid.physics import check_columns
 from shipid.metrics import BINS, rank_correlation, tally_quantile
+from shipid.study.evidence import LEVEL, holm
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
@@ -164,7 +166,9 @@ def spread(frame: pd.DataFrame) -> pd.DataFrame:
 def drivers(frame: pd.DataFrame) -> pd.DataFrame:
     """What drives A in each family: rank correlations of A with a factor and with how far the factor is from 1.
 
-    The `DRIVERS` largest, a row each: family, paths (those drawn together count once), factor, away.
+    The `DRIVERS` largest of those that chance hardly makes, a row each: family, paths (those drawn together count
+    once), factor, away. Chance is judged by Kendall's rank correlation, whose p-values are exact for few members,
+    corrected for the number of pairs in a family.
     """
     rows = []
     for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
@@ -172,10 +176,13 @@ def drivers(frame: pd.DataFrame) -> pd.DataFrame:
         for path in frame.columns.difference(list(FIXED), sort=False):
             if part[path].nunique() > 1:
                 alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
-        for paths in alike.values():
-            factor = part[paths[0]].to_numpy()
-            pair = rank_correlation(A, factor), rank_correlation(A, np.abs(factor - 1))
-            rows.append((name, ", ".join(paths), *pair, max(map(abs, pair))))
+        pairs = {", ".join(paths): (part[paths[0]], (part[paths[0]] - 1).abs()) for paths in alike.values()}
+        chances = [kendalltau(A, values).pvalue for pair in pairs.values() for values in pair]
+        chance = holm(np.nan_to_num(chances, nan=1.0)).reshape(-1, 2).min(axis=1)  # nan: all are as far from 1
+        for (named, pair), least in zip(pairs.items(), chance, strict=True):
+            if least <= 2 * LEVEL:  # of both sides
+                strength = [rank_correlation(A, values.to_numpy()) for values in pair]
+                rows.append((name, named, *strength, max(map(abs, strength))))
     effects = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])
     largest = (
         effects.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(DRIVERS)

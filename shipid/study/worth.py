@@ -133,7 +133,8 @@ def _crossing(values: Array, limits: tuple[float, float]) -> Array:
 def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
     """Runs that no physics needs for the error that a model has with the amount of this place.
 
-    Interpolated between amounts along ln H over ln N_D; where more data made it worse, the best so far counts.
+    Interpolated between amounts along ln H over ln N_D; where more data made it worse, the best so far counts. The
+    interval holds at least every amount of data at which the test cannot tell the two.
     """
     rivals = np.stack([table.by_run(NO_MODEL, k) for k in range(len(table.amounts))])
     values = np.vstack([rivals, table.by_run(model, place)[None]])
@@ -141,7 +142,10 @@ def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
     noise = np.array([*table.noise, table.noise[place]])
     mean, drawn = (values @ table.weights)[None], _trained(resampled_means(values, table.counts), noise)
     amounts = np.array(table.amounts, dtype=float)
-    return _estimate(_runs(amounts, mean), _runs(amounts, drawn), table.runs, limits)
+    estimate = _estimate(_runs(amounts, mean), _runs(amounts, drawn), table.runs, limits)
+    differences = table.compare([[(1.0, NO_MODEL, k), (-1.0, model, place)] for k in range(len(amounts))])
+    alike = amounts[(differences.above > LEVEL) & (differences.below > LEVEL)]
+    return replace(estimate, low=min([estimate.low, *alike]), high=max([estimate.high, *alike]))
 
 
 def _runs(amounts: Array, values: Array) -> Array:

@@ -28,7 +28,7 @@ def frame(seed: int, conditions: tuple[str, ...] = ("calm", "rough"), failing: b
                         dict(zip(COLUMNS, [condition, family, N_D, method, 4, failed, failed, H, 0.9 * H, 1.2 * H,
                                  2 * H, 1.7 * H, 2.0, 8.0, "a",
                              4 - failed, difference, difference - 0.5, difference + 0.4, 9, 5, 2, difference - 0.1,
-                             difference + 0.1, np.nan, np.nan], strict=True))
+                             difference + 0.1, np.nan, np.nan, ""], strict=True))
                     )  # fmt: skip
     return pd.DataFrame(rows)
 
@@ -56,6 +56,36 @@ def test_a_method_that_does_not_run_on_every_model_is_not_the_best() -> None:
     (sentence,) = verdicts(rows)
     assert "b errs least" not in sentence
     assert sentence.count(" (left out: b, not on every model)") == 2
+
+
+def three(H: tuple[float, float, float], **more: list[object]) -> str:
+    """The sentence of three methods at one amount of data, differences are to `a`."""
+    rows = frame(1, ("",), failing=False)
+    rows = rows[rows.family.eq(EVERY) & rows.N_D.eq(3)].assign(H=H, difference=np.array(H) - H[0], **more)
+    rows = rows.assign(low=rows.difference - 0.5, high=rows.difference + 0.5)
+    (sentence,) = verdicts(rows)
+    return sentence
+
+
+def test_methods_that_err_alike_are_named_together() -> None:
+    assert three((2.0, 2.0 * (1 + 1e-15), 2.5)) == (
+        "With N_D = 3 a and b err alike, least over all cells with physics, 2.00 m "
+        "(c is next, its difference to a is 0.50 m [0.00, 1.00])."
+    )
+    assert "b and c err alike, least over all cells with physics, 1.00 m (their difference to a is" in three((2, 1, 1))
+
+
+def test_a_lead_of_the_reference_is_as_large_as_it_is() -> None:
+    for lead in (0.1, 1.0):
+        assert f"(b is next, its difference to a is {lead:.2f} m [{lead - 0.5:.2f}, " in three((2.0, 2.0 + lead, 9.0)
+        ).replace("−", "-")  # fmt: skip
+
+
+def test_a_method_that_lacks_a_cell_and_errs_less_elsewhere_is_named() -> None:
+    rivals = three((9.0, 2.0, 3.0), missing=[1, 0, 1], failed=[1, 0, 0], ahead=["", "a, c", ""])
+    assert "b errs least over all cells with physics, 2.00 m" in rivals
+    assert ", but over the cells that both have a and c err less, without a result: a (1 of 4) (left out: c," in rivals
+    assert "but over" not in three((9.0, 2.0, 3.0), missing=[1, 0, 1], failed=[1, 0, 0])
 
 
 @pytest.mark.parametrize("conditions", [("",), ("calm", "rough")])

@@ -193,6 +193,16 @@ def test_how_good_physics_must_be(made: Any) -> None:
     assert "With 10 or 30 runs physics does not pay even with an error A of 1.00 m, the best tried" in advice
 
 
+@pytest.mark.parametrize("lost", [10, 30])
+def test_the_worst_tried_is_not_the_worst_that_has_every_result(made: Any, lost: int) -> None:
+    """The least accurate model has no result at one amount: the line knows nothing of it."""
+    alone = {f"m{k}": 2.0**k for k in range(5)}
+    H = grid({name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (30.0, 20.0)})
+    advice = text(made(H | {("m4", lost, 0): None}, alone=alone, claims=None, runs=8))
+    assert "pays even with an error A of 8.00 m, the worst tried with a result in every cell" in advice
+    assert "in every cell" not in text(made(H, alone=alone, claims=None, runs=8))
+
+
 def test_no_limit_of_A_where_better_physics_does_worse(made: Any) -> None:
     """The better the physics, the worse it predicts with data: no A divides what pays from what harms."""
     alone = {f"m{k}": 2.0**k for k in range(5)}

@@ -152,6 +152,19 @@ def test_one_model_has_one_radius(results: Results) -> None:
     assert sentence.endswith(f"their mean radius is {metres(row['width'])}.")
 
 
+def test_a_study_of_several_methods_says_whose_bands_it_speaks_of(results: Results) -> None:
+    """Findings speak of the method that the study judges by, this sentence of all that have a band."""
+    (way,) = results.plan.methods
+    plan = replace(results.plan, methods=(way, replace(way, name="other")))
+    assert "of the method" not in bands.answer(results)[0][0]
+    assert f" models of the method {way.name!r} with " in bands.answer(replace(results, plan=plan))[0][0]
+    most = results.cells["N_D"].max()
+    cells = results.cells.assign(method=np.where(results.cells["family"].eq("none"), "other", way.name))
+    said = bands.answer(replace(results, plan=plan, cells=cells))[0][0]
+    named = [repr(name) for name in cells["method"][cells["width"].notna() & cells["N_D"].eq(most)].unique()]
+    assert f" models of the methods {' and '.join(named)} with {most} runs" in said
+
+
 def test_findings_say_what_the_cells_hold(results: Results) -> None:
     verdicts = {one["id"]: one for one in findings(results)}
     top = results.cells[results.cells["N_D"] == results.cells["N_D"].max()].groupby("foundation")[

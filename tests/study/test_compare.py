@@ -82,8 +82,35 @@ def test_verdicts_are_counted_and_numbers_have_an_interval(made: Any) -> None:
     row = frame.loc[("R2", "H inaccurate / A accurate")]
     assert row["verdicts"] == "2 confirmed, 1 refuted"
     wide = 4.3027 * np.std([0.8, 0.85, 1.65], ddof=1) / 3**0.5  # Student's t of three worlds
-    assert row[["mean", "low", "high"]].tolist() == pytest.approx([1.1, 1.1 - wide, 1.1 + wide], abs=1e-4)
+    assert row[["mean", "low", "high"]].tolist() == pytest.approx([1.1, 0.0, 1.1 + wide], abs=1e-4)
+    assert wide > 1.1, "a ratio is not below 0"
     assert frame.loc[("R3", "gap after [m]"), "mean"] == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize(
+    ("name", "limits"),
+    [
+        ("share shown to lead at N_D = 3", (0.0, 1.0)),
+        ("rank correlation of H and H_90", (-1.0, 1.0)),
+        ("roughness of true paths [m]", (0.0, 99.0)),
+        ("H at N_D = 100 / at 10, median", (0.0, 99.0)),
+        ("rise for twice the A at N_D = 3 [m]", (-99.0, 99.0)),
+    ],
+)
+def test_each_kind_of_number_has_its_limits(
+    name: str, limits: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Worlds that differ so much that Student's interval reaches far beyond any limit."""
+    of_worlds = iter((0.0, 1.0, 0.4))
+    monkeypatch.setattr(
+        compare,
+        "findings",
+        lambda _: [{"id": "S", "claim": "", "verdict": "undecided", "numbers": {name: next(of_worlds)}}],
+    )
+    row = compare_findings([SimpleNamespace()] * 3).iloc[0]  # type: ignore[list-item]
+    assert limits[0] <= row["low"] <= row["mean"] <= row["high"] <= limits[1]
+    assert (row["low"] < 0) == (limits[0] < 0)
+    assert (row["high"] > 1) == (limits[1] > 1)
 
 
 def test_a_world_that_cannot_tell_is_counted(made: Any) -> None:
@@ -127,14 +154,14 @@ def test_a_member_weighs_once_and_a_failed_cell_nothing() -> None:
 
 def test_the_command_prints_both_tables(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     H = {"good": (1.0,), "bad": (2.1,), "none": (9.0,)}
-    worlds = [made(grid({**H, "good": (good,)}, (30,)), runs=8) for good in (1.0, 1.5)]
+    worlds = [made(grid({**H, "good": (good,)}, (30,)), runs=8) for good in (1.0, 1.25, 1.5)]
     monkeypatch.setattr(compare, "are_worlds", lambda _: True)
     monkeypatch.setattr(compare, "read_worlds", lambda _: worlds)
     result = CliRunner().invoke(app, ["study", "compare", "one", "other"])
     assert result.exit_code == 0, result.output
     lines = [" ".join(line.split()) for line in result.output.splitlines()]
-    assert "finding in 2 worlds number mean [95 % over worlds]" in lines
-    assert "R1 2 confirmed H / A, accurate 0.62 [-0.96, 2.21]" in lines
+    assert "finding in 3 worlds number mean [95 % over worlds]" in lines
+    assert "R1 3 confirmed H / A, accurate 0.625 [0.314, 0.936]" in lines
     assert "H [m], mean [least, greatest] N_D = 0 N_D = 30" in lines
     assert "good 2.00 [2.00, 2.00] 1.25 [1.00, 1.50]" in lines
     assert "none - 9.00 [9.00, 9.00]" in lines

@@ -102,6 +102,26 @@ def test_differences_that_are_all_alike() -> None:
     assert contrast.above[1] >= 0.5
 
 
+@pytest.mark.parametrize("size", [0.0016, 0.3, 7.0])
+@pytest.mark.parametrize("spread", [0.0, 1e-15, 1e-6, 1e-4])
+@pytest.mark.parametrize("runs", [5, 6, 9, 20])
+def test_errors_that_differ_by_far_less_than_training_have_the_interval_of_training(
+    runs: int, spread: float, size: float
+) -> None:
+    """Equal but for rounding, they had an interval up to 30,000 times the error: rounding was measured by rounding."""
+    errors = size * (1 + spread * np.random.default_rng(runs).normal(size=(40, runs)))
+    counts, training = np.random.default_rng(1).integers(3, 60, runs).astype(float), 0.03 * size
+    for judged in (
+        mean_errors(errors, counts, training),
+        contrasts_apart(errors, counts, np.zeros_like(errors), counts, training),
+    ):
+        for side in (judged.high - judged.mean, judged.mean - judged.low):
+            assert (side >= stats.norm.ppf(0.975) * training * (1 - 1e-9)).all()
+            assert (side <= 1.05 * stats.t.ppf(0.975, runs - 1) * training).all()
+    alone = mean_errors(np.full((1, runs), size), counts)
+    assert (alone.low[0], alone.high[0]) == pytest.approx((size, size))
+
+
 @pytest.mark.parametrize(("runs", "others"), [(6, 6), (6, 30), (20, 8)])
 def test_intervals_of_manoeuvres_that_are_no_pairs_cover(runs: int, others: int) -> None:
     """As above, for two sets of manoeuvres of unequal number and spread."""
@@ -207,6 +227,8 @@ def test_the_error_that_training_gives_a_mean_over_cells() -> None:
 
 
 def test_worlds() -> None:
-    assert np.isnan(over_worlds(np.array([1.0]))).all()
-    wide = 12.706 * 0.5**0.5 / 2**0.5
-    assert over_worlds(np.array([1.0, 2.0])) == pytest.approx((1.5 - wide, 1.5 + wide), abs=1e-3)
+    for few in (1, 2):
+        assert np.isnan(over_worlds(np.arange(1.0, 1.0 + few))).all()
+    wide = 4.3027 / 3**0.5
+    assert over_worlds(np.array([1.0, 2.0, 3.0])) == pytest.approx((2 - wide, 2 + wide), abs=1e-3)
+    assert over_worlds(np.array([1.0, 2.0, 3.0]), 0.0, 3.5) == (0.0, 3.5)

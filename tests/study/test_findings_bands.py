@@ -175,7 +175,10 @@ def test_widths_are_means_of_each_manoeuvre_where_every_model_has_a_band() -> No
         np.testing.assert_array_equal(drawn.H[name], [[[2.0, 7.0]]])
 
 
-def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("methods", "of"), [(["drawn"], ""), (["drawn", "memory"], " of the method 'drawn'")])
+def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(
+    methods: list[str], of: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its cell has no band: the report of a whole study ended in a traceback for it."""
     run, models = np.repeat(["a", "b", "c", "d", "e"], 2), ("good", "bad")
     rows = [
@@ -184,7 +187,7 @@ def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(monk
     results: Any = SimpleNamespace(
         cells=pd.DataFrame(rows),
         complete=True,
-        plan=SimpleNamespace(judged="drawn", plain=None, level=LEVEL),
+        plan=SimpleNamespace(judged="drawn", methods=methods, plain=None, level=LEVEL),
         test=SimpleNamespace(run=run, future=np.ones((2, 10, 2))),
         paths={f"{name}-9": np.zeros((2, 10, 2)) for name in models},
         physics=dict.fromkeys(models, np.zeros((2, 10, 2))),
@@ -203,3 +206,9 @@ def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(monk
     first, second = band_findings(results, models, rivals=True)
     assert first["verdict"] == "undecided"  # both are as wide
     assert second["numbers"] == {"share at 90 %": 1.0}
+    for one in (first, second):
+        assert one["evidence"].count("of the method") == one["evidence"].count(f"; bands{of}") == bool(of)
+    results.bands = {}
+    monkeypatch.setattr(findings_bands, "regions", lambda *_: iter(()))
+    for one in band_findings(results, models, rivals=True):
+        assert one["evidence"] == f"no two models with physics{of} have a band of 90 %"

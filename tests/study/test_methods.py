@@ -157,6 +157,18 @@ def test_a_failed_cell_is_counted_and_not_averaged() -> None:
     assert np.isnan(lost.difference)
 
 
+def test_who_is_ahead_over_the_cells_that_both_have() -> None:
+    """Errors of `other` are lower; without its easiest cell its mean is higher."""
+    made = cells(np.random.default_rng(2), -0.3, noise=0.01)
+    mine = made[made.method.eq("other") & made.family.eq("moderate")]
+    made.loc[mine.H.idxmin(), ["status", "H"]] = ["diverged", np.nan]
+    table = compared(made, "drawn")
+    both = made[made.family.eq("moderate") & ~made.foundation.eq(mine.foundation[mine.H.idxmin()])]
+    assert both.groupby("method").H.mean()["other"] < both.groupby("method").H.mean()["drawn"]
+    assert (row(table, "drawn").ahead, row(table).ahead) == ("other", "")
+    assert set(compared(cells(np.random.default_rng(2), 0.0, noise=0.0), "drawn").ahead) == {""}
+
+
 def test_what_learns_is_what_other_training_runs_change(tmp_path: Path) -> None:
     """The noise of training is in the intervals of these cells, `alone` on an identified family among them."""
     methods = [one for one in MIXED if one["name"] in ("drawn", "alone")]

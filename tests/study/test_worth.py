@@ -98,6 +98,24 @@ def test_runs_are_interpolated_between_amounts() -> None:
     assert at_once.value == 10
 
 
+@pytest.mark.parametrize("runs", [6, 20])
+def test_runs_that_the_test_cannot_tell_from_the_model_are_in_the_interval(runs: int) -> None:
+    """300 tables of one model, which is as good as no physics with the fewest runs, and no better."""
+    rng, excluded, amounts = np.random.default_rng(runs), 0, (3, 8, 13)
+    for _ in range(300):
+        hard, level = rng.lognormal(0.0, 1.0, runs), np.array([4.0, 2.45, 1.92])
+        H = {
+            name: level[:, None, None] * hard * rng.lognormal(0, 0.25, runs) * rng.lognormal(0, 0.03, (3, 1, 1))
+            for name in ("m0", "none")
+        }
+        errors = ErrorTable(amounts, np.ones(runs), {"m0": hard}, H)
+        worth = runs_without_physics(errors, "m0", 0)
+        differs = errors.against("none", ["m0"], 0)
+        excluded += worth.low > amounts[0]
+        assert differs.above[0] <= 0.025 or differs.below[0] <= 0.025 or worth.low == amounts[0]
+    assert excluded <= stats.binom.ppf(0.999, 300, 0.025)
+
+
 def test_more_data_that_harm_take_nothing_back() -> None:
     worth = runs_without_physics(table(A, {"m0": [2.0] * 3, "none": [4.0, 1.0, 3.0]}, (10, 40, 80)), "m0", 0)
     assert worth.value == pytest.approx(20.0)
