@@ -25,7 +25,7 @@ from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.engines import check_device
 from shipid.engine.native import engine
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.errors import DataError
+from shipid.errors import DataError, ShipidError
 from shipid.files import make_folder, write_json
 from shipid.hybrid.compensator import shared_units
 from shipid.hybrid.device import use_threads, vectors
@@ -246,7 +246,7 @@ def _other_session(plan: Plan, folder: Path, claims: Claims, device: str) -> Ite
         yield f"earlier results were computed otherwise: {'; '.join(changed)}"
 
 
-def session_on(device: str, methods: Mapping[str, str]) -> dict[str, Any]:
+def session_on(device: str, code: Mapping[str, Mapping[str, str]]) -> dict[str, Any]:
     """What results depend on beside the plan, to the last digit: versions, engine, processor, device, users' code."""
     computer = machine()
     others = {name: version for name, version in computer["packages"].items() if name != "shipid"}
@@ -257,7 +257,7 @@ def session_on(device: str, methods: Mapping[str, str]) -> dict[str, Any]:
         "python": computer["python"],
         "device": device,
         "packages": others,
-        **({"code of the method": dict(methods)} if methods else {}),
+        **code,
     }
 
 
@@ -625,12 +625,18 @@ def _compute(
 
 
 def _there(
-    shared: tuple[Plan, Prepared, str, Path, Holder, Mapping[str, str]], unit: Unit
+    shared: tuple[Plan, Prepared, str, Path, Holder, Mapping[str, Mapping[str, str]]], unit: Unit
 ) -> tuple[dict[str, Any], Results | str]:
     """A unit on a machine of a cluster: what it was computed with, and the results."""
     plan, prepared, device, trials, holder, code = shared
     imported = replace(plan, methods=tuple(way for way in plan.methods if type(way.method).__module__ != "__main__"))
-    return session_on(device, {**code, **imported.code}), _claimed(plan, prepared, unit, device, trials, holder)
+    try:
+        here = imported.code
+    except KeyError as unknown:
+        words = f"its workers lack the term {unknown}: start them with --preload and your file that puts it into TERMS"
+        raise ShipidError(words, path="--scheduler") from None
+    session = session_on(device, {what: {**code.get(what, {}), **here.get(what, {})} for what in {**code, **here}})
+    return session, _claimed(plan, prepared, unit, device, trials, holder)
 
 
 def _claimed(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path, holder: Holder) -> Results | str:
