@@ -28,7 +28,7 @@ from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor
 from shipid.study import run, seals, store
 from shipid.study.check import check_folder
-from shipid.study.claims import Claims
+from shipid.study.claims import UnitClaims
 from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import obtain, prepare
@@ -228,7 +228,7 @@ def test_one_process_leaves_what_another_works_on(tmp_path: Path, tiny_run: Path
     """It ends without tables; the other one, which comes back from far away, ends the run and writes them."""
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     store.open_folder(folder, plan)
-    with Claims(folder) as other:
+    with UnitClaims(folder) as other:
         assert other.take("N0004-s0")
         *_, end = events_here(plan, folder, leave=True)
         assert (end.kind, end.done, end.total) == ("end", 4, 8)
@@ -272,7 +272,7 @@ def test_a_process_that_was_held_up_leaves_its_unit_to_the_one_that_took_it_over
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     store.open_folder(folder, plan)
     fit, lost = PathDrawn.fit, list[str]()
-    with Claims(folder) as other:
+    with UnitClaims(folder) as other:
 
         def held_up(self: PathDrawn, task: Task) -> dict[str, Fitted]:
             fits = fit(self, task) if late or lost else {}
@@ -302,7 +302,7 @@ def test_of_processes_that_start_together_one_mends(pattern: str, leave: bool, t
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     shutil.copytree(tiny_run, folder)
     (folder / pattern).write_bytes(b"half")
-    with Claims(folder) as other:
+    with UnitClaims(folder) as other:
         assert other.take("elsewhere")
         *events, end = events_here(plan, folder, leave=leave)
     assert any("damaged: computed again" in event.text for event in events)
