@@ -49,6 +49,10 @@ class DocumentError(ShipidError):
     """A TOML document (vessel, study, mapping, patch) that is invalid."""
 
 
+class Diverges(DocumentError):
+    """A model of a study whose prediction diverges; another integrator, a smaller step or a milder family may not."""
+
+
 class DataError(ShipidError):
     """A log or dataset that does not agree with its mapping or schema."""
 

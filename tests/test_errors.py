@@ -5,9 +5,9 @@ import pickle
 
 import pytest
 
-from shipid.errors import DataError, DocumentError, ResultError, ShipidError, choices, is_utf_8, visible
+from shipid.errors import DataError, Diverges, DocumentError, ResultError, ShipidError, choices, is_utf_8, visible
 
-ERRORS = pytest.mark.parametrize("error", [ShipidError, DocumentError, DataError, ResultError])
+ERRORS = pytest.mark.parametrize("error", [ShipidError, DocumentError, Diverges, DataError, ResultError])
 
 
 @ERRORS

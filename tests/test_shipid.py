@@ -19,6 +19,7 @@ import pytest
 import shipid
 from shipid.document import bundled_folder
 from shipid.errors import ShipidError
+from tests.documented import code
 from tests.study.tiny import TINY, without_workers
 
 ROOT = Path(__file__).parents[1]
@@ -158,6 +159,22 @@ def test_a_method_in_a_users_script_is_known_to_every_command(tmp_path: Path) ->
     assert f'aria-label="Command">python my.py study run {TINY} --set' in page
     with pytest.raises(ShipidError, match="one that you wrote needs the script"):
         shipid.read_cells(tmp_path / "one")
+
+
+@pytest.mark.slow
+def test_a_term_in_a_users_script_is_known_to_every_command(tmp_path: Path) -> None:
+    """The files of the page, with two workers; after an edit a resumed study says so, by the script's name."""
+    (tmp_path / "skeg.py").write_text(code("A term")[1])
+    (tmp_path / "my.py").write_text(code("A term")[2])
+    (tmp_path / "ship.toml").write_text(
+        'extends = "gunnerus-28.9"\n[hull.skeg]\nx = -10.0\nA = 6.0\nC = 1.8\nsource = "-"\n'
+    )
+    (tmp_path / "study.toml").write_text(TINY.read_text().replace('"gunnerus-28.9"', '"ship.toml"'))
+    script("study", "run", "study.toml", "--workers", 2, "--out", "one", folder=tmp_path)
+    assert 'aria-label="Command">python my.py study run ' in (tmp_path / "one" / "report.html").read_text()
+    assert "otherwise" not in script("study", "resume", "one", folder=tmp_path)
+    (tmp_path / "skeg.py").write_text(code("A term")[1].replace("-rho / 2", "-rho * 5"))
+    assert "computed otherwise: code of the term.hull.skeg was" in script("study", "resume", "one", folder=tmp_path)
 
 
 def test_results_of_the_how_to_become_a_table_and_a_figure(

@@ -64,15 +64,16 @@ def aboard(
     adaptive: Adaptive = None,
 ) -> None:
     """Play a log as if at sea: every instant uses the past alone. Show what an officer would have seen."""
-    from shipid.study.aboard import play, summary, write
+    from shipid.study.aboard import play, summed_up, write
 
     check_band(level, kind, adaptive)
     check_ending(html, ".html")
     played = play(predictor, log, mapping, every, level=level, kind=kind, rate=adaptive)
     if out is not None:
         write(played, out)
-    for line in summary(played):
-        typer.echo(line)
+    lines = summed_up(played)
+    for line in lines:
+        typer.echo(line.text)
     if out is not None:
         typer.echo(f"{len(played.points)} points -> {out}")
     if html is not None:
@@ -82,7 +83,7 @@ def aboard(
         content = AboardContent(
             title=f"{log.stem}, played as if at sea",
             name=predictor.stem,
-            lines=summary(played),
+            lines=lines,
             instants=played.instants,
             points=played.points,
             track=played.track,

@@ -17,14 +17,14 @@ from shipid.hybrid.settings import Searched, seed_of, spread
 Array = NDArray[np.float64]
 
 
-def points_of(method: Searched) -> Iterator[dict[str, float]]:
-    """The trials of a method: a value of everything searched but the ridge, evenly spread over its range.
+def points_of(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
+    """The trials of a method: a value of everything searched but what is `idle`, evenly spread over its range.
 
     A setting is spread by its logarithm unless it is one of `LINEAR`; one of `COUNTS` is rounded. They never end where
     a budget says how many are made. Where nothing is searched they differ in what is drawn at random.
     """
-    ranges = {name: pair for name, pair in method.ranges().items() if name != "ridge"}
-    fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in {*ranges, "ridge"}}
+    ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
+    fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in {*ranges, *idle}}
     for shares in spread(max(len(ranges), 1), None if method.budget else method.trials):
         point = {name: value_at(method, name, share) for share, name in zip(shares, ranges, strict=False)}
         yield {**fixed, **point}

@@ -45,7 +45,7 @@ from shipid.identification.statistics import (
 )
 from shipid.identification.unstable import grows, growth_in
 from shipid.interrupts import uninterrupted
-from shipid.simulation.measured import measure_standard
+from shipid.simulation.measured import TRIALS, measure_standard
 from shipid.units import digits, listed, percent, plural
 from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
@@ -60,8 +60,8 @@ SIGNALS = ("u", "v", "r", "position")
 WORSE = 0.02  # of the error of free runs before the fit: what is more by less is not worse
 ACCURATE = 0.03  # of a measured thrust or torque: its proposed standard deviation
 EXACT = 1e-3  # of its deviation: what a signal counts with that the vessel repeats exactly
-TRIED: tuple[tuple[str, tuple[float, ...]], ...] = (("zigzag", (10, 10)), ("zigzag", (20, 20)), ("turning", (35,)))
-"""Standard manoeuvres [deg] that both vessels perform in calm water."""
+TRIED = tuple(sorted(TRIALS, key=lambda trial: trial[0] == "turning"))
+"""Standard manoeuvres [deg] that both vessels perform in calm water: those that have criteria, turning last."""
 COMPARED = {
     "zigzag": ("overshoot_1", "overshoot_2", "initial_turning", "period"),
     "turning": ("advance", "transfer", "tactical_diameter", "steady_diameter", "steady_speed"),

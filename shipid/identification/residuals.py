@@ -41,9 +41,8 @@ SIZES = {"u": 0.1, "v": 0.1, "w": 0.1, "north": 1.0, "east": 1.0, "down": 0.1, "
     **dict.fromkeys(("p", "q", "r"), math.radians(0.2)),
 }
 """Typical error [SI] of a state that is not fitted: the scale of its correction in the solver."""
-COMPILE_FROM = (
-    4e4  # steps times entries of the sensitivities: below it CasADi's virtual machine is faster than compiling
-)
+# Steps times entries of the sensitivities: below it CasADi's virtual machine is faster than compiling.
+COMPILE_FROM = 4e4
 CURRENT = ("V_c", "beta_c")  # channels that the nuisance of that name estimates
 MOST_LATE = 4.0  # prior widths that a latency may reach
 

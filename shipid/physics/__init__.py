@@ -40,6 +40,12 @@ class Term:
     rates: Callable[..., Any] | None = None
     gives: Mapping[str, Callable[..., Any]] = field(default_factory=dict, hash=False)
 
+    @property
+    def functions(self) -> tuple[Callable[..., Any], ...]:
+        """Every function that the term holds."""
+        every = (self.function, self.components, self.drawn, self.states, self.rates, *self.gives.values())
+        return tuple(one for one in every if one is not None)
+
 
 @dataclass(frozen=True)
 class Memory:
@@ -50,6 +56,11 @@ class Memory:
 
     output: Callable[..., Any]
     advance: Callable[..., Any]
+
+    @property
+    def functions(self) -> tuple[Callable[..., Any], ...]:
+        """Both functions."""
+        return self.output, self.advance
 
 
 MOTION = ("eta", "nu", "nu_r", "psi", "state")

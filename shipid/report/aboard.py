@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import Floats, PageContent, Sentence
+from shipid.report.content import Floats, Line, PageContent, Sentence
 from shipid.report.figure import Chip, Control, Figure, Panel, Plot, Trace, axis, layout, line, plane
 from shipid.report.page import page, write
 from shipid.report.palette import INK, category
@@ -20,7 +20,7 @@ from shipid.report.wording import metres
 LOGGED, PATH, PHYSICS, BAND, ALARM = "logged track", "predicted path", "physics alone", "band", "alarm"
 COLOURS = {LOGGED: INK, PATH: category(0), PHYSICS: category(1), BAND: category(0), ALARM: INK}
 DASHES = {PHYSICS: "dash", BAND: "dot"}
-FIRST, LEFT_OUT = ("alarm:", "band of"), ("latency:", "error where")  # begins of lines of the summary
+FIRST = ("predictions", "alarm", "band")  # kinds of lines that the page begins with
 MOST_RUNS, MOMENTS = 24, 6  # runs to choose from; instants of a run whose paths are drawn
 
 
@@ -31,14 +31,14 @@ class AboardContent(PageContent):
     Parameters
     ----------
     title, name : in words, and the predictor.
-    lines : the lines of the summary, in the order of the terminal; those that begin with a space belong to one above.
+    lines : the lines of the summary, in the order of the terminal.
     instants : run, t [s], outside (the alarm), error at the end of the horizon [m], latency [s].
     points : run, t, ahead [s], north, east, physics_north, physics_east [m]; with a band also band_along, band_across
         [m] and band_course [rad, clockwise from north].
     track : run, t [s], north, east [m], as measured.
     """
 
-    lines: Sequence[str]
+    lines: Sequence[Line]
     instants: pd.DataFrame
     points: pd.DataFrame
     track: pd.DataFrame
@@ -46,10 +46,9 @@ class AboardContent(PageContent):
     @property
     def answer(self) -> list[Sentence]:
         """What was predicted, how often the alarm was raised, whether the band kept its promise; then its limits."""
-        whole = [text for text in self.lines if not text.startswith((" ", *LEFT_OUT))]
-        first = [text for text in whole if text.startswith(FIRST) or (" prediction" in text and " ahead; " in text)]
-        every = [*first, *(text for text in whole if text not in first)]
-        return [Sentence(text[0].upper() + text[1:] + ".", "seen") for text in every]
+        first = [line for line in self.lines if line.kind in FIRST]
+        limits = [line for line in self.lines if line.kind == "limit"]
+        return [_sentence(line) for line in (*first, *limits)]
 
     @property
     def runs(self) -> list[str]:
@@ -67,6 +66,11 @@ class AboardContent(PageContent):
     def banded(self) -> bool:
         """Whether a band was asked for."""
         return "band_along" in self.points
+
+
+def _sentence(line: Line) -> Sentence:
+    """A line of the terminal as a sentence of the page."""
+    return Sentence(line.text[0].upper() + line.text[1:] + ".", "seen")
 
 
 AXES = {"band along": ("band_along", "dash"), "band across": ("band_across", "dot")}
@@ -96,7 +100,7 @@ def seen(content: AboardContent) -> Figure:
     return Figure(
         id="seen",
         title="What was seen",
-        takeaway=next((one.text for one in content.answer if one.text.startswith("Band of")), content.answer[0].text),
+        takeaway=_sentence(next((line for line in content.lines if line.kind == "band"), content.lines[0])).text,
         how=f"Paths of at most {MOMENTS} instants of a run, predicted from the rows up to then; the track went on as "
         "drawn." + (" Ellipses are the band at a few steps of each path." if content.banded else ""),
         alternative="The measured track, with the paths predicted along it and those of the physics alone.",

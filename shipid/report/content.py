@@ -29,6 +29,18 @@ def spoken(model: str) -> str:
 
 
 @dataclass(frozen=True)
+class Line:
+    """A line of the summary of a log played as if at sea: what it is about, and its text.
+
+    kind : `predictions`, `alarm` and `band` are how it went, `limit` is what limits that; a `detail` belongs to a line
+        above it or to the terminal, and the page draws it.
+    """
+
+    kind: Literal["predictions", "alarm", "band", "limit", "detail"]
+    text: str
+
+
+@dataclass(frozen=True)
 class Sentence:
     """One sentence of the answer and the figure or table that carries it.
 

@@ -50,11 +50,8 @@ MOST_LINES = 5
 NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
 TICKS = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
 SHORT = 12  # characters of a name at the axis
-WIDE, ASIDE, BACK = (
-    0.34,
-    0.45,
-    0.11,
-)  # of the oblique bars: half a width; how far aside and up (of the highest) an N_D is
+# Of the oblique bars: half a width; how far aside and up (of the highest) an N_D is.
+WIDE, ASIDE, BACK = 0.34, 0.45, 0.11
 SHADE = "rgba(0,0,0,0.28)"
 Pieces = list[tuple[float, Floats]]  # of lines of equal value: level and points (k, 2)
 
@@ -80,7 +77,7 @@ class Map(NamedTuple):
 
 
 def error_map(content: ReportContent) -> Figure | None:
-    """H over A and N_D; None where there is a single N_D, fewer than two physics models, or H is A: nothing learns."""
+    """H over A and N_D; None where `lack` says why not, or H is A: nothing learns."""
     drawn = _map(content)
     if drawn is None or nothing_learns(content):
         return None
@@ -97,7 +94,7 @@ def error_map(content: ReportContent) -> Figure | None:
     return Figure(
         id="map",
         title="Physics and data: the map",
-        takeaway=_takeaway(rows, spots),
+        takeaway=_takeaway(rows, spots) + _method(content, rows),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
         + (f" Hatched: H is not below that of {_rival(rows)} at the same N_D." if any(s.worse for s in spots) else "")
         + (lined if pieces else "")
@@ -147,18 +144,34 @@ def _plainly(spot: Spot) -> str:
     return f"<b>{label(spot.model)}</b>, N_D = {spot.size}<br>{metres(spot.H)}"
 
 
+def lack(content: ReportContent) -> str:
+    """What a map needs that the content does not have, as the end of a sentence; empty where it can be drawn."""
+    cells = content.cells
+    physics = cells[cells.family.ne(DATA_DRIVEN)].groupby("model").A.first()
+    needs = {
+        "rows of cells": not cells.empty,
+        "two N_D or more": cells.N_D.nunique() > 1,
+        "two models with physics or more": len(physics) > 1,
+        "the column A [m], a number for two models with physics or more": physics.notna().sum() > 1,
+        "cells with a result": not trained(content).merge(_rows(content)[["model"]]).empty,
+    }
+    return next((f"it needs {name}" for name, there in needs.items() if not there), "")
+
+
 def _map(content: ReportContent) -> Map | None:
-    """What the map shows; None where there is a single N_D or fewer than two physics models."""
+    """What the map shows; None where `lack` says why not."""
+    if lack(content):
+        return None
     rows = _rows(content)
     counts = sorted({int(size) for size in content.cells.N_D})
     means = trained(content).merge(rows[["model"]])
-    if len(counts) < 2 or (rows.A.notna() & rows.family.ne(DATA_DRIVEN)).sum() < 2 or means.empty:
-        return None
     return Map(rows, counts, _spots(content, means, rows), (float(means.H.min()), float(means.H.max())))
 
 
 def _rows(content: ReportContent) -> pd.DataFrame:
-    """Return the models of the cells by A: model, family, A [m], y (square root of A; models without A above).
+    """Return the models of the cells by A: model, family, A [m], y (square root of A; models without A above), short.
+
+    short : the name, without the method where all have the same one.
 
     Of several methods on the same physics, which have one place, the first: the one judged, where it is among them.
     """
@@ -167,7 +180,19 @@ def _rows(content: ReportContent) -> pd.DataFrame:
     top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
     without = frame.A.isna()
     strips = top * (1.05 + 0.06 * without.cumsum())
-    return frame.assign(y=np.sqrt(frame.A).where(~without, strips))
+    parts = [str(name).partition(" + ") for name in frame.model]
+    one = len({method for _, _, method in parts}) == 1
+    short = [foundation if one else str(name) for (foundation, _, _), name in zip(parts, frame.model, strict=True)]
+    return frame.assign(y=np.sqrt(frame.A).where(~without, strips), short=short)
+
+
+def _method(content: ReportContent, rows: pd.DataFrame) -> str:
+    """Sentence on the method of the cells on the map, where other methods are not on it; empty if all are."""
+    if not (_beside(content) or left_out(content)):
+        return ""
+    drawn = content.cells[content.cells.model.isin(rows.model[rows.family.ne(DATA_DRIVEN)])]
+    names = sorted({str(name) for name in drawn.method}) if "method" in drawn else []
+    return f" Of several methods, {listed(names) if names else 'the first'} is drawn."
 
 
 def _beside(content: ReportContent) -> str:
@@ -326,7 +351,7 @@ def _row_names(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
     place = {"xref": "paper", "x": 1, "xanchor": "left", "xshift": 4, "showarrow": False}
     return [
         {**place, "y": height, "text": label(shortened(name, SHORT)), "font": {"size": 11, "color": INK}}
-        for height, name in zip(heights, known.model[shown], strict=True)
+        for height, name in zip(heights, known.short[shown], strict=True)
     ]
 
 
@@ -341,7 +366,7 @@ def _ticks(rows: pd.DataFrame) -> dict[str, list[Any]]:
         if tick <= known.A.max() and all(abs(math.sqrt(tick) - math.sqrt(other)) > room for other in values):
             values.append(float(tick))
     strips = rows[rows.A.isna()]
-    names = [shortened(str(model), SHORT) for model in strips.model]
+    names = [shortened(name, SHORT) for name in strips.short]
     return {
         "tickvals": [*(math.sqrt(value) for value in values), *strips.y],
         "ticktext": [*(f"{value:g}" for value in values), *map(label, names)],

@@ -51,7 +51,12 @@ FIGURES: dict[str, Callable[[Any], Figure | None]] = {
 }
 """Name of a function of `shipid.figures` -> what draws it from the content of a page."""
 
+LACKS: dict[str, Callable[[Any], str]] = {"error_map": error_map.lack, "width_map": error_map.lack}
+"""Key of `FIGURES` -> what says why there is nothing to draw, if it is not that there are no rows."""
+
 WIDTH, MARGIN, GAP = 900, 130, 70  # of a figure; height of what is around its panels, and between two of them [px]
+BAR = 80  # of a scale below the panels [px]
+LYING = {"orientation": "h", "title_side": "top", "thickness": 16, "x": 0.5, "y": -0.15, "yanchor": "top"}
 BESIDE = 1.25  # of the width of the panels: a legend or a scale right of names that are right of the panel
 
 
@@ -69,7 +74,8 @@ def standalone(name: str, content: object, chosen: Sequence[object] = (), *, dar
     """
     figure = FIGURES[name](content)
     if figure is None:
-        raise ShipidError("there is nothing to draw: the results hold no rows for it", path=name)
+        lack = LACKS[name](content) if name in LACKS else ""
+        raise ShipidError(f"there is nothing to draw: {lack or 'the results hold no rows for it'}", path=name)
     given = [*chosen, *[None] * (len(figure.controls) - len(chosen))]
     places = [_place(control, value, name) for control, value in zip(figure.controls, given, strict=True)]
     return dressed(figure, figure.views["-".join(map(str, places))], dark)
@@ -168,10 +174,17 @@ def _titled(figure: go.Figure, record: Figure) -> go.Figure:
         trace.showlegend = False
         if keys and hasattr(trace, "legendgroup"):
             trace.legendgroup = next((key for key in keys if key.startswith("model:")), keys[0])
+    figure.layout.margin.t = 76
+    beside = any(_is_beside(note) for note in figure.layout.annotations)
+    if beside:
+        figure.layout.legend.x = BESIDE
     if not any(trace.type.endswith("3d") for trace in figure.data):
         figure.add_traces([_entry(chip) for chip in record.chips])
         if record.scale:
             figure.add_trace(_bar(record.scale))
+        if record.scale and record.chips and not beside:  # a legend of many models is as high as the plot
+            figure.data[-1].marker.colorbar.update(LYING)
+            figure.update_layout(height=figure.layout.height + BAR, margin_b=(figure.layout.margin.b or 0) + BAR)
     takeaway = label("\n".join(wrap(record.takeaway, 110))).replace("\n", "<br>")
     words = f"{label(record.title)}<br><sup>{takeaway}</sup>"
     figure.update_layout(
@@ -179,9 +192,6 @@ def _titled(figure: go.Figure, record: Figure) -> go.Figure:
         width=WIDTH,
         showlegend=bool(record.chips),
     )
-    figure.layout.margin.t = 76
-    if any(_is_beside(note) for note in figure.layout.annotations):
-        figure.layout.legend.x = BESIDE
     return figure
 
 

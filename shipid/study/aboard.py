@@ -30,6 +30,7 @@ from shipid.logs.mapping import read_mapping
 from shipid.metrics import share_of
 from shipid.observer import observe
 from shipid.predictor import Predictor
+from shipid.report.content import Line
 from shipid.study.apply import Band, along_run
 from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
@@ -232,28 +233,34 @@ def write(played: Played, file: Path) -> None:
 
 
 def summary(played: Played) -> list[str]:
-    """Summary of a replay, as lines."""
+    """Summary of a replay, as lines of text."""
+    return [line.text for line in summed_up(played)]
+
+
+def summed_up(played: Played) -> list[Line]:
+    """Summary of a replay, as lines that say what they are about."""
     instants, points = played.instants, played.points
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
     early = f"{played.skipped} {plural(played.skipped, 'instant')} before there was a past"
-    lines = [
-        f"{len(instants)} {plural(len(instants), 'prediction')} in {runs} {plural(runs, 'run')}, "
-        f"{played.horizon * played.step:g} s ahead; {early}"
-    ]
+    many = f"{len(instants)} {plural(len(instants), 'prediction')} in {runs} {plural(runs, 'run')}"
+    lines = [Line("predictions", f"{many}, {played.horizon * played.step:g} s ahead; {early}")]
     if played.assumed:
-        lines.append(f"not in the log, taken as 0: {', '.join(played.assumed)}")
+        lines.append(Line("limit", f"not in the log, taken as 0: {', '.join(played.assumed)}"))
     if played.gaps:
-        lines.append(f"{played.gaps}: no errors there, and a past over one of them is interpolated")
+        words = f"{played.gaps}: no errors there, and a past over one of them is interpolated"
+        lines.append(Line("limit", words))
     if played.plan:
-        lines.append("the plan was: orders stay as they are, since at sea later orders are not known")
+        words = "the plan was: orders stay as they are, since at sea later orders are not known"
+        lines.append(Line("limit", words))
     latency = 1e3 * instants["latency"].to_numpy()
-    lines.append(f"latency: median {np.median(latency):.1f} ms, 99 % below {np.quantile(latency, 0.99):.1f} ms")
-    lines.append(
-        f"alarm: at {outside.sum()} of {len(outside)} instants ({percent(outside.mean())}) outside of the training"
-    )
-    lines += _spans(instants)
-    lines += _promise(played)
-    lines.append("error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm")
+    words = f"latency: median {np.median(latency):.1f} ms, 99 % below {np.quantile(latency, 0.99):.1f} ms"
+    lines.append(Line("detail", words))
+    share = f"{outside.sum()} of {len(outside)} instants ({percent(outside.mean())})"
+    lines.append(Line("alarm", f"alarm: at {share} outside of the training"))
+    lines += [Line("detail", text) for text in _spans(instants)]
+    for place, text in enumerate(_promise(played)):
+        lines.append(Line("detail" if place else "band", text))
+    table = ["error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm"]
     merged = points.merge(instants[["run", "t", "outside"]], on=["run", "t"])
     for moment in _moments(points):
         here = merged[(merged["ahead"] == moment) & merged["error"].notna()]
@@ -261,12 +268,12 @@ def summary(played: Played) -> list[str]:
             error, alarm = here["error"].to_numpy(), here["outside"].to_numpy(dtype=bool)
             median, most, worst = map(length_text, (np.median(error), np.quantile(error, 0.9), error.max()))
             inside = length_text(np.median(error[alarm])) if alarm.any() else "-"
-            lines.append(f"{moment:>36g} s {median:>8} {most:>6} {worst:>7} {inside:>10}")
-    return lines
+            table.append(f"{moment:>36g} s {median:>8} {most:>6} {worst:>7} {inside:>10}")
+    return [*lines, *(Line("detail", text) for text in table)]
 
 
 def _promise(played: Played) -> list[str]:
-    """How often the band held whole paths, by how much it adapted, and its size over the horizon; none without one."""
+    """How often the band held whole paths, then by how much it adapted and its size ahead; none without a band."""
     if played.band is None or played.bands is None:
         return []
     lines = _held(played.instants, played.band, played.bands, f"{UNPLANNED}, or {CHANGED}" if played.plan else CHANGED)

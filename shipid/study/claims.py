@@ -62,7 +62,7 @@ class Holder:
         raise TakenOver("another process has taken it over, since this one was held up: left to it", path=unit)
 
 
-class Claims:
+class UnitClaims:
     """Claims of one process on units of work in a folder.
 
     Safe against other processes on this machine and on others that share the folder. Use it in `with`: claims are
@@ -83,7 +83,7 @@ class Claims:
         self._words = json.dumps({**owner, "system": _system(), "key": self._me.name}) + "\n"
         self.holder = Holder(folder.absolute(), self._words)
 
-    def __enter__(self) -> Claims:
+    def __enter__(self) -> UnitClaims:
         self._sign_in()
         self._renew_all()
         threading.Thread(target=self._renew, daemon=True).start()

@@ -18,7 +18,7 @@ from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent, verdicts
 from shipid.study import advise, bands, memory, methods, seals, store
 from shipid.study import results as parts
-from shipid.study.claims import Claims
+from shipid.study.claims import UnitClaims
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import intervals_frame
 from shipid.study.findings import findings
@@ -99,7 +99,7 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
     folder = path_of("folder", folder)
     store.stored_plan(folder)
     store.check_writable(folder)
-    with Claims(folder) as claims, claims.alone(PAGES):
+    with UnitClaims(folder) as claims, claims.alone(PAGES):
         return _write(folder, say)
 
 
@@ -117,7 +117,7 @@ def _write(folder: Path, say: Say | None) -> Path:
 
 def _write_one(folder: Path, say: Say | None) -> tuple[Path, bool]:
     """The pages of one run, and whether all of its cells are in them."""
-    with Claims(folder) as claims, claims.alone(store.RESULTS):  # tables are those of the page, or of the whole run
+    with UnitClaims(folder) as claims, claims.alone(store.RESULTS):  # tables are those of the page, or of the whole run
         results = read_results(folder, say)
         store.write_results(folder, results.plan, results.cells, whole=results.complete)
     content = report_content(results, say)
@@ -145,7 +145,7 @@ def share_pages(folder: Path, say: Say | None = None) -> Path:
         except FileNotFoundError:
             return False
 
-    with Claims(folder) as claims:
+    with UnitClaims(folder) as claims:
         claims.once(PAGES, is_done, lambda: _write(folder, say))
     return report
 

@@ -22,7 +22,7 @@ from tomlkit.items import Table
 from shipid import document as documents
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
 from shipid.data.windows import cut_windows
-from shipid.errors import DataError, DocumentError, ShipidError
+from shipid.errors import DataError, Diverges, DocumentError, ShipidError
 from shipid.hybrid.physics import assumed, check_columns
 from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
 from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
@@ -44,9 +44,8 @@ LETTERS = {"ä": "ae", "ö": "oe", "ü": "ue", "ø": "oe", "å": "aa", "æ": "ae
 CORRECTED = "-corrected"  # ends the name of a family whose numbers the log corrects
 LEAST_RUNS = 2  # the smallest amount of data of a new study: one run trains too, if it is long enough to be parted
 MOST_AMOUNTS, MOST_WINDOWS = 6, 20000
-LENGTHS_AHEAD = (
-    2.5  # ship lengths: the paper's experiments look 2.3 (15 s at full scale) and 2.4 (30 s, simulated) ahead
-)
+# Ship lengths: the paper's experiments look 2.3 (15 s at full scale) and 2.4 (30 s, simulated) ahead.
+LENGTHS_AHEAD = 2.5
 WIND, WIND_LENGTH = 6.0, 28.9  # m/s, m: up to a moderate breeze on R/V Gunnerus, as in the bundled studies
 HORIZONS = (1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 450, 600)  # s
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
@@ -210,11 +209,11 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     warnings += [look.sentence for look in looks.values() if look.wrong]
     try:
         draft = _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
-    except DocumentError as error:
-        if "diverges" not in error.message or not seen.faults:
+    except Diverges as error:
+        if not seen.faults:
             raise
         message = f"{error.message}; but first {_failing(seen, data)}"
-        raise DocumentError(message, file=error.file, path=error.path) from None
+        raise Diverges(message, file=error.file, path=error.path) from None
     return replace(draft, looks=looks)
 
 
@@ -286,9 +285,7 @@ def _first_that_runs(
         plan = _planned(choices, chosen, out, vessels)
         try:
             _check_runs(plan, obtain(plan) if dataset is None else dataset)
-        except DocumentError as error:
-            if "diverges" not in error.message:
-                raise
+        except Diverges as error:
             last = error
         else:
             return Draft(_text(choices, chosen, warnings), tuple(choices), plan, tuple(warnings))

@@ -6,7 +6,7 @@ import json
 import math
 import shlex
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -40,11 +40,12 @@ from shipid.study.ranges import LONGEST_NAME, Cut, check_memory, check_ranges, c
 from shipid.study.schema import Claims, Data, Published, Study, check_version
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, resolve
+from shipid.vessel.schema import functions
 
 WITH = "+"  # between a foundation and a method
 OF_PART = "/"  # between the name of a part and that of its source
 OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
-USER_SCRIPT = "my.py"  # a user's script with a method, where its name is unknown
+USER_SCRIPT = "my.py"  # a user's script with a method or a term, where its name is unknown
 FEEDBACK = ("zigzag", "reverse_spiral", "station_keeping")  # kinds of manoeuvres whose orders react to the ship
 
 
@@ -160,32 +161,38 @@ class Plan:
 
     @property
     def program(self) -> str:
-        """The command line that knows the methods: `shipid`, or the user's script where one of them is the user's."""
+        """The command line that knows methods and terms: `shipid`, or the user's script where the user wrote one."""
         return "shipid" if not self.code else shlex.join(["python", _script() or USER_SCRIPT])
 
     @property
-    def code(self) -> dict[str, str]:
-        """Name of each method that the user wrote -> digest of its code and of that of its corrector."""
+    def code(self) -> dict[str, dict[str, str]]:
+        """What the user wrote: `code of the method`, by its name, and `code of the term`, by its key -> digest.
+
+        A method has the code of its corrector too, a term that of all its functions. What has none is left out.
+        KeyError for a term of a vessel that TERMS of this process lacks.
+        """
         kinds = {way.name: type(way.method) for way in self.methods}
-        return {
-            name: users_code((kind, getattr(kind, "corrector", kind))) for name, kind in kinds.items() if of_users(kind)
+        of_method = {name: (kind, getattr(kind, "corrector", kind)) for name, kind in kinds.items()}
+        of_term = {key: held for vessel in self.used_vessels for key, held in functions(vessel.document).items()}
+        every: dict[str, Mapping[str, tuple[Callable[..., Any], ...]]] = {"method": of_method, "term": of_term}
+        found = {
+            f"code of the {what}": {name: users_code(held) for name, held in named.items() if any(map(of_users, held))}
+            for what, named in every.items()
         }
+        return {what: digests for what, digests in found.items() if digests}
 
     @property
     def command(self) -> str:
         """The command that runs this study, with its changes: by name if bundled, else by its file.
 
-        A line before it says what the script is where a method is the user's and no script has started this process.
+        A line before it says what the script is where the user wrote a part and no script has started this process.
         """
         name = self.name if documents.bundled("studies").get(self.name) == Path(self.file) else as_argument(self.file)
         changes = (f"--set {shlex.quote(f'{path}={json.dumps(value)}')}" for path, value in self.changes.items())
         words = " ".join([self.program, "study run", name, *changes])
         missing = self.program != "shipid" and not _script()
-        return (
-            f"# {USER_SCRIPT}: your script that puts the method into METHODS and calls main\n{words}"
-            if missing
-            else words
-        )
+        note = f"# {USER_SCRIPT}: your script that puts methods into METHODS or terms into TERMS and calls main\n"
+        return note + words if missing else words
 
     @property
     def digest_in_any_world(self) -> str:

@@ -28,7 +28,7 @@ from shipid.data.windows import (
     run_folds,
 )
 from shipid.engine.casadi import memory_along
-from shipid.errors import DataError, DocumentError, choices
+from shipid.errors import DataError, Diverges, DocumentError, choices
 from shipid.hybrid.physics import Physics, assumed, check_columns
 from shipid.logs.catalogue import fetch
 from shipid.logs.importing import import_log
@@ -501,13 +501,13 @@ def paths_of(
 
 
 def _redraw(plan: Plan, foundation: Foundation, family: Family, share: float) -> Foundation:
-    """The member drawn again with the next counter; DocumentError where nothing can be drawn, or no more."""
+    """The member drawn again with the next counter; Diverges where nothing can be drawn, or no more."""
     assert foundation.variant is not None
     assert foundation.base is not None
     counter = foundation.variant.counter + 1
     if counter > MOST_REDRAWS or not any(block.drawn for block in family.perturb):
         tries = f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else ""
-        raise DocumentError(
+        raise Diverges(
             f"{foundation.name} diverges on {percent(share, 1)} of the training windows{tries}: "
             "take a smaller [prediction] step, rk4, or narrower factors",
             file=plan.file,

@@ -32,6 +32,7 @@ from shipid.metrics import (
 from shipid.observer import Estimates, observe
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.predictor import Predictor, checked_bands, read_bands
+from shipid.report.selection import FEW_RUNS, spread
 from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL, Way
 from shipid.study.envelope import envelope_table
@@ -41,7 +42,6 @@ from shipid.study.prepare import constant_motion, instants_of, known_by_then
 from shipid.vessel.outline import ship_outline
 
 ALL_KINDS = "all"
-MOST_TEST_RUNS = 40  # shown over time and in the window browser
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 STRIDE = 20  # cells read between words on how far it is
 MOST_KEPT = 2**30  # bytes of predicted paths in memory
@@ -342,8 +342,8 @@ def _horizon(results: Results, path: np.ndarray, model: str, N_D: int, seed: int
 
 
 def shown_runs(results: Results) -> list[str]:
-    """Test runs that figures over time show."""
-    return list(results.test.spans)[:MOST_TEST_RUNS]
+    """Test runs that figures over time show: of many some at even distances, first and last included."""
+    return spread(list(results.test.spans), FEW_RUNS)
 
 
 def time_frame(results: Results) -> pd.DataFrame:

@@ -18,7 +18,7 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
 from shipid.files import make_folder, read_table, sweep, write_table, write_text
 from shipid.logs.importing import sha256_of
-from shipid.study.claims import Claims
+from shipid.study.claims import UnitClaims
 from shipid.study.code import code_digest
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ErrorTable
@@ -84,16 +84,16 @@ def rotate(
 
 
 @contextmanager
-def _sharing(kept: Path) -> Iterator[Claims]:
+def _sharing(kept: Path) -> Iterator[UnitClaims]:
     """The claims of this process in a folder of kept turns."""
     make_folder(kept)
     sweep(kept)
-    with Claims(kept) as claims:
+    with UnitClaims(kept) as claims:
         yield claims
 
 
 def _computed(
-    turn: Plan, dataset: Dataset, test: str, device: str, kept: Path | None, claims: Claims | None
+    turn: Plan, dataset: Dataset, test: str, device: str, kept: Path | None, claims: UnitClaims | None
 ) -> Iterator[pd.DataFrame]:
     """Cells of a turn, batch by batch; those of batches that nobody has computed are, and kept."""
     prepared = prepare(turn, dataset, device)
@@ -138,7 +138,7 @@ def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -
 
 def forget(kept: Path) -> None:
     """Remove the folder of kept turns, whose table is written; the last one of several processes does."""
-    with Claims(kept) as claims:
+    with UnitClaims(kept) as claims:
         if claims.others():
             return
     shutil.rmtree(kept, ignore_errors=True)

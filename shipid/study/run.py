@@ -25,7 +25,7 @@ from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.engines import check_device
 from shipid.engine.native import engine
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.errors import DataError
+from shipid.errors import DataError, ShipidError
 from shipid.files import make_folder, write_json
 from shipid.hybrid.compensator import shared_units
 from shipid.hybrid.device import use_threads, vectors
@@ -35,7 +35,7 @@ from shipid.hybrid.physics import Physics
 from shipid.metrics import lengths, position_error, share_of, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
-from shipid.study.claims import WAIT, Claims, Holder, TakenOver, pause
+from shipid.study.claims import WAIT, Holder, TakenOver, UnitClaims, pause
 from shipid.study.code import code_digest, of_users
 from shipid.study.declared import Foundation, Way
 from shipid.study.envelope import envelope
@@ -132,7 +132,7 @@ def run_study(
         return
     if scheduler is None:
         import_for_workers()
-    with Claims(folder) as claims:
+    with UnitClaims(folder) as claims:
         for words in _mended(folder, claims):
             yield Event("note", words)
         for words in _other_session(plan, folder, claims, device):
@@ -200,7 +200,7 @@ def _write_data(plan: Plan, folder: Path) -> None:
     seals.write_seal(folder, DATA, [folder / store.DATASET])
 
 
-def _finish(plan: Plan, folder: Path, claims: Claims, prepared: Prepared, device: str, begun: float) -> None:
+def _finish(plan: Plan, folder: Path, claims: UnitClaims, prepared: Prepared, device: str, begun: float) -> None:
     """Write what only the end of a run knows: the tables, and in the provenance notes, machine and time."""
     with claims.alone(SESSIONS):  # a process that joins notes its session there
         record = store.provenance(folder)
@@ -217,7 +217,7 @@ def _is_finished(folder: Path) -> bool:
     return seals.is_sealed(folder, store.RESULTS) and "wall_seconds" in store.provenance(folder)
 
 
-def _mended(folder: Path, claims: Claims) -> list[str]:
+def _mended(folder: Path, claims: UnitClaims) -> list[str]:
     """Take away damaged files, so that they are computed again; one process looks, others wait until it has."""
     with claims.alone(MENDING):
         return list(seals.mend(folder)) if claims.take(MENDED) else []
@@ -238,7 +238,7 @@ def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
     seals.write_seal(folder, COMMON, [folder / name for name in (store.TEST, store.ENVELOPE, store.FOUNDATIONS)])
 
 
-def _other_session(plan: Plan, folder: Path, claims: Claims, device: str) -> Iterator[str]:
+def _other_session(plan: Plan, folder: Path, claims: UnitClaims, device: str) -> Iterator[str]:
     """Note what this run is computed with; a sentence where earlier results were computed with something else."""
     with claims.alone(SESSIONS):
         changed = store.note_session(folder, session_on(device, plan.code))
@@ -246,7 +246,7 @@ def _other_session(plan: Plan, folder: Path, claims: Claims, device: str) -> Ite
         yield f"earlier results were computed otherwise: {'; '.join(changed)}"
 
 
-def session_on(device: str, methods: Mapping[str, str]) -> dict[str, Any]:
+def session_on(device: str, code: Mapping[str, Mapping[str, str]]) -> dict[str, Any]:
     """What results depend on beside the plan, to the last digit: versions, engine, processor, device, users' code."""
     computer = machine()
     others = {name: version for name, version in computer["packages"].items() if name != "shipid"}
@@ -257,12 +257,12 @@ def session_on(device: str, methods: Mapping[str, str]) -> dict[str, Any]:
         "python": computer["python"],
         "device": device,
         "packages": others,
-        **({"code of the method": dict(methods)} if methods else {}),
+        **code,
     }
 
 
 def _shared(
-    plan: Plan, folder: Path, claims: Claims, compute: Callable[[Iterable[Unit]], Computed], leave: bool
+    plan: Plan, folder: Path, claims: UnitClaims, compute: Callable[[Iterable[Unit]], Computed], leave: bool
 ) -> Iterator[Event]:
     """Compute every unit that is not finished yet, here or, where another process is at work on it, there."""
     units = {unit.key: unit for unit in plan.units}
@@ -617,7 +617,7 @@ def _compute(
     for unit, (session, results) in on_dask(scheduler, _there, shared, named, plan.digest, of_user):
         if session not in noted:
             noted.append(session)
-            with Claims(folder) as claims, claims.alone(SESSIONS):
+            with UnitClaims(folder) as claims, claims.alone(SESSIONS):
                 changed = store.note_session(folder, session)
             if changed:
                 log.warning("computed otherwise on the cluster: %s", "; ".join(changed))
@@ -625,12 +625,18 @@ def _compute(
 
 
 def _there(
-    shared: tuple[Plan, Prepared, str, Path, Holder, Mapping[str, str]], unit: Unit
+    shared: tuple[Plan, Prepared, str, Path, Holder, Mapping[str, Mapping[str, str]]], unit: Unit
 ) -> tuple[dict[str, Any], Results | str]:
     """A unit on a machine of a cluster: what it was computed with, and the results."""
     plan, prepared, device, trials, holder, code = shared
     imported = replace(plan, methods=tuple(way for way in plan.methods if type(way.method).__module__ != "__main__"))
-    return session_on(device, {**code, **imported.code}), _claimed(plan, prepared, unit, device, trials, holder)
+    try:
+        here = imported.code
+    except KeyError as unknown:
+        words = f"its workers lack the term {unknown}: start them with --preload and your file that puts it into TERMS"
+        raise ShipidError(words, path="--scheduler") from None
+    session = session_on(device, {what: {**code.get(what, {}), **here.get(what, {})} for what in {**code, **here}})
+    return session, _claimed(plan, prepared, unit, device, trials, holder)
 
 
 def _claimed(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path, holder: Holder) -> Results | str:

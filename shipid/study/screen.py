@@ -30,9 +30,8 @@ from shipid.vessel.perturb import Family, Variant, members
 Array = np.ndarray
 Cut = tuple[Windows, Windows, list[str]]  # what `partition` gives
 MEMBERS = 512  # of a block
-NUMBERS = (
-    12_000_000  # sums of windows and tallies of a block, for each of pool and test: fewer members if windows are many
-)
+# Sums of windows and tallies of a block, for each of pool and test: fewer members if windows are many.
+NUMBERS = 12_000_000
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
 DRIVERS = 5  # of a family that are named
 FIXED = ("family", "member", "A", "A_90", "diverged")

@@ -20,7 +20,7 @@ from shipid.physics.inertia import added_mass, coriolis, rigid_body
 from shipid.physics.signals import named, units
 from shipid.vessel.bindings import Binding
 from shipid.vessel.load import Vessel
-from shipid.vessel.schema import BEHIND, actuators, behind, signals, structural, term_blocks, term_parameters
+from shipid.vessel.schema import BEHIND, actuators, behind, functions, signals, structural, term_blocks, term_parameters
 from shipid.vessel.schema import parameters as declared
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
@@ -89,7 +89,7 @@ class Dynamics:
         return tuple(term for term in self.sums if term.arrays is None)
 
 
-_compiled: dict[tuple[str, Helmsman | None], Dynamics] = {}
+_compiled: dict[tuple[Any, ...], Dynamics] = {}
 
 
 def dynamics(vessel: Vessel, helmsman: Helmsman | None = None) -> Dynamics:
@@ -99,7 +99,7 @@ def dynamics(vessel: Vessel, helmsman: Helmsman | None = None) -> Dynamics:
     ShipidError for what is no vessel.
     """
     of_class("vessel", vessel, Vessel, "as of `load_vessel`")  # here all that simulate, fit or identify come by
-    key = (vessel.structure, helmsman)
+    key = (vessel.structure, helmsman, *functions(vessel.document).values())  # a notebook may put another into TERMS
     if key not in _compiled:
         _compiled[key] = _assemble(vessel, helmsman)
     return _compiled[key]

@@ -316,3 +316,13 @@ def term_blocks(document: Mapping[str, Any], off: bool = False) -> Iterator[tupl
         for name, entry in named.items():
             if bool(entry.get("off", False)) == off:
                 yield (f"{group}.{name}" if name else group), f"{group}.{entry.get('kind', name)}", entry
+
+
+def functions(document: Mapping[str, Any]) -> dict[str, tuple[Callable[..., Any], ...]]:
+    """TERMS key of every term that acts, `actuator.KIND` of its actuators -> the functions that are their equations."""
+    found: dict[str, tuple[Callable[..., Any], ...]] = {}
+    for _, key, block in term_blocks(document):
+        found[key] = TERMS[key].functions
+        for _, actuator in actuators(block):
+            found[f"actuator.{actuator['kind']}"] = ACTUATORS[actuator["kind"]].functions
+    return found

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from shipid.study import store
-from shipid.study.claims import LATE, Claims
+from shipid.study.claims import LATE, UnitClaims
 from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, Unit
 from shipid.study.prepare import obtain, prepare
@@ -73,7 +73,7 @@ def _played(plan: Plan, folder: Path, workers: int, cell: store.Cell) -> dict[st
     units, seconds = {unit.key: unit for unit in plan.units}, {"claims": 0.0, "files": 0.0}
     rng, left = random.Random(1), len(units)
 
-    def taken(claims: Claims) -> Iterator[str]:
+    def taken(claims: UnitClaims) -> Iterator[str]:
         return claims.free(
             list(units),
             partial(store.finished_keys, folder, units),
@@ -81,7 +81,7 @@ def _played(plan: Plan, folder: Path, workers: int, cell: store.Cell) -> dict[st
         )
 
     with ExitStack() as stack:
-        joined = [stack.enter_context(Claims(folder)) for _ in range(workers)]
+        joined = [stack.enter_context(UnitClaims(folder)) for _ in range(workers)]
         at_work = [(claims, taken(claims)) for claims in joined]
         die, join = set(range(0, workers, 20)), workers // 20
         while left:
@@ -98,7 +98,7 @@ def _played(plan: Plan, folder: Path, workers: int, cell: store.Cell) -> dict[st
                 _dies(folder, key, claims)
                 if join:
                     join -= 1
-                    claims = stack.enter_context(Claims(folder))
+                    claims = stack.enter_context(UnitClaims(folder))
                     at_work[place] = (claims, taken(claims))
                 continue
             begun = time.process_time()
@@ -111,7 +111,7 @@ def _played(plan: Plan, folder: Path, workers: int, cell: store.Cell) -> dict[st
     return seconds
 
 
-def _dies(folder: Path, key: str, claims: Claims) -> None:
+def _dies(folder: Path, key: str, claims: UnitClaims) -> None:
     """The claim is that of another machine, and has not been renewed for a while."""
     file = folder / "claims" / key
     claims._mine.discard(key)

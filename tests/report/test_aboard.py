@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.report.aboard import SECTIONS, AboardContent, along, outline, seen, write_aboard
+from shipid.report.content import Line
 from shipid.report.section import drawn
 
 NASTY = "<b>run</b>"
@@ -26,10 +27,12 @@ def content(banded: bool = True, physics: bool = True) -> AboardContent:
     instants = pd.DataFrame({"run": NASTY, "t": times, "outside": times > 20, "latency": 0.01})
     instants["error"] = np.where(times < 36, 1.0 + times / 10, np.nan)
     track = pd.DataFrame({"run": NASTY, "t": times, "north": 5 * times, "east": 0.0})
-    lines = ["10 predictions in 1 run, 5 s ahead; 0 instants before there was a past", "alarm: at 4 of 10 instants"]
-    return AboardContent(
-        title="played", name="cell", lines=[*lines, "latency: 10 ms"], instants=instants, points=points, track=track
-    )
+    lines = [
+        Line("predictions", "10 predictions in 1 run, 5 s ahead; 0 instants before there was a past"),
+        Line("alarm", "alarm: at 4 of 10 instants"),
+        Line("detail", "latency: 10 ms"),
+    ]
+    return AboardContent(title="played", name="cell", lines=lines, instants=instants, points=points, track=track)
 
 
 def test_the_outline_of_a_band_is_its_ellipse() -> None:
@@ -64,12 +67,13 @@ def test_it_draws_what_was_played(banded: bool, physics: bool, tmp_path) -> None
 
 def test_what_limits_the_promise_is_on_the_page() -> None:
     """That bands do not hold, that wind was taken as 0 and times without rows were said in the terminal alone."""
-    limits = ["not in the log, taken as 0: V_w", "1 time without rows: no errors there"]
-    broken = "band of 90 %: it held 40 % of the 20 whole paths; that is fewer than 90 % by more than chance"
+    limits = [Line("limit", "not in the log, taken as 0: V_w"), Line("limit", "1 time without rows: no errors there")]
+    broken = Line("band", "it held 40 % of the 20 whole paths; that is fewer than 90 % by more than chance")
     here = content()
-    here = replace(here, lines=[here.lines[0], *limits, *here.lines[1:], "  b: from 1 to 2 s", broken])
+    here = replace(here, lines=[here.lines[0], *limits, *here.lines[1:], Line("detail", "  b: from 1 to 2 s"), broken])
     said = [one.text for one in here.answer]
-    assert said == [f"{text[0].upper()}{text[1:]}." for text in (here.lines[0], here.lines[3], broken, *limits)]
+    texts = [line.text for line in (here.lines[0], here.lines[3], broken, *limits)]
+    assert said == [f"{text[0].upper()}{text[1:]}." for text in texts], "by kind, whatever the words"
     assert seen(here).takeaway == said[2]
     assert seen(content(banded=False)).takeaway == said[0], "the figure shows paths, no alarm"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report.error_map import error_map
+from shipid.report.error_map import error_map, lack
 
 
 @pytest.fixture(scope="module")
@@ -168,7 +168,38 @@ def test_two_methods_on_the_same_physics_do_not_hide_each_other(simulation):
     assert (
         "Not on the map, where another method has their place: moderate-1 + alone and moderate-2 + alone." in figure.how
     )
+    assert figure.takeaway.endswith(" Of several methods, the first is drawn.")
     assert "another method" not in error_map(simulation).how
+    assert "Of several methods" not in error_map(simulation).takeaway
+    both = pd.concat([simulation.cells.assign(method="learned"), others.assign(method="alone")], ignore_index=True)
+    assert error_map(replace(simulation, cells=both)).takeaway.endswith(" Of several methods, learned is drawn.")
+
+
+def test_rows_of_one_method_alone_are_named_without_it(simulation):
+    """Names of twelve characters were the same `moder… drawn` in every row."""
+    plain = [note.text for note in flat(simulation).layout.annotations if note.xref == "paper"]
+    cells, models = (frame.assign(model=frame.model + " + drawn") for frame in (simulation.cells, simulation.models))
+    layout = flat(replace(simulation, cells=cells, models=models)).layout
+    assert [note.text for note in layout.annotations if note.xref == "paper"] == plain
+    assert layout.yaxis.ticktext == flat(simulation).layout.yaxis.ticktext
+
+
+@pytest.mark.parametrize(
+    ("kept", "needs"),
+    [
+        (lambda cells: cells[:0], "rows of cells"),
+        (lambda cells: cells[cells.N_D.eq(10)], "two N_D or more"),
+        (lambda cells: cells[cells.model.isin(["nominal", "no physics"])], "two models with physics or more"),
+        (lambda cells: cells.assign(A=np.nan), r"the column A \[m\], a number for two models"),
+        (lambda cells: cells.assign(H=np.nan, status="failed"), "cells with a result"),
+    ],
+)
+def test_what_a_map_lacks_is_named(simulation, kept, needs):
+    """Every one of them was said to be `no rows`."""
+    content = replace(simulation, cells=kept(simulation.cells))
+    assert error_map(content) is None
+    assert re.match(f"it needs {needs}", lack(content))
+    assert lack(simulation) == ""
 
 
 @pytest.mark.parametrize("factor", [0.001, 0.02, 1.0, 1000.0])

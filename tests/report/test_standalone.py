@@ -1,5 +1,6 @@
 import itertools
 import re
+from dataclasses import replace
 
 import numpy as np
 import plotly.graph_objects as go
@@ -57,6 +58,19 @@ def test_a_legend_lies_right_of_names_that_are_right_of_the_panel(simulation, na
     assert standalone("gain", simulation).layout.legend.x is None
 
 
+def test_a_scale_beside_a_legend_lies_below_the_plot(simulation):
+    """With six models or more the bar of A covered their names."""
+    made = standalone("gain", simulation)
+    (bar,) = [trace.marker.colorbar for trace in made.data if trace.marker.showscale]
+    assert made.layout.showlegend
+    assert (bar.orientation, bar.yanchor) == ("h", "top")
+    assert bar.y < 0 < bar.x < 1
+    (bar,) = [trace.marker.colorbar for trace in standalone("error_map", simulation).data if trace.marker.showscale]
+    assert (bar.orientation, bar.x) == (None, 1.25)
+
+
 def test_nothing_to_draw_is_a_sentence(full_scale):
-    with pytest.raises(ShipidError, match="error_map: there is nothing to draw"):
+    with pytest.raises(ShipidError, match="error_map: there is nothing to draw: it needs two N_D or more"):
         standalone("error_map", full_scale)
+    with pytest.raises(ShipidError, match="search: there is nothing to draw: the results hold no rows for it"):
+        standalone("search", replace(full_scale, trials=full_scale.trials[:0]))

@@ -18,7 +18,7 @@ from shipid.hybrid.physics import Physics
 from shipid.observer import Observer, observe
 from shipid.predictor import Predictor, fit
 from shipid.study import aboard, apply
-from shipid.study.aboard import play, summary, write
+from shipid.study.aboard import play, summary, summed_up, write
 from shipid.units import percent
 from shipid.vessel.load import load_vessel
 from tests.export.strange import bands_of, drawn
@@ -112,6 +112,9 @@ def test_an_officer_sees_path_alarm_and_latency(predictor, tmp_path):
     assert any("latency" in line for line in lines)
     assert any("orders stay as they are" in line for line in lines)
     assert any("alarm" in line for line in lines)
+    kinds = {line.text.partition(":")[0]: line.kind for line in summed_up(played)}
+    assert next(iter(kinds.values())) == "predictions"
+    assert (kinds["alarm"], kinds["the plan was"], kinds["latency"]) == ("alarm", "limit", "detail")
     write(played, tmp_path / "seen.csv")
     assert {"ahead", "north", "outside", "latency"} <= set(pd.read_csv(tmp_path / "seen.csv").columns)
 
@@ -140,6 +143,7 @@ def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tm
         assert instants["reach"][i] == pytest.approx(reach, rel=1e-9)
         held.append(reach <= 1)
     (line,) = (line for line in summary(played) if line.startswith("band of 90 %"))
+    assert [one.text for one in summed_up(played) if one.kind == "band"] == [line]
     assert f"held {percent(np.mean(held))} of the {len(held)} whole paths" in line
     assert any("50 % held" in line and "95 %" not in line for line in summary(played))  # ten runs do not promise 95 %
     write(played, tmp_path / "seen.csv")

@@ -18,11 +18,11 @@ from pathlib import Path
 import pytest
 
 from shipid.study import claims
-from shipid.study.claims import Claims, TakenOver, held
+from shipid.study.claims import TakenOver, UnitClaims, held
 
 
 def test_a_unit_is_claimed_once(tmp_path: Path) -> None:
-    with Claims(tmp_path) as one, Claims(tmp_path) as other:
+    with UnitClaims(tmp_path) as one, UnitClaims(tmp_path) as other:
         assert one.take("a")
         assert not other.take("a")
         assert other.take("b")
@@ -41,34 +41,34 @@ def test_a_full_disk_leaves_no_sign_of_a_process(tmp_path: Path) -> None:
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
     try:
-        with pytest.raises(OSError, match="File too large") as caught, Claims(tmp_path):
+        with pytest.raises(OSError, match="File too large") as caught, UnitClaims(tmp_path):
             pass
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert Path(caught.value.filename).parent == tmp_path / "claims", "before, the error named no file"
     assert not list(tmp_path.rglob(".*"))
-    with Claims(tmp_path) as here:
+    with UnitClaims(tmp_path) as here:
         assert not here.others()
 
 
 def test_a_claim_of_a_process_that_is_gone_is_taken_over(tmp_path: Path) -> None:
     process = os.fork()
     if not process:
-        Claims(tmp_path).take("a")
+        UnitClaims(tmp_path).take("a")
         os._exit(0)
     os.waitpid(process, 0)
     assert held(tmp_path) == ["a"]
-    with Claims(tmp_path) as other:
+    with UnitClaims(tmp_path) as other:
         assert other.take("a")
 
 
 def test_a_claim_that_was_left_on_a_finished_unit_is_removed(tmp_path: Path) -> None:
     process = os.fork()
     if not process:
-        Claims(tmp_path).take("a")
+        UnitClaims(tmp_path).take("a")
         os._exit(0)
     os.waitpid(process, 0)
-    with Claims(tmp_path) as other:
+    with UnitClaims(tmp_path) as other:
         assert other.take("b")
     assert list(tmp_path.iterdir()) == []
 
@@ -77,7 +77,7 @@ def test_a_claim_of_another_machine_is_taken_over_when_it_is_late(tmp_path: Path
     (tmp_path / "claims").mkdir()
     claim = tmp_path / "claims" / "a"
     claim.write_text("elsewhere 1\n")
-    with Claims(tmp_path) as mine:
+    with UnitClaims(tmp_path) as mine:
         assert not mine.take("a")
         late = time.time() - claims.LATE - 5
         os.utime(claim, (late, late))
@@ -94,7 +94,7 @@ def test_a_claim_of_before_the_clock_was_set_back_is_taken_over_when_nobody_rene
     claim = tmp_path / "claims" / "a"
     claim.write_text("elsewhere 1\n")
     ahead = time.time() + 3e7
-    with Claims(tmp_path) as mine:
+    with UnitClaims(tmp_path) as mine:
         for later in (0.0, 10.0):  # the second is renewed, by a clock that is still wrong
             os.utime(claim, (ahead + later, ahead + later))
             assert not mine.take("a")
@@ -111,7 +111,7 @@ def test_a_claim_is_not_taken_over_because_the_clock_was_set_forward(
     clock = [1000.0]
     monkeypatch.setattr(claims.time, "monotonic", lambda: clock[0])
     utime = os.utime
-    with Claims(tmp_path) as slow, Claims(tmp_path) as mine:
+    with UnitClaims(tmp_path) as slow, UnitClaims(tmp_path) as mine:
         assert slow.take("a")
         monkeypatch.setattr(os, "utime", lambda file: utime(file, (time.time() + 7200, time.time() + 7200)))
         clock[0] += claims.RENEWED
@@ -136,7 +136,7 @@ def test_the_number_of_a_process_says_nothing_on_another_system(tmp_path: Path) 
     os.waitpid(process, 0)
     (tmp_path / "claims").mkdir()
     claim = tmp_path / "claims" / "a"
-    with Claims(tmp_path) as mine:
+    with UnitClaims(tmp_path) as mine:
         gone = {**json.loads(mine.holder.words), "process": process}
         claim.write_text(json.dumps(gone | {"system": f"{gone['system']} other"}))
         assert not mine.take("a")
@@ -148,7 +148,7 @@ def test_the_number_of_a_process_says_nothing_on_another_system(tmp_path: Path) 
 
 def test_a_claim_is_renewed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(claims, "RENEWED", 0.01)
-    with Claims(tmp_path) as mine:
+    with UnitClaims(tmp_path) as mine:
         mine.take("a")
         claim = tmp_path / "claims" / "a"
         os.utime(claim, (1.0, 1.0))
@@ -164,7 +164,7 @@ def test_a_file_system_without_links(tmp_path: Path, monkeypatch: pytest.MonkeyP
         raise OSError(errno.EPERM, "Operation not permitted")
 
     monkeypatch.setattr(os, "link", refused)
-    with Claims(tmp_path) as one, Claims(tmp_path) as other:
+    with UnitClaims(tmp_path) as one, UnitClaims(tmp_path) as other:
         assert one.take("a")
         assert not other.take("a")
 
@@ -172,18 +172,18 @@ def test_a_file_system_without_links(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_rubbish_is_no_claim_of_anyone_until_it_is_late(tmp_path: Path) -> None:
     (tmp_path / "claims").mkdir()
     (tmp_path / "claims" / "a").write_bytes(b"\xff\xfe")
-    with Claims(tmp_path) as mine:
+    with UnitClaims(tmp_path) as mine:
         assert not mine.take("a")
         os.utime(tmp_path / "claims" / "a", (1.0, 1.0))
 
 
-def free(mine: Claims, units: list[str], finished: set[str]) -> Iterator[str]:
+def free(mine: UnitClaims, units: list[str], finished: set[str]) -> Iterator[str]:
     return mine.free(units, lambda: finished, finished.__contains__)
 
 
 def test_one_process_takes_units_in_their_order(tmp_path: Path) -> None:
     units = [f"u{k}" for k in range(30)]
-    with Claims(tmp_path) as mine:
+    with UnitClaims(tmp_path) as mine:
         assert list(free(mine, units, {"u3", "u7"})) == [unit for unit in units if unit not in ("u3", "u7")]
         assert list(free(mine, units, set())) == ["u3", "u7"]  # it is at work on the others
 
@@ -197,8 +197,8 @@ def test_every_unit_is_done_once_by_workers_that_die_and_join(tmp_path: Path, se
     done: list[str] = []
     with ExitStack() as stack:
 
-        def joined() -> tuple[Claims, Iterator[str]]:
-            mine = stack.enter_context(Claims(tmp_path))
+        def joined() -> tuple[UnitClaims, Iterator[str]]:
+            mine = stack.enter_context(UnitClaims(tmp_path))
             return mine, free(mine, units, finished)
 
         workers = [joined() for _ in range(rng.randrange(1, 20))]
@@ -221,7 +221,7 @@ def test_every_unit_is_done_once_by_workers_that_die_and_join(tmp_path: Path, se
     assert list(tmp_path.iterdir()) == []
 
 
-def _gone(folder: Path, mine: Claims, unit: str) -> None:
+def _gone(folder: Path, mine: UnitClaims, unit: str) -> None:
     """A claim of a process of another machine, not renewed any more."""
     (folder / "claims" / unit).unlink()
     (folder / "claims" / unit).write_text('{"host": "elsewhere", "process": 1, "system": ""}')
@@ -230,7 +230,7 @@ def _gone(folder: Path, mine: Claims, unit: str) -> None:
 
 
 def test_a_claim_says_who_works_and_since_when(tmp_path: Path) -> None:
-    with Claims(tmp_path) as mine:
+    with UnitClaims(tmp_path) as mine:
         mine.take("a")
         words = json.loads((tmp_path / "claims" / "a").read_text())
     assert words["host"] == socket.gethostname()
@@ -241,7 +241,7 @@ def test_a_claim_says_who_works_and_since_when(tmp_path: Path) -> None:
 
 def test_what_one_process_has_lost_it_does_not_give_back(tmp_path: Path) -> None:
     """A process that was held up for long: its claim is another one's now."""
-    with Claims(tmp_path) as slow, Claims(tmp_path) as other:
+    with UnitClaims(tmp_path) as slow, UnitClaims(tmp_path) as other:
         assert slow.take("a")
         (tmp_path / "claims" / "a").unlink()
         assert other.take("a")
@@ -258,7 +258,7 @@ def test_a_worker_sees_that_the_claim_is_lost(tmp_path: Path, monkeypatch: pytes
 
     if not links:
         monkeypatch.setattr(os, "link", refused)
-    with Claims(tmp_path) as slow, Claims(tmp_path) as other:
+    with UnitClaims(tmp_path) as slow, UnitClaims(tmp_path) as other:
         assert slow.take("a")
         holder = pickle.loads(pickle.dumps(slow.holder))
         holder.check("a")
@@ -274,7 +274,7 @@ def test_a_worker_sees_that_the_claim_is_lost(tmp_path: Path, monkeypatch: pytes
 def test_once_waits_for_the_one_that_took_over(tmp_path: Path) -> None:
     """A process that was held up while it made a thing takes what the other one makes."""
     made: list[str] = []
-    with Claims(tmp_path) as slow, Claims(tmp_path) as other:
+    with UnitClaims(tmp_path) as slow, UnitClaims(tmp_path) as other:
 
         def held_up() -> None:
             (tmp_path / "claims" / "thing").unlink()
@@ -296,7 +296,7 @@ def test_once_is_once(tmp_path: Path) -> None:
         made.append(1)
 
     def work() -> None:
-        with Claims(tmp_path) as mine:
+        with UnitClaims(tmp_path) as mine:
             mine.once("thing", lambda: bool(made), make)
             assert made == [1]
 
@@ -306,7 +306,7 @@ def test_once_is_once(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert made == [1]
-    with Claims(tmp_path) as mine:
+    with UnitClaims(tmp_path) as mine:
         mine.once("thing", lambda: bool(made), make)
     assert made == [1]
 
@@ -315,7 +315,7 @@ def test_alone_keeps_others_out(tmp_path: Path) -> None:
     inside: list[int] = []
 
     def work() -> None:
-        with Claims(tmp_path) as mine, mine.alone("record"):
+        with UnitClaims(tmp_path) as mine, mine.alone("record"):
             inside.append(1)
             time.sleep(0.02)
             assert inside == [1]
@@ -331,20 +331,20 @@ def test_alone_keeps_others_out(tmp_path: Path) -> None:
 
 
 def test_others_are_those_that_live(tmp_path: Path) -> None:
-    with Claims(tmp_path) as one:
+    with UnitClaims(tmp_path) as one:
         assert not one.others()
-        with Claims(tmp_path):
+        with UnitClaims(tmp_path):
             assert one.others()
         process = os.fork()
         if not process:
-            Claims(tmp_path).take("a")
+            UnitClaims(tmp_path).take("a")
             os._exit(0)
         os.waitpid(process, 0)
         assert not one.others()
 
 
 def test_a_process_that_ends_meanwhile_is_no_other(tmp_path: Path) -> None:
-    with Claims(tmp_path) as one:
+    with UnitClaims(tmp_path) as one:
         (tmp_path / claims.FOLDER / ".ended").symlink_to("nowhere")  # listed, and gone when it is looked at
         assert not one.others()
     assert list(tmp_path.iterdir()) == []

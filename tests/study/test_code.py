@@ -5,12 +5,14 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import shipid
-from shipid.study.code import code_digest, users_code
+from shipid.physics import TERMS
+from shipid.study.code import code_digest, of_users, users_code
 
 
 def digest_of(copy: Path) -> str:
@@ -93,3 +95,18 @@ def test_other_installed_packages_are_no_part_of_a_method(tmp_path: Path, monkey
     assert code() == before
     (place / "mine/law.py").write_text("x = 2", encoding="utf-8")
     assert code() != before
+
+
+def test_functions_of_a_user_are_known_in_any_dress() -> None:
+    """A term may hold a plain function, a part of one, or an object that is called."""
+
+    class Called:
+        def __call__(self) -> None: ...
+
+    def plain() -> None: ...
+
+    users = (plain, partial(plain), Called(), lambda: None)
+    assert all(map(of_users, users))
+    assert len({users_code((one,)) for one in users}) == 1  # all are in this file
+    assert users_code(users) != "unknown"
+    assert not any(map(of_users, (code_digest, partial(code_digest), *TERMS["radiation.roll"].functions)))

@@ -17,7 +17,7 @@ import tomlkit
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.engine.rollout import rollout
-from shipid.errors import DataError, DocumentError
+from shipid.errors import DataError, Diverges, DocumentError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor, limits_of
@@ -211,7 +211,7 @@ def test_what_cannot_be_drawn_is_reported(tmp_path: Path, monkeypatch: pytest.Mo
         family = {"name": "lost", "base": "gunnerus-28.9", "perturb": [{"parameters": ["hull.derivatives.X_u|u|"]}]}
         family["perturb"][0]["factor"] = factor  # type: ignore[index]
         plan = tiny_plan(tmp_path, {"family": [family], "unusual": ["family.0.perturb.0.factor*"]})
-        with pytest.raises(DocumentError, match=message) as caught:
+        with pytest.raises(Diverges, match=message) as caught:
             prepare(plan, obtain(plan))
         assert caught.value.path == "family.lost"
 

@@ -6,6 +6,7 @@ import shlex
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -313,3 +314,17 @@ def test_few_paths_stay_in_memory(tiny_run: Path, monkeypatch: pytest.MonkeyPatc
     for cell in [*whole, *whole]:
         np.testing.assert_array_equal(paths[cell], whole[cell])
     assert len(paths._read) == 1  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_of_many_test_runs_those_at_even_distances_are_shown(seed: int) -> None:
+    """The first 40 by name: of a test whose later runs are in rough weather none of these was ever seen."""
+    count = int(np.random.default_rng(seed).integers(frames.FEW_RUNS + 1, 500))
+    for many in (count, frames.FEW_RUNS, 3):
+        names = [f"R{place:03d}" for place in range(many)]
+        results = SimpleNamespace(test=SimpleNamespace(spans=dict.fromkeys(names)))
+        shown = frames.shown_runs(results)  # type: ignore[arg-type]
+        places = [names.index(name) for name in shown]
+        assert len(shown) == min(many, frames.FEW_RUNS)
+        assert (places[0], places[-1]) == (0, many - 1)
+        assert np.ptp(np.diff(places)) <= 1

@@ -9,11 +9,13 @@ import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+import tomlkit
 
 from shipid.data.dataset import read_dataset
 from shipid.errors import ResultError, ShipidError
@@ -22,10 +24,11 @@ from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.metrics import position_error, summary
+from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor
 from shipid.study import run, seals, store
 from shipid.study.check import check_folder
-from shipid.study.claims import Claims
+from shipid.study.claims import UnitClaims
 from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import obtain, prepare
@@ -34,6 +37,7 @@ from shipid.study.rotate import kept_folder
 from shipid.study.run import run_study, run_unit
 from shipid.version import __version__
 from shipid.vessel.load import load_vessel
+from tests.documented import code
 from tests.study.tiny import events_here, mixed_plan, run_here, tiny_plan
 
 
@@ -128,6 +132,44 @@ def test_a_method_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch
     assert kept_folder(tmp_path / "rows.csv", plan, dataset) != kept
 
 
+def skeg_plan(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[ModuleType, Plan]:
+    """The skeg of docs/extending.md as a file in a folder and a term, and a tiny study of a vessel with it."""
+    (folder / "skeg.py").write_text(code("A term")[1])
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.delitem(sys.modules, "skeg", raising=False)
+    module = importlib.import_module("skeg")
+    monkeypatch.setitem(TERMS, "hull.skeg", Term(module.skeg))
+    values = {"x": -10.0, "A": 6.0, "C": 1.8, "source": "made up"}
+    (folder / "ship.toml").write_text(tomlkit.dumps({"extends": "gunnerus-28.9", "hull": {"skeg": values}}))
+    return module, tiny_plan(folder, {"truth.vessel": "ship.toml", "family.0.base": "ship.toml", "grid.N_D": [4]})
+
+
+def test_a_term_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The finished cells are those of the ship as she was; nothing said so, and hints named a command without it."""
+    assert not tiny_plan(tmp_path).code
+    module, plan = skeg_plan(tmp_path, monkeypatch)
+    assert plan.program == "python my.py"
+    folder = tmp_path / "run"
+    run_here(plan, folder)
+    (session,) = read_json(folder / store.PROVENANCE)["sessions"]
+    assert session["code of the term"].keys() == {"hull.skeg"}
+    assert not any("otherwise" in event.text for event in events_here(plan, folder))
+    file = tmp_path / "skeg.py"
+    file.write_text(file.read_text().replace("-rho / 2", "-rho * 5"))
+    importlib.reload(module)
+    monkeypatch.setitem(TERMS, "hull.skeg", Term(module.skeg))
+    notes = [event.text for event in events_here(read_plan(plan.file, plan.changes), folder) if event.kind == "note"]
+    assert any("earlier results were computed otherwise: code of the term.hull.skeg was" in note for note in notes)
+    assert "code of the term.hull.skeg" in provenance_words(read_results(folder))["computed in parts"]
+
+
+def test_a_worker_of_a_cluster_without_the_term_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, plan = skeg_plan(tmp_path, monkeypatch)
+    monkeypatch.delitem(TERMS, "hull.skeg")
+    with pytest.raises(ShipidError, match=r"lack the term 'hull\.skeg': start them with --preload"):
+        run._there((plan, None, "cpu", tmp_path, None, {}), plan.units[0])  # type: ignore[arg-type]
+
+
 def test_a_dask_cluster_gives_the_same_numbers(tmp_path: Path, tiny_run: Path) -> None:
     from dask.distributed import LocalCluster
 
@@ -186,7 +228,7 @@ def test_one_process_leaves_what_another_works_on(tmp_path: Path, tiny_run: Path
     """It ends without tables; the other one, which comes back from far away, ends the run and writes them."""
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     store.open_folder(folder, plan)
-    with Claims(folder) as other:
+    with UnitClaims(folder) as other:
         assert other.take("N0004-s0")
         *_, end = events_here(plan, folder, leave=True)
         assert (end.kind, end.done, end.total) == ("end", 4, 8)
@@ -230,7 +272,7 @@ def test_a_process_that_was_held_up_leaves_its_unit_to_the_one_that_took_it_over
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     store.open_folder(folder, plan)
     fit, lost = PathDrawn.fit, list[str]()
-    with Claims(folder) as other:
+    with UnitClaims(folder) as other:
 
         def held_up(self: PathDrawn, task: Task) -> dict[str, Fitted]:
             fits = fit(self, task) if late or lost else {}
@@ -260,7 +302,7 @@ def test_of_processes_that_start_together_one_mends(pattern: str, leave: bool, t
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     shutil.copytree(tiny_run, folder)
     (folder / pattern).write_bytes(b"half")
-    with Claims(folder) as other:
+    with UnitClaims(folder) as other:
         assert other.take("elsewhere")
         *events, end = events_here(plan, folder, leave=leave)
     assert any("damaged: computed again" in event.text for event in events)
@@ -608,5 +650,6 @@ def test_a_method_in_the_script_itself_has_the_code_of_the_script_on_a_cluster(
     monkeypatch.setitem(METHODS, "mine", kind)
     monkeypatch.setattr(run, "_claimed", lambda *_: "left")
     plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine"}, {"name": "bare", "kind": "alone"}]})
-    session, _ = run._there((plan, None, "cpu", tmp_path, None, {"mine": "01234567"}), plan.units[0])  # type: ignore[arg-type]
+    written = {"code of the method": {"mine": "01234567"}}
+    session, _ = run._there((plan, None, "cpu", tmp_path, None, written), plan.units[0])  # type: ignore[arg-type]
     assert session["code of the method"] == {"mine": "01234567"}

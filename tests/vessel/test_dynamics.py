@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import wraps
 from typing import Any
 
 import casadi as ca
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from shipid.engine.rollout import rollout
+from shipid.physics import TERMS, Term
 from shipid.physics.inertia import added_mass, rigid_body
 from shipid.vessel import dynamics as module
 from shipid.vessel.dynamics import dynamics
@@ -276,3 +278,21 @@ def test_a_body_that_moves_steadily_has_no_added_mass_in_heave() -> None:
     nu_dot = np.append(-np.cross(nu[3:], nu[:3]), np.zeros(3))
     force = ca.evalf(module._added_mass_force(ca.SX(M_A), ca.SX(nu), (0, 1, 5)))
     np.testing.assert_allclose(np.array(force).ravel() - M_A @ nu_dot, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_another_function_under_the_name_of_a_term_is_another_model(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A notebook whose cell of a term runs again got the equations of the function before, without a word."""
+    vessel, plain = load_vessel("gunnerus-28.9"), TERMS["hull.derivatives"].function
+    speed, factor = np.random.default_rng(seed).uniform(1.0, 3.0, 2)
+    before = rates(vessel, u=speed)["u"]
+
+    def scaled(factor: float) -> float:
+        function = wraps(plain)(lambda *args, **kwargs: factor * plain(*args, **kwargs))
+        monkeypatch.setitem(TERMS, "hull.derivatives", Term(function))
+        return rates(vessel, u=speed)["u"]
+
+    rest = scaled(0.0)  # of the other terms
+    assert scaled(factor) - rest == pytest.approx(factor * (before - rest))
+    monkeypatch.undo()
+    assert rates(vessel, u=speed)["u"] == before

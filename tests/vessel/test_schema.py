@@ -13,6 +13,8 @@ from shipid.physics.inertia import rigid_body
 from shipid.physics.signals import named
 from shipid.vessel.load import load_vessel
 from shipid.vessel.schema import (
+    actuators,
+    functions,
     kinds,
     model_for,
     parameters,
@@ -146,3 +148,15 @@ def test_a_model_for_one_document_says_what_the_whole_one_says(name: str) -> Non
         with pytest.raises(DocumentError) as one:
             parse(model_for(spoilt), spoilt, name)
         assert str(one.value) == str(whole.value)
+
+
+def test_functions_of_a_vessel_are_those_of_its_terms_and_actuators() -> None:
+    document = load_vessel("kvlcc2-l7").document
+    held = functions(document)
+    keys = {key for _, key, _ in term_blocks(document)}
+    assert {key for key in held if not key.startswith("actuator.")} == keys
+    assert all(held[key] == TERMS[key].functions for key in keys)
+    assert TERMS["thruster.propeller"].gives["wash"] in held["thruster.propeller"]
+    moved = {actuator["kind"] for _, _, block in term_blocks(document) for _, actuator in actuators(block)}
+    assert moved
+    assert all(held[f"actuator.{kind}"] == ACTUATORS[kind].functions for kind in moved)
