@@ -14,6 +14,7 @@ from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
 from shipid.data.windows import (
     Instants,
+    coarse_in_words,
     from_frame,
     gaps_in_words,
     past_of,
@@ -57,7 +58,8 @@ class Played:
     skipped : instants at which a prediction was due before there was a past.
     plan : whether orders were taken as held where the predictor knows a plan.
     band : what was asked of the band; None: none was asked. bands : of the predictor, where it has some.
-    track : run, t [s], north, east [m] as measured, for a page. gaps : times without rows, in words.
+    track : run, t [s], north, east [m] as measured, for a page. gaps : times without rows, in words. coarse : that rows
+        are farther apart than the step, in words.
     """
 
     instants: pd.DataFrame
@@ -71,6 +73,7 @@ class Played:
     bands: Bands | None = None
     track: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=TRACK))
     gaps: str = ""
+    coarse: str = ""
 
 
 def play(
@@ -120,6 +123,7 @@ def play(
     return Played(
         pd.DataFrame(rows), pd.concat(paths, ignore_index=True), step, predictor.physics.horizon, skipped, missing,
         predictor.commands == "known", band, predictor.bands, dataset.frame[TRACK], gaps_in_words(dataset, step),
+        coarse_in_words(dataset, step),
     )  # fmt: skip
 
 
@@ -214,7 +218,8 @@ def _judged(
     missed = np.full((physics.horizon, 2), np.nan)
     if there.any():
         shown = np.append(t[i], later[there])
-        missed[there] = true_path(rows, shown, sample(rows, shown), physics.path)[1:] - predicted[there]
+        true = true_path(rows, shown, sample(rows, shown), physics.path, longest=physics.step)[1:]
+        missed[there] = true - predicted[there]
     error, reach = np.hypot(*missed.T), np.nan
     if region is not None:
         course = np.arctan2(region.ahead[:, 0, 1], region.ahead[:, 0, 0]) + origin[2]
@@ -242,6 +247,8 @@ def summary(played: Played) -> list[str]:
     ]
     if played.assumed:
         lines.append(f"not in the log, taken as 0: {', '.join(played.assumed)}")
+    if played.coarse:
+        lines.append(played.coarse)
     if played.gaps:
         lines.append(f"{played.gaps}: no errors there, and a past over one of them is interpolated")
     if played.plan:
