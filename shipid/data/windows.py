@@ -436,7 +436,7 @@ def gaps_in_words(dataset: Dataset, least: float) -> str:
 
 
 def coarse_in_words(dataset: Dataset, step: float) -> str:
-    """That rows are farther apart than a step [s], with the usual time of the coarsest run; empty where they are not."""
+    """That rows of the coarsest run are farther apart than a step [s], in words; empty where they are not."""
     between = float(dataset.frame.groupby("run", sort=False)["t"].agg(lambda t: t.diff().median()).max())
     if not between > COARSE * step:
         return ""
