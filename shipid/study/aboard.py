@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.causal import causal_columns
-from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
+from shipid.data.dataset import Dataset, clock_slack, pieces, sample
 from shipid.data.windows import (
     Instants,
     coarse_in_words,
@@ -26,12 +26,10 @@ from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Bands, Region, at_level
 from shipid.hybrid.physics import assumed, check_columns
 from shipid.logs.dates import span_of
-from shipid.logs.importing import import_log
-from shipid.logs.mapping import read_mapping
 from shipid.metrics import share_of
 from shipid.observer import observe
 from shipid.predictor import Predictor
-from shipid.study.apply import Band, along_run
+from shipid.study.apply import Band, along_run, dataset_of
 from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
 from shipid.study.store import read_predictor
@@ -100,7 +98,7 @@ def play(
     if level is not None:
         predictor.check_level(level, kind)
     band = None if level is None else Band(level, kind, rate)
-    dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
+    dataset = dataset_of(log, mapping)
     vessel, step = predictor.vessel, predictor.physics.step
     names = list(map(str, dataset.frame.columns))
     if vessel is not None:

@@ -56,7 +56,7 @@ def predict_log(
     predictor = read_predictor(_known_cell(folder, cell))
     if level is not None:
         predictor.check_level(level, kind)
-    dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
+    dataset = dataset_of(log, mapping)
     if predictor.vessel is not None:
         check_columns(predictor.vessel, dataset.frame.columns, str(log))
     if predictor.causal:
@@ -73,6 +73,13 @@ def predict_log(
     step = predictor.physics.step
     frame.attrs |= {"gaps": gaps_in_words(dataset, step), "coarse": coarse_in_words(dataset, step)}
     return frame, float(frame["outside"].mean())
+
+
+def dataset_of(log: Path, mapping: str | None) -> Dataset:
+    """A dataset, or a raw log with its mapping; DataError for what is neither."""
+    if mapping is None:
+        return read_dataset(log, remedy=", or give the log itself with --mapping")
+    return import_log(read_mapping(mapping), log)
 
 
 @dataclass(frozen=True)

@@ -222,6 +222,14 @@ def test_a_band_that_cannot_be_promised_is_refused(banded, predictor, tmp_path):
     assert any("no whole path can be judged" in line for line in summary(short))
 
 
+def test_a_log_that_is_no_dataset_is_said_to_need_a_mapping_only_where_one_can_be_given(predictor, tmp_path):
+    (tmp_path / "log.csv").write_text("t,u\n0,1\n")
+    with pytest.raises(DataError, match="`shipid data import`, or give the log itself with --mapping$"):
+        play(predictor, tmp_path / "log.csv")
+    with pytest.raises(DataError, match="make one from a log with `shipid data import`$"):
+        read_dataset(tmp_path / "log.csv")
+
+
 def test_a_wrong_interval_is_refused(predictor, tmp_path):
     with pytest.raises(DataError, match="--every"):
         play(predictor, saved(log(), tmp_path), every=0.0)
