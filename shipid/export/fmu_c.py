@@ -13,7 +13,6 @@ import numpy as np
 from shipid.export.band import CHOICE, COLUMNS
 from shipid.export.blocks import Precision
 
-
 MOST_STEPS = 1e6  # of the solver in a communication step: some seconds
 
 

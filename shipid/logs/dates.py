@@ -48,7 +48,8 @@ _SAID = re.compile(
 )
 """A zone other than UTC in the head of a log, or in the name of its clock."""
 _SAID_OF_CLOCK = re.compile(
-    r"(?<![A-Za-z])(?:CES?T|MES?Z|[ECMP][SD]T|JST|KST|AE[SD]T|LT|(?i:(?:heure |ora )?locale|local|lokale?(?:[ _]?(?:tid|tijd))?))(?![A-Za-z])"
+    r"(?<![A-Za-z])(?:CES?T|MES?Z|[ECMP][SD]T|JST|KST|AE[SD]T|LT"
+    r"|(?i:(?:heure |ora )?locale|local|lokale?(?:[ _]?(?:tid|tijd))?))(?![A-Za-z])"
 )
 """A zone in letters, in the name of a clock alone."""
 ZONE_REMEDY = "write UTC, or the zone behind every time, as in 2024-05-14T08:00:00+01:00"

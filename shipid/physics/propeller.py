@@ -21,9 +21,9 @@ ROOT_FLOOR = 1e-4  # m/s: below it the root of a square is a line
 def drift(nu_r: SX) -> tuple[SX, SX]:
     """Speed U [m/s] and drift angle beta = atan(-v / |u|) [rad] at the origin; finite, with derivatives, at rest.
 
-    Ahead it is the drift angle of the MMG model; astern it is measured from the stern, so that it stays small. Where the
-    speed is below SPEED_FLOOR, 0.01 m/s, |u| counts as 0.01 m/s, and U is rounded off by it everywhere: wake and rudder
-    formulas are then not those of the source.
+    Ahead it is the drift angle of the MMG model; astern it is measured from the stern, so that it stays small. Where
+    the speed is below SPEED_FLOOR, |u| counts as 0.01 m/s, and U is rounded off by it everywhere: formulas of wake and
+    rudder are then not those of the source.
     """
     square = nu_r[0] ** 2 + nu_r[1] ** 2
     along = ca.if_else(square < SPEED_FLOOR**2, SPEED_FLOOR, ca.fabs(nu_r[0]))

@@ -165,7 +165,8 @@ def test_calls_out_of_order_and_states_of_others_are_refused(ship, tmp_path):
 ABOVE_ZERO = """
 #include "@NAME@.c"
 static char said[300];
-static void hear(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status, fmi2String category, fmi2String format, ...)
+static void hear(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status, fmi2String category,
+    fmi2String format, ...)
 {
     va_list arguments;
     (void)e, (void)name, (void)status, (void)category;

@@ -224,9 +224,9 @@ def test_a_band_that_cannot_be_promised_is_refused(banded, predictor, tmp_path):
 
 def test_a_log_that_is_no_dataset_is_said_to_need_a_mapping_only_where_one_can_be_given(predictor, tmp_path):
     (tmp_path / "log.csv").write_text("t,u\n0,1\n")
-    with pytest.raises(DataError, match="`shipid data import`, or give the log itself with --mapping$"):
+    with pytest.raises(DataError, match=r"`shipid data import`, or give the log itself with --mapping$"):
         play(predictor, tmp_path / "log.csv")
-    with pytest.raises(DataError, match="make one from a log with `shipid data import`$"):
+    with pytest.raises(DataError, match=r"make one from a log with `shipid data import`$"):
         read_dataset(tmp_path / "log.csv")
 
 
