@@ -36,6 +36,8 @@ def predict(
     check_output(file, [log], "--out")
     frame, outside = predict_log(folder, cell, log, mapping, file, level=level, kind=kind, rate=adaptive)
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
+    if frame.attrs["coarse"]:
+        typer.echo(frame.attrs["coarse"])
     if frame.attrs["gaps"]:
         typer.echo(f"{frame.attrs['gaps']}: a past over one of them is interpolated")
     if outside:

@@ -373,8 +373,11 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
     return target
 
 
-def read_dataset(file: str | os.PathLike[str]) -> Dataset:
-    """Read a dataset that `write_dataset` wrote; raises DataError for anything else, naming file and column."""
+def read_dataset(file: str | os.PathLike[str], *, remedy: str = "") -> Dataset:
+    """Read a dataset that `write_dataset` wrote; raises DataError for anything else, naming file and column.
+
+    remedy : what else helps where the file is no Parquet file, added to the sentence that says so.
+    """
     file = path_of("file", file, DataError)
     if os.path.isdir(file):
         raise DataError("is a folder: name one dataset; `shipid data join` makes one of several", file=file)
@@ -382,7 +385,7 @@ def read_dataset(file: str | os.PathLike[str]) -> Dataset:
         with open_file(file) as stream:
             table = read_arrow(stream)
     except (pyarrow.ArrowException, ValueError, TypeError):
-        hint = "make one from a log with `shipid data import`, or give the log itself if the command has --mapping"
+        hint = f"make one from a log with `shipid data import`{remedy}"
         raise DataError(f"not a Parquet file: {hint}", file=file) from None
     except FileNotFoundError:
         raise DataError("cannot be read (no such file)", file=file) from None

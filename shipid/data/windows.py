@@ -35,6 +35,8 @@ NESTED, HELD_OUT, FOLDS = 1, 2, 3
 """Purposes of a draw of runs: one seed gives each a separate order."""
 VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
 MANY = 100  # instants asked for each row, from which on every row is one
+COARSE = 1.1  # times the step: rows farther apart are no jitter
+MISSED = 0.25  # of the way between two rows: where velocities miss more of it, a straight line is safer
 STATES = ("u", "v", "r", "psi")
 """True states that a window holds over its horizon, beside the path."""
 
@@ -238,8 +240,9 @@ def cut_windows(
     dataset : the recorded or simulated runs.
     horizon, step : T, and its step [s].
     interval : time between instants of prediction [s].
-    path : the true path: recorded north, east; or the integral (trapezoid on the clock of the dataset) of u, v, psi
-        from the start of the window, where positions are coarser than velocities.
+    path : the true path: recorded north, east, between rows farther apart than the step bent as u, v, psi turn; or the
+        integral (trapezoid on the clock of the dataset) of u, v, psi from the start of the window, where positions are
+        coarser than velocities.
     past : number P of steps before the instant that a window holds. The first instant of a run is P steps after its
         first row.
 
@@ -265,7 +268,7 @@ def cut_windows(
                     run=np.full(len(instants), run),
                     t=instants,
                     columns={name: column[0] for name, column in values.items()},
-                    future=true_path(rows, grid, values, path)[1:],
+                    future=true_path(rows, grid, values, path, longest=step)[1:],
                     planned=in_force(rows, instants + step * np.arange(horizon + 1)[:, None]),
                     horizon=horizon,
                     step=step,
@@ -295,8 +298,8 @@ def _instants(t: Array, past: float, ahead: float, interval: float) -> Array:
 def past_of(rows: Rows, instants: Array, past: int, step: float, path: PathSource) -> dict[str, Array]:
     """Columns of one unbroken stretch at P, ..., 1 steps before the instants (S,) [s], name -> (P, S); none for P = 0.
 
-    x, y [m] are the positions then in the frame (11) of the instant, by the same true path as the future; the columns
-    north and east and the flags are left out.
+    x, y [m] are the positions then in the frame (11) of the instant, by the same true path as the future, but straight
+    between rows, as in exported predictors; the columns north and east and the flags are left out.
     """
     if not past:
         return {}
@@ -312,16 +315,50 @@ def past_of(rows: Rows, instants: Array, past: int, step: float, path: PathSourc
 def future_of(rows: Rows, instants: Array, horizon: int, step: float, path: PathSource) -> Array:
     """True paths (T, S, 2) [m] in the frame (11) after instants (S,) [s] of one unbroken stretch that holds them."""
     grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], np.asarray(rows["t"])[-1])
-    return true_path(rows, grid, sample(rows, grid), path)[1:]
+    return true_path(rows, grid, sample(rows, grid), path, longest=step)[1:]
 
 
-def true_path(rows: Rows, instants: Array, values: Mapping[str, Array], path: PathSource, origin: int = 0) -> Array:
+def true_path(
+    rows: Rows,
+    instants: Array,
+    values: Mapping[str, Array],
+    path: PathSource,
+    *,
+    origin: int = 0,
+    longest: float = np.inf,
+) -> Array:
     """True positions (T, ..., 2) [m] at instants (T, ...) [s] of one unbroken stretch, in the frame (11) of the first.
 
     values : what `sample` gives at the instants. origin : index of another instant to take the frame of.
+    longest : time [s]; logged positions are joined by straight lines, or, between rows farther apart, as in `_bent`.
     """
-    north, east = travelled(rows, instants) if path == "velocity" else (values["north"], values["east"])
+    north, east = travelled(rows, instants) if path == "velocity" else _bent(rows, instants, values, longest)
     return np.stack(to_frame(north, east, north[origin], east[origin], values["psi"][origin]), axis=-1)
+
+
+def _bent(rows: Rows, instants: Array, values: Mapping[str, Array], longest: float) -> tuple[Array, Array]:
+    """North and east [m] at instants, of one stretch whose rows farther apart than `longest` [s] a curve joins.
+
+    The curve is what u, v, psi travel, and what is then missing to the next row grows evenly; so it passes through the
+    rows, and a steady current or offset of the velocities bends nothing. At rows it is `values` to the bit. Where the
+    velocities miss more than `MISSED` of the way between two rows the line stays straight.
+    """
+    t = np.asarray(rows["t"])
+    slack, apart = clock_slack(t), np.diff(t)
+    names = ("north", "east")
+    if not (apart > longest + slack).any():
+        return values["north"], values["east"]
+    at_rows = travelled(rows, t)
+    way = np.hypot(*(np.diff(np.asarray(rows[name])) for name in names))
+    missed = np.hypot(*(np.diff(np.asarray(rows[name]) - along) for name, along in zip(names, at_rows, strict=True)))
+    bends = np.append((apart > longest + slack) & (missed <= MISSED * way), False)
+    row = np.clip(np.searchsorted(t, instants + slack, side="right") - 1, 0, len(t) - 1)
+    between = bends[row] & (instants > t[row] + slack)
+    north, east = (
+        np.where(between, values[name] + along - np.interp(instants, t, at), values[name])
+        for name, along, at in zip(names, travelled(rows, instants), at_rows, strict=True)
+    )
+    return north, east
 
 
 def travelled(rows: Rows, instants: Array) -> tuple[Array, Array]:
@@ -396,6 +433,14 @@ def gaps_in_words(dataset: Dataset, least: float) -> str:
     spans = gaps(dataset, least)
     count = sum(map(len, spans.values()))
     return f"{count} {plural(count, 'time')} without rows, {longest_gap(spans)}" if count else ""
+
+
+def coarse_in_words(dataset: Dataset, step: float) -> str:
+    """That rows of the coarsest run are farther apart than a step [s], in words; empty where they are not."""
+    between = float(dataset.frame.groupby("run", sort=False)["t"].agg(lambda t: t.diff().median()).max())
+    if not between > COARSE * step:
+        return ""
+    return f"rows are {between:.3g} s apart and the step is {step:g} s: path and motion between rows are interpolated"
 
 
 def without_rows(t: Array, instants: Array, least: float) -> NDArray[np.bool_]:

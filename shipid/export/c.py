@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from shipid.export.blocks import Precision
+from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 NEARBY = [  # of the header in single precision
@@ -102,6 +103,18 @@ def tables_of_names(prefix: str, group: str, names: Sequence[str], unit: Mapping
         declared.append(f"extern const char *const {prefix}_{group}_{what}[{count}];")
         defined.append(f"const char *const {prefix}_{group}_{what}[{count}] = {{\n    {strings(texts)}}};")
     return "\n".join(declared), "\n".join(defined)
+
+
+def refusals(parameters: Sequence[str], vessel: Vessel | None, result: str) -> list[str]:
+    """Lines of C that return a result where a parameter that must be above 0 is not; none where there is none."""
+    above_zero = frozenset() if vessel is None else vessel.above_zero
+    places = [str(place) for place, name in enumerate(parameters) if name in above_zero]
+    if not places:
+        return []
+    return [
+        f"static const int above_zero[{len(places)}] = {{{', '.join(places)}}};",
+        f"for (i = 0; i < {len(places)}; ++i) if (!(parameters[above_zero[i]] > 0)) return {result};",
+    ]
 
 
 def provenance_lines(what: Mapping[str, Any]) -> list[str]:

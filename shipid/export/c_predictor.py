@@ -19,6 +19,7 @@ from shipid.export.c import (
     array_of,
     comment,
     provenance_lines,
+    refusals,
     source_head,
     strings,
     tables_of_names,
@@ -191,7 +192,8 @@ enum {{
     {name}_TIME = 16,      /* time does not go on: the row is not kept */
     {
             name
-        }_NO_BAND = 32    /* no band can be promised: too few runs for the level or kind, or no such level: it is NAN */
+        }_NO_BAND = 32,   /* no band can be promised: too few runs for the level or kind, or no such level: it is NAN */
+    {name}_PARAMETER = 64 /* a parameter that must be above 0 is not, such as inertia.m: the path is NAN */
 }};
 
 {declared}
@@ -362,7 +364,8 @@ double {name}_factor(double miss, double level, int kind)
         commands = [names.now.index(key) for key in names.planned]
         reached = [names.now.index(key) for key in names.reached]
         first = [names.planned.index(key) for key in names.reached] if names.planned else []
-        lines = ["int i, status = 0;"]
+        checked = refusals(names.parameters, model.vessel, f"{name}_PARAMETER")
+        lines = ["int i, status = 0;", *checked[:1]]
         if names.planned:
             lines += [f"real held[{sizes_['planned']}];", f"static const int order[] = {{{_whole(commands)}}};"]
         if names.reached:
@@ -374,6 +377,7 @@ double {name}_factor(double miss, double level, int kind)
         for key in ("now", "past", "estimates", "parameters"):
             if sizes_[key]:
                 lines.append(f"for (i = 0; i < {sizes_[key]}; ++i) if (!isfinite({key}[i])) return {name}_NOT_FINITE;")
+        lines += checked[1:]
         if names.planned:
             lines.append(
                 f"if (!planned) {{ for (i = 0; i < {sizes_['planned']}; ++i) "

@@ -9,7 +9,7 @@ import numpy as np
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.export.blocks import Block, Precision, c_functions
-from shipid.export.c import NEARBY, Files, array_of, comment, source_head, tables_of_names
+from shipid.export.c import NEARBY, Files, array_of, comment, refusals, source_head, tables_of_names
 from shipid.export.equations import Equations
 from shipid.physics.grammar import AXES
 from shipid.physics.signals import ACTUAL, SIGNALS, row_of, signal_of
@@ -110,7 +110,8 @@ enum {{
 enum {{
     {name}_NOT_FINITE = 1, /* an input is not a finite number */
     {name}_TIME = 2,       /* the step is not above 0 */
-    {name}_DIVERGED = 4    /* the state after the step is not finite, or a velocity is above {SPEED_LIMIT:g} */
+    {name}_DIVERGED = 4,   /* the state after the step is not finite, or a velocity is above {SPEED_LIMIT:g} */
+    {name}_PARAMETER = 8   /* a parameter that must be above 0 is not, such as inertia.m */
 }};
 
 {declared}
@@ -165,6 +166,7 @@ int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_re
             for group, size in sizes_.items()
             if size
         )
+        above_zero, refused = refusals(groups["parameters"], self.vessel, f"{name}_PARAMETER") or ("", "")
         speeds = range(model.num_dof, 2 * model.num_dof)
         idle = [key for key in ("commands", "environment", "parameters") if not sizes_[key]]
         voids = "".join(f"    (void){key};\n" for key in idle)
@@ -197,9 +199,11 @@ void {name}_rates(const {name}_real *carry, const {name}_real *commands, const {
 int {name}_step({name}_real *carry, const {name}_real *commands, const {name}_real *environment,
                 const {name}_real *loads, const {name}_real *parameters, {name}_real dt)
 {{
+    {above_zero}
     real after[{n}];
     int i;
 {voids}{checks}
+    {refused}
     if (!isfinite(dt)) return {name}_NOT_FINITE;
     if (!(dt > 0)) return {name}_TIME;
     {call[id(step)]}({given(step, "after")});

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import platform
 import re
+import sys
 import uuid
 import zipfile
 from dataclasses import dataclass
@@ -38,6 +39,7 @@ _BAND = {
     "ahead_x": ("-", "unit vector of the track, ahead"),
     "ahead_y": ("-", "unit vector of the track, to starboard"),
 }
+LEAST = sys.float_info.min  # FMI 2.0 has no limit that is not allowed itself
 LARGEST_STEP = 0.1  # s: inside a communication step, of a ship of 30 m and more; times the root of the length below
 
 
@@ -90,8 +92,9 @@ def vessel_unit(vessel: Vessel, name: str, method: Method) -> Packed:
         )
         for key in groups["loads"]
     ]
+    above_zero, text = vessel.above_zero, "number of the vessel document"
     variables += [
-        Variable(key, "parameter", "tunable", vessel.units[key], "number of the vessel document", value)
+        Variable(key, "parameter", "tunable", vessel.units[key], text, value, above_zero=key in above_zero)
         for key, value in vessel.parameters.items()
     ]
     variables.append(
@@ -129,9 +132,11 @@ def predictor_unit(model: Model, name: str) -> Packed:
     variables.append(
         Variable("instant", "output", "continuous", "s", "time of the row that the path starts from", None)
     )
+    above_zero = frozenset() if model.vessel is None else model.vessel.above_zero
     for key, value in zip(names.parameters, model.parameters, strict=True):
+        text, positive = "number of the vessel document", key in above_zero
         variables.append(
-            Variable(key, "parameter", "tunable", model.unit(key), "number of the vessel document", float(value))
+            Variable(key, "parameter", "tunable", model.unit(key), text, float(value), above_zero=positive)
         )
     if names.planned:
         text = "1: orders stay as they are over the horizon; 0: as in planned[...]"
@@ -203,6 +208,7 @@ def description(unit: Packed, guid: str) -> str:
         head += f' causality="{variable.causality}" variability="{variable.variability}"'
         head += f' initial="{variable.initial}"' if variable.initial else ""
         real = "" if variable.unit in ("-", "") else f" unit={quoteattr(variable.unit)}"
+        real += f' min="{LEAST!r}"' if variable.above_zero else ""
         real += "" if variable.start is None else f' start="{float(variable.start)!r}"'
         rows.append(
             f"{head} description={quoteattr(variable.description)}>\n      <Real{real}/>\n    </ScalarVariable>"

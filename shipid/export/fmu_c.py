@@ -13,12 +13,15 @@ import numpy as np
 from shipid.export.band import CHOICE, COLUMNS
 from shipid.export.blocks import Precision
 
+MOST_STEPS = 1e6  # of the solver in a communication step: some seconds
+
 
 @dataclass(frozen=True)
 class Variable:
     """A real variable of an FMU.
 
     start : None where it is calculated. guess : whether it is calculated, too, unless the importer sets a start value.
+    above_zero : whether it is a parameter that must be above 0.
     """
 
     name: str
@@ -28,6 +31,7 @@ class Variable:
     description: str
     start: float | None
     guess: bool = False
+    above_zero: bool = False
 
     @property
     def initial(self) -> str:
@@ -55,6 +59,8 @@ def vessel_wrapper(name: str, sizes: Mapping[str, int], num_states: int, variabl
     return f"""
 #define NUM_REALS {total}
 #define NUM_BOOLEANS 0
+#define FIRST_PARAMETER {at["parameters"]}
+#define PARAMETER_NAMES {name}_parameters_names
 {_FMI_HEAD}
 typedef struct {{
     double values[NUM_REALS];
@@ -72,15 +78,21 @@ static const char *Model_begin(Model *self, const unsigned char *set, double t)
 {begin}    return 0;
 }}
 
-static const char *Model_step(Model *self, double t, double h)
+/* What is wrong with the settings of the solver for a step h: no smaller one mends it. */
+static const char *Model_unfit(const Model *self, double h)
 {{
     const double largest = self->values[{total - 1}];
-    const double count = ceil(h / largest - 1e-9);
+    if (!(largest > 0)) return "solver.step must be above 0";
+    if (!(h / largest <= {MOST_STEPS:g})) return "the communication step needs more than {MOST_STEPS:g} steps of solver.step";
+    return 0;
+}}
+
+static const char *Model_step(Model *self, double t, double h)
+{{
+    const double count = ceil(h / self->values[{total - 1}] - 1e-9);
     double before[{max(1, sizes["carry"])}];
     long k, steps;
     (void)t;
-    if (!(largest > 0)) return "solver.step must be above 0";
-    if (!(count < 1e9)) return "the communication step needs too many steps of solver.step";
     steps = count < 1 ? 1 : (long)count;
     memcpy(before, self->values, sizeof before);
     for (k = 0; k < steps; ++k) {{
@@ -110,6 +122,8 @@ def predictor_wrapper(name: str, horizon: int, num_parameters: int, variables: S
     return f"""
 #define NUM_REALS {len(variables)}
 #define NUM_BOOLEANS 1
+#define FIRST_PARAMETER {next((i for i, one in enumerate(variables) if one.causality == "parameter"), 0)}
+#define PARAMETER_NAMES {name}_parameters_names
 {_FMI_HEAD}
 typedef struct {{
     double values[NUM_REALS];
@@ -135,6 +149,13 @@ static const char *Model_begin(Model *self, const unsigned char *set, double t)
     (void)set;
     self->trial = self->kept;
     return predict_from(self, &self->trial, t);
+}}
+
+static const char *Model_unfit(const Model *self, double h)
+{{
+    (void)self;
+    (void)h;
+    return 0;
 }}
 
 static const char *Model_step(Model *self, double t, double h)
@@ -196,7 +217,7 @@ def _predict_from(name: str, horizon: int, num_parameters: int, at: Mapping[str,
 
 def _kind(variable: Variable) -> str:
     exact = variable.causality == "output" and variable.start is not None
-    return f"'{'e' if exact else variable.causality[0]}'"
+    return f"'{'e' if exact else 'a' if variable.above_zero else variable.causality[0]}'"
 
 
 def _fmi(name: str, variables: Sequence[Variable]) -> str:
@@ -206,7 +227,7 @@ def _fmi(name: str, variables: Sequence[Variable]) -> str:
 static const char guid[] = "@GUID@";
 static const char identifier[] = "{name}";
 static const double start_values[NUM_REALS] = {{{values}}};
-static const char kinds[] = {{{", ".join(_kind(v) for v in variables)}}}; /* input, output, exact at the start, parameter */
+static const char kinds[] = {{{", ".join(_kind(v) for v in variables)}}}; /* input, output, exact at the start, parameter, parameter above 0 */
 """
 
 
@@ -456,6 +477,8 @@ FMI2_STATUS FMI2(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr[], si
             return refuse(self, fmi2Error, "variable %u is an output and cannot be set now", vr[i]);
         if (!isfinite(value[i]))
             return refuse(self, fmi2Discard, "variable %u: %g is not a finite number", vr[i], value[i]);
+        if (kinds[vr[i]] == 'a' && !(value[i] > 0))
+            return refuse(self, fmi2Discard, "%s: %g must be above 0", PARAMETER_NAMES[vr[i] - FIRST_PARAMETER], value[i]);
     }
     for (i = 0; i < n; ++i) {
         self->model.values[vr[i]] = value[i];
@@ -677,6 +700,8 @@ FMI2_STATUS FMI2(fmi2DoStep)(fmi2Component c, fmi2Real time, fmi2Real step, fmi2
     if (time + step > self->stop + 1e-9 * fmax(fabs(self->stop), step))
         return refuse(self, fmi2Error, "a step from %g to %g s goes beyond the stop time %g s", time, time + step, self->stop);
     if (step == 0) return fmi2OK;
+    message = Model_unfit(&self->model, step);
+    if (message) return refuse(self, fmi2Error, "at %g s: %s", time, message);
     message = Model_step(&self->model, time, step);
     if (message) return refuse(self, fmi2Discard, "at %g s: %s", time, message);
     self->time = time + step;

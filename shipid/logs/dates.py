@@ -42,11 +42,15 @@ ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?
 _SAID = re.compile(
     r"(?:\b(?:UTC|GMT)|\b(?:tz|time[ _]?zone|Zeitzone|UTC[ _]?offset)\W{1,4}(?:UTC|GMT)?)"
     r"\s*[+-]\s*0?[1-9]\d?(?::?\d\d)?\b"
-    r"|\b(?:tz|time[ _]?zone|Zeitzone)\W{1,4}(?!UTC|GMT|Etc)[A-Z]\w+(?:/\w+)*|\blocal[ _]time\b|\b(?:Orts|Lokal)zeit\b",
+    r"|\b(?:tz|time[ _]?zone|Zeitzone)\W{1,4}(?!UTC|GMT|Etc)[A-Z]\w+(?:/\w+)*|\blocal[ _]time\b|\b(?:Orts|Lokal)zeit\b"
+    r"|\blokale?[ _]?(?:tid|tijd)\b|\b(?:heure|ora)[ _]locale\b|\bhora[ _]local\b",
     re.IGNORECASE,
 )
 """A zone other than UTC in the head of a log, or in the name of its clock."""
-_SAID_OF_CLOCK = re.compile(r"(?<![A-Za-z])(?:CES?T|MES?Z|[ECMP][SD]T|JST|KST|AE[SD]T|(?i:local))(?![A-Za-z])")
+_SAID_OF_CLOCK = re.compile(
+    r"(?<![A-Za-z])(?:CES?T|MES?Z|[ECMP][SD]T|JST|KST|AE[SD]T|LT"
+    r"|(?i:(?:heure |ora )?locale|local|lokale?(?:[ _]?(?:tid|tijd))?))(?![A-Za-z])"
+)
 """A zone in letters, in the name of a clock alone."""
 ZONE_REMEDY = "write UTC, or the zone behind every time, as in 2024-05-14T08:00:00+01:00"
 DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y")

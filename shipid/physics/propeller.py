@@ -21,7 +21,9 @@ ROOT_FLOOR = 1e-4  # m/s: below it the root of a square is a line
 def drift(nu_r: SX) -> tuple[SX, SX]:
     """Speed U [m/s] and drift angle beta = atan(-v / |u|) [rad] at the origin; finite, with derivatives, at rest.
 
-    Ahead it is the drift angle of the MMG model; astern it is measured from the stern, so that it stays small.
+    Ahead it is the drift angle of the MMG model; astern it is measured from the stern, so that it stays small. Where
+    the speed is below SPEED_FLOOR, |u| counts as 0.01 m/s, and U is rounded off by it everywhere: formulas of wake and
+    rudder are then not those of the source.
     """
     square = nu_r[0] ** 2 + nu_r[1] ** 2
     along = ca.if_else(square < SPEED_FLOOR**2, SPEED_FLOOR, ca.fabs(nu_r[0]))
@@ -29,7 +31,7 @@ def drift(nu_r: SX) -> tuple[SX, SX]:
 
 
 def signed_root(square: SX) -> SX:
-    """sign(q) sqrt(|q|) [m/s] of a signed square q [m^2/s^2]; linear, with finite slope, below ROOT_FLOOR."""
+    """sign(q) sqrt(|q|) [m/s] of a signed square q [m^2/s^2]; linear, with finite slope, below 1e-4 m/s."""
     return square / ca.sqrt(ca.fmax(ca.fabs(square), ROOT_FLOOR**2))
 
 

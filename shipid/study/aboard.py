@@ -11,9 +11,10 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.causal import causal_columns
-from shipid.data.dataset import Dataset, clock_slack, pieces, read_dataset, sample
+from shipid.data.dataset import Dataset, clock_slack, pieces, sample
 from shipid.data.windows import (
     Instants,
+    coarse_in_words,
     from_frame,
     gaps_in_words,
     past_of,
@@ -25,13 +26,11 @@ from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Bands, Region, at_level
 from shipid.hybrid.physics import assumed, check_columns
 from shipid.logs.dates import span_of
-from shipid.logs.importing import import_log
-from shipid.logs.mapping import read_mapping
 from shipid.metrics import share_of
 from shipid.observer import observe
 from shipid.predictor import Predictor
 from shipid.report.content import Line
-from shipid.study.apply import Band, along_run
+from shipid.study.apply import Band, along_run, dataset_of
 from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
 from shipid.study.store import read_predictor
@@ -58,7 +57,8 @@ class Played:
     skipped : instants at which a prediction was due before there was a past.
     plan : whether orders were taken as held where the predictor knows a plan.
     band : what was asked of the band; None: none was asked. bands : of the predictor, where it has some.
-    track : run, t [s], north, east [m] as measured, for a page. gaps : times without rows, in words.
+    track : run, t [s], north, east [m] as measured, for a page. gaps : times without rows, in words. coarse : that rows
+        are farther apart than the step, in words.
     """
 
     instants: pd.DataFrame
@@ -72,6 +72,7 @@ class Played:
     bands: Bands | None = None
     track: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=TRACK))
     gaps: str = ""
+    coarse: str = ""
 
 
 def play(
@@ -98,7 +99,7 @@ def play(
     if level is not None:
         predictor.check_level(level, kind)
     band = None if level is None else Band(level, kind, rate)
-    dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
+    dataset = dataset_of(log, mapping)
     vessel, step = predictor.vessel, predictor.physics.step
     names = list(map(str, dataset.frame.columns))
     if vessel is not None:
@@ -121,6 +122,7 @@ def play(
     return Played(
         pd.DataFrame(rows), pd.concat(paths, ignore_index=True), step, predictor.physics.horizon, skipped, missing,
         predictor.commands == "known", band, predictor.bands, dataset.frame[TRACK], gaps_in_words(dataset, step),
+        coarse_in_words(dataset, step),
     )  # fmt: skip
 
 
@@ -215,7 +217,8 @@ def _judged(
     missed = np.full((physics.horizon, 2), np.nan)
     if there.any():
         shown = np.append(t[i], later[there])
-        missed[there] = true_path(rows, shown, sample(rows, shown), physics.path)[1:] - predicted[there]
+        true = true_path(rows, shown, sample(rows, shown), physics.path, longest=physics.step)[1:]
+        missed[there] = true - predicted[there]
     error, reach = np.hypot(*missed.T), np.nan
     if region is not None:
         course = np.arctan2(region.ahead[:, 0, 1], region.ahead[:, 0, 0]) + origin[2]
@@ -246,6 +249,8 @@ def summed_up(played: Played) -> list[Line]:
     lines = [Line("predictions", f"{many}, {played.horizon * played.step:g} s ahead; {early}")]
     if played.assumed:
         lines.append(Line("limit", f"not in the log, taken as 0: {', '.join(played.assumed)}"))
+    if played.coarse:
+        lines.append(Line("limit", played.coarse))
     if played.gaps:
         words = f"{played.gaps}: no errors there, and a past over one of them is interpolated"
         lines.append(Line("limit", words))

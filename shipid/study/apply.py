@@ -10,7 +10,7 @@ import pandas as pd
 
 from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, clock_slack, in_force, pieces, read_dataset, sample
-from shipid.data.windows import Instants, from_frame, future_of, gaps_in_words, past_of, without_rows
+from shipid.data.windows import Instants, coarse_in_words, from_frame, future_of, gaps_in_words, past_of, without_rows
 from shipid.errors import DataError, ResultError, choices
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region, adapted, adaptive, factor
@@ -50,13 +50,13 @@ def predict_log(
     with a level also band_along, band_across [m], band_course [rad], half axes and direction, clockwise from north, of
     the ellipse that holds the true place, and band_factor where it adapts) and the share of instants outside the
     training's limits. Cells without physics have NaN for physics. `attrs["gaps"]` of the frame says how many times
-    without rows the log has, and the longest.
+    without rows the log has, and the longest; `attrs["coarse"]` that its rows are farther apart than the step.
     """
     check_table(out)
     predictor = read_predictor(_known_cell(folder, cell))
     if level is not None:
         predictor.check_level(level, kind)
-    dataset = read_dataset(log) if mapping is None else import_log(read_mapping(mapping), log)
+    dataset = dataset_of(log, mapping)
     if predictor.vessel is not None:
         check_columns(predictor.vessel, dataset.frame.columns, str(log))
     if predictor.causal:
@@ -70,8 +70,16 @@ def predict_log(
     if frame.empty:
         raise DataError(_too_short(predictor), file=log)
     write_table(out, frame)
-    frame.attrs["gaps"] = gaps_in_words(dataset, predictor.physics.step)
+    step = predictor.physics.step
+    frame.attrs |= {"gaps": gaps_in_words(dataset, step), "coarse": coarse_in_words(dataset, step)}
     return frame, float(frame["outside"].mean())
+
+
+def dataset_of(log: Path, mapping: str | None) -> Dataset:
+    """A dataset, or a raw log with its mapping; DataError for what is neither."""
+    if mapping is None:
+        return read_dataset(log, remedy=", or give the log itself with --mapping")
+    return import_log(read_mapping(mapping), log)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from shipid.data.windows import (
     Instants,
     PathSource,
     Windows,
+    coarse_in_words,
     cut_windows,
     gaps,
     longest_gap,
@@ -140,7 +141,8 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
     test_runs = _test_runs(plan, windows)
     test = windows.select(np.isin(windows.run, test_runs))
     rest = windows.select(~np.isin(windows.run, test_runs))
-    notes = over_gaps(dataset, windows)
+    coarse = coarse_in_words(dataset, windows.step)
+    notes = [*([coarse] if coarse else []), *over_gaps(dataset, windows)]
     if windows.shared_clock:
         touching = rest.touching(test.spans.values())
         if touching.any():

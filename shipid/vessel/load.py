@@ -99,6 +99,14 @@ class Vessel:
         """Dotted path -> value of every number that the equations use; a copy, free to be changed."""
         return dict(self._parameters)
 
+    @property
+    def above_zero(self) -> frozenset[str]:
+        """Dotted paths of the parameters that must be above 0, such as `inertia.m`."""
+        model = model_for(self.document)
+        return frozenset(
+            path for path in self._units if not documents.suits(model, documents.replace(self.document, {path: 0.0}))
+        )
+
     @cached_property
     def _units(self) -> dict[str, str]:
         return units(self.document)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from shipid.data.dataset import Dataset
 from shipid.data.windows import (
     Windows,
+    coarse_in_words,
     concatenate,
     covered,
     cut_windows,
@@ -100,6 +101,51 @@ def test_velocity_path_is_the_position_path_on_a_consistent_log() -> None:
     # positions are interpolated linearly between rows 0.6 s apart, 0.05 rad/s, 6 m/s: error under v r dt^2 / 8
     np.testing.assert_allclose(windows[0].future, windows[1].future, atol=2 * 6 * 0.06 * 0.6**2 / 8)
     np.testing.assert_array_equal(windows[0].columns["north"], windows[1].columns["north"])
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("apart", "share"), [(2.0, 0.05), (5.0, 0.15)])
+def test_between_coarse_rows_the_path_turns_with_the_ship(seed: int, apart: float, share: float) -> None:
+    """Chords were the truth before: a predictor was judged by them and learned them. A current changes no digit."""
+    rng = np.random.default_rng(seed)
+    u, v, r = rng.uniform(2, 8), rng.uniform(-0.5, 0.5), rng.choice([-1, 1]) * rng.uniform(0.01, 0.04)
+    few, many = (turning(np.arange(0.0, 101.0, step), u=u, v=v, r=r) for step in (apart, 1.0))
+    coarse, true = (cut_windows(as_dataset(f), horizon=20, step=1.0, interval=apart) for f in (few, many))
+    np.testing.assert_array_equal(coarse.t, true.t)
+    whole = int(apart)
+    np.testing.assert_allclose(coarse.future[whole - 1 :: whole], true.future[whole - 1 :: whole], atol=1e-9)
+    sagitta = np.hypot(u, v) * abs(r) * apart**2 / 8
+    assert np.linalg.norm(coarse.future - true.future, axis=-1).max() < share * sagitta
+    adrift = few.assign(u=u - 0.3 * np.cos(few["psi"]), v=v + 0.3 * np.sin(few["psi"]))
+    current = cut_windows(as_dataset(adrift), horizon=20, step=1.0, interval=apart)
+    np.testing.assert_allclose(current.future, coarse.future, atol=0.01 * sagitta)
+
+
+def test_only_rows_farther_apart_than_the_step_bend_the_path_and_only_by_right_velocities() -> None:
+    """At rows, and where rows are no farther apart, a path is that of the positions to the bit; so with a stuck u."""
+    frame = weaving(np.arange(0.0, 200.0, 5.0))
+    stuck = frame.assign(u=0.0, v=0.0)
+    for step, interval in ((5.0, 5.0), (7.5, 5.0), (10.0, 10.0)):
+        one, other = (cut_windows(as_dataset(f), horizon=4, step=step, interval=interval) for f in (frame, stuck))
+        np.testing.assert_array_equal(one.future, other.future)
+    bent, straight = (cut_windows(as_dataset(f), horizon=20, step=1.0, interval=5.0, past=6) for f in (frame, stuck))
+    at_row = np.arange(1, 21) % 5 == 0
+    np.testing.assert_array_equal(bent.future[at_row], straight.future[at_row])
+    assert np.abs(bent.future[~at_row] - straight.future[~at_row]).max() > 0.1
+    chords = np.diff(np.concatenate([np.zeros((1, len(straight), 2)), straight.future]), axis=0)[:5]
+    np.testing.assert_allclose(chords, np.broadcast_to(chords[:1], chords.shape), atol=1e-9)
+    for name in ("x", "y"):  # pasts stay straight, as in exported predictors
+        np.testing.assert_array_equal(bent.past[name], straight.past[name])
+
+
+def test_rows_farther_apart_than_the_step_are_said() -> None:
+    rng = np.random.default_rng(0)
+    jittered = weaving(np.arange(0.0, 100.0, 1.0) + rng.uniform(-0.05, 0.05, 100))
+    words = "rows are 5 s apart and the step is 1 s: path and motion between rows are interpolated"
+    coarse = weaving(np.arange(0.0, 100.0, 5.0))
+    assert coarse_in_words(as_dataset(jittered), 1.0) == coarse_in_words(as_dataset(coarse), 5.0) == ""
+    assert coarse_in_words(as_dataset(coarse), 1.0) == words
+    assert coarse_in_words(as_dataset(jittered, coarse), 1.0) == words
 
 
 def test_velocity_path_does_not_see_positions() -> None:

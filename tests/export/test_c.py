@@ -37,7 +37,7 @@ from tests.export.compiled import SANITIZERS, compile_, compiler, library, paths
 from tests.export.strange import KINDS, bands_of, drawn, network_of
 
 NEAR = 1e-12  # m
-INVALID, OUTSIDE, DIVERGED, NO_PAST, TIME = 1, 2, 4, 8, 16
+INVALID, OUTSIDE, DIVERGED, NO_PAST, TIME, PARAMETER = 1, 2, 4, 8, 16, 64
 
 
 def agree(computed, results, strange):
@@ -107,6 +107,14 @@ def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
                 faulty[place] = fault
                 assert result(**{group: faulty}) == INVALID
                 assert np.isnan(path).all()
+    places = [exported.layout.parameters.index(name) for name in exported.vessel.above_zero]
+    assert places
+    for place in places:
+        for fault in (0.0, -1.0):
+            faulty = given["parameters"].copy()
+            faulty[place] = fault
+            assert result(parameters=faulty) == PARAMETER
+            assert np.isnan(path).all()
     for size in (1e6, 1e100, 1e300):
         huge = given["now"].copy()
         huge[exported.layout.now.index("u")] = size
@@ -608,6 +616,12 @@ def _steps(vessel, folder, draw_inputs):
         given = [pointer(array) for array in (carry, *groups, loads, values)]
         assert loaded.ship_step(*given, 0.0) == 2
         assert loaded.ship_step(*given, float("nan")) == 1
+        for place, name in enumerate(vessel.parameters):
+            faulty, before = values.copy(), carry.copy()
+            faulty[place] = 0.0
+            if name in vessel.above_zero:
+                assert loaded.ship_step(*given[:-1], pointer(faulty), 0.1 * slow) == 8
+                np.testing.assert_array_equal(carry, before)
         for _ in range(steps):
             result = loaded.ship_step(*given, 0.1 * slow)
             if result:

@@ -162,6 +162,64 @@ def test_calls_out_of_order_and_states_of_others_are_refused(ship, tmp_path):
     run_c(ship, CALLS_OUT_OF_ORDER, tmp_path)
 
 
+ABOVE_ZERO = """
+#include "@NAME@.c"
+static char said[300];
+static void hear(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status, fmi2String category,
+    fmi2String format, ...)
+{
+    va_list arguments;
+    (void)e, (void)name, (void)status, (void)category;
+    va_start(arguments, format);
+    vsnprintf(said, sizeof said, format, arguments);
+    va_end(arguments);
+}
+int main(void)
+{
+    static const char *const names[] = {@NAMES@};
+    static const fmi2ValueReference places[] = {@PLACES@};
+    const double wrong[] = {0, -1}, right = 1;
+    fmi2CallbackFunctions call = {hear, 0, 0, 0, 0};
+    fmi2Component c = fmi2Instantiate("a", fmi2CoSimulation, guid, "", &call, 0, 0);
+    size_t i, k;
+    if (!c) return __LINE__;
+    for (i = 0; i < sizeof places / sizeof *places; ++i) {
+        for (k = 0; k < 2; ++k) {
+            said[0] = 0;
+            if (fmi2SetReal(c, &places[i], 1, &wrong[k]) != fmi2Discard) return __LINE__;
+            if (!strstr(said, names[i]) || !strstr(said, "must be above 0")) return __LINE__;
+        }
+        if (fmi2SetReal(c, &places[i], 1, &right) != fmi2OK) return __LINE__;
+    }
+    fmi2FreeInstance(c);
+    return 0;
+}
+"""
+
+
+def test_a_number_that_must_be_above_zero_is_refused_by_name_and_has_a_min(ship, aboard, tmp_path):
+    """What Python refuses: before, a mass of 0 or less gave a motion, and every step was fine."""
+    for unit, vessel in ((ship, variety()["actuators"]), (aboard, load_vessel("mariner"))):
+        with zipfile.ZipFile(unit) as archive:
+            root = ET.fromstring(archive.read("modelDescription.xml"))
+        variables = {entry.get("name"): entry for entry in root.iter("ScalarVariable")}
+        least = {
+            name: entry.find("Real").get("min") for name, entry in variables.items() if entry.find("Real") is not None
+        }
+        limited = [name for name, value in least.items() if value is not None]
+        assert {"inertia.m", "inertia.I_z", "constants.rho"} <= set(limited)
+        assert all(float(least[name]) > 0 for name in limited)
+        for name in limited:
+            with pytest.raises(ShipidError, match="above 0"):
+                vessel.with_values({name: 0.0})
+        names, places = (
+            '"' + '", "'.join(limited) + '"',
+            ", ".join(variables[n].get("valueReference") for n in limited),
+        )
+        source = ABOVE_ZERO.replace("@NAME@", unit.stem).replace("@NAMES@", names).replace("@PLACES@", places)
+        run_c(unit, source, tmp_path / unit.stem)
+
+
 BEYOND_THE_STOP = """
 #include "ship.c"
 #define NO(call) if ((call) != fmi2Error) return __LINE__
@@ -332,14 +390,14 @@ STEPS_OF_NO_LENGTH = """
 #include "ship.c"
 int main(void)
 {
-    const double steps[] = {0, -1, 1e-300, 1e300};
+    const double steps[] = {0, -1, 1e-300, 9e-8, 1e300}; /* the last but one: more than a million */
     const fmi2ValueReference last = NUM_REALS - 1; /* solver.step */
     fmi2CallbackFunctions call = {0, 0, 0, 0, 0};
     fmi2Component c = fmi2Instantiate("a", fmi2CoSimulation, guid, "", &call, 0, 0);
     int i;
     if (!c || fmi2EnterInitializationMode(c) || fmi2ExitInitializationMode(c)) return 1;
-    for (i = 0; i < 4; ++i)
-        if (fmi2SetReal(c, &last, 1, &steps[i]) || fmi2DoStep(c, 0, 0.1, 0) != (i < 3 ? fmi2Discard : fmi2OK)) return 2;
+    for (i = 0; i < 5; ++i)
+        if (fmi2SetReal(c, &last, 1, &steps[i]) || fmi2DoStep(c, 0, 0.1, 0) != (i < 4 ? fmi2Error : fmi2OK)) return 2;
     fmi2FreeInstance(c);
     return 0;
 }
@@ -347,7 +405,10 @@ int main(void)
 
 
 def test_an_internal_step_of_no_length_is_refused(ship, tmp_path):
-    """Before, the number of steps, which is infinite, was made a whole number first: C does not say what that gives."""
+    """Before, the number of steps, which is infinite, was made a whole number first: C does not say what that gives.
+
+    And a thousand million steps were taken without a word. An error, since FMPy tries a discarded step for ever.
+    """
     with zipfile.ZipFile(ship) as archive:
         archive.extractall(tmp_path)
     (tmp_path / "sources" / "main.c").write_text(STEPS_OF_NO_LENGTH)

@@ -22,6 +22,7 @@ from shipid.study.aboard import play, summary, summed_up, write
 from shipid.units import percent
 from shipid.vessel.load import load_vessel
 from tests.export.strange import bands_of, drawn
+from tests.logs.conftest import as_dataset, turning
 
 STEP = 5.0
 
@@ -225,6 +226,14 @@ def test_a_band_that_cannot_be_promised_is_refused(banded, predictor, tmp_path):
     assert any("no whole path can be judged" in line for line in summary(short))
 
 
+def test_a_log_that_is_no_dataset_is_said_to_need_a_mapping_only_where_one_can_be_given(predictor, tmp_path):
+    (tmp_path / "log.csv").write_text("t,u\n0,1\n")
+    with pytest.raises(DataError, match=r"`shipid data import`, or give the log itself with --mapping$"):
+        play(predictor, tmp_path / "log.csv")
+    with pytest.raises(DataError, match=r"make one from a log with `shipid data import`$"):
+        read_dataset(tmp_path / "log.csv")
+
+
 def test_a_wrong_interval_is_refused(predictor, tmp_path):
     with pytest.raises(DataError, match="--every"):
         play(predictor, saved(log(), tmp_path), every=0.0)
@@ -276,6 +285,21 @@ def test_where_the_log_has_no_rows_there_is_no_error(banded, tmp_path):
     assert second.instants.loc[before & (second.instants["t"] > 80), "reach"].isna().all()
     assert (first.gaps, second.gaps) == ("", "1 time without rows, the longest 50 s after t = 100 s of 'a'")
     assert any(second.gaps in line for line in summary(second))
+
+
+def test_errors_on_a_coarse_log_are_those_of_the_ship(tmp_path):
+    """In a turn with rows 5 s apart and a step of 1 s errors are as with rows of 1 s, not those to a chord."""
+    steady = Predictor(Physics(None, 10, 1.0), "alone", Unchanged({}), {}, {}).save(tmp_path / "cell.npz")
+    many, few = (
+        play(steady, write_dataset(as_dataset(turning(np.arange(0.0, 101.0, apart), u=7.0)), tmp_path / "log.parquet"))
+        for apart in (1.0, 5.0)
+    )
+    words = "rows are 5 s apart and the step is 1 s: path and motion between rows are interpolated"
+    assert (many.coarse, few.coarse) == ("", words)
+    assert words in summary(few)
+    both = few.points.merge(many.points, on=["run", "t", "ahead"]).dropna(subset=["error_x", "error_y"])
+    assert len(both) > 100
+    np.testing.assert_allclose(both["error_x"], both["error_y"], atol=0.1 * 7.0 * 0.05 * 5.0**2 / 8)
 
 
 def test_a_heading_that_wraps_changes_no_prediction():

@@ -507,3 +507,11 @@ def test_a_note_counts_the_windows_over_a_time_without_rows(tiny: tuple[Plan, Da
     assert f"the longest 7 s after t = 5 s of {run!r}" in note
     assert "set max_gap in [clock]" in note
     assert prepare(plan, holed).notes == (note,)
+
+
+def test_a_note_says_that_rows_are_farther_apart_than_the_step(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+    plan, dataset, _ = tiny
+    rare = replace(dataset, frame=dataset.frame[dataset.frame["t"] % 5 == 0].reset_index(drop=True))
+    assert prepare(plan, rare).notes == (
+        "rows are 5 s apart and the step is 1 s: path and motion between rows are interpolated",
+    )
