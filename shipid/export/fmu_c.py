@@ -288,6 +288,7 @@ typedef struct {
     Phase phase;
     double time, stop; /* the stop is that of the experiment, infinite where it has none */
     unsigned char set[NUM_REALS]; /* by the importer */
+    int refused; /* whether the last step was: as it is, the motion does not go on */
     char *name;
     fmi2CallbackFunctions call;
 } Instance;
@@ -447,6 +448,7 @@ FMI2_STATUS FMI2(fmi2Reset)(fmi2Component c)
     memset(self->set, 0, sizeof self->set);
     self->phase = INSTANTIATED;
     self->time = 0;
+    self->refused = 0;
     self->stop = INFINITY;
     return fmi2OK;
 }
@@ -598,6 +600,7 @@ FMI2_STATUS FMI2(fmi2SetFMUstate)(fmi2Component c, fmi2FMUstate state)
     self->model = kept->model;
     self->phase = kept->phase;
     self->time = kept->time;
+    self->refused = 0;
     memcpy(self->set, kept->set, sizeof self->set);
     return fmi2OK;
 }
@@ -703,6 +706,7 @@ FMI2_STATUS FMI2(fmi2DoStep)(fmi2Component c, fmi2Real time, fmi2Real step, fmi2
     message = Model_unfit(&self->model, step);
     if (message) return refuse(self, fmi2Error, "at %g s: %s", time, message);
     message = Model_step(&self->model, time, step);
+    self->refused = message != 0;
     if (message) return refuse(self, fmi2Discard, "at %g s: %s", time, message);
     self->time = time + step;
     return fmi2OK;
@@ -742,7 +746,7 @@ FMI2_STATUS FMI2(fmi2GetBooleanStatus)(fmi2Component c, const fmi2StatusKind kin
 {
     if (!c) return fmi2Error;
     if (kind != fmi2Terminated) return refuse((Instance *)c, fmi2Discard, "status %d is not kept", (int)kind);
-    *value = 0;
+    *value = ((Instance *)c)->refused;
     return fmi2OK;
 }
 

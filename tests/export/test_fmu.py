@@ -335,13 +335,15 @@ int main(void)
     const double fast = 9; /* limits: 0 to 8 m/s */
     double at = 0;
     fmi2Integer status = 0;
-    fmi2Boolean alarm = 0;
+    fmi2Boolean alarm = 0, ended = 1;
     fmi2CallbackFunctions call = {0, 0, 0, 0, 0};
     fmi2Component c = fmi2Instantiate("a", fmi2CoSimulation, guid, "", &call, 0, 0);
     if (!c || fmi2EnterInitializationMode(c) || fmi2SetReal(c, &u, 1, &fast) || fmi2ExitInitializationMode(c)) return 1;
-    if (fmi2DoStep(c, 5, 1, 0) || fmi2DoStep(c, 4, 1, 0) != fmi2Discard) return 2;
+    if (fmi2DoStep(c, 5, 1, 0) || fmi2GetBooleanStatus(c, fmi2Terminated, &ended) || ended) return 2;
+    if (fmi2DoStep(c, 4, 1, 0) != fmi2Discard || fmi2GetBooleanStatus(c, fmi2Terminated, &ended) || !ended) return 2;
     if (fmi2GetReal(c, &instant, 1, &at) || fmi2GetInteger(c, &first, 1, &status)) return 3;
     if (fmi2GetBoolean(c, &first, 1, &alarm)) return 4;
+    if (fmi2DoStep(c, 6, 1, 0) || fmi2GetBooleanStatus(c, fmi2Terminated, &ended) || ended) return 6;
     fmi2FreeInstance(c);
     return at > 4.9 && alarm && status == path_OUTSIDE ? 0 : 5;
 }
