@@ -520,11 +520,7 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
             part = build_plan(_changed(bare, mine, f"condition.{place}.set", file), file, known, plan.sources)
             part = build_plan(_changed(part.document, turn, "repeat", file), file, known, plan.sources)
             if part.study.data != plan.study.data:
-                begins = f"{name}{OF_PART}"
-                stored = {
-                    key.removeprefix(begins): value for key, value in (sources or {}).items() if key.startswith(begins)
-                }
-                part = replace(part, sources=_sources(part.study.data, file) if sources is None else stored)
+                part = replace(part, sources=_of_part(name, part, parts, sources))
             twin = next((other for other, done in parts.items() if done.plan.study == part.study), None)
             if twin is not None:
                 message = f"{name} has the settings of {twin}: equal studies are no more evidence than one"
@@ -534,6 +530,15 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
                 condition.name if condition else "", replace(part, changes={**plan.changes, **whole, **mine, **turn})
             )
     return parts
+
+
+def _of_part(name: str, part: Plan, made: Mapping[str, Part], stored: Mapping[str, str] | None) -> Mapping[str, str]:
+    """Digests of the sources of a part with data of its own: as stored, or of its files, which are read once."""
+    if stored is not None:
+        begins = f"{name}{OF_PART}"
+        return {key.removeprefix(begins): digest for key, digest in stored.items() if key.startswith(begins)}
+    same = next((one.plan.sources for one in made.values() if one.plan.study.data == part.study.data), None)
+    return _sources(part.study.data, Path(part.file)) if same is None else same
 
 
 def _changed(document: Document, changes: Mapping[str, Any], where: str, file: Path) -> Document:
