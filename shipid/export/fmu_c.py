@@ -13,7 +13,7 @@ import numpy as np
 from shipid.export.band import CHOICE, COLUMNS
 from shipid.export.blocks import Precision
 
-MOST_STEPS = 1e6  # of the solver in a communication step: some seconds
+MOST_STEPS = 1_000_000  # of the solver in a communication step: some seconds
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ static const char *Model_unfit(const Model *self, double h)
 {{
     const double largest = self->values[{total - 1}];
     if (!(largest > 0)) return "solver.step must be above 0";
-    if (!(h / largest <= {MOST_STEPS:g})) return "the communication step needs more than {MOST_STEPS:g} steps of solver.step";
+    if (!(h / largest <= {MOST_STEPS})) return "the communication step needs more than {MOST_STEPS} steps of solver.step";
     return 0;
 }}
 
