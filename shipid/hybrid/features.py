@@ -253,7 +253,8 @@ def choose_features(table: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
         tolerance = TOLERANCE * max(1e-300, float(np.abs(values).max(initial=0.0)))
         if np.ptp(values) <= tolerance:
             continue
-        twin = next((kept for kept in chosen if "." in name and np.allclose(table[kept], values, 0.0, tolerance)), None)
+        same = (kept for kept in chosen if "." in name and np.abs(table[kept] - values).max() <= tolerance)
+        twin = next(same, None)
         if twin is None:
             chosen[name] = (name,)
         else:

@@ -24,7 +24,7 @@ from shipid.vessel.load import Vessel
 Array = np.ndarray
 MOTION = ("u", "v", "r", "psi")
 ESTIMATED = tuple(f"observer.{name}" for name in COLUMNS)
-WORTH_COMPILING = 20_000  # steps of single windows: who asks for so many at once, in training or on a log, asks again
+WORTH_COMPILING = 5_000  # steps of single windows: who asks for so many at once, in training or on a log, asks again
 RolloutInputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
 """Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
 

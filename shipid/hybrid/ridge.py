@@ -616,7 +616,8 @@ class _FewRows:
     def __init__(self, part: _Part, block: _Block) -> None:
         self.part, self.block, self.shape = part, block, block.out.shape
         out = block.out.flatten()
-        self.flat, self.targets = part.rotated(out).float(), part.targets[out].float()
+        self.exact = part.rotated(out)
+        self.flat, self.targets = self.exact.float(), part.targets[out].float()
         self.rows = self.flat.view(*self.shape, -1)
         self.columns = self.rows.mT.contiguous()
         self.unit = torch.eye(self.shape[1], device=out.device)
@@ -639,15 +640,15 @@ class _FewRows:
         errors = matmul(torch.cholesky_inverse(lower), missed)
         if unsound.any():
             errors = errors.double()
-            errors[unsound] = self._double(self.block.out[unsound], diagonal, columns)
+            errors[unsound] = self._double(unsound, diagonal, columns)
         return errors
 
-    def _double(self, out: Tensor, diagonal: Tensor, columns: list[int] | slice) -> Tensor:
-        """Errors of some blocks (folds, b) of windows without themselves, (folds, b, C), in double precision."""
-        rows = self.part.rotated(out)
+    def _double(self, folds: Tensor, diagonal: Tensor, columns: list[int] | slice) -> Tensor:
+        """Errors of some of the blocks without themselves, (folds, b, C), in double precision."""
+        rows = self.exact.view(*self.shape, -1)[folds]
         weighted = rows / diagonal
         remainder = self.unit.double() - matmul(weighted, rows.mT)
-        missed = self.part.targets[:, columns][out] - matmul(weighted, self.part.product[:, columns])
+        missed = self.part.targets[:, columns][self.block.out[folds]] - matmul(weighted, self.part.product[:, columns])
         solved: Tensor = torch.linalg.solve(remainder, missed)
         return solved
 
