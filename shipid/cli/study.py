@@ -343,7 +343,7 @@ def study_compare(
     out: Annotated[Path | None, typer.Option(help="file for a row per comparison: .csv or .parquet")] = None,
     as_json: Json = False,
 ) -> None:
-    """Set runs beside the first one: what their documents differ in, and H of equal cells with paired intervals.
+    """Compare runs with the first one: what their documents differ in, and H of equal cells with paired intervals.
 
     Finished runs of one study in several worlds (another --set seed= each) are repetitions: then it shows findings and
     errors over the worlds.

@@ -109,7 +109,7 @@ class Controls:
         idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
         if not np.isfinite(idle).all():
             weather = ", ".join(dynamics(vessel).environment)
-            zeros = f" and {weather} 0, as where nobody gives them" if weather else ""
+            zeros = f" and {weather} 0, as where none is given" if weather else ""
             message = f"the forces on {vessel.name} are not finite at rest, with commands neutral{zeros}"
             raise DocumentError(f"{message}: mend the term or its numbers", file=vessel.file)
         ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in self.commands if is_shaft(name)}

@@ -566,8 +566,8 @@ def _how_to_read(case: Case) -> list[str]:
         )
     else:
         sentences.append(
-            f"Brackets are 95 % intervals over {manoeuvres(table.runs)} of one world; lists of names are corrected for "
-            "their length (Holm)."
+            f"Brackets are 95 % intervals over {manoeuvres(table.runs)} of one world. A test of several models is "
+            "corrected for their number (Holm): one that a short list names may be missing in a longer one."
         )
         if case.smallest < case.largest and case.results.cells["seed"].nunique() == 1:
             sentences.append(
