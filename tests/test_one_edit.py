@@ -1,7 +1,9 @@
-"""One edit is enough: a signal, a term, a log reader or a family rule is one entry, added here while the tests run."""
+"""One edit is enough: a signal, a term, a manoeuvre, a log reader, a family rule is one entry, added while they run."""
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,12 +13,14 @@ import casadi as ca
 import numpy as np
 import pandas as pd
 import pytest
+from typer.testing import CliRunner
 
+from shipid.cli import app
 from shipid.data.checks import check_dataset
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Instants, cut_windows
 from shipid.engine.rollout import rollout
-from shipid.errors import DataError, DocumentError
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.export.correctors import taken
 from shipid.export.model import model
 from shipid.export.write import export_predictor
@@ -28,14 +32,21 @@ from shipid.hybrid.stepping import Stepper, free
 from shipid.logs import readers
 from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
-from shipid.physics import TERMS, Term, signals
+from shipid.logs.measuring import measure_dataset
+from shipid.physics import TERMS, Term, helm, signals
 from shipid.physics.frames import force_at
 from shipid.physics.signals import Signal
 from shipid.predictor import fit
+from shipid.report.wording import number
+from shipid.schemas import schema as schema_of
+from shipid.simulation import manoeuvre
 from shipid.simulation.approach import Controls
+from shipid.simulation.measured import measure_standard
+from shipid.simulation.scripted import simulated
+from shipid.simulation.standard import standard
 from shipid.simulation.truth import Truth, check_truth, simulate
 from shipid.study.envelope import envelope_table
-from shipid.study.plan import build_plan
+from shipid.study.plan import Plan, build_plan
 from shipid.study.schema import Published
 from shipid.units import DEGREE
 from shipid.vessel import perturb, schema
@@ -44,7 +55,7 @@ from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.perturb import Rule
 from tests import test_laws
 from tests.documented import code, module
-from tests.logs.conftest import PLAIN, as_log, turning
+from tests.logs.conftest import PLAIN, as_dataset, as_log, turning
 from tests.logs.simulated import as_bridge, si_log
 
 FLAP = Signal(
@@ -468,3 +479,78 @@ def test_a_rule_refuses_a_value_at_its_key(tmp_path: Path, monkeypatch: pytest.M
     with pytest.raises(DocumentError) as caught:
         shifted(tmp_path, {"shift": "far"})
     assert str(caught.value.path).startswith("family.wrong.perturb.0.shift")
+
+
+@pytest.fixture
+def coast_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The manoeuvre of docs/extending.md."""
+    made = module("A manoeuvre", "coast_down_of_the_page", monkeypatch)
+    monkeypatch.setitem(manoeuvre.KINDS, "coast_down", made.CoastDown)
+
+
+def as_document(folder: Path, **keys: Any) -> Path:
+    """A document of one manoeuvre."""
+    block = {"kind": "coast_down", "n_rpm": 600, "execute_at": 5, "duration": 40, **keys}
+    file = folder / "runs.toml"
+    file.write_text("step = 0.1\ninterval = 0.5\n[[manoeuvre]]\n" + "".join(f"{k} = {v!r}\n" for k, v in block.items()))
+    return file
+
+
+def command(*words: object) -> Any:
+    """What a command writes with `--json`."""
+    result = CliRunner().invoke(app, [*map(str, words), "--json"])
+    assert result.exit_code == 0, result.output + repr(result.exception)
+    return json.loads(result.output)
+
+
+def coasting_study(folder: Path, kind: str = "coast_down") -> Plan:
+    """A study of simulated runs of one kind."""
+    block = {"kind": kind, "n_rpm": [400.0, 700.0]}
+    truth = {"vessel": "kvlcc2-l7", "manoeuvres": 8, "duration": 20.0, "step": 0.1, "manoeuvre": [block]}
+    known = {"ahead": 5.0, "commands": "known"}
+    head = {"question": "How far does she run?", "truth": truth, "split": {"test": 2}, "prediction": known}
+    family = [{"name": "exact", "base": "kvlcc2-l7"}]
+    return build_plan({**head, "grid": {"N_D": [4]}, "family": family}, folder / "study.toml")
+
+
+def test_without_the_line_nobody_knows_the_manoeuvre(tmp_path: Path) -> None:
+    file = as_document(tmp_path)
+    for ask in (
+        lambda: simulated(load_vessel("kvlcc2-l7"), str(file)),
+        lambda: coasting_study(tmp_path),
+        lambda: measure_standard(load_vessel("kvlcc2-l7"), "coast-down"),
+        lambda: measure_dataset(as_dataset(turning(T)), "coast-down"),
+    ):
+        with pytest.raises(ShipidError, match=r"coast.down"):
+            ask()
+
+
+@pytest.mark.usefixtures("coast_down")
+def test_a_document_the_measures_of_a_log_and_the_command_take_the_manoeuvre(tmp_path: Path) -> None:
+    """From a document to a log, from the log to its measures; and by the command at the scale of the ship."""
+    log, page = tmp_path / "log.parquet", tmp_path / "page.html"
+    command("simulate", "kvlcc2-l7", "--manoeuvres", as_document(tmp_path, execute_at=15, duration=300), "--out", log)
+    frame = read_dataset(log).frame
+    assert set(frame["propeller.n"].round(9)) == {10.0, 0.0}
+    rows = {row["measure"]: row for row in command("data", "measures", log, "--manoeuvre", "coast-down")["measures"]}
+    assert rows["execute"]["value"] == 15
+    halved = np.interp(15 + rows["half time"]["value"], frame["t"], np.hypot(frame["u"], frame["v"]))
+    assert halved == pytest.approx(frame["u"].iloc[0] / 2, rel=1e-3)
+    done = command("manoeuvre", "kvlcc2-l7", "coast-down", "--out", page)
+    assert done["title"] == "coast down"
+    assert [row["measure"] for row in done["measures"]] == list(rows)
+    assert re.search(rf"half run: {number(done['measures'][2]['value'])}\sm", page.read_text())
+    with pytest.raises(ShipidError, match="coast-down takes no angles"):
+        standard(load_vessel("kvlcc2-l7"), "coast-down", 10)
+
+
+@pytest.mark.usefixtures("coast_down")
+def test_a_study_and_its_schema_take_the_manoeuvre(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = coasting_study(tmp_path)
+    assert not plan.reacting
+    assert simulate(plan.study.truth, plan.truth)["propeller.n"].eq(0).all()
+    assert '"coast_down"' in json.dumps(schema_of("study"))
+    coasting = manoeuvre.KINDS["coast_down"]
+    helmed = {"helmsman": lambda _, controls: helm.course_keeping(controls.commands)}
+    monkeypatch.setitem(manoeuvre.KINDS, "coast_on_course", type("CoastOnCourse", (coasting,), helmed))
+    assert coasting_study(tmp_path, "coast_on_course").reacting

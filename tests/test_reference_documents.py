@@ -6,11 +6,12 @@ import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_type_hints
 
 import pytest
 from pydantic import BaseModel
 
+from shipid.cli.simulation import manoeuvre
 from shipid.hybrid.features import Memory
 from shipid.hybrid.methods import METHODS
 from shipid.identification.settings import Identify
@@ -21,10 +22,12 @@ from shipid.observer import Observer
 from shipid.physics import ACTUATORS, TERMS
 from shipid.simulation.draw import SHARED
 from shipid.simulation.manoeuvre import KINDS
+from shipid.simulation.standard import standards
 from shipid.study.schema import Study
 from shipid.vessel.load import Patch
 from shipid.vessel.perturb import Perturbation
 from shipid.vessel.schema import FIXED, term_model, vessel_model
+from tests.measures.made_records import RECORDS, every
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -125,6 +128,26 @@ def test_every_key_of_a_manoeuvre_is_named(kind: str) -> None:
     (row,) = re.findall(rf"^\| `{kind}` \|.*$", section(text, "Kinds"), re.MULTILINE)
     missing = set(KINDS[kind].model_fields) - named(row) - named(section(text, "Common to all")) - set(SHARED)
     assert not missing, missing
+
+
+def test_the_kinds_that_a_helmsman_steers_are_named() -> None:
+    (sentence,) = re.findall(r"^A helmsman steers (.*?)\.", page("manoeuvres"), re.MULTILINE)
+    assert named(sentence) == {name for name, kind in KINDS.items() if kind.reacts()}
+
+
+@pytest.mark.parametrize("name", standards())
+def test_every_standard_manoeuvre_and_every_measure_is_named(name: str) -> None:
+    """In the help of the command, in the table of the names that it takes, and in that of the measures."""
+    text = page("manoeuvres")
+    rows = section(text, "From the command line")
+    assert re.search(rf"^\| `{name}` \|", rows, re.MULTILINE), (
+        f"docs/manoeuvres.md: no row for `shipid manoeuvre {name}`"
+    )
+    argument = get_type_hints(manoeuvre, include_extras=True)["name"].__metadata__[0]
+    assert name in re.split(r", | or ", argument.help), f"shipid/cli/simulation.py: the help of NAME lacks {name}"
+    measures = standards()[name].measures(every(RECORDS[name](), 0.5))
+    listed = {re.sub(r"_[234]$", "_1", measure) for measure in measures}  # `overshoot_1` ... `overshoot_4`
+    assert not listed - named(section(text, "Measures")), "docs/manoeuvres.md: the table of the measures lacks some"
 
 
 VESSEL_BLOCKS = {"": vessel_model()} | {

@@ -10,11 +10,11 @@ import pandas as pd
 
 from shipid.data.dataset import DATED, Dataset, pieces
 from shipid.errors import DataError, choices
-from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.physics.signals import is_command, steers
+from shipid.simulation.standard import standards
 
 NO_HELM = (
     "the log has no angle that steers, by which zigzags and turning circles are measured, and the shafts are not "
@@ -41,15 +41,16 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
 
     Parameters
     ----------
-    kind : of all runs, a key of `MEASURES`; default: what is recognised.
+    kind : of all runs, a key of `standards()`; default: what is recognised.
     length : of the ship between perpendiculars [m]; without it nothing is judged by ship lengths.
 
     Raises
     ------
     DataError : an unknown kind, a length that is not positive.
     """
-    if kind is not None and kind not in MEASURES:
-        raise DataError(f"no manoeuvre is called {kind!r}: {choices(kind, MEASURES)}", path="--manoeuvre")
+    trials = standards()
+    if kind is not None and kind not in trials:
+        raise DataError(f"no manoeuvre is called {kind!r}: {choices(kind, trials)}", path="--manoeuvre")
     if length is not None and not length > 0:
         raise DataError(f"a length of {length:g} m: it must be positive", path="--length")
     measures, judged, left = [], [], {}
@@ -66,7 +67,7 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
             helm = any(is_command(column) and steers(column) for column in columns)
             left[name] = why if helm else NO_HELM
         for seen in kinds:
-            result = MEASURES[seen](record)
+            result = trials[seen].measures(record)
             measures += [{"run": name, "kind": seen, **row} for row in measure_rows(result, length)]
             judged += [{"run": name, "kind": seen, **row} for row in criterion_rows(criteria(seen, result, length))]
     return Measured(pd.DataFrame(measures), pd.DataFrame(judged), left)

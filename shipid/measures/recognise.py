@@ -92,7 +92,7 @@ def _sense(angle: Array, r: Array) -> float:
 
 
 def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
-    """Kinds of manoeuvre of a run (keys of `MEASURES`), and the reason as a sentence if there is none.
+    """Kinds of manoeuvre of a run as `shipid manoeuvre` names them, and the reason as a sentence if there is none.
 
     Stop: the shaft changes from ahead to astern, by its speed, its pitch or the angle of its unit. The other kinds
     follow from the helm, and the ship must be on a straight course when the helm is first put over. Zigzag: the helm is

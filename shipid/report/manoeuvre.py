@@ -19,17 +19,9 @@ from shipid.report.wording import distance, number
 
 POINTS = 2000  # a line needs no more
 OUTLINES = 12  # ships drawn along the track
+EXECUTE = "execute heading"  # the measure that is drawn beside the heading
 TOGETHER = np.deg2rad(120)  # a heading that stays within this is drawn with the helm
 ROUNDING = 1e-9  # deg, m/s, deg/s, rpm: what changes by less is constant, and an axis is no picture of its rounding
-# what the page says first of each kind
-FIRST = {
-    "zigzag": ("overshoot 1", "overshoot 2", "initial turning", "period"),
-    "turning": ("advance", "tactical diameter", "steady diameter", "steady drift"),
-    "pull-out": ("turning rate", "residual rate"),
-    "spiral": ("neutral helm", "loop width"),
-    "reverse-spiral": ("neutral helm", "loop width"),
-    "stop": ("track reach", "head reach", "stopping time"),
-}
 Values = Sequence[float] | Floats
 
 
@@ -39,15 +31,15 @@ class ManoeuvreContent(PageContent):
 
     Parameters
     ----------
-    title, name : the manoeuvre in words, and the vessel.
-    kind : as measures are named.
+    title, name : the manoeuvre in words, and its kind.
+    first : names of the measures that the answer says.
     log : `t` [s], `north`, `east` [m], `psi`, `helm` [rad], `u`, `v` [m/s], `r` [rad/s], `shaft` [rev/s].
     measures, criteria : rows from `shipid.measures.rows`.
     levels : `helm` [rad], `rate` [rad/s] of a spiral in the order performed; without rows there is no figure.
     outline : (k, 2) outline of the ship from above, body axes x ahead, y to starboard [m].
     """
 
-    kind: str
+    first: Sequence[str]
     log: pd.DataFrame
     measures: pd.DataFrame
     criteria: pd.DataFrame
@@ -57,7 +49,7 @@ class ManoeuvreContent(PageContent):
     @property
     def answer(self) -> list[Sentence]:
         """Return sentences: the main measures, and how many criteria are met."""
-        known = self.measures[self.measures["measure"].isin(FIRST[self.kind])]
+        known = self.measures[self.measures["measure"].isin(self.first)]
         measures = [f"{row.measure}: {_amount(float(str(row.value)), str(row.unit))}" for row in known.itertuples()]
         sentences = [Sentence("; ".join(measures).capitalize() + ".", "measures")]
         judged = self.criteria[self.criteria["verdict"] != "not judged"] if len(self.criteria) else self.criteria
@@ -186,7 +178,7 @@ def histories(content: ManoeuvreContent) -> Figure:
         takeaway=f"Yaw rate from {number(float(r.min()))} to {number(float(r.max()))} deg/s, "
         f"speed ahead from {number(float(log['u'].max()))} down to {number(float(log['u'].min()))} m/s.",
         how="Heading counted from that at the start of the log; helm and shaft as ordered, helm above 0 turns the ship "
-        "to starboard." + (" Dotted: the execute headings." if content.kind == "zigzag" else ""),
+        "to starboard." + (" Dotted: the execute headings." if EXECUTE in set(content.measures["measure"]) else ""),
         alternative="Heading, helm, speeds and yaw rate over time.",
         height=270,
         views={"": panels},
@@ -199,8 +191,8 @@ def _ink(index: int) -> dict[str, object]:
 
 
 def _panel(title: str, traces: list[Trace], content: ManoeuvreContent | None = None) -> Panel:
-    """One quantity over time; execute headings are drawn for a zigzag."""
-    heading = _value(content, "execute heading") if content and content.kind == "zigzag" else float("nan")
+    """One quantity over time; execute headings are drawn where they are measured."""
+    heading = _value(content, EXECUTE) if content else float("nan")
     ends = [float(traces[0]["x"][0]), float(traces[0]["x"][-1])]
     marks = [
         line(

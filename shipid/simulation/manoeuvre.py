@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,15 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 
 from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
+from shipid.measures import pull_out, reverse_spiral, spiral, stop, turning, zigzag
+from shipid.measures.record import Measures, Record
+from shipid.measures.spiral import Levels, levels, rate_levels
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman
 from shipid.physics.signals import SIGNALS, signal_of
 from shipid.simulation.approach import Controls, helm_effect, thrust_sharing
 from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
+from shipid.simulation.request import Request, Side
 from shipid.units import DEGREE, RPM
 from shipid.vessel.schema import term_blocks
 
@@ -34,6 +38,7 @@ Helm = Annotated[FiniteFloat, Field(ge=-MOST_HELM, le=MOST_HELM)]
 HELMS = (25, 20, 15, 10, 5, 3, 1, 0, -1, -3, -5, -10, -15, -20, -25)
 SPIRAL = (*HELMS, *HELMS[-2::-1])  # to the other side and back
 RATES = (3, 2, 1, 0.5, 0, -0.5, -1, -2, -3)
+ZIGZAG, TURN, LEVEL, STOP = 30.0, 60.0, 40.0, 80.0  # ship lengths of standard manoeuvres
 SETTLES = 40.0  # rad: omega x hold of the reverse spiral's helmsman
 
 
@@ -86,6 +91,11 @@ class Manoeuvre(Checked, BaseModel, ABC):
     def helmsman(self, controls: Controls) -> Helmsman | None:  # noqa: ARG002
         """The helmsman that gives the orders from the state; None if orders depend on time only."""
         return None
+
+    @classmethod
+    def reacts(cls) -> bool:
+        """Whether a helmsman gives the orders of this kind, so that they react to the motion of the ship."""
+        return cls.helmsman is not Manoeuvre.helmsman
 
     @abstractmethod
     def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
@@ -259,11 +269,49 @@ class Timed(Executed):
         return self.duration
 
 
+class Trial(Executed):
+    """A standard manoeuvre: `shipid manoeuvre` performs it at the scale of a ship, and runs of it are measured.
+
+    angles : what the angles on the command line are, in their order; a `helm` is in deg.
+    straight : whether the track is straight, and so is drawn from left to right.
+    first : measures that the page says first, as in its table: "overshoot 1".
+    ends : the measure, a time counted from the execute, at which the manoeuvre ends; "": it ends with the log.
+    """
+
+    angles: ClassVar[tuple[str, ...]] = ("helm",)
+    straight: ClassVar[bool] = False
+    first: ClassVar[tuple[str, ...]] = ()
+    ends: ClassVar[str] = ""
+
+    @classmethod
+    @abstractmethod
+    def scaled(cls, request: Request) -> Self:
+        """The manoeuvre as asked, with durations in ship lengths."""
+
+    def title(self, words: str) -> str:
+        """Title with angles and side; `words` are the name of the kind."""
+        return words
+
+    @staticmethod
+    @abstractmethod
+    def measures(record: Record) -> Measures:
+        """Measures of a run of this kind, recorded or simulated."""
+
+    def measured(self, record: Record) -> Measures:
+        """Measures of a run of this manoeuvre, of which the orders are known."""
+        return self.measures(record)
+
+    @staticmethod
+    def levels(record: Record) -> Levels:  # noqa: ARG004
+        """Steady levels of a spiral; of other kinds none."""
+        return Levels(np.empty(0), np.empty(0), 0)
+
+
 class HelmOver(Timed):
     """A manoeuvre that begins with the helm put over to one side."""
 
     angle_deg: Annotated[Positive, Field(le=MOST_HELM, description="deg of helm")] = 20.0
-    side: Annotated[Literal["starboard", "port"], Field(description="to which the ship turns first")] = "starboard"
+    side: Annotated[Side, Field(description="to which the ship turns first")] = "starboard"
 
     @property
     def greatest_helm(self) -> float:
@@ -280,25 +328,55 @@ class HelmOver(Timed):
         return np.where(_from(self.execute_at, t), self.sense * self.angle_deg * DEGREE, 0.0)
 
 
-class TurningCircle(HelmOver):
+class TurningCircle(HelmOver, Trial):
     """The helm is put over and held."""
 
+    measures = staticmethod(turning)
+    first: ClassVar[tuple[str, ...]] = ("advance", "tactical diameter", "steady diameter", "steady drift")
     angle_deg: Annotated[Positive, Field(le=MOST_HELM, description="deg of helm")] = 35.0
 
+    @classmethod
+    def scaled(cls, request: Request) -> Self:
+        """A turning circle of 60 ship lengths."""
+        return cls(angle_deg=request.angle(35.0), side=request.side, duration=request.time(TURN), **request.keys)
 
-class PullOut(HelmOver):
+    def title(self, words: str) -> str:
+        """Title with the helm."""
+        return f"{words}, {self.angle_deg:g} deg of helm to {self.side}"
+
+
+class PullOut(HelmOver, Trial):
     """A turn, then the helm amidships: a stable ship's yaw rate decays to zero."""
 
+    measures = staticmethod(pull_out)
+    first: ClassVar[tuple[str, ...]] = ("turning rate", "residual rate")
     turn: Annotated[Positive, Field(description="s that the helm is over")]
 
     def helm(self, t: Array) -> Array:
         """Helm angle [rad] at times (T,)."""
         return np.where(_from(self.execute_at + self.turn, t), 0.0, super().helm(t))
 
+    @classmethod
+    def scaled(cls, request: Request) -> Self:
+        """A turn of 30 ship lengths, then as many amidships or more: until the rate of a stable ship has decayed."""
+        begin, end = request.keys["execute_at"], request.time(TURN)
+        turn = request.in_rows((end - begin) / 2)  # between two rows the log would show the release after it
+        if request.duration is None:
+            end = begin + turn + request.passing * request.settling(TURN / 2)
+        return cls(angle_deg=request.angle(20.0), side=request.side, turn=turn, duration=end, **request.keys)
 
-class Zigzag(HelmOver):
+    def title(self, words: str) -> str:
+        """Title with the helm of the turn."""
+        return f"{words}, {self.angle_deg:g} deg of helm to {self.side}"
+
+
+class Zigzag(HelmOver, Trial):
     """The helm is reversed each time the heading has changed from that at the first order by the execute heading."""
 
+    measures = staticmethod(zigzag)
+    angles: ClassVar[tuple[str, ...]] = ("helm", "execute heading")
+    straight: ClassVar[bool] = True
+    first: ClassVar[tuple[str, ...]] = ("overshoot 1", "overshoot 2", "initial turning", "period")
     execute_heading_deg: Annotated[
         Positive | None,
         Field(
@@ -321,10 +399,28 @@ class Zigzag(HelmOver):
         more = {"executed": np.where(_from(self.execute_at, t), 1.0, 0.0), "execute_heading": reversal}
         return super().inputs(controls, t, speed) | more
 
+    @classmethod
+    def scaled(cls, request: Request) -> Self:
+        """A zigzag of 30 ship lengths."""
+        angle = request.angle(10.0)
+        heading, time = request.angle(angle, 1), request.time(ZIGZAG)
+        return cls(angle_deg=angle, execute_heading_deg=heading, side=request.side, duration=time, **request.keys)
 
-class Spiral(Executed):
+    def title(self, words: str) -> str:
+        """Title with helm and execute heading."""
+        return f"{words} {self.angle_deg:g}/{self.reversal_deg:g}, first to {self.side}"
+
+    def measured(self, record: Record) -> Measures:
+        """Measures at the execute heading that was ordered; of a log it is estimated."""
+        return zigzag(record, execute_heading=self.reversal_deg * DEGREE)
+
+
+class Spiral(Trial):
     """Direct (Dieudonne) spiral: one helm angle after another, each held until the turn is steady."""
 
+    measures = staticmethod(spiral)
+    levels = staticmethod(levels)
+    first: ClassVar[tuple[str, ...]] = ("neutral helm", "loop width")
     angles_deg: Annotated[tuple[Helm, ...], Field(min_length=1, description="deg, > 0 to starboard, in order")] = SPIRAL
     hold: Annotated[Positive, Field(description="s that each is held")]
 
@@ -342,10 +438,25 @@ class Spiral(Executed):
         """Helm angle [rad] at times (T,)."""
         return _levels(self.angles_deg, self.hold, self.execute_at, t) * DEGREE
 
+    @classmethod
+    def scaled(cls, request: Request) -> Self:
+        """There and back on 29 levels of 40 ship lengths, or more: until the turn of a stable ship is steady."""
+        there = [request.sense * request.angle(HELMS[0]) / HELMS[0] * helm for helm in HELMS]
+        hold = request.level(request.settling(LEVEL) if request.duration is None else LEVEL)
+        return cls(angles_deg=(*there, *there[-2::-1]), hold=hold, **request.keys)
 
-class ReverseSpiral(Executed):
+    def title(self, words: str) -> str:
+        """Title with the greatest helm."""
+        return f"{words}, {max(self.angles_deg):g} deg of helm to either side"
+
+
+class ReverseSpiral(Trial):
     """Reverse (Bech) spiral: one yaw rate after another, each held by the helm until that is steady."""
 
+    measures = staticmethod(reverse_spiral)
+    levels = staticmethod(rate_levels)
+    angles: ClassVar[tuple[str, ...]] = ("greatest rate",)
+    first: ClassVar[tuple[str, ...]] = ("neutral helm", "loop width")
     rates_deg: Annotated[
         tuple[FiniteFloat, ...], Field(min_length=1, description="deg/s, > 0 to starboard, in order")
     ] = RATES
@@ -383,10 +494,22 @@ class ReverseSpiral(Executed):
         rate = _levels(self.rates_deg, self.hold, self.execute_at, t) * DEGREE
         return controls.orders(self.shaft(t), np.full(len(t), greatest)) | {"rate": rate, **law}
 
+    @classmethod
+    def scaled(cls, request: Request) -> Self:
+        """Nine levels of 40 ship lengths, up to r L / U = 0.25."""
+        most = request.sense * request.angle(float(np.rad2deg(0.25 / request.passing)))
+        rates = tuple(most * rate / RATES[0] for rate in RATES)
+        return cls(rates_deg=rates, hold=request.level(LEVEL), **request.keys)
 
-class CrashStop(Timed):
+
+class CrashStop(Timed, Trial):
     """Full astern, the helm amidships: a shaft turns the other way, of a controllable pitch the pitch is reversed."""
 
+    measures = staticmethod(stop)
+    angles: ClassVar[tuple[str, ...]] = ()
+    straight: ClassVar[bool] = True
+    first: ClassVar[tuple[str, ...]] = ("track reach", "head reach", "stopping time")
+    ends: ClassVar[str] = "stopping time"  # when she no longer moves ahead; the log goes on astern
     astern_rpm: Annotated[
         Positive,
         Field(description="rpm ordered astern; with a controllable pitch rpm of the shaft while the pitch is astern"),
@@ -418,6 +541,11 @@ class CrashStop(Timed):
             if pitch in orders:
                 orders |= {part: np.where(astern, -orders[part], orders[part]) for part in (shaft, pitch)}
         return orders
+
+    @classmethod
+    def scaled(cls, request: Request) -> Self:
+        """A stop of 80 ship lengths, as fast astern as ahead."""
+        return cls(astern_rpm=request.keys["n_rpm"], duration=request.time(STOP), **request.keys)
 
 
 class Excitation(Timed):

@@ -10,19 +10,16 @@ import numpy as np
 import pandas as pd
 
 from shipid.errors import ShipidError
-from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Record
 from shipid.measures.rows import criterion_rows, measure_rows
-from shipid.measures.spiral import Levels, levels, rate_levels
 from shipid.physics.signals import ACTUAL, neutral, signal_of, steers
 from shipid.report.manoeuvre import ManoeuvreContent
 from shipid.simulation.approach import Controls, NotStraight
-from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import Standard, standard
-from shipid.units import DEGREE, RPM
+from shipid.units import RPM
 from shipid.version import __version__
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -33,7 +30,6 @@ TRIALS: tuple[tuple[str, tuple[float, ...]], ...] = (("turning", (35,)), ("zigza
 """Standard manoeuvres [deg] that have criteria."""
 FROM_REST = "the ship comes from rest: the tests ask for a steady approach at the test speed"
 SLOW, FAST = 0.9, 1.1  # of the service speed: the approach of the tests
-LEVELS = {"spiral": levels, "reverse-spiral": rate_levels}  # kind -> how its steady levels are read from a record
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +113,7 @@ def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
     """The measures of one log."""
     columns = {str(column): frame[column].to_numpy() for column in frame if column != "run"}
     record = record_of(_within_stops(vessel, columns), Controls(vessel).effects[1])
-    known = {"execute_heading": chosen.manoeuvre.reversal_deg * DEGREE} if isinstance(chosen.manoeuvre, Zigzag) else {}
-    measures, length = MEASURES[chosen.kind](record, **known), vessel.length
+    measures, length = chosen.manoeuvre.measured(record), vessel.length
     judged = criteria(chosen.kind, measures, length, calm=True)
     if chosen.manoeuvre.approach == "rest":
         judged = [replace(one, met=None, note=FROM_REST) for one in judged]
@@ -184,9 +179,10 @@ def trials(vessel: Vessel, speed: float | None = None) -> tuple[list[dict[str, A
 
 
 def _to_the_end(log: pd.DataFrame, measured: Measured) -> pd.DataFrame:
-    """Rows of the manoeuvre itself: a stop ends when the ship no longer moves ahead, and the log goes on astern."""
+    """Rows up to the end of the manoeuvre itself, as its kind says."""
+    ends = measured.standard.manoeuvre.ends
     known = {row["measure"]: float(row["value"]) for row in measured.measures}
-    end = known["execute"] + known["stopping time"] if measured.standard.kind == "stop" else np.inf
+    end = known["execute"] + known[ends] if ends else np.inf
     return log[: int(np.searchsorted(log["t"], end)) + 1] if np.isfinite(end) else log
 
 
@@ -195,12 +191,11 @@ def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent
     ship, chosen, record = measured.vessel, measured.standard, measured.record
     columns = {key: getattr(record, key) for key in ("t", "north", "east", "psi", "u", "v", "r", "helm")}
     shaft = np.zeros(len(record.t)) if record.shaft is None else record.shaft
-    read = LEVELS.get(chosen.kind)
-    steady = read(record) if read else Levels(np.empty(0), np.empty(0), 0)
+    steady = chosen.manoeuvre.levels(record)
     return ManoeuvreContent(
         title=f"{ship.name}: {chosen.title}",
         name=chosen.kind,
-        kind=chosen.kind,
+        first=chosen.manoeuvre.first,
         log=_to_the_end(pd.DataFrame({**columns, "shaft": shaft}), measured),
         measures=pd.DataFrame(measured.measures),
         criteria=pd.DataFrame(measured.criteria),

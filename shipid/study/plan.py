@@ -24,6 +24,7 @@ from shipid.errors import DataError, DocumentError, choices
 from shipid.files import as_argument
 from shipid.logs.importing import digest_of, sha256_of
 from shipid.logs.mapping import read_mapping
+from shipid.simulation.manoeuvre import KINDS
 from shipid.simulation.truth import Truth, check_truth, vessel_of
 from shipid.study.code import of_users, users_code
 from shipid.study.declared import (
@@ -46,7 +47,6 @@ WITH = "+"  # between a foundation and a method
 OF_PART = "/"  # between the name of a part and that of its source
 OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
 USER_SCRIPT = "my.py"  # a user's script with a method or a term, where its name is unknown
-FEEDBACK = ("zigzag", "reverse_spiral", "station_keeping")  # kinds of manoeuvres whose orders react to the ship
 
 
 def _script() -> str:
@@ -307,7 +307,7 @@ class Plan:
     def reacting(self) -> bool:
         """Whether orders may have reacted to the ship: recorded runs, or made manoeuvres that steer by her heading."""
         truth = self.study.truth
-        return truth is None or any(getattr(one, "kind", "") in FEEDBACK for one in truth.manoeuvre)
+        return truth is None or any(KINDS[one.kind].reacts() for one in truth.manoeuvre)
 
     @property
     def draws(self) -> dict[str, Any] | None:

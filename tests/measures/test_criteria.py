@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria, first_limit, second_limit
 from shipid.measures.record import AT_REST, Measures
 from shipid.units import DEGREE
 from tests.measures.made_records import RECORDS, every
+from tests.measures.test_laws import MEASURES
 
 
 @pytest.mark.parametrize(

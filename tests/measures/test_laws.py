@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of
 from shipid.measures.record import AT_REST, Measures, Record
 from shipid.measures.rows import measure_rows
+from shipid.simulation.standard import standards
 from shipid.units import DEGREE
 from tests.measures.made_records import RECORDS, START, every, rows
 
+MEASURES = {kind: trial.measures for kind, trial in standards().items()}
 KINDS = list(MEASURES)
 DENSE = {kind: every(sail(), 0.05) for kind, sail in RECORDS.items()}
 SIGNED = ("lateral_deviation", "neutral_helm")  # to starboard

@@ -9,25 +9,27 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.measures import MEASURES
 from shipid.measures.criteria import criteria
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import levels
 from shipid.report import manoeuvre
-from shipid.report.manoeuvre import FIRST, ManoeuvreContent, write_manoeuvre
+from shipid.report.manoeuvre import ManoeuvreContent, write_manoeuvre
+from shipid.simulation.standard import standards
 from tests.measures.made_records import RECORDS, every
 from tests.report.test_page import Page
+
+TRIALS = standards()
 
 
 def content(kind: str, name: str = "a ship") -> ManoeuvreContent:
     record = every(RECORDS[kind](), 0.5)
     columns = {key: getattr(record, key) for key in ("t", "north", "east", "psi", "u", "v", "r", "helm")}
     shaft = np.zeros(len(record.t)) if record.shaft is None else record.shaft
-    measures, points = MEASURES[kind](record), levels(record)
+    measures, points = TRIALS[kind].measures(record), levels(record)
     return ManoeuvreContent(
         title=f"{name}: {kind}",
         name=kind,
-        kind=kind,
+        first=TRIALS[kind].first,
         log=pd.DataFrame({**columns, "shaft": shaft}),
         measures=pd.DataFrame(measure_rows(measures, 120.0)),
         criteria=pd.DataFrame(criterion_rows(criteria(kind, measures, 120.0))),
@@ -40,7 +42,7 @@ def content(kind: str, name: str = "a ship") -> ManoeuvreContent:
     )
 
 
-@pytest.mark.parametrize("kind", MEASURES)
+@pytest.mark.parametrize("kind", TRIALS)
 def test_every_kind_has_a_page_that_fetches_nothing(kind: str, tmp_path: Path) -> None:
     text = write_manoeuvre(content(kind, "<b>a ship</b>"), tmp_path / "new" / "page.html").read_text()
     page = Page(text)
@@ -54,15 +56,16 @@ def test_every_kind_has_a_page_that_fetches_nothing(kind: str, tmp_path: Path) -
         if attributes.get("href"):
             assert str(attributes["href"])[1:] in anchors
     words = " ".join(line for _, line in page.all("li", "td", "th"))
-    for measure in FIRST[kind]:
+    for measure in TRIALS[kind].first:
         assert measure in words.lower()
     assert ("spiral" in anchors) == (kind == "spiral")
 
 
 def test_first_measures_exist() -> None:
     """A measure that is renamed must be renamed here too."""
-    for kind, names in FIRST.items():
-        assert set(names) <= set(content(kind).measures["measure"])
+    for kind, trial in TRIALS.items():
+        assert trial.first, kind
+        assert set(trial.first) <= set(content(kind).measures["measure"])
 
 
 def test_the_answer_has_the_digits_of_the_table() -> None:

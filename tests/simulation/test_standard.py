@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError, ShipidError
-from shipid.measures import MEASURES
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Measures
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import PullOut, ReverseSpiral, Spiral, Zigzag
 from shipid.simulation.measured import measure_standard
 from shipid.simulation.perform import perform
-from shipid.simulation.standard import KINDS, shaft_speed, standard
+from shipid.simulation.standard import shaft_speed, standard, standards
 from shipid.vessel.load import load_vessel
 from shipid.vessel.template import Particulars, first_guess
 from tests.measures.test_laws import SIGNED, TOLERANCE
@@ -28,11 +27,7 @@ SHIP = load_vessel("gunnerus-28.9")
 def measured(name: str, *angles: float, **how: object) -> Measures:
     chosen = standard(SHIP, name, angles, **how)  # type: ignore[arg-type]
     log = perform(SHIP, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
-    return MEASURES[chosen.kind](record_of({str(key): log[key].to_numpy() for key in log if key != "run"}))
-
-
-def test_every_kind_that_is_measured_can_be_performed() -> None:
-    assert set(KINDS) == set(MEASURES)
+    return chosen.manoeuvre.measures(record_of({str(key): log[key].to_numpy() for key in log if key != "run"}))
 
 
 @pytest.mark.parametrize("speed", [1.5, 3.0, 5.0])
@@ -95,7 +90,7 @@ def test_a_ship_that_steers_with_two_screws_can_be_stopped() -> None:
     under_way = (t >= stopped["execute"]) & (u > 0)
     assert stopped["track reach"] == pytest.approx(np.trapezoid(u[under_way], t[under_way]), rel=5e-3)
     assert (done.frame["port.n"] == done.frame["starboard.n"]).all()
-    for name in sorted({*KINDS} - {"stop"}):
+    for name in sorted({*standards()} - {"stop"}):
         with pytest.raises(ShipidError, match="no angle command turns Otter"):
             standard(otter, name)
 
