@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from shipid.errors import visible
 from shipid.export.blocks import Precision
 from shipid.vessel.load import Vessel
 
@@ -68,8 +69,8 @@ def _escaped(byte: int) -> str:
 
 
 def comment(lines: Sequence[str]) -> str:
-    """A C comment."""
-    kept = [line.replace("*/", "* /").replace("/*", "/ *") for line in lines]
+    """A C comment; what is not printable is written out: compilers refuse letters that turn the direction of a line."""
+    kept = [visible(line).replace("*/", "* /").replace("/*", "/ *") for line in lines]
     return "\n".join(["/*", *(f" * {line}".rstrip() for line in kept), " */"])
 
 

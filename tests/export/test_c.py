@@ -18,7 +18,7 @@ from shipid.data.windows import Instants, past_of
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
 from shipid.export.blocks import Precision
-from shipid.export.c import Files, c_name, strings
+from shipid.export.c import Files, c_name, comment, strings
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.casadi import predictor_function
@@ -722,6 +722,10 @@ def test_examples_run(tmp_path):
     text = run_example(predictor_files(model(predictor), "m", Precision()), tmp_path / "a")
     assert "30 s: " in text
     assert "psi" in run_example(vessel_files(load_vessel("mariner"), "m", "rk4", Precision()), tmp_path / "b")
+
+
+def test_a_comment_holds_what_is_printable_and_nothing_that_ends_it():
+    assert comment(["M \u202e */ x\x07"]) == "/*\n * M \\u202e * / x\\x07\n */"
 
 
 def test_any_text_is_a_string_of_c(tmp_path):
