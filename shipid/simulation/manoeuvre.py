@@ -148,7 +148,8 @@ class Ordered(Manoeuvre):
         valid = [key for pair in chosen.values() for key in pair]
         unknown = next((key for key in series if key not in valid), None)
         if unknown is not None:
-            message = f"orders no command of {controls.vessel.name}: {choices(unknown, set(valid))}"
+            known = {*valid, *type(self).model_fields} - {"orders"}
+            message = f"orders no command of {controls.vessel.name}: {choices(unknown, known)}"
             raise DocumentError(message, path=f"manoeuvre.{unknown}")
         result = {}
         for name, (single, common) in chosen.items():
@@ -256,6 +257,13 @@ class Executed(Approached):
         """The inputs with the helm that holds the course of the approach [rad], by command, until the first order."""
         before = ~_from(self.execute_at, t)
         return inputs | {name: np.where(before, angle, inputs[name]) for name, angle in helm.items()}
+
+    def check(self, controls: Controls) -> None:
+        """Raise DocumentError as for every approach, and where the first order comes after the end of the log."""
+        if not self.execute_at < self.length:
+            message = f"{self.execute_at:g} s: the run ends at {self.length:g} s, before the first order: give less"
+            raise DocumentError(message, path="manoeuvre.execute_at")
+        super().check(controls)
 
 
 class Timed(Executed):

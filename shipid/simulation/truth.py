@@ -114,7 +114,8 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
     controls = Controls(vessel)
     for place, block in enumerate(truth.manoeuvre):
         try:
-            block.manoeuvre(truth.length, lambda _: 0.0).check(controls)
+            for end in (0.0, 1.0):  # of every range
+                block.manoeuvre(truth.length, lambda _, end=end: end).check(controls)  # type: ignore[misc]
         except DocumentError as error:
             raise DocumentError(error.message, path=_in_block(error.path, place)) from None
     if unknown is not None:

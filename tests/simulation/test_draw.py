@@ -70,6 +70,25 @@ def test_every_kind_refuses_a_key_that_it_has_not(kind: str) -> None:
             truth({"kind": kind, **BLOCKS[kind], "helm": 3.0})
 
 
+@pytest.mark.parametrize("kind", [name for name, kind in KINDS.items() if "execute_at" in kind.model_fields])
+def test_a_first_order_after_the_end_of_the_run_is_refused(kind: str) -> None:
+    """Such a run was straight, and was called a zigzag."""
+    block = {"kind": kind, **BLOCKS[kind]}
+    check_truth(truth({**block, "execute_at": 19.0}), SHIP)
+    if "duration" not in KINDS[kind].model_fields:  # it ends so long after its first order
+        check_truth(truth({**block, "execute_at": 300.0}), SHIP)
+        return
+    for late in (20.0, [0.0, 300.0]):
+        with pytest.raises(DocumentError, match="the run ends at 20 s, before the first order: give less") as caught:
+            check_truth(truth({**block, "execute_at": late}), SHIP)
+        assert caught.value.path == "truth.manoeuvre.0.execute_at"
+
+
+def test_an_unknown_key_beside_orders_may_be_a_misspelt_key_of_the_kind() -> None:
+    with pytest.raises(DocumentError, match="did you mean 'start_speed'"):
+        check_truth(truth({"kind": "turning", **BLOCKS["turning"], "START_SPEED": 3.0}), SHIP)
+
+
 def test_every_command_of_every_vessel_takes_orders(vessel: Vessel) -> None:
     """Ranges by signal; without one, the line names the key that is missing."""
     keys = {order_keys(name)[1]: [5.0, 10.0] for name in dynamics(vessel).commands}
