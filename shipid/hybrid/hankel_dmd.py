@@ -22,7 +22,7 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import MOTIONS, choose_features, feature_table, steps_of
-from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.method import Fitted, Index, Task, Traits
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
@@ -182,6 +182,11 @@ class HankelDMD(Searched):
     def past(self) -> float:
         """Length of the past that windows must hold [s]."""
         return max(self.delays)
+
+    @property
+    def traits(self) -> Traits:
+        """What a study says of this method and compares it by."""
+        return Traits(mirror=self.mirror)
 
     def varied(self) -> tuple[str, ...]:
         """Return the names of the hyperparameters that differ between trials."""

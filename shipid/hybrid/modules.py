@@ -26,7 +26,7 @@ from shipid.files import part_of
 from shipid.hybrid.bands import nearest
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
-from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.method import Fitted, Index, Task, Traits
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
@@ -223,6 +223,11 @@ class Modules(Searched):
     centres: PositiveInt = 256
     fade: PositiveFloat = 1.0
     samples: PositiveInt = 300
+
+    @property
+    def traits(self) -> Traits:
+        """What a study says of this method and compares it by."""
+        return Traits(mirror=self.mirror)
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve the factors for every foundation; the best trial, solved with all windows, is the corrector."""

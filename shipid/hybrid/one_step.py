@@ -20,7 +20,7 @@ from shipid.data.windows import Instants
 from shipid.errors import ResultError
 from shipid.files import entries_of, part_of
 from shipid.hybrid.features import feature_table
-from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.method import Fitted, Index, Task, Traits
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
@@ -136,6 +136,11 @@ class OneStep(Searched):
     mirror: bool = True
     averaged: PositiveInt = 4
     samples: PositiveInt = 300
+
+    @property
+    def traits(self) -> Traits:
+        """What a study says of this method and compares it by."""
+        return Traits(mirror=self.mirror)
 
     def num_chosen(self) -> int:
         """Return how many of the best trials make the corrector, at most."""

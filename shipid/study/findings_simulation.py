@@ -393,7 +393,8 @@ RULES: Mapping[str, Callable[[Grid], Finding]] = {"S1": _S1, "S2": _S2, "S3": _S
 
 def smooth_by_construction(method: Method, steps: int) -> bool:
     """Whether the compensation of a method is a polynomial of time with fewer terms than steps."""
-    return bool(getattr(method, "terms", steps) < steps)
+    terms = method.traits.terms
+    return terms is not None and terms < steps
 
 
 def _S7(results: Results, grid: Grid) -> Finding:

@@ -10,7 +10,6 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from shipid.hybrid.features import NOTHING
 from shipid.metrics import over_time, position_error
 from shipid.observer import bank, observe
 from shipid.predictor import Predictor
@@ -70,7 +69,7 @@ def pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list[Pair]:
 
 def taken(way: Way, foundation: Foundation) -> frozenset[str]:
     """Kinds of memory that a method takes on a foundation: `history`, `error`, `observer`, or `past` for any other."""
-    memory = getattr(way.method, "memory", NOTHING)
+    memory = way.method.traits.memory
     kinds = {"history"} if memory.history or memory.turned else set()
     kinds |= {"error"} if memory.error and foundation.base is not None else set()
     if not kinds and not memory.past and way.method.past > 0:
