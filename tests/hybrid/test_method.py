@@ -17,6 +17,7 @@ from shipid.hybrid.method import Case, Fitted, Method, Task, Traits, fit_all, sa
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Searched
+from shipid.hybrid.stepping import Stepped
 from shipid.hybrid.trials import row_of
 from shipid.vessel.load import load_vessel
 from tests.study.test_whole import windy
@@ -78,7 +79,7 @@ def test_inputs_without_physics_are_one_array_for_all() -> None:
             np.testing.assert_array_equal(table[key], values)
 
 
-@pytest.mark.parametrize("skeleton", [Method, Searched])
+@pytest.mark.parametrize("skeleton", [Method, Searched, Stepped])
 def test_a_skeleton_is_no_method(skeleton: type[Method]) -> None:
     with pytest.raises(TypeError, match=r"abstract class \w+ with"):
         skeleton()
