@@ -34,7 +34,7 @@ Acceleration = Callable[[Instants, int, Array], Array]
 Point = Mapping[str, float]
 Solve = Callable[[Index, Sequence[float]], Any]
 """Indices of training windows and R ridges -> a corrector; of several ridges R in one, which takes R S instants."""
-WORTH_COMPILING = 2000  # steps of single samples: below it compiling C costs more than it saves
+STEPWISE_FROM = 2000  # steps of paths, asked for one by one: below it compiling C costs more than it saves
 LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
 
 
@@ -76,7 +76,7 @@ def _one_step(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
     """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not known."""
     if physics.vessel is None:
         return np.stack([at.columns[name] for name in MOTIONS], axis=1), None
-    engine = REPEATED if len(at) * physics.horizon > WORTH_COMPILING else AUTO
+    engine = REPEATED if len(at) * physics.horizon > STEPWISE_FROM else AUTO
     states = replace(physics, horizon=1).states(at, engine=engine)
     after = np.stack([states[name][0] for name in MOTIONS], axis=1)
     if physics.integrator == "euler":
