@@ -63,9 +63,10 @@ EXACT = 1e-3  # of its deviation: what a signal counts with that the vessel repe
 TRIED = tuple(sorted(TRIALS, key=lambda trial: trial[0] == "turning"))
 """Standard manoeuvres [deg] that both vessels perform in calm water: those that have criteria, turning last."""
 COMPARED = {
-    "zigzag": ("overshoot_1", "overshoot_2", "initial_turning", "period"),
-    "turning": ("advance", "transfer", "tactical_diameter", "steady_diameter", "steady_speed"),
+    "zigzag": ("overshoot 1", "overshoot 2", "initial turning", "period"),
+    "turning": ("advance", "transfer", "tactical diameter", "steady diameter", "steady speed"),
 }
+"""Kind of a standard manoeuvre -> measures of it that are set beside each other, those of the base and of the fit."""
 
 
 class Settings(BaseModel):
@@ -527,13 +528,12 @@ def _manoeuvres(pair: Mapping[str, Vessel], logs: dict[str, pd.DataFrame] | None
             rows.append({"manoeuvre": title, "measure": "", "unit": "", **nothing, "note": note})
             continue
         for measure in COMPARED[kind]:
-            label = measure.replace("_", " ")
-            measured = {name: values[name].get(label) for name in pair}
+            measured = {name: values[name].get(measure) for name in pair}
             unit = next((row["unit"] for row in measured.values() if row is not None), "")
             numbers = {name: float("nan") if row is None else row["value"] for name, row in measured.items()}
             why = [f"{name}: {row['note']}" for name, row in measured.items() if row is not None and row["note"]]
             note = "; ".join([*said, *why])
-            rows.append({"manoeuvre": title, "measure": label, "unit": unit, **numbers, "note": note})
+            rows.append({"manoeuvre": title, "measure": measure, "unit": unit, **numbers, "note": note})
     return pd.DataFrame(rows)
 
 
@@ -548,8 +548,7 @@ def _banded(
     def performed(kind: str, angles: Sequence[float]) -> Measure:
         def measure(one: Vessel) -> dict[str, float]:
             measures = _measured(one, kind, angles)
-            names = [name.replace("_", " ") for name in COMPARED[kind]]
-            return {name: float(measures[name]["value"]) for name in names if name in measures}
+            return {name: float(measures[name]["value"]) for name in COMPARED[kind] if name in measures}
 
         return measure
 

@@ -55,7 +55,8 @@ Array = NDArray[np.float64]
 Report = Callable[[str], object]
 FOLDS = 3
 SIDES = ("starboard", "port")
-MEASURES = {"zigzag": ("overshoot 1", "overshoot 2"), "turning": ("advance", "tactical diameter")}
+SHOWN = {"zigzag": ("overshoot 1", "overshoot 2"), "turning": ("advance", "tactical diameter")}
+"""Kind of a standard manoeuvre -> measures shown, few of `COMPARED` of `identify`: each has a row a structure."""
 LEVEL = 0.95
 FIRST = 8  # manoeuvres to run next
 
@@ -448,7 +449,7 @@ def _manoeuvres(
 def _values(one: Measured) -> dict[str, float]:
     """The measures that are compared."""
     measures = {row["measure"]: float(row["value"]) for row in one.measures}
-    return {name: measures[name] for name in MEASURES[one.standard.kind] if name in measures}
+    return {name: measures[name] for name in SHOWN[one.standard.kind] if name in measures}
 
 
 def _measure(title: str, known: dict[str, dict[str, Measured]]) -> Measure:
