@@ -231,7 +231,7 @@ class Method(Checked, BaseModel, ABC):
 
 
 TRIAL = ("number", "params", "value", "epochs", "seconds", "state")  # keys of the row of a trial
-STATES = ("complete", "stopped", "diverged")
+TRIAL_STATES = ("complete", "stopped", "diverged")
 TAKEN = ("cell", "model", "N_D", "seed", "chosen", *TRIAL)  # columns of a table of trials beside their params
 
 
@@ -273,7 +273,7 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...]) -> None:
             number(f"{where}: {key} of a trial", row[key], DataError)
         for key in ("number", "epochs"):
             whole_number(f"{where}: {key} of a trial", row[key], 0, DataError)
-        one_of(f"{where}: state of a trial", row["state"], STATES, DataError)
+        one_of(f"{where}: state of a trial", row["state"], TRIAL_STATES, DataError)
         for key, value in row.items():
             try:
                 json_text(value)

@@ -56,7 +56,7 @@ from shipid.vessel.ranges import contradictions
 Array = NDArray[np.float64]
 BEFORE, AFTER = "before", "after"
 BETTER = 0.01  # of the limit of a profile: a point this much below the estimate is a better fit
-SIGNALS = ("u", "v", "r", "position")
+ERRORS_OF = ("u", "v", "r", "position")  # what free runs are judged by
 WORSE = 0.02  # of the error of free runs before the fit: what is more by less is not worse
 ACCURATE = 0.03  # of a measured thrust or torque: its proposed standard deviation
 EXACT = 1e-3  # of its deviation: what a signal counts with that the vessel repeats exactly
@@ -171,7 +171,7 @@ class Identified:
             "factors": {path: _rounded(factor) for path, (factor, _) in known.items()},
             "standard_errors": {path: _rounded(error) for path, (_, error) in known.items()},
             "free_run_rms": {
-                f"{row['set']} {row['model']}": {name: _rounded(row[name]) for name in SIGNALS} for row in free
+                f"{row['set']} {row['model']}": {name: _rounded(row[name]) for name in ERRORS_OF} for row in free
             },
             "settings": solution.settings.model_dump(),
         }
@@ -763,7 +763,7 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
 
 def _worse(errors: pd.DataFrame) -> list[str]:
     """Signals with more error after the fit than before, and by how much; errors : by model."""
-    ratios = {name: float(errors[name][AFTER]) / max(float(errors[name][BEFORE]), 1e-12) for name in SIGNALS}
+    ratios = {name: float(errors[name][AFTER]) / max(float(errors[name][BEFORE]), 1e-12) for name in ERRORS_OF}
     return [f"{name} by {digits(100 * (ratio - 1), 2)} %" for name, ratio in ratios.items() if ratio > 1 + WORSE]
 
 

@@ -21,8 +21,8 @@ from shipid.report.structures import write_structures
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform
 from shipid.study.structures import (
+    ERRORS_OF,
     SHOWN,
-    SIGNALS,
     Compared,
     _table,
     _with_mean,
@@ -172,7 +172,7 @@ def table_of(position: np.ndarray) -> pd.DataFrame:
     """The table of structures (K) whose errors on runs (R) that their fits have not seen are these (K, R) [m]."""
     names, runs = [f"s{k}" for k in range(len(position))], [f"r{k}" for k in range(position.shape[1])]
     parts = [
-        _with_mean(pd.DataFrame({"run": runs, **dict.fromkeys(SIGNALS, one), "model": name, "samples": 9})).assign(
+        _with_mean(pd.DataFrame({"run": runs, **dict.fromkeys(ERRORS_OF, one), "model": name, "samples": 9})).assign(
             structure=name, set="folds"
         )
         for name, one in zip(names, position, strict=True)
