@@ -17,6 +17,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
+from pydantic import model_validator as validator
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError
@@ -170,7 +171,7 @@ class HankelDMD(Stepped):
     Parameters
     ----------
     delays : how far back the law may look [s]; each is a trial, with every ridge, and judged by the path. `trials`
-        therefore has no effect.
+        is therefore refused.
     ridge : weight of the squared weights of normalised inputs; 8 from low to high.
     mirror, samples : as in `Stepped`; the image of every step in the mirror counts, too.
     """
@@ -180,6 +181,13 @@ class HankelDMD(Stepped):
 
     delays: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (2.0, 4.0, 8.0)
     ridge: Scale = (1e-8, 1e-1)
+
+    @validator(mode="after")
+    def _delays_are_the_trials(self) -> Self:
+        """Refuse a number of trials, which nothing would ask for."""
+        if "trials" in self.model_fields_set:
+            raise ValueError("trials: each of `delays` is a trial: leave it out")
+        return self
 
     @property
     def past(self) -> float:
