@@ -186,7 +186,8 @@ def _compare(
     answer: Answer,
 ) -> None:
     """Compare structures of the hull, print the comparison, and write the vessel with the structure chosen."""
-    from shipid.study.structures import LEVEL, compare_structures, structures_content, write_chosen
+    from shipid.identification.statistics import LEVEL
+    from shipid.study.structures import compare_structures, structures_content, write_chosen
 
     with ended_by(), steps() as say:
         compared = compare_structures(ship, log, declared, names, level=LEVEL if band is None else band, say=say, **how)

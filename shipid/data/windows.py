@@ -37,7 +37,7 @@ VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % 
 MANY = 100  # instants asked for each row, from which on every row is one
 COARSE = 1.1  # times the step: rows farther apart are no jitter
 MISSED = 0.25  # of the way between two rows: where velocities miss more of it, a straight line is safer
-STATES = ("u", "v", "r", "psi")
+FUTURE_STATES = ("u", "v", "r", "psi")
 """True states that a window holds over its horizon, beside the path."""
 
 
@@ -274,7 +274,7 @@ def cut_windows(
                     step=step,
                     shared_clock=shared,
                     past=past_of(rows, instants, past, step, path),
-                    states={name: values[name][1:] for name in STATES},
+                    states={name: values[name][1:] for name in FUTURE_STATES},
                 )
             )
     if not parts:

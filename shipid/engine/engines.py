@@ -21,7 +21,7 @@ AUTO, REPEATED = "auto", "repeated"  # `repeated`: as `auto`, where so many call
 Result = TypeVar("Result")
 COMPONENTS_A_STEP = 4  # drawn components that take as long as all the rest of a step
 NATIVE_FROM = 2e5  # rate evaluations: below it compiling C (half a second, once) costs more than it saves
-COMPILE_FROM = 5e8  # the same for a kernel on a GPU (15 s): 2e8 of small batches, 3e9 of large ones on an H200
+KERNEL_FROM = 5e8  # the same for a kernel on a GPU (15 s): 2e8 of small batches, 3e9 of large ones on an H200
 BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operation an instruction
 
 
@@ -100,7 +100,7 @@ ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
     "single": Engine(run_single, available=_has_compiler, measure=measure_single, checks=True),
     "casadi": Engine(run_casadi, preferred=lambda load: load.device == "cpu" and load.width < BATCH_FROM),
     "compiled": Engine(
-        _compiled, preferred=lambda load: load.device != "cpu" and load.work > COMPILE_FROM, any_device=True
+        _compiled, preferred=lambda load: load.device != "cpu" and load.work > KERNEL_FROM, any_device=True
     ),
     "torch": Engine(_torch, preferred=lambda _: True, gradient=_torch_gradient, any_device=True),
 }

@@ -20,7 +20,7 @@ from shipid.data.windows import Instants
 from shipid.errors import ResultError, ShipidError
 from shipid.hybrid.compensator import unflatten
 from shipid.hybrid.features import Inputs, Memory, choose_features, rows_of
-from shipid.hybrid.method import Fitted, Index, Task, shared_tables
+from shipid.hybrid.method import Fitted, Index, Task, Traits, shared_tables
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
@@ -172,6 +172,11 @@ class Forest(Searched):
     def past(self) -> float:
         """Length of the past that windows must hold [s]."""
         return self.memory.past
+
+    @property
+    def traits(self) -> Traits:
+        """What a study says of this method and compares it by."""
+        return Traits(mirror=self.mirror, memory=self.memory, terms=self.terms)
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Grow a forest for every foundation; the best trial, grown on all windows, is the corrector."""

@@ -9,26 +9,35 @@ nu_(k+1) = physics(nu_k) + step a_k. Dynamic mode decomposition with delays and 
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat
+from pydantic import model_validator as validator
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import MOTIONS, choose_features, feature_table, steps_of
-from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.method import Index, Task
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Search
-from shipid.hybrid.settings import Scale, Searched
-from shipid.hybrid.stepping import Stepper, TrueSteps, free, stepped_paths, true_motion, true_steps
-from shipid.hybrid.trials import best_of, fit_each, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.settings import Scale
+from shipid.hybrid.stepping import (
+    Point,
+    Solve,
+    Stepped,
+    Stepper,
+    TrueSteps,
+    free,
+    stepped_paths,
+    true_motion,
+    true_steps,
+)
 from shipid.hybrid.units import solve, taken
 
 Array = NDArray[np.float64]
@@ -156,27 +165,29 @@ class HankelCorrector:
         return cls(law, float(header["past"]), dict(header["hyperparameters"]))
 
 
-class HankelDMD(Searched):
+class HankelDMD(Stepped):
     """A linear law with delays and control; it needs a past, and works with and without physics.
 
     Parameters
     ----------
     delays : how far back the law may look [s]; each is a trial, with every ridge, and judged by the path. `trials`
-        therefore has no effect.
+        is therefore refused.
     ridge : weight of the squared weights of normalised inputs; 8 from low to high.
-    mirror : whether every step counts with its image of port and starboard too, where the inputs allow it.
-    samples : validation windows that a trial is judged on, at most.
+    mirror, samples : as in `Stepped`; the image of every step in the mirror counts, too.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
-    RIDGES: ClassVar[int] = 8
-    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = HankelCorrector
 
     delays: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (2.0, 4.0, 8.0)
     ridge: Scale = (1e-8, 1e-1)
-    mirror: bool = True
-    samples: PositiveInt = 300
+
+    @validator(mode="after")
+    def _delays_are_the_trials(self) -> Self:
+        """Refuse a number of trials, which nothing would ask for."""
+        if "trials" in self.model_fields_set:
+            raise ValueError("trials: each of `delays` is a trial: leave it out")
+        return self
 
     @property
     def past(self) -> float:
@@ -187,48 +198,39 @@ class HankelDMD(Searched):
         """Return the names of the hyperparameters that differ between trials."""
         return ("delays", *self.ranges())
 
+    def num_trials(self) -> int | None:
+        """Return how many delays are tried; None where the budget decides it."""
+        return None if self.budget else len(self.delays)
+
     def choices(self) -> dict[str, tuple[float, ...]]:
         """Return what is searched among some values: the delays."""
         return {"delays": self.delays}
 
-    def fit(self, task: Task) -> dict[str, Fitted]:
-        """Solve the law for every foundation; the best delays and ridge, solved with all windows, are the corrector."""
-        points = [{"delays": delays} for delays in self.delays]
-        return fit_each(task, self, lambda: points, lambda name: self._fit(task, name))
+    def points(self) -> list[Point]:
+        """Return the trials: every delay."""
+        return [{"delays": delays} for delays in self.delays]
 
-    def _fit(self, task: Task, name: str) -> Fitted:
-        search = Search(task, [name], self.model_copy(update={"trials": len(self.delays)}))
-        steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
-        for number, seconds in search.left(self.delays):
-            start = time.process_time()
-            table = _true_table(task, name, steps, steps_of(seconds, task.windows.step))
+    def trial_of(self, task: Task, name: str) -> Callable[[int, Point], Solve]:
+        """Return how a trial is solved: a law with its delay."""
+        steps = true_steps(task, name)
 
-            def solved(
-                training: Index, table: Mapping[str, Array] = table, seconds: float = seconds
-            ) -> HankelCorrector:
-                return HankelCorrector(self._law(task, table, steps, steps.of(training), seconds, ridges), seconds, {})
+        def trial(_: int, point: Point) -> Solve:
+            table = _true_table(task, name, steps, steps_of(point["delays"], task.windows.step))
+            return partial(self._solved, task, table, steps, point)
 
-            ridge, value = ridge_trial(task, name, ridges, self.samples, solved)
-            search.record({name: row_of(number, {"delays": seconds, "ridge": ridge}, value, start)})
-        rows = search.rows[name]
-        if not best_of(rows):
-            return Fitted(None, rows, search.seconds)
-        params = best_of(rows)[0]["params"]
-        table = _true_table(task, name, steps, steps_of(params["delays"], task.windows.step))
-        law = self._law(task, table, steps, steps.of(used(task)), params["delays"], [params["ridge"]])
-        corrector = HankelCorrector(replace(law, weights=law.weights[0]), params["delays"], params)
-        return Fitted(corrector, rows, search.seconds)
+        return trial
 
-    def _law(
+    def _solved(
         self,
         task: Task,
         table: Mapping[str, Array],
         steps: TrueSteps,
-        chosen: Index,
-        seconds: float,
-        ridges: list[float],
-    ) -> Law:
-        """The law on the chosen steps, for each ridge."""
+        point: Point,
+        windows: Index,
+        ridges: Sequence[float],
+    ) -> HankelCorrector:
+        """The law on the steps of some windows for all ridges; one ridge has no axis in front."""
+        chosen, seconds = steps.of(windows), point["delays"]
         here = {key: values[chosen] for key, values in table.items()}
         features = choose_features(here)
         names = tuple(features)
@@ -242,7 +244,9 @@ class HankelDMD(Searched):
         size = np.maximum(missing.std(axis=0), 1e-12)
         penalty = np.r_[np.ones(len(names)), 1e-3]
         weights = solve(full, missing / size, ridges, penalty) * size
-        return Law(task.commands, steps_of(seconds, task.windows.step), normaliser, weights)
+        weights = weights[0] if len(ridges) == 1 else weights
+        law = Law(task.commands, steps_of(seconds, task.windows.step), normaliser, weights)
+        return HankelCorrector(law, seconds, point)
 
 
 def _true_table(task: Task, name: str, steps: TrueSteps, delays: int) -> dict[str, Array]:

@@ -86,7 +86,8 @@ class LearnedForce(Searched):
 
     Parameters
     ----------
-    trials : values of the ridge that are tried, evenly spread by its logarithm.
+    trials : values of the ridge that are tried, evenly spread by its logarithm; with a `budget` as many of them as
+        fit, from the stiffest on.
     units : hidden units of the network.
     ridge : weight of the mean squared output weight [m^2]; a range is searched.
     limit : bound of the force, times m U^2 / L_pp, and of the moment, times I_z (U / L_pp)^2, with U the greatest speed
@@ -120,6 +121,10 @@ class LearnedForce(Searched):
             remedy = "take a base that extends the vessel, with `off = true` in that block"
             return f"{drawn[0].path} is a sum over drawn waves, which has no gradient: {remedy}"
         return ""
+
+    def num_trials(self) -> int | None:
+        """Return how many ridges are tried; None where the budget decides it."""
+        return None if self.budget else len(self.ridges())
 
     def ridges(self) -> list[float]:
         """Return the values of the ridge that are tried."""

@@ -18,7 +18,7 @@ from shipid.checked import Checked
 from shipid.data.windows import Instants, Windows, locked
 from shipid.errors import DataError, ShipidError
 from shipid.files import json_text
-from shipid.hybrid.features import Inputs
+from shipid.hybrid.features import NOTHING, Inputs, Memory
 from shipid.hybrid.physics import Physics
 from shipid.vessel.load import Vessel
 
@@ -157,8 +157,27 @@ class Fitted:
     sentence: str = ""
 
 
+@dataclass(frozen=True)
+class Traits:
+    """What sentences, comparisons and findings of a study know of a method; no number depends on it.
+
+    A study reads no setting by its name, so a method may call its settings as it likes.
+
+    mirror : whether it may use that port and starboard are mirror images; None where it has no such choice. One that
+        may not, on no physics alone, is the plain rival of the others.
+    memory : what its inputs hold of the past. Methods of a kind that differ in it are compared.
+    terms : its compensation of the path is a polynomial of time with so many terms; None where it is something else.
+    """
+
+    mirror: bool | None = None
+    memory: Memory = NOTHING
+    terms: int | None = None
+
+
 class Method(Checked, BaseModel, ABC):
     """A way to improve physics by data: its fields are its settings, `fit` returns correctors.
+
+    What a study asks of a method is below; all but `fit` and `corrector` have a default.
 
     validation : `runs` leaves out every run in turn to judge a trial; `share` holds out a fifth of the runs.
     compensates : whether anything is learned from data.
@@ -184,6 +203,11 @@ class Method(Checked, BaseModel, ABC):
         """Whether several foundations cost much less in one fit than in a fit each: then they are one unit of work."""
         return False
 
+    @property
+    def traits(self) -> Traits:
+        """What a study says of this method and compares it by."""
+        return Traits()
+
     def unfit(self, vessel: Vessel) -> str:
         """Why this method cannot work with a vessel, and what to do, in words; empty where it can."""
         del vessel
@@ -192,6 +216,10 @@ class Method(Checked, BaseModel, ABC):
     def varied(self) -> tuple[str, ...]:
         """Names of the hyperparameters that differ between trials."""
         return ()
+
+    def num_trials(self) -> int | None:
+        """Number of trials of each foundation; None where nothing is searched, or a budget decides it."""
+        return None
 
     def num_chosen(self) -> int:
         """Number of the best trials that make the corrector, at most."""
@@ -203,7 +231,7 @@ class Method(Checked, BaseModel, ABC):
 
 
 TRIAL = ("number", "params", "value", "epochs", "seconds", "state")  # keys of the row of a trial
-STATES = ("complete", "stopped", "diverged")
+TRIAL_STATES = ("complete", "stopped", "diverged")
 TAKEN = ("cell", "model", "N_D", "seed", "chosen", *TRIAL)  # columns of a table of trials beside their params
 
 
@@ -245,7 +273,7 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...]) -> None:
             number(f"{where}: {key} of a trial", row[key], DataError)
         for key in ("number", "epochs"):
             whole_number(f"{where}: {key} of a trial", row[key], 0, DataError)
-        one_of(f"{where}: state of a trial", row["state"], STATES, DataError)
+        one_of(f"{where}: state of a trial", row["state"], TRIAL_STATES, DataError)
         for key, value in row.items():
             try:
                 json_text(value)

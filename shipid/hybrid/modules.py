@@ -11,9 +11,9 @@ the closed form is ours.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -26,12 +26,10 @@ from shipid.files import part_of
 from shipid.hybrid.bands import nearest
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
-from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Search
-from shipid.hybrid.settings import Scale, Searched, seed_of
-from shipid.hybrid.stepping import TrueSteps, free, stepped_paths, true_steps
-from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.settings import Scale, seed_of
+from shipid.hybrid.stepping import Point, Solve, Stepped, TrueSteps, free, stepped_paths, true_steps
 from shipid.hybrid.units import Seen, Units, solve, taken
 from shipid.physics import TERMS
 from shipid.vessel.load import Vessel
@@ -190,7 +188,7 @@ class ModulesCorrector:
         )
 
 
-class Modules(Searched):
+class Modules(Stepped):
     """Bounded factors of hull, thrusters and rudders: a constant each, and a small network of state and commands.
 
     Parameters
@@ -200,16 +198,14 @@ class Modules(Searched):
     motion_scale, command_scale, offset : as in `path-drawn`.
     ridge : weight of the squared weights of the hidden units; the constants have a hundredth of it.
     limit : greatest departure of a factor from 1, below 1.
-    mirror : whether port and starboard are mirror images, where the inputs allow it.
     centres : moments of training that the alarm keeps, at most.
     fade : distance beyond the training data, in standard deviations of the inputs, at which all factors are 1.
-    samples : validation windows that a trial is judged on, at most.
+    mirror, samples : as in `Stepped`.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "offset", "ridge")
     RIDGES: ClassVar[int] = 6
     meets_none: ClassVar[bool] = False
-    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = ModulesCorrector
 
     trials: PositiveInt = 6
@@ -219,41 +215,20 @@ class Modules(Searched):
     offset: Scale = (0.5, 4.0)
     ridge: Scale = (1e-6, 1.0)
     limit: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
-    mirror: bool = True
     centres: PositiveInt = 256
     fade: PositiveFloat = 1.0
-    samples: PositiveInt = 300
-
-    def fit(self, task: Task) -> dict[str, Fitted]:
-        """Solve the factors for every foundation; the best trial, solved with all windows, is the corrector."""
-        return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name))
 
     def unfit(self, vessel: Vessel) -> str:
         """Return why there is no factor to learn; empty where there is."""
         lacks = "the vessel has no hull, thruster or rudder whose factor could be learned: give one"
         return "" if modules_of(vessel) else lacks
 
-    def _fit(self, task: Task, name: str) -> Fitted:
-        search, physics = Search(task, [name], self), task.cases[name].physics
-        steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
+    def trial_of(self, task: Task, name: str) -> Callable[[int, Point], Solve]:
+        """Return how a trial is solved: factors of all modules, from what each adds to the true steps."""
+        steps, physics = true_steps(task, name), task.cases[name].physics
         modules = tuple(modules_of(physics.vessel))
         parts = shares(without(physics), steps.at, steps.free, steps.step)
-        for number, point in search.left(points_of(self)):
-            start = time.process_time()
-
-            def solved(training: Index, number: int = number, point: Mapping[str, float] = point) -> ModulesCorrector:
-                return self._solved(task, modules, steps, parts, steps.of(training), point, number, ridges)
-
-            ridge, value = ridge_trial(task, name, ridges, self.samples, solved)
-            search.record({name: row_of(number, {**point, "ridge": ridge}, value, start)})
-        rows = search.rows[name]
-        if not best_of(rows):
-            return Fitted(None, rows, search.seconds)
-        row = best_of(rows)[0]
-        params = row["params"]
-        everything = steps.of(used(task))
-        corrector = self._solved(task, modules, steps, parts, everything, params, row["number"], [params["ridge"]])
-        return Fitted(corrector, rows, search.seconds)
+        return lambda number, point: partial(self._solved, task, modules, steps, parts, number, point)
 
     def _solved(
         self,
@@ -261,12 +236,13 @@ class Modules(Searched):
         modules: tuple[str, ...],
         steps: TrueSteps,
         parts: Array,
-        chosen: Index,
-        point: Mapping[str, float],
         number: int,
-        ridges: list[float],
+        point: Point,
+        windows: Index,
+        ridges: Sequence[float],
     ) -> ModulesCorrector:
-        """Factors on the chosen steps for all ridges; one ridge has no axis in front."""
+        """Factors on the steps of some windows for all ridges; one ridge has no axis in front."""
+        chosen = steps.of(windows)
         table = {key: values[chosen] for key, values in feature_table(steps.at.columns, task.commands).items()}
         table = {key: values for key, values in table.items() if not key.endswith("_rw")}  # factors are of the ship
         units = Seen.of(table, self.mirror).draw(point, self.units, seed_of(task.seed, number))

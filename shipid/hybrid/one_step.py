@@ -7,9 +7,9 @@ here f(z) = W tanh(V z + c) with V, c drawn and W in closed form.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -20,12 +20,10 @@ from shipid.data.windows import Instants
 from shipid.errors import ResultError
 from shipid.files import entries_of, part_of
 from shipid.hybrid.features import feature_table
-from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Search
-from shipid.hybrid.settings import Scale, Searched, seed_of
-from shipid.hybrid.stepping import TrueSteps, stepped_paths, true_steps
-from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.settings import Scale, seed_of
+from shipid.hybrid.stepping import Point, Solve, Stepped, TrueSteps, stepped_paths, true_steps
 from shipid.hybrid.units import Seen, Units, solve, taken
 
 Array = NDArray[np.float64]
@@ -103,7 +101,7 @@ class OneStepCorrector:
         return cls(tuple(header["commands"]), tuple(heads), dict(header["hyperparameters"]))
 
 
-class OneStep(Searched):
+class OneStep(Stepped):
     """Networks with drawn hidden units on the missing acceleration, applied at every step of the rollout.
 
     Every trial draws hidden units, solves them for 8 ridges on the training steps, and is judged by the path on the
@@ -116,14 +114,11 @@ class OneStep(Searched):
     motion_scale, command_scale, wind_scale, offset : as in `path-drawn`.
     ridge : weight of the squared output weights beside the mean squared error of the accelerations, each axis by its
         standard deviation; from low to high, the best of 8 is taken for each trial.
-    mirror : whether port and starboard are mirror images, where the inputs allow it.
     averaged : the accelerations are the mean of the networks of so many best trials.
-    samples : validation windows that a trial is judged on, at most.
+    mirror, samples : as in `Stepped`.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "wind_scale", "offset", "ridge")
-    RIDGES: ClassVar[int] = 8
-    meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = OneStepCorrector
 
     trials: PositiveInt = 12
@@ -133,58 +128,40 @@ class OneStep(Searched):
     wind_scale: Scale = (4.0, 64.0)
     offset: Scale = (0.5, 4.0)
     ridge: Scale = (1e-9, 1e-2)
-    mirror: bool = True
     averaged: PositiveInt = 4
-    samples: PositiveInt = 300
 
     def num_chosen(self) -> int:
         """Return how many of the best trials make the corrector, at most."""
         return self.averaged
 
-    def fit(self, task: Task) -> dict[str, Fitted]:
-        """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name))
-
-    def _fit(self, task: Task, name: str) -> Fitted:
-        search = Search(task, [name], self)
-        steps, ridges = true_steps(task, name), ridges_of(self.ridge, self.RIDGES)
+    def trial_of(self, task: Task, name: str) -> Callable[[int, Point], Solve]:
+        """Return how a trial is solved: a network on drawn hidden units."""
+        steps = true_steps(task, name)
         table = feature_table(steps.at.columns, task.commands)
-        for number, point in search.left(points_of(self)):
-            start = time.process_time()
+        return lambda number, point: partial(self._solved, task, steps, table, number, point)
 
-            def solved(training: Index, number: int = number, point: Mapping[str, float] = point) -> OneStepCorrector:
-                head = self._head(steps, table, steps.of(training), point, number, ridges, task.seed)
-                return OneStepCorrector(task.commands, (head,), {})
+    def joined(self, best: Sequence[OneStepCorrector]) -> OneStepCorrector:
+        """Return the mean of the networks of the best trials."""
+        return replace(best[0], heads=tuple(one.heads[0] for one in best))
 
-            ridge, value = ridge_trial(task, name, ridges, self.samples, solved)
-            search.record({name: row_of(number, {**point, "ridge": ridge}, value, start)})
-        rows = search.rows[name]
-        kept = best_of(rows)
-        if not kept:
-            return Fitted(None, rows, search.seconds)
-        everything, heads = steps.of(used(task)), []
-        for row in kept[: self.averaged]:
-            params = row["params"]
-            head = self._head(steps, table, everything, params, row["number"], [params["ridge"]], task.seed)
-            heads.append(Head(head.units, head.surge[0], head.sway_yaw[0]))
-        corrector = OneStepCorrector(task.commands, tuple(heads), kept[0]["params"])
-        return Fitted(corrector, rows, search.seconds)
-
-    def _head(
+    def _solved(
         self,
+        task: Task,
         steps: TrueSteps,
         table: Mapping[str, Array],
-        chosen: Index,
-        point: Mapping[str, float],
         number: int,
-        ridges: list[float],
-        seed: int,
-    ) -> Head:
-        """Networks for all ridges on the chosen steps."""
+        point: Point,
+        windows: Index,
+        ridges: Sequence[float],
+    ) -> OneStepCorrector:
+        """Networks on the steps of some windows for all ridges; one ridge has no axis in front."""
+        chosen = steps.of(windows)
         here = {key: values[chosen] for key, values in table.items()}
-        units = Seen.of(here, self.mirror).draw(point, self.units, seed_of(seed, number))
+        units = Seen.of(here, self.mirror).draw(point, self.units, seed_of(task.seed, number))
         missing = steps.missing[chosen]
         size = np.maximum(missing.std(axis=0), 1e-12)
         even, odd = units.parts(here)
         surge = solve(even, missing[:, :1] / size[:1], ridges) * size[:1]
-        return Head(units, surge, solve(odd, missing[:, 1:] / size[1:], ridges) * size[1:])
+        sway_yaw = solve(odd, missing[:, 1:] / size[1:], ridges) * size[1:]
+        head = Head(units, surge, sway_yaw) if len(ridges) > 1 else Head(units, surge[0], sway_yaw[0])
+        return OneStepCorrector(task.commands, (head,), point)

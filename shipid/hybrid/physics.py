@@ -24,7 +24,7 @@ from shipid.vessel.load import Vessel
 Array = np.ndarray
 MOTION = ("u", "v", "r", "psi")
 ESTIMATED = tuple(f"observer.{name}" for name in COLUMNS)
-WORTH_COMPILING = 5_000  # steps of single windows: who asks for so many at once, in training or on a log, asks again
+REPEATED_FROM = 5_000  # steps of one rollout: who asks for so many at once, in training or on a log, asks again
 RolloutInputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
 """Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
 
@@ -95,7 +95,7 @@ class Physics:
         """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S), horizontal as in a log.
 
         With an observer u and v are those through the water.
-        engine : as in `rollout`; `auto` takes C from `WORTH_COMPILING` steps on.
+        engine : as in `rollout`; `auto` takes C from `REPEATED_FROM` steps on.
         """
         leaning = tuple(name for name in LEANING if name in dynamics(self.ship).state)
         kept = ("north", "east", *MOTION, *leaning)
@@ -190,7 +190,7 @@ class Physics:
     ) -> tuple[Trajectories, tuple[Array, Array]]:
         """Trajectories of the vessel, and north and east (T, V, S) [m] over ground after 1..T steps."""
         start, commands, environment, slow, drift = self._inputs(instants)
-        if engine == AUTO and len(instants) * self.horizon > WORTH_COMPILING:
+        if engine == AUTO and len(instants) * self.horizon > REPEATED_FROM:
             engine = REPEATED
         result = rollout(
             self.ship,

@@ -25,7 +25,7 @@ from shipid.errors import DataError, ResultError
 from shipid.files import entries_of, part_of
 from shipid.hybrid.compensator import Normaliser, unflatten
 from shipid.hybrid.features import Inputs, Memory, feature_table, steps_of
-from shipid.hybrid.method import Fitted, Index, Task, shared_tables
+from shipid.hybrid.method import Fitted, Index, Task, Traits, shared_tables
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
@@ -235,6 +235,11 @@ class Recurrent(Searched):
     def past(self) -> float:
         """Length of the past that windows must hold [s]."""
         return max(self.seconds, self.memory.past)
+
+    @property
+    def traits(self) -> Traits:
+        """What a study says of this method and compares it by."""
+        return Traits(mirror=self.mirror, memory=self.memory, terms=self.terms)
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""

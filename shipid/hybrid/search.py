@@ -61,7 +61,7 @@ class Search:
         self.cells = {name: task.cells.get(name, name) for name in names}
         self.rows: dict[str, list[Row]] = {name: [] for name in self.cells}
         self.written = dict.fromkeys(self.cells, 0)
-        self.count = None if method.budget else method.trials
+        self.count = method.num_trials()
         self.before: float | None = None
         self._earlier = 0.0
         self._wrote = time.monotonic()

@@ -63,6 +63,10 @@ class Searched(Method):
         """Return the names of the hyperparameters that differ between trials."""
         return tuple(self.ranges())
 
+    def num_trials(self) -> int | None:
+        """Return how many sets of hyperparameters are tried per foundation; None where the budget decides it."""
+        return None if self.budget else self.trials
+
     def choices(self) -> dict[str, tuple[float, ...]]:
         """Return what is searched among some values: name -> values."""
         return {}

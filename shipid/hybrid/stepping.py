@@ -8,23 +8,33 @@ Steps start from measured states: physics with an observer are refused.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import time
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import PositiveInt
 
 from shipid.data.windows import Instants, Windows
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
-from shipid.hybrid.method import Index, Task
+from shipid.hybrid.method import Fitted, Index, Task, Traits
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.search import Search
+from shipid.hybrid.settings import Scale, Searched
+from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
 from shipid.physics.signals import measurable
 
 Array = NDArray[np.float64]
 Acceleration = Callable[[Instants, int, Array], Array]
-WORTH_COMPILING = 2000  # steps of single samples: below it compiling C costs more than it saves
+Point = Mapping[str, float]
+Solve = Callable[[Index, Sequence[float]], Any]
+"""Indices of training windows and R ridges -> a corrector; of several ridges R in one, which takes R S instants."""
+STEPWISE_FROM = 2000  # steps of paths, asked for one by one: below it compiling C costs more than it saves
 LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
 
 
@@ -66,7 +76,7 @@ def _one_step(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
     """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not known."""
     if physics.vessel is None:
         return np.stack([at.columns[name] for name in MOTIONS], axis=1), None
-    engine = REPEATED if len(at) * physics.horizon > WORTH_COMPILING else AUTO
+    engine = REPEATED if len(at) * physics.horizon > STEPWISE_FROM else AUTO
     states = replace(physics, horizon=1).states(at, engine=engine)
     after = np.stack([states[name][0] for name in MOTIONS], axis=1)
     if physics.integrator == "euler":
@@ -172,3 +182,56 @@ def joined(parts: Sequence[Instants]) -> Instants:
     columns = {key: np.concatenate([part.columns[key] for part in parts]) for key in parts[0].columns}
     hidden = {key: np.concatenate([(part.hidden or {})[key] for part in parts]) for key in parts[0].hidden or {}}
     return Instants(columns, hidden=hidden or None)
+
+
+class Stepped(Searched):
+    """A method that adds to each step: a trial is solved on true steps for all ridges, and judged by the path.
+
+    RIDGES : how many ridges are solved where `ridge` is a range.
+
+    Parameters
+    ----------
+    ridge : weight of the squared weights of the solution; of a range, from low to high, each trial takes the best.
+    mirror : whether port and starboard are mirror images, where the inputs allow it.
+    samples : validation windows that a trial is judged on, at most.
+    """
+
+    RIDGES: ClassVar[int] = 8
+    meets_observer: ClassVar[bool] = False
+
+    ridge: Scale
+    mirror: bool = True
+    samples: PositiveInt = 300
+
+    @property
+    def traits(self) -> Traits:
+        """What a study says of this method and compares it by."""
+        return Traits(mirror=self.mirror)
+
+    def points(self) -> Iterable[Point]:
+        """Return the trials: a value of everything searched but the ridge."""
+        return points_of(self)
+
+    @abstractmethod
+    def trial_of(self, task: Task, name: str) -> Callable[[int, Point], Solve]:
+        """Prepare what the trials of a foundation share; return (number, point) of one -> how it is solved."""
+
+    def joined(self, best: Sequence[Any]) -> Any:
+        """Return the corrector that the best trials make, solved with all windows and one ridge each."""
+        return best[0]
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Solve every foundation; the best trials, solved with all windows of the folds, are the corrector."""
+        return fit_each(task, self, self.points, lambda name: self._fit(task, name))
+
+    def _fit(self, task: Task, name: str) -> Fitted:
+        search, ridges = Search(task, [name], self), ridges_of(self.ridge, self.RIDGES)
+        trial = self.trial_of(task, name)
+        for number, point in search.left(self.points()):
+            start = time.process_time()
+            ridge, value = ridge_trial(task, name, ridges, self.samples, trial(number, point))
+            search.record({name: row_of(number, {**point, "ridge": ridge}, value, start)})
+        rows, every = search.rows[name], used(task)
+        kept = best_of(rows)[: self.num_chosen()]
+        best = [trial(row["number"], row["params"])(every, [row["params"]["ridge"]]) for row in kept]
+        return Fitted(self.joined(best) if best else None, rows, search.seconds)

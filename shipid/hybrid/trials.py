@@ -62,16 +62,16 @@ def fit_each(
 
 
 def ridge_trial(
-    task: Task, name: str, ridges: Sequence[float], samples: int, solved: Callable[[Index], Corrector]
+    task: Task, name: str, ridges: Sequence[float], samples: int, solve: Callable[[Index, Sequence[float]], Corrector]
 ) -> tuple[float, float]:
     """The ridge with the least mean squared error [m^2] of the path per coordinate, over all folds, and that error.
 
-    solved : indices of training windows -> R correctors in one, which takes R S instants in R blocks.
+    solve : (indices of training windows, R ridges) -> R correctors in one, which takes R S instants in R blocks.
     samples : validation windows of a fold that are judged, at most.
     """
     errors, physics = np.zeros(len(ridges)), task.cases[name].physics
     for fold, (training, validation) in enumerate(task.folds):
-        corrector = solved(training)
+        corrector = solve(training, ridges)
         judged = some_of(validation, samples, seed_of(task.seed, fold))
         instants = task.instants(name).select(np.tile(judged, len(ridges)))
         paths = np.split(corrector.predict(physics, instants, np.empty(0)), len(ridges), axis=1)

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, choices
-from shipid.identification.settings import SIGNALS
+from shipid.identification.settings import WEIGHTED
 from shipid.physics.signals import ACTUAL
 from shipid.simulation.approach import FROUDE, Controls, NotStraight
 from shipid.simulation.log import aboard, horizontal
@@ -166,16 +166,16 @@ def informed(
     ------
     ShipidError : a signal that is not known, no candidate, or a candidate that cannot be simulated.
     """
-    unknown = next((name for name in weights if name not in SIGNALS), None)
+    unknown = next((name for name in weights if name not in WEIGHTED), None)
     if unknown is not None:
-        raise ShipidError(f"no signal {unknown!r}: {choices(unknown, SIGNALS)}", path="weights")
+        raise ShipidError(f"no signal {unknown!r}: {choices(unknown, WEIGHTED)}", path="weights")
     if not choice:
         raise ShipidError("no manoeuvre is within the limits of the actuators")
     every = steps_between(vessel, interval) if step is None else max(round(interval / step), 1)
     fine = interval / every
     log = performed(vessel, choice, step=fine)
     cut = _cut(vessel, log, round(horizon / interval) * every, every)
-    signals = {name: width for signal, width in weights.items() for name in SIGNALS[signal]}
+    signals = {name: width for signal, width in weights.items() for name in WEIGHTED[signal]}
     by_factor, by_start = _sensitivities(vessel, cut, groups, scale, signals, fine, every)
     each = _projected(by_factor, by_start)
     return [Informed(one, each[cut.runs == number].sum(axis=0)) for number, one in enumerate(choice)]

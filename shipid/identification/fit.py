@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from shipid.identification.residuals import Prediction, Problem, predict
+from shipid.identification.settings import NUISANCES
 from shipid.interrupts import uninterrupted
 
 Array = NDArray[np.float64]
@@ -36,7 +37,6 @@ CROSSINGS, ROUNDS, MISSES = 4, 40, 4  # searches across kinks, steps of one, and
 FALL = 1e-3  # relative fall of the objective that is worth a search across a kink
 INNER, HALVINGS, CLOSE = 12, 6, 1e-10  # Gauss-Newton steps of one run, halvings of one, and the change that ends them
 BEGIN = {"current_north": 0.01, "current_east": 0.01, "latency": 0.3}  # in prior widths: off a vanishing slope
-CURRENT = ("current_north", "current_east")
 FAR, DIRECTIONS = 0.5, 4  # prior widths, and on the circle: currents that a run is also begun from
 VALLEYS = 3  # searches that go on where the run's current leads to another valley
 NEAR = 1e-3  # of a factor: nearer to a bound than this, with the objective falling towards it, it is set to the bound
@@ -135,9 +135,9 @@ def deepest(problem: Problem, factors: Array, point: Point) -> Point | None:
     Each run is begun from its unknowns as they are, from the median current of all runs, and from currents around 0.
     None where currents are no unknowns.
     """
-    if not set(CURRENT) <= set(problem.names):
+    if not NUISANCES["current"].keys() <= set(problem.names):
         return None
-    places = [problem.names.index(name) for name in CURRENT]
+    places = [problem.names.index(name) for name in NUISANCES["current"]]
     angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     guesses = [FAR * np.array([np.cos(angle), np.sin(angle)]) for angle in angles]
     best = _eliminated(problem, factors, point)

@@ -56,16 +56,17 @@ from shipid.vessel.ranges import contradictions
 Array = NDArray[np.float64]
 BEFORE, AFTER = "before", "after"
 BETTER = 0.01  # of the limit of a profile: a point this much below the estimate is a better fit
-SIGNALS = ("u", "v", "r", "position")
+ERRORS_OF = ("u", "v", "r", "position")  # what free runs are judged by
 WORSE = 0.02  # of the error of free runs before the fit: what is more by less is not worse
 ACCURATE = 0.03  # of a measured thrust or torque: its proposed standard deviation
 EXACT = 1e-3  # of its deviation: what a signal counts with that the vessel repeats exactly
 TRIED = tuple(sorted(TRIALS, key=lambda trial: trial[0] == "turning"))
 """Standard manoeuvres [deg] that both vessels perform in calm water: those that have criteria, turning last."""
 COMPARED = {
-    "zigzag": ("overshoot_1", "overshoot_2", "initial_turning", "period"),
-    "turning": ("advance", "transfer", "tactical_diameter", "steady_diameter", "steady_speed"),
+    "zigzag": ("overshoot 1", "overshoot 2", "initial turning", "period"),
+    "turning": ("advance", "transfer", "tactical diameter", "steady diameter", "steady speed"),
 }
+"""Kind of a standard manoeuvre -> measures of it that are set beside each other, those of the base and of the fit."""
 
 
 class Settings(BaseModel):
@@ -170,7 +171,7 @@ class Identified:
             "factors": {path: _rounded(factor) for path, (factor, _) in known.items()},
             "standard_errors": {path: _rounded(error) for path, (_, error) in known.items()},
             "free_run_rms": {
-                f"{row['set']} {row['model']}": {name: _rounded(row[name]) for name in SIGNALS} for row in free
+                f"{row['set']} {row['model']}": {name: _rounded(row[name]) for name in ERRORS_OF} for row in free
             },
             "settings": solution.settings.model_dump(),
         }
@@ -527,13 +528,12 @@ def _manoeuvres(pair: Mapping[str, Vessel], logs: dict[str, pd.DataFrame] | None
             rows.append({"manoeuvre": title, "measure": "", "unit": "", **nothing, "note": note})
             continue
         for measure in COMPARED[kind]:
-            label = measure.replace("_", " ")
-            measured = {name: values[name].get(label) for name in pair}
+            measured = {name: values[name].get(measure) for name in pair}
             unit = next((row["unit"] for row in measured.values() if row is not None), "")
             numbers = {name: float("nan") if row is None else row["value"] for name, row in measured.items()}
             why = [f"{name}: {row['note']}" for name, row in measured.items() if row is not None and row["note"]]
             note = "; ".join([*said, *why])
-            rows.append({"manoeuvre": title, "measure": label, "unit": unit, **numbers, "note": note})
+            rows.append({"manoeuvre": title, "measure": measure, "unit": unit, **numbers, "note": note})
     return pd.DataFrame(rows)
 
 
@@ -548,8 +548,7 @@ def _banded(
     def performed(kind: str, angles: Sequence[float]) -> Measure:
         def measure(one: Vessel) -> dict[str, float]:
             measures = _measured(one, kind, angles)
-            names = [name.replace("_", " ") for name in COMPARED[kind]]
-            return {name: float(measures[name]["value"]) for name in names if name in measures}
+            return {name: float(measures[name]["value"]) for name in COMPARED[kind] if name in measures}
 
         return measure
 
@@ -764,7 +763,7 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
 
 def _worse(errors: pd.DataFrame) -> list[str]:
     """Signals with more error after the fit than before, and by how much; errors : by model."""
-    ratios = {name: float(errors[name][AFTER]) / max(float(errors[name][BEFORE]), 1e-12) for name in SIGNALS}
+    ratios = {name: float(errors[name][AFTER]) / max(float(errors[name][BEFORE]), 1e-12) for name in ERRORS_OF}
     return [f"{name} by {digits(100 * (ratio - 1), 2)} %" for name, ratio in ratios.items() if ratio > 1 + WORSE]
 
 

@@ -29,7 +29,7 @@ BLOCK = "identify"
 POSITIVE = 1e-3  # least factor of a number that must not be 0: a mass, a diameter, a resistance
 ENVIRONMENT = "environment"
 DIMENSIONS = frozenset((*SHARED, "x_aft", "x_fwd"))  # and constants: no pattern selects them
-SIGNALS = {"u": ("u",), "v": ("v",), "r": ("r",), "psi": ("psi",), "position": ("north", "east")}
+WEIGHTED = {"u": ("u",), "v": ("v",), "r": ("r",), "psi": ("psi",), "position": ("north", "east")}
 """Name in `weights` -> columns of the data that it fits."""
 NUISANCES: dict[str, dict[str, float]] = {
     "initial_state": {},
@@ -111,9 +111,9 @@ class Identify(Checked, BaseModel):
     @model_validator(mode="after")
     def _known(self) -> Identify:
         for name in self.weights:
-            if name not in SIGNALS and not is_output(name):
+            if name not in WEIGHTED and not is_output(name):
                 outputs = f"or a measured output, <component>.<signal> with a signal of {', '.join(named('output'))}"
-                raise ValueError(f"weights.{name} is no valid name: {choices(name, SIGNALS)} ({outputs})")
+                raise ValueError(f"weights.{name} is no valid name: {choices(name, WEIGHTED)} ({outputs})")
         unknown = next((name for name in self.nuisance if name not in NUISANCES), None)
         if unknown is not None:
             raise ValueError(f"nuisance.{unknown} is no valid name: {choices(unknown, NUISANCES)}")
@@ -153,7 +153,7 @@ class Identify(Checked, BaseModel):
 
 def columns_of(name: str) -> tuple[str, ...]:
     """Columns of the data that a name in `weights` fits; an output is its column."""
-    return SIGNALS.get(name, (name,))
+    return WEIGHTED.get(name, (name,))
 
 
 @dataclass(frozen=True)

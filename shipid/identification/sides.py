@@ -29,7 +29,7 @@ LEVELS = (2.5, 7.5, 12.5, 17.5, 22.5, 27.5, 32.5)  # deg, between levels of helm
 TURNING = 0.1  # of the greatest yaw rate: slower rows turn to no side
 WORSE, LEAST = 2.0, 0.05  # a side is worse from this ratio of errors on, and from this error of the turning on
 FEWEST = 20  # rows that make a group
-LEVEL = 0.05  # chance that any of the tests made finds a difference where there is none
+FALSE_ALARM = 0.05  # chance that any of the tests made finds a difference where there is none
 COLUMNS = ("group", "side", "rows", "u", "v", "r", "r_error", "turning", "error", "pieces")
 
 
@@ -142,7 +142,7 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
         group: [row for row in rows if row["group"] == group] for group in dict.fromkeys(row["group"] for row in rows)
     }
     both = {group: of for group, of in by.items() if len(of) == len(("starboard", "port"))}
-    level = LEVEL / max(2 * len(both), 1)
+    level = FALSE_ALARM / max(2 * len(both), 1)
     for group, of in both.items():
         where = "" if group == "all" else f" at {group}"
         freedom = min(row["pieces"] for row in of) - 1

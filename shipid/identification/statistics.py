@@ -54,7 +54,7 @@ _Part = tuple[Array, Array, Array]  # of a cluster: singular values of J_g R, th
 KINDS: tuple[Kind, ...] = get_args(Kind)
 """In order of preference: the first trusted form is reported; if none is, `blocks`, or `fisher` with one block only."""
 
-LEVEL = 0.95
+LEVEL = 0.95  # of intervals
 WIDEST = 1.0  # half-width of the 95 % interval of a factor, in base values, from which on it is not identified
 LEAST_FREEDOM = 4.0  # degrees of freedom under which t misleads (Tipton 2015)
 WHITE = 0.05  # probability under which whiteness is rejected

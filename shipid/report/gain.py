@@ -55,14 +55,20 @@ HOW = (
 
 
 def gain(content: ReportContent) -> Figure | None:
-    """H over N_D, or the dumbbell A -> H when the study has a single N_D.
-
-    None without cells, and where nothing learns and no model differs from one N_D to the next.
-    """
-    if content.cells.empty or (nothing_learns(content) and not _differs(content)):
+    """H over N_D, or the dumbbell A -> H when the study has a single N_D; None where `lack` says why not."""
+    if lack(content):
         return None
     means = trained(content).merge(overview(content)[["model"]])
     return _over_size(content, means) if content.cells.N_D.nunique() > 1 else _dumbbell(content, means)
+
+
+def lack(content: ReportContent) -> str:
+    """Why there is nothing to draw, as the end of a sentence; empty where it can be drawn."""
+    if content.cells.empty:
+        return "it needs rows of cells"
+    if nothing_learns(content) and not _differs(content):
+        return "no method learns from data, so that every H is the A of its physics, whatever N_D"
+    return ""
 
 
 def _differs(content: ReportContent) -> bool:

@@ -14,7 +14,7 @@ import pandas as pd
 from shipid.report import tables
 from shipid.report.content import Floats, PageContent, Sentence
 from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line, marks, silent
-from shipid.report.motion import LOG, SIGNALS, panels
+from shipid.report.motion import LOG, MOTIONS, panels
 from shipid.report.page import page, write
 from shipid.report.palette import INK, MUTED, category
 from shipid.report.section import Section
@@ -87,11 +87,11 @@ def write_identification(content: IdentificationContent, file: Path) -> Path:
 def _bought(content: IdentificationContent) -> str:
     which = "test" if content.held_out else "fit"
     rows = content.errors[(content.errors["set"] == which) & (content.errors["run"] == "all")]
-    rms = rows.set_index("model")[[*SIGNALS, "position"]].astype(float)
+    rms = rows.set_index("model")[[*MOTIONS, "position"]].astype(float)
     runs = counted(len(content.held_out), "run") + " held out" if content.held_out else "the fitted runs"
     changes = [
         f"{name} from {number(factor * rms[name][BEFORE])} to {number(factor * rms[name][AFTER])} {unit}"
-        for name, (_, unit, factor) in {**SIGNALS, "position": ("", "m", 1.0)}.items()
+        for name, (_, unit, factor) in {**MOTIONS, "position": ("", "m", 1.0)}.items()
     ]
     return f"On {runs}, the root mean square error of a free run {_length(content)} goes in {listed(changes)}."
 
@@ -270,7 +270,7 @@ def _panels(rows: pd.DataFrame) -> list[Panel]:
 def errors(content: IdentificationContent) -> Table:
     """Root mean square errors of the free runs, run by run."""
     words, places = {"fit": "fitted", "test": "held out"}, decimals(content.errors["position"])
-    factors = {name: factor for name, (_, _, factor) in SIGNALS.items()} | {"position": 1.0}
+    factors = {name: factor for name, (_, _, factor) in MOTIONS.items()} | {"position": 1.0}
     rows = []
     for kind, run in _all_first(content.errors[["set", "run"]]):
         mine = content.errors[(content.errors["set"] == kind) & (content.errors["run"] == run)].set_index("model")

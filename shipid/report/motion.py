@@ -13,7 +13,7 @@ from shipid.report.palette import GRID
 
 POINTS = 600  # of one line: more than pixels are wide
 LOG = "measured"
-SIGNALS = {"u": ("speed ahead, u", "m/s", 1.0), "v": ("to starboard, v", "m/s", 1.0)} | {
+MOTIONS = {"u": ("speed ahead, u", "m/s", 1.0), "v": ("to starboard, v", "m/s", 1.0)} | {
     "r": ("yaw rate, r", "deg/s", float(np.rad2deg(1.0)))
 }
 """Column -> what it is, the unit shown, and how many of those an SI unit is."""
@@ -28,7 +28,7 @@ def panels(rows: pd.DataFrame, lines: Mapping[str, Mapping[str, Any]], framed: S
     start, parts = float(rows["t"].min()), {name: _joined(rows[rows["model"] == name]) for name in lines}
     inks = {name: {**ink, "width": 1.4 if name == LOG else 2} for name, ink in lines.items()}
     result = []
-    for column, (title, unit, factor) in SIGNALS.items():
+    for column, (title, unit, factor) in MOTIONS.items():
         traces = [
             line(name, mine["t"].to_numpy() - start, factor * mine[column].to_numpy(), [name], unit, line=inks[name])
             for name, mine in parts.items()

@@ -9,7 +9,7 @@ import pandas as pd
 
 from shipid.report.content import PageContent, Sentence
 from shipid.report.figure import Chip, Control, Figure
-from shipid.report.motion import LOG, SIGNALS, panels
+from shipid.report.motion import LOG, MOTIONS, panels
 from shipid.report.page import page, write
 from shipid.report.palette import INK, category
 from shipid.report.section import Section
@@ -77,7 +77,7 @@ def motion(content: ReplayContent) -> Figure:
 
 def errors(content: ReplayContent) -> Table:
     """Root mean square errors, run by run."""
-    factors = {name: factor for name, (_, _, factor) in SIGNALS.items()} | {"position": 1.0}
+    factors = {name: factor for name, (_, _, factor) in MOTIONS.items()} | {"position": 1.0}
     places = decimals(content.errors["position"])
     rows = [
         [

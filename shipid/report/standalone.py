@@ -51,7 +51,11 @@ FIGURES: dict[str, Callable[[Any], Figure | None]] = {
 }
 """Name of a function of `shipid.figures` -> what draws it from the content of a page."""
 
-LACKS: dict[str, Callable[[Any], str]] = {"error_map": error_map.lack, "width_map": error_map.lack}
+LACKS: dict[str, Callable[[Any], str]] = {
+    "error_map": error_map.lack,
+    "width_map": error_map.lack,
+    "gain": gain.lack,
+}
 """Key of `FIGURES` -> what says why there is nothing to draw, if it is not that there are no rows."""
 
 WIDTH, MARGIN, GAP = 900, 130, 70  # of a figure; height of what is around its panels, and between two of them [px]

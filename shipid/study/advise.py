@@ -528,8 +528,7 @@ def _how_to_read(case: Case) -> list[str]:
     """What "no physics" is, what identified models, models set from the runs and known commands mean, and brackets."""
     plan, table, sentences = case.results.plan, case.table, []
     judged = next(way.method for way in plan.methods if way.name == plan.judged)
-    mirrored = getattr(judged, "mirror", 0.0) > 0
-    if NO_MODEL in table.H and mirrored:
+    if NO_MODEL in table.H and judged.traits.mirror:
         text = '"No physics" may use that port and starboard are mirror images, which is a little physics'
         if PLAIN in table.H:
             first, last = (table.mean(PLAIN, case.place(amount)) for amount in (case.smallest, case.largest))

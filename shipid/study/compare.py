@@ -11,14 +11,12 @@ import pandas as pd
 
 from shipid.errors import ResultError, ShipidError
 from shipid.files import as_argument
-from shipid.study.declared import NO_MODEL
+from shipid.study.declared import NO_METHOD, NO_MODEL
 from shipid.study.evidence import over_worlds
 from shipid.study.findings import findings
 from shipid.study.results import Results, read_results
 from shipid.study.store import stored_plan
 
-ALONE = "alone"
-"""Method of the rows of A, which no data improve."""
 POSSIBLE = {
     "rank correlation": (-1.0, 1.0),
     "share": (0.0, 1.0),
@@ -88,7 +86,7 @@ def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
     for world, results in enumerate(worlds):
         good = results.cells[results.cells["status"] == "ok"]
         known = ~good["family"].isin([NO_MODEL, *results.plan.fitted])
-        alone = good[known].drop_duplicates("foundation").assign(N_D=0, H=lambda rows: rows["A"], method=ALONE)
+        alone = good[known].drop_duplicates("foundation").assign(N_D=0, H=lambda rows: rows["A"], method=NO_METHOD)
         means = pd.concat([alone, good]).groupby(["family", "method", "N_D"], sort=False)["H"].mean()
         parts.append(means.reset_index().assign(world=world))
     grouped = pd.concat(parts).groupby(["family", "method", "N_D"], sort=False)["H"]

@@ -18,6 +18,7 @@ from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, members, resolve
 
 NO_MODEL = "none"
+NO_METHOD = "alone"  # of the rows of A in comparisons of runs, whose N_D is 0: no data improve it
 IDENTIFIED, OBSERVED = "identified from the runs of each cell", "with an observer"
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 Array = NDArray[np.float64]
-LEVEL = 0.025  # of one side: an interval of 95 % is free of 0
+SIGNIFICANT = 0.025  # of one side: an interval of 95 % is free of 0
 RESAMPLES, SEED = 1999, 0
 FEWEST_RUNS = 5  # test manoeuvres below which no interval is given
 FEWEST_WORLDS = 3  # below which no interval over worlds is given
@@ -113,9 +113,9 @@ def _judged(mean: Array, drawn: Array, error: Array, alike: Array, freedom: Arra
         interval takes the larger one.
     """
     wide, least = np.maximum(error, alike), 1e-12 * np.abs(mean) + 1e-300
-    student = stdtrit(freedom, 1 - LEVEL) * wide
-    lower = np.minimum(np.quantile(drawn, LEVEL, axis=0, method="lower") * error, -student)
-    upper = np.maximum(np.quantile(drawn, 1 - LEVEL, axis=0, method="higher") * error, student)
+    student = stdtrit(freedom, 1 - SIGNIFICANT) * wide
+    lower = np.minimum(np.quantile(drawn, SIGNIFICANT, axis=0, method="lower") * error, -student)
+    upper = np.maximum(np.quantile(drawn, 1 - SIGNIFICANT, axis=0, method="higher") * error, student)
     ahead, apart = (mean / np.maximum(one, least) for one in (error, wide))
     chances = (_beyond(drawn, ahead, apart, freedom), _beyond(-drawn, -ahead, -apart, freedom))
     return Contrasts(mean, mean - upper, mean - lower, *chances)
@@ -191,7 +191,7 @@ def over_worlds(values: Array, least: float = -np.inf, greatest: float = np.inf)
     """
     if len(values) < FEWEST_WORLDS:
         return np.nan, np.nan
-    wide = float(stdtrit(len(values) - 1, 1 - LEVEL) * values.std(ddof=1) / len(values) ** 0.5)
+    wide = float(stdtrit(len(values) - 1, 1 - SIGNIFICANT) * values.std(ddof=1) / len(values) ** 0.5)
     return max(float(values.mean()) - wide, least), min(float(values.mean()) + wide, greatest)
 
 
@@ -203,7 +203,7 @@ def doubling(x: Array) -> Array:
 
 
 def holm(chances: Array) -> Array:
-    """Return p-values (J,) corrected for their number (Holm 1979): one of them at most `LEVEL` is a finding."""
+    """Return p-values (J,) corrected for their number (Holm 1979): one of them at most `SIGNIFICANT` is a finding."""
     order = np.argsort(chances)
     raised = np.maximum.accumulate(chances[order] * np.arange(len(chances), 0, -1))
     corrected = np.empty_like(chances)

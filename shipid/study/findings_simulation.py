@@ -38,7 +38,16 @@ from shipid.metrics import rank_correlation, roughness
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, PLAIN, ErrorTable, Metric, error_table
-from shipid.study.evidence import FEWEST_MODELS, FEWEST_RUNS, LEVEL, Contrasts, at_least, by_chance, contrasts, doubling
+from shipid.study.evidence import (
+    FEWEST_MODELS,
+    FEWEST_RUNS,
+    SIGNIFICANT,
+    Contrasts,
+    at_least,
+    by_chance,
+    contrasts,
+    doubling,
+)
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
     SAME_A,
@@ -275,7 +284,7 @@ def _S4(grid: Grid) -> Finding:
     if worst:
         worst_moves, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
         chance = _student(worst_moves - calm)
-        moves = verdict(chance <= LEVEL, 1 - chance <= LEVEL)
+        moves = verdict(chance <= SIGNIFICANT, 1 - chance <= SIGNIFICANT)
         evidence += (
             f"; over {orders} nested orders H of these varies by {percent(worst_moves.mean())}, of moderate models by "
             f"{percent(calm.mean())}"
@@ -393,7 +402,8 @@ RULES: Mapping[str, Callable[[Grid], Finding]] = {"S1": _S1, "S2": _S2, "S3": _S
 
 def smooth_by_construction(method: Method, steps: int) -> bool:
     """Whether the compensation of a method is a polynomial of time with fewer terms than steps."""
-    return bool(getattr(method, "terms", steps) < steps)
+    terms = method.traits.terms
+    return terms is not None and terms < steps
 
 
 def _S7(results: Results, grid: Grid) -> Finding:

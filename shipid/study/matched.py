@@ -20,7 +20,7 @@ from shipid.arguments import path_of
 from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError, ShipidError, choices
 from shipid.metrics import over_time, position_error
-from shipid.study.declared import NO_MODEL
+from shipid.study.declared import NO_METHOD, NO_MODEL
 from shipid.study.differences import document_differences
 from shipid.study.evidence import Contrasts, contrasts, contrasts_apart, training_error
 from shipid.study.plan import Plan
@@ -30,8 +30,8 @@ from shipid.study.verdict import manoeuvres, shown, too_few
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-ALONE, IDENTICAL = "alone", "identical"
-"""Method of the rows of A, which no data improve, whose N_D is 0; verdict on cells that err alike to the digit."""
+IDENTICAL = "identical"
+"""Verdict on cells that err alike to the digit."""
 KEYS = ["family", "member", "method", "N_D", "seed"]
 GROUP = ["family", "method", "N_D"]
 GRID = {"N_D": "grid.N_D", "seed": "grid.seeds"}  # what two runs must share: key -> where the study says it
@@ -105,7 +105,7 @@ def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = N
 
 def _check_pairs(runs: Sequence[Results], pairs: Mapping[str, str]) -> None:
     """DocumentError for a name that is no family or method of the first run, or a counterpart that no other run has."""
-    first, *others = ({*results.cells["family"], *results.cells["method"], ALONE} for results in runs)
+    first, *others = ({*results.cells["family"], *results.cells["method"], NO_METHOD} for results in runs)
     there = set[str]().union(*others)
     for words, named, known in (("the first run", pairs, first), ("any other run", pairs.values(), there)):
         wrong = next((name for name in named if name not in known), None)
@@ -184,7 +184,7 @@ def _cells(results: Results) -> pd.DataFrame:
     every = results.cells.drop_duplicates("foundation")
     known = every["foundation"].isin([name for name, path in results.physics.items() if np.isfinite(path).all()])
     alone = every[known & (every["family"] != NO_MODEL)].reindex(columns=good.columns)
-    alone = alone.assign(cell="", method=ALONE, N_D=0, seed=0, H=every["A"], coverage=np.nan, trained=False)
+    alone = alone.assign(cell="", method=NO_METHOD, N_D=0, seed=0, H=every["A"], coverage=np.nan, trained=False)
     alone = alone[~alone["family"].isin(results.plan.fitted)]
     return pd.concat([alone, good], ignore_index=True).astype({"coverage": float, "H": float, "trained": bool})
 

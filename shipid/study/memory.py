@@ -10,7 +10,6 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from shipid.hybrid.features import NOTHING
 from shipid.metrics import over_time, position_error
 from shipid.observer import bank, observe
 from shipid.predictor import Predictor
@@ -22,7 +21,7 @@ from shipid.study.results import Results, shown_runs, with_gaps
 
 Array = np.ndarray
 Added = Literal["memory", "observer", "both"]
-ALONE = "physics alone"
+PHYSICS_ALONE = "physics alone"
 ORDER = 0.05  # share of a command's range in a run that counts as a new order
 NOT_COMPARED = ("memory", "choose", "history_scale", "error_scale", "observer_scale")  # settings of memory itself
 ALONG = [
@@ -57,8 +56,8 @@ def pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list[Pair]:
         rows += [_memory_pair(one, one, way, rival) for way, rival in _rivals(ways, one, one)]
     for observed, original in _observed(foundations):
         if not observed.fitted:
-            label = f"observer: {ALONE}"
-            rows.append(Pair("observer", label, (original.name, ALONE), (observed.name, ALONE)))
+            label = f"observer: {PHYSICS_ALONE}"
+            rows.append(Pair("observer", label, (original.name, PHYSICS_ALONE), (observed.name, PHYSICS_ALONE)))
         for way in ways:
             if observed.name in way.foundations and original.name in way.foundations:
                 label = f"observer: {way.name}"
@@ -70,7 +69,7 @@ def pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list[Pair]:
 
 def taken(way: Way, foundation: Foundation) -> frozenset[str]:
     """Kinds of memory that a method takes on a foundation: `history`, `error`, `observer`, or `past` for any other."""
-    memory = getattr(way.method, "memory", NOTHING)
+    memory = way.method.traits.memory
     kinds = {"history"} if memory.history or memory.turned else set()
     kinds |= {"error"} if memory.error and foundation.base is not None else set()
     if not kinds and not memory.past and way.method.past > 0:
@@ -174,7 +173,7 @@ def memory_time_frame(results: Results) -> pd.DataFrame:
 
 def _names(pair: Pair, label: Callable[[str, str], str]) -> dict[str, Any]:
     words = [
-        f"{name}, {ALONE}" if method == ALONE else label(name, method)
+        f"{name}, {PHYSICS_ALONE}" if method == PHYSICS_ALONE else label(name, method)
         for name, method in (pair.without, pair.remembering)
     ]
     named = {"comparison": pair.comparison, "added": pair.added, "model": pair.without[0]}
@@ -197,7 +196,7 @@ def _errors(results: Results) -> Iterator[tuple[Pair, int, Array, Array]]:
         return known[cell]
 
     for pair in pairs(results.plan.foundations, results.plan.methods):
-        if pair.without[1] == ALONE:
+        if pair.without[1] == PHYSICS_ALONE:
             alone = [results.physics.get(name) for name, _ in (pair.without, pair.remembering)]
             finite = [path for path in alone if path is not None and np.isfinite(path).all()]
             if len(finite) == 2:

@@ -241,7 +241,7 @@ class Plan:
     def plain(self) -> str | None:
         """Name of the method that predicts without physics and without mirror symmetry, if there is one."""
         alone = [way for way in self.methods if way.foundations == (NO_MODEL,) and way.name != self.judged]
-        return next((way.name for way in alone if getattr(way.method, "mirror", None) == 0.0), None)
+        return next((way.name for way in alone if way.method.traits.mirror is False), None)
 
     @property
     def learning(self) -> list[str]:

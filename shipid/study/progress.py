@@ -46,7 +46,7 @@ class Watch:
     def __init__(self, plan: Plan, folder: Path) -> None:
         plans = {part_folder(folder, name): part.plan for name, part in plan.parts.items()} or {folder: plan}
         self._trials = {
-            place: {way.name: getattr(way.method, "trials", None) for way in one.methods if way.method.compensates}
+            place: {way.name: way.method.num_trials() for way in one.methods if way.method.compensates}
             for place, one in plans.items()
         }
         self._ends: dict[Path, int] = {}

@@ -551,7 +551,7 @@ def _source_words(source: Any) -> str:
 
 def _method_words(way: Way) -> str:
     """A method in a few words: its name, its kind and how much it searches."""
-    trials = getattr(way.method, "trials", None)
+    trials = way.method.num_trials()
     kind = "" if way.kind == way.name else f" ({way.kind})"
     return f"{way.name}{kind}" + (f": {trials} trials" if trials else "")
 

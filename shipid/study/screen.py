@@ -21,7 +21,7 @@ from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError, choices
 from shipid.hybrid.physics import check_columns
 from shipid.metrics import BINS, rank_correlation, tally_quantile
-from shipid.study.evidence import LEVEL, holm
+from shipid.study.evidence import SIGNIFICANT, holm
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
@@ -179,7 +179,7 @@ def drivers(frame: pd.DataFrame) -> pd.DataFrame:
         chances = [kendalltau(A, values).pvalue for pair in pairs.values() for values in pair]
         chance = holm(np.nan_to_num(chances, nan=1.0)).reshape(-1, 2).min(axis=1)  # nan: all are as far from 1
         for (named, pair), least in zip(pairs.items(), chance, strict=True):
-            if least <= 2 * LEVEL:  # of both sides
+            if least <= 2 * SIGNIFICANT:  # of both sides
                 strength = [rank_correlation(A, values.to_numpy()) for values in pair]
                 rows.append((name, named, *strength, max(map(abs, strength))))
     effects = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])

@@ -27,7 +27,7 @@ from shipid.identification.bands import Measure, bands, check_level, refusal
 from shipid.identification.design import Candidate, candidates, performed, recorded, steps_between
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
 from shipid.identification.outcome import (
-    SIGNALS,
+    ERRORS_OF,
     TRIED,
     pick_runs,
     residual_level,
@@ -40,7 +40,7 @@ from shipid.identification.reach import Reach, beyond, of_log, reach_of
 from shipid.identification.settings import Identify
 from shipid.identification.sides import by_group, uneven
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, Statistics, statistics
+from shipid.identification.statistics import LEVEL, LinearFit, Statistics, statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange
 from shipid.report.structures import StructuresContent
 from shipid.simulation.measured import Measured, measure_all
@@ -55,8 +55,8 @@ Array = NDArray[np.float64]
 Report = Callable[[str], object]
 FOLDS = 3
 SIDES = ("starboard", "port")
-MEASURES = {"zigzag": ("overshoot 1", "overshoot 2"), "turning": ("advance", "tactical diameter")}
-LEVEL = 0.95
+SHOWN = {"zigzag": ("overshoot 1", "overshoot 2"), "turning": ("advance", "tactical diameter")}
+"""Kind of a standard manoeuvre -> measures shown, few of `COMPARED` of `identify`: each has a row a structure."""
 FIRST = 8  # manoeuvres to run next
 
 
@@ -327,8 +327,8 @@ def _judged(
 
 def _with_mean(errors: pd.DataFrame) -> pd.DataFrame:
     """Errors of runs below their mean over runs; a run whose prediction diverges makes it infinite."""
-    known = errors.assign(**{name: errors[name].fillna(np.inf) for name in SIGNALS})
-    mean = {name: float(known[name].mean()) for name in SIGNALS}
+    known = errors.assign(**{name: errors[name].fillna(np.inf) for name in ERRORS_OF})
+    mean = {name: float(known[name].mean()) for name in ERRORS_OF}
     return pd.concat([pd.DataFrame([{"run": ALL, **mean}]), known.drop(columns=["model", "samples"])])
 
 
@@ -363,7 +363,7 @@ def _table(
             {
                 "structure": name,
                 "numbers": counts[name],
-                **{signal: float(here[signal]) for signal in SIGNALS},
+                **{signal: float(here[signal]) for signal in ERRORS_OF},
                 "test": float(means["test", name]["position"]) if ("test", name) in means else np.nan,
                 "more": float(here["position"] - means["folds", best]["position"]) if name in sound else np.inf,
                 "low": low,
@@ -372,7 +372,7 @@ def _table(
                 "note": "" if name in sound else "diverges on a run that was held out",
             }
         )
-    nothing = dict.fromkeys((*SIGNALS, "test", "more", "low", "high"), np.nan)
+    nothing = dict.fromkeys((*ERRORS_OF, "test", "more", "low", "high"), np.nan)
     rows += [
         {"structure": name, "numbers": 0, **nothing, "equal": False, "note": notes[name]}
         for name in names
@@ -448,7 +448,7 @@ def _manoeuvres(
 def _values(one: Measured) -> dict[str, float]:
     """The measures that are compared."""
     measures = {row["measure"]: float(row["value"]) for row in one.measures}
-    return {name: measures[name] for name in MEASURES[one.standard.kind] if name in measures}
+    return {name: measures[name] for name in SHOWN[one.standard.kind] if name in measures}
 
 
 def _measure(title: str, known: dict[str, dict[str, Measured]]) -> Measure:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shipid.report.content import spoken
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
-from shipid.study.evidence import FEWEST_RUNS, LEVEL, Contrasts, holm
+from shipid.study.evidence import FEWEST_RUNS, SIGNIFICANT, Contrasts, holm
 from shipid.units import decimals_of, plural
 
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
@@ -37,7 +37,7 @@ def verdict(shown: bool, opposite: bool) -> Verdict:
 
 def every(chances: NDArray[np.float64]) -> bool:
     """Whether each difference is shown: "all of them" needs no correction for their number (Berger 1982)."""
-    return bool(len(chances) and (chances <= LEVEL).all())
+    return bool(len(chances) and (chances <= SIGNIFICANT).all())
 
 
 def some(chances: NDArray[np.float64]) -> bool:
@@ -47,7 +47,7 @@ def some(chances: NDArray[np.float64]) -> bool:
 
 def shown(chances: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which differences are shown: all where each is, else those that are after Holm's correction."""
-    return np.full(len(chances), True) if every(chances) else holm(chances) <= LEVEL
+    return np.full(len(chances), True) if every(chances) else holm(chances) <= SIGNIFICANT
 
 
 def weakest(verdicts: Iterable[Verdict]) -> Verdict:

@@ -11,7 +11,7 @@ from scipy.special import ndtr, stdtrit
 
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable
-from shipid.study.evidence import FEWEST_RUNS, LEVEL, SEED, resampled_means
+from shipid.study.evidence import FEWEST_RUNS, SEED, SIGNIFICANT, resampled_means
 
 Array = NDArray[np.float64]
 FEWEST_MODELS = 4  # for a line of H over A
@@ -48,7 +48,7 @@ class Estimate:
 
 def _estimate(value: Array, drawn: Array, runs: int, limits: tuple[float, float]) -> Estimate:
     """Quantiles of resampled values, further out where manoeuvres are few (expanded percentiles; Hesterberg 2015)."""
-    level = float(ndtr(stdtrit(runs - 1, LEVEL) * (runs / (runs - 1)) ** 0.5)) if runs >= FEWEST_RUNS else np.nan
+    level = float(ndtr(stdtrit(runs - 1, SIGNIFICANT) * (runs / (runs - 1)) ** 0.5)) if runs >= FEWEST_RUNS else np.nan
     low, high = np.quantile(drawn, [level, 1 - level]) if runs >= FEWEST_RUNS else (np.nan, np.nan)
     middle, least, greatest = (
         next((end for end in limits if np.isclose(end, number)), float(number)) for number in (value[0], low, high)
@@ -99,7 +99,7 @@ def _open(values: Array, counts: Array, limits: tuple[float, float]) -> tuple[fl
     left = np.vstack([counts, counts * (1 - np.eye(runs))])  # all manoeuvres, and all without each in turn
     centre, slope, margin = _line(np.moveaxis(values @ (left / left.sum(axis=1, keepdims=True)).T, -1, 0))
     ahead = margin[:, None] - slope[:, None] * (np.log(A) - centre[:, None])  # of none, (1 + R, A)
-    wide = stdtrit(runs - 1, 1 - LEVEL) * np.sqrt(runs - 1) * ahead[1:].std(axis=0)
+    wide = stdtrit(runs - 1, 1 - SIGNIFICANT) * np.sqrt(runs - 1) * ahead[1:].std(axis=0)
     open_below, open_above = np.flatnonzero(ahead[0] <= wide), np.flatnonzero(ahead[0] >= -wide)
     least = A[max(open_below[0] - 1, 0)] if len(open_below) else limits[1]  # where the least A is not shown to pay
     most = A[min(open_above[-1] + 1, STEPS - 1)] if len(open_above) else limits[0]
@@ -144,7 +144,7 @@ def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
     amounts = np.array(table.amounts, dtype=float)
     estimate = _estimate(_runs(amounts, mean), _runs(amounts, drawn), table.runs, limits)
     differences = table.compare([[(1.0, NO_MODEL, k), (-1.0, model, place)] for k in range(len(amounts))])
-    alike = amounts[(differences.above > LEVEL) & (differences.below > LEVEL)]
+    alike = amounts[(differences.above > SIGNIFICANT) & (differences.below > SIGNIFICANT)]
     return replace(estimate, low=min([estimate.low, *alike]), high=max([estimate.high, *alike]))
 
 

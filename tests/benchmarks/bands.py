@@ -330,9 +330,7 @@ def _slopes(ship: Vessel, paths: Sequence[str]) -> tuple[dict[str, Array], dict[
         slopes = {}
         for kind, angles in (("zigzag", (20, 20)), ("turning", (35,))):
             rows = _measured(one, kind, angles)
-            slopes |= {
-                name: float(rows[name]["value"]) for name in (label.replace("_", " ") for label in COMPARED[kind])
-            }
+            slopes |= {name: float(rows[name]["value"]) for name in COMPARED[kind]}
         return slopes
 
     truth = measure(ship)

@@ -63,6 +63,13 @@ def test_it_learns_most_of_a_wrong_resistance(windows: Windows) -> None:
     assert [row["params"]["ridge"] for row in fit.trials] == pytest.approx([1e-2, 1e-4])  # from stiff to soft
 
 
+@pytest.mark.parametrize(
+    ("given", "count"), [({}, 3), ({"ridge": 0.1}, 1), ({"trials": 2}, 2), ({"budget": 9.0}, None)]
+)
+def test_each_ridge_is_a_trial(given: dict[str, Any], count: int | None) -> None:
+    assert LearnedForce(**given).num_trials() == count
+
+
 def test_a_stiff_ridge_leaves_the_physics_as_it_is(windows: Windows) -> None:
     given = task(windows)
     fit = LearnedForce(**CHEAP, ridge=1e12).fit(given)["wrong"].corrector

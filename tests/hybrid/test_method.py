@@ -13,10 +13,11 @@ from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import Inputs, Memory
-from shipid.hybrid.method import Case, Fitted, Method, Task, fit_all, same_table, shared_tables
+from shipid.hybrid.method import Case, Fitted, Method, Task, Traits, fit_all, same_table, shared_tables
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Searched
+from shipid.hybrid.stepping import Stepped
 from shipid.hybrid.trials import row_of
 from shipid.vessel.load import load_vessel
 from tests.study.test_whole import windy
@@ -78,7 +79,7 @@ def test_inputs_without_physics_are_one_array_for_all() -> None:
             np.testing.assert_array_equal(table[key], values)
 
 
-@pytest.mark.parametrize("skeleton", [Method, Searched])
+@pytest.mark.parametrize("skeleton", [Method, Searched, Stepped])
 def test_a_skeleton_is_no_method(skeleton: type[Method]) -> None:
     with pytest.raises(TypeError, match=r"abstract class \w+ with"):
         skeleton()
@@ -165,6 +166,18 @@ def test_a_mistake_in_the_code_of_a_user_has_its_file_and_line() -> None:
 
     with pytest.raises(ShipidError, match=rf"^Mine\.fit: KeyError: 'left' in {re.escape(__file__)}, line \d+$"):
         fit_all(Mine(), task())
+
+
+@pytest.mark.parametrize("kind", METHODS)
+def test_every_listed_method_tells_of_its_mirror_memory_and_terms(kind: str) -> None:
+    fields, memory = METHODS[kind].model_fields, Memory(history=(2.0,))
+    without = 0.0 if "mirror" in fields and fields["mirror"].annotation is float else False  # a share of the trials
+    given: dict[str, Any] = {"mirror": without, "memory": memory, "terms": 5}
+    told = {name: value for name, value in given.items() if name in fields}
+    method = METHODS[kind](**told)
+    assert method.traits == Traits(**told)
+    assert method.traits.mirror in (False, None)
+    assert method.past >= method.traits.memory.past
 
 
 @pytest.mark.parametrize("kind", METHODS)

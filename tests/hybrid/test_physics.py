@@ -225,7 +225,7 @@ def test_many_steps_at_once_run_as_c(count: int, engine: str, monkeypatch: pytes
         taken.append(engine)
         return rollout(*arguments, engine="casadi", **more)
 
-    monkeypatch.setattr(physics_module, "WORTH_COMPILING", 100)
+    monkeypatch.setattr(physics_module, "REPEATED_FROM", 100)
     monkeypatch.setattr(physics_module, "rollout", noted)
     vessel = load_vessel("gunnerus-28.9")
     zero = np.zeros(count)

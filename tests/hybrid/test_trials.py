@@ -137,11 +137,12 @@ def test_the_ridge_of_a_trial_is_the_best_on_the_validation_windows():
 
     trained = []
 
-    def solved(training):
+    def solve(training, ridges):
+        assert ridges == [0.1, 1.0, 10.0]
         trained.append(training)
         return Off()
 
-    assert ridge_trial(here, "one", [0.1, 1.0, 10.0], 2, solved) == (1.0, 1.0)  # the true path is 0: 1 m^2
+    assert ridge_trial(here, "one", [0.1, 1.0, 10.0], 2, solve) == (1.0, 1.0)  # the true path is 0: 1 m^2
     assert [list(part) for part in trained] == [list(training) for training, _ in FOLDS]
     for (first, *others), (_, validation) in zip(seen, FOLDS, strict=True):
         assert len(first) == 2

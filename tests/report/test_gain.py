@@ -5,8 +5,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.errors import ShipidError
 from shipid.report.figure import Figure
-from shipid.report.gain import gain
+from shipid.report.gain import gain, lack
+from shipid.report.standalone import standalone
 
 LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
@@ -140,3 +142,22 @@ def test_a_failed_model_keeps_its_physics_and_shows_no_result(full_scale):
     (text,) = (a.text for a in plot.layout.annotations if "bare hull" in a.text)
     assert "6.40 m → no result" in text
     assert "<script>" not in text
+
+
+def test_why_nothing_is_drawn_is_named(simulation):
+    """Where nothing learns, it was said that there were no rows."""
+    physics = simulation.cells[simulation.cells.family.ne("none")]
+    alike = physics.assign(H=physics.A, status="ok")
+    still = replace(simulation, cells=alike, alone=set(alike.model))
+    moving = replace(still, cells=alike.assign(H=alike.A + alike.N_D))  # as of physics that each cell identifies
+    reasons = {"it needs rows of cells": replace(simulation, cells=physics[:0]), "no method learns from data": still}
+    for reason, content in reasons.items():
+        assert gain(content) is None
+        assert lack(content).startswith(reason)
+    with pytest.raises(
+        ShipidError, match=r"gain: there is nothing to draw: no method learns from data, so that every H"
+    ):
+        standalone("gain", still)
+    for content in (simulation, moving):
+        assert gain(content) is not None
+        assert lack(content) == ""

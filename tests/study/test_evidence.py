@@ -8,7 +8,7 @@ from scipy import stats
 
 from shipid.study.evidence import (
     FEWEST_RUNS,
-    LEVEL,
+    SIGNIFICANT,
     TRAINING,
     at_least,
     by_chance,
@@ -52,7 +52,7 @@ def test_intervals_cover_where_few_manoeuvres_have_most_of_the_windows(windows: 
     limit = stats.binom.ppf(0.999, 1000, 0.025)
     assert (contrast.low > 0).sum() <= limit
     assert (contrast.high < 0).sum() <= limit
-    assert ((contrast.low > 0) == (contrast.above <= LEVEL)).mean() > 0.99
+    assert ((contrast.low > 0) == (contrast.above <= SIGNIFICANT)).mean() > 0.99
 
 
 @pytest.mark.parametrize("runs", [5, 12])
@@ -72,9 +72,9 @@ def test_intervals_of_errors_are_never_below_0_and_cover_as_before(runs: int, sp
 def test_an_interval_free_of_0_and_a_small_p_value_are_the_same() -> None:
     rng = np.random.default_rng(2)
     contrast = contrasts(rng.normal(0.4, 1.0, (300, 12)), np.ones(12), 0.05)
-    same = (contrast.low > 0) == (contrast.above <= LEVEL)
+    same = (contrast.low > 0) == (contrast.above <= SIGNIFICANT)
     assert same.mean() > 0.99, "but for the rounding of a quantile"
-    assert ((contrast.high < 0) == (contrast.below <= LEVEL)).mean() > 0.99
+    assert ((contrast.high < 0) == (contrast.below <= SIGNIFICANT)).mean() > 0.99
 
 
 def test_student_for_normal_differences_by_hand() -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
+from shipid.identification.outcome import COMPARED
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
 from shipid.identification.structures import exchange
@@ -20,7 +21,8 @@ from shipid.report.structures import write_structures
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform
 from shipid.study.structures import (
-    SIGNALS,
+    ERRORS_OF,
+    SHOWN,
     Compared,
     _table,
     _with_mean,
@@ -38,6 +40,11 @@ TRIALS = (
     (10, 5, 627, "port"), (20, 10, 627, "starboard"), (30, 10, 627, "port"),
     (15, 10, 450, "starboard"), (25, 10, 450, "port"), (35, 15, 627, "starboard"),
 )  # fmt: skip
+
+
+def test_what_is_shown_is_among_what_identify_compares() -> None:
+    assert SHOWN.keys() == COMPARED.keys()
+    assert all(set(shown) < set(COMPARED[kind]) for kind, shown in SHOWN.items())
 
 
 def zigzags(vessel: Vessel, seed: int = 0) -> Dataset:
@@ -165,7 +172,7 @@ def table_of(position: np.ndarray) -> pd.DataFrame:
     """The table of structures (K) whose errors on runs (R) that their fits have not seen are these (K, R) [m]."""
     names, runs = [f"s{k}" for k in range(len(position))], [f"r{k}" for k in range(position.shape[1])]
     parts = [
-        _with_mean(pd.DataFrame({"run": runs, **dict.fromkeys(SIGNALS, one), "model": name, "samples": 9})).assign(
+        _with_mean(pd.DataFrame({"run": runs, **dict.fromkeys(ERRORS_OF, one), "model": name, "samples": 9})).assign(
             structure=name, set="folds"
         )
         for name, one in zip(names, position, strict=True)

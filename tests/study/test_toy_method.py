@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import ModuleType
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
 from shipid.data.dataset import read_dataset
+from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.method import Fitted, Method, Task, Traits
 from shipid.hybrid.methods import METHODS
+from shipid.hybrid.trials import row_of
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.apply import predict_log
 from shipid.study.contents import report_content
+from shipid.study.findings_simulation import smooth_by_construction
+from shipid.study.memory import taken
 from shipid.study.prepare import prepare
-from shipid.study.results import read_results
+from shipid.study.progress import Watch
+from shipid.study.results import provenance_words, read_results
 from tests.documented import module
 from tests.study.tiny import run_here, tiny_plan
 
@@ -63,3 +70,34 @@ def test_a_new_method_goes_through_a_whole_study(
     left = prepared.pool.future[:, seen] - predictor.corrector.predict(predictor.physics, instants, physics)
     for name in ("u", "v", "r"):
         np.testing.assert_allclose(left.transpose(0, 2, 1) @ (instants.columns[name]), 0.0, atol=1e-6)
+
+
+class Otherwise(Method):
+    """A method of a user whose settings have names of those of other methods, and another meaning."""
+
+    corrector: ClassVar[type[Any]] = Unchanged
+    trials: str = "sea trials of 2022"
+    mirror: float = 0.0
+    memory: str = "of the crew"
+    terms: int = 2
+
+    def fit(self, given: Task) -> dict[str, Fitted]:
+        return {name: Fitted(Unchanged({}), [row_of(0, {}, 1.0, 0.0)], 0.0) for name in given.cases}
+
+
+def test_settings_of_a_users_method_mean_what_the_user_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were taken for the trials, the mirror, the memory and the polynomial that a study speaks of."""
+    monkeypatch.setitem(METHODS, "otherwise", Otherwise)
+    drawn = {"name": "drawn", "kind": "path-drawn", "trials": 1, "terms": 4, "units": 8}
+    added = {"name": "mine", "kind": "otherwise", "families": ["none"]}
+    plan = tiny_plan(tmp_path, {"method": [drawn, added], "grid.N_D": [4]})
+    mine = plan.methods[1]
+    assert (mine.method.traits, mine.method.num_trials()) == (Traits(), None)
+    assert plan.plain is None
+    assert not any(taken(mine, foundation) for foundation in plan.foundations)
+    assert not smooth_by_construction(mine.method, plan.horizon)
+    Watch(plan, tmp_path)
+    run_here(plan, tmp_path / "run")
+    results = read_results(tmp_path / "run")
+    assert provenance_words(results)["methods"] == "drawn (path-drawn): 1 trials; mine (otherwise)"
+    assert report_content(results).answer
