@@ -31,14 +31,14 @@ class ShipidError(Exception):
         others: Iterable[ShipidError] = (),
     ) -> None:
         super().__init__(message)
-        self.message = message
+        self.message = str(message)  # of a user it may be another error
         self.file = None if file is None else str(file)
         self.path = path
         self.others = tuple(others)
 
     def __str__(self) -> str:
         parts = [part for part in (self.file, self.path, self.message) if part]
-        line = ": ".join(_legible(" ".join(part.split())) for part in parts)
+        line = ": ".join(legible(part) for part in parts)
         return "\n".join([line, *map(str, self.others)])
 
     def __reduce__(self) -> tuple[object, ...]:  # errors of worker processes are pickled
@@ -82,9 +82,9 @@ def visible(text: str) -> str:
     )
 
 
-def _legible(text: str) -> str:
-    """The text as printable characters, shortened: contents of a file must not flood a terminal."""
-    shown = visible(text)
+def legible(text: str) -> str:
+    """The text as one line of printable characters, shortened: contents of a file must not flood a terminal."""
+    shown = visible(" ".join(text.split()))
     return shown if len(shown) <= LONGEST else f"{shown[: LONGEST // 2]} ... {shown[-LONGEST // 2 :]}"
 
 

@@ -21,6 +21,7 @@ from shipid.errors import DataError, ResultError, ShipidError, choices
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrated
+from shipid.hybrid.contract import fault_of_corrector, named
 from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, place_of, placed, widened
 from shipid.hybrid.methods import METHODS, kind_of, listed
 from shipid.hybrid.physics import Physics, check_columns, check_instants
@@ -138,25 +139,26 @@ class Predictor:
         ------
         DataError : planned commands, a column or a part of the past is missing, or has another shape; there were too
             few runs for the level.
-        ShipidError : the method of a user makes another mistake, such as a division by zero.
+        ShipidError : the method of a user makes a mistake, such as a division by zero.
         """
         if level is not None:
             self.check_level(level, kind)
         instants = self._known(instants)
         alone = locked(self._paths(self.physics.paths(instants) if paths is None else paths, instants))
         home = type(self.corrector)
-        with placed(f"the method {self.method!r}", home):
+        with placed(f"{home.__name__}.predict", home):
             try:
                 predicted, lost = self.corrector.predict(self.physics, instants, alone), self._lost(instants)
-            except KeyError as error:
-                raise DataError(
-                    f"the method was trained with this input, and the instants lack it{place_of(error, home)}",
-                    path=str(error.args[0]),
-                ) from error
-            except (ValueError, TypeError, IndexError) as error:
-                raise DataError(
-                    f"the method {self.method!r} and the instants do not fit together ({error}){place_of(error, home)}"
-                ) from error
+            except (KeyError, ValueError, TypeError, IndexError) as error:
+                name = str(*error.args[:1]) if isinstance(error, KeyError) else ""
+                lacks, place = name in self.limits and name not in instants.columns, place_of(error, home)
+                if place and not lacks:  # a mistake in the code of a user
+                    raise
+                if name:
+                    words = "the method was trained with this input, and the instants lack it"
+                    raise DataError(f"{words}{place}", path=name) from error
+                message = f"the method {self.method!r} and the instants do not fit together ({error})"
+                raise DataError(message) from error
         predicted = self._paths(predicted, instants, f"paths of the method {self.method!r}")
         if np.may_share_memory(predicted, alone) or lost.any():  # the prediction is the caller's to change
             predicted = predicted.copy()
@@ -305,7 +307,8 @@ class Predictor:
 
     def _corrector_header(self) -> dict[str, Any]:
         """What the method keeps beside its arrays; DataError for what would not be read back as it is."""
-        with placed(f"the header of the method {self.method!r}", type(self.corrector)):
+        home = type(self.corrector)
+        with placed(f"{home.__name__}.header", home):
             header = plain(self.corrector.header())
         wrong = f"the header of the method {self.method!r} must be a table of texts, numbers and lists of them"
         if not isinstance(header, dict):
@@ -327,8 +330,11 @@ class Predictor:
         if home.__module__.startswith("shipid."):  # the tests of shipid say so
             return
         header = json.loads(json.dumps(self._corrector_header(), default=str))
-        with placed(f"from_arrays of the method {self.method!r}", home):
-            corrector = METHODS[self.method].corrector.from_arrays(header, self._corrector_arrays())
+        kind, arrays = METHODS[self.method].corrector, self._corrector_arrays()
+        with placed(f"{kind.__name__}.from_arrays", kind):
+            corrector = kind.from_arrays(header, arrays)
+        if fault := fault_of_corrector(corrector):
+            raise ShipidError(f"`from_arrays` of {named(kind)} must return a corrector: {fault}")
         one, first = instants.select(np.arange(1)), paths[:, :1]
         kept, restored = (replace(self, corrector=each).predict(one, first) for each in (self.corrector, corrector))
         if not np.allclose(kept, restored, rtol=1e-6, atol=1e-6, equal_nan=True):
@@ -340,11 +346,15 @@ class Predictor:
 
     def _corrector_arrays(self) -> dict[str, Array]:
         """The arrays of the method; DataError for what would not be read back."""
-        with placed(f"the arrays of the method {self.method!r}", type(self.corrector)):
+        home = type(self.corrector)
+        with placed(f"{home.__name__}.arrays", home):
             given = self.corrector.arrays()
         if not isinstance(given, Mapping):
             raise DataError(f"the arrays of the method {self.method!r} must be a table, not {type(given).__name__}")
-        arrays = {str(name): np.asarray(values) for name, values in given.items()}
+        try:
+            arrays = {str(name): np.asarray(values) for name, values in given.items()}
+        except (TypeError, ValueError) as error:
+            raise DataError(f"arrays of the method {self.method!r}: {error}") from None
         taken = next((name for name in arrays if name == "header" or name.startswith(BANDS)), None)
         fault = _fault_of(arrays) if taken is None else f"{taken!r} is a name that is taken: use another"
         if fault:

@@ -16,6 +16,7 @@ def test_one_line_with_file_path_and_message(error: type[ShipidError]) -> None:
     assert str(raised) == "a.toml: hull.x: first second"
     assert str(error("only this")) == "only this"
     assert isinstance(raised, ShipidError)
+    assert str(error(ValueError("of a user\nwho wraps another"))) == "of a user who wraps another"  # type: ignore[arg-type]
 
 
 @ERRORS

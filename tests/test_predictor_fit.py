@@ -26,6 +26,7 @@ from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.trials import row_of
 from shipid.metrics import position_error
 from shipid.predictor import Predictor, _folds, fit
 from shipid.vessel.load import Vessel, load_vessel
@@ -120,6 +121,8 @@ def test_held_commands_are_never_those_of_the_plan() -> None:
 
 class Shared(Method):
     """A method that holds out a fifth of the runs."""
+
+    corrector: ClassVar[type[Any]] = Unchanged
 
     def fit(self, task: Task) -> dict[str, Fitted]:  # noqa: ARG002
         return {}
@@ -359,7 +362,9 @@ def centred(physics: Physics, instants: Instants, paths: Any) -> Any:  # noqa: A
 def test_a_method_changes_no_array_that_others_have(predict: Any) -> None:
     """A corrector that added to the paths of the physics changed A, and H of the methods after it, without a word."""
     instants, paths = WINDOWS.instants(), np.zeros((HORIZON, len(WINDOWS), 2))
-    with pytest.raises(DataError, match=r"the method 'mine' and the instants do not fit together \(.*read-only\)"):
+    with pytest.raises(
+        ShipidError, match=r"^Mistaken\.predict: ValueError: .*read-only in .*, line \d+: .*`paths \+ shift`"
+    ):
         Predictor(NONE, "mine", Mistaken(predict)).predict(instants, paths)
     assert not paths.any()
     paths += 1.0
@@ -372,11 +377,15 @@ def test_a_method_changes_no_window_that_others_are_fitted_to(monkeypatch: pytes
             for array in (task.windows.future, task.windows.columns["u"], task.cases["none"].paths):
                 with pytest.raises(ValueError, match="read-only"):
                     array += 1.0
-            return {"none": Fitted(Unchanged({}), [], 0.0)}
+            return {"none": Fitted(Unchanged({}), [row_of(0, {}, 1.0, 0.0)], 0.0)}
 
     monkeypatch.setitem(METHODS, "greedy", Greedy)
     fit(Greedy(), NONE, WINDOWS)
     assert WINDOWS.future.flags.writeable
+
+
+def _two_lines(_: Any) -> Any:
+    raise ValueError("first\n  second")
 
 
 def _parts_that_do_not_fit(paths: Any) -> Any:
@@ -386,21 +395,26 @@ def _parts_that_do_not_fit(paths: Any) -> Any:
 @pytest.mark.parametrize(
     ("made", "message"),
     [
-        (_parts_that_do_not_fit, r"the method 'mine' and the instants do not fit together \(.*\)"),
-        (lambda paths: {}["slope"] + paths, "slope: the method was trained with this input, and the instants lack it"),
-        (lambda _: sys.exit(2), r"the method 'mine' calls sys\.exit"),
-        (lambda paths: paths + 1 / len(paths[:0]), "the method 'mine': ZeroDivisionError: .*"),
-        (lambda paths: paths.mean_of_all(), "the method 'mine': AttributeError: .*"),
+        (_parts_that_do_not_fit, r"Mistaken\.predict: ValueError: operands .*"),
+        (lambda paths: {}["slope"] + paths, r"Mistaken\.predict: KeyError: 'slope'"),
+        (lambda paths: {}["u"] + paths, r"Mistaken\.predict: KeyError: 'u'"),  # the instants have it
+        (lambda paths: {}["gone"] + paths, "gone: the method was trained with this input, and the instants lack it"),
+        (lambda _: sys.exit(2), r"Mistaken\.predict calls sys\.exit"),
+        (lambda paths: paths + 1 / len(paths[:0]), r"Mistaken\.predict: ZeroDivisionError: .*"),
+        (lambda paths: paths.mean_of_all(), r"Mistaken\.predict: AttributeError: .*"),
+        (_two_lines, r"Mistaken\.predict: ValueError: first second"),
     ],
 )
 def test_a_mistake_in_a_method_of_a_user_has_its_place(made: Callable[[Any], Any], message: str) -> None:
     """One sentence without file and line: the mistake might be anywhere. The last line of the user's file is named."""
-    known = Predictor(NONE, "mine", Mistaken(lambda _, __, paths: made(paths)))
+    seen = {"u": (0.0, 9.0), "gone": (0.0, 1.0)}
+    known = Predictor(NONE, "mine", Mistaken(lambda _, __, paths: made(paths)), seen)
     with pytest.raises(ShipidError, match=f"^{message} in {re.escape(__file__)}, line ") as caught:
         known.predict(WINDOWS.instants())
     lines = Path(__file__).read_text().splitlines()
     line = lines[int(re.search(r"line (\d+)", str(caught.value))[1]) - 1]  # type: ignore[index]
-    assert any(part in line for part in ("np.zeros(3)", '{}["slope"]', "sys.exit", "1 / len", "mean_of_all"))
+    assert any(part in line for part in ("np.zeros(3)", "{}[", "sys.exit", "1 / len", "mean_of_all", "first"))
+    assert "\n" not in str(caught.value)
 
 
 @dataclass(frozen=True)
@@ -440,8 +454,13 @@ def test_a_method_that_loses_what_it_learned_is_seen_before_its_results(monkeypa
         ShipidError, match=r"the method 'mine', saved and read back, predicts places 4\.2 m away: `header`"
     ):
         Predictor(NONE, "mine", Stored(5.0, kept=False)).check_restored(instants, paths)
-    with pytest.raises(ShipidError, match=r"^from_arrays of the method 'mine': ZeroDivisionError: .*, line "):
+    with pytest.raises(ShipidError, match=r"^Stored\.from_arrays: ZeroDivisionError: .*, line "):
         Predictor(NONE, "mine", Stored(0.0)).check_restored(instants, paths)
+    monkeypatch.setattr(Stored, "from_arrays", classmethod(lambda *_: None))
+    with pytest.raises(
+        ShipidError, match=r"^`from_arrays` of Stored in .* must return a corrector: NoneType lacks `pred"
+    ):
+        Predictor(NONE, "mine", Stored(2.0)).check_restored(instants, paths)
 
 
 @pytest.mark.parametrize(
@@ -472,6 +491,7 @@ def test_paths_of_a_method_that_are_none_are_named(made: Callable[[Any], Any], m
         ({}, {"std": np.zeros(2)}, "arrays of the method 'mine': 'std' must be above 0"),
         ({}, {"header": np.zeros(2)}, "arrays of the method 'mine': 'header' is a name that is taken: use another"),
         ({}, {"bands.x": np.zeros(2)}, "arrays of the method 'mine': 'bands.x' is a name that is taken"),
+        ({}, {"ragged": [[1.0], [1.0, 2.0]]}, "arrays of the method 'mine': .*inhomogeneous"),
         ({}, None, "the arrays of the method 'mine' must be a table, not NoneType"),
         ([1], {}, "the header of the method 'mine' must be a table of texts, numbers and lists of them, not list"),
         ({"a": {1, 2}}, {}, "the header of the method 'mine' must be a table .* not JSON serializable"),

@@ -18,6 +18,7 @@ from shipid.checked import Checked
 from shipid.data.windows import Instants, Windows, locked
 from shipid.errors import DataError, ShipidError
 from shipid.files import json_text
+from shipid.hybrid.contract import fault_of_corrector
 from shipid.hybrid.features import NOTHING, Inputs, Memory
 from shipid.hybrid.physics import Physics
 from shipid.vessel.load import Vessel
@@ -253,11 +254,11 @@ def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
         one = given.get(case)
         if not isinstance(one, Fitted):
             raise DataError(f"{name}.fit must give a Fitted for {case!r}, not {type(one).__name__}")
-        _check_fitted(f"{name}.fit", one, shape)
+        _check_fitted(f"{name}.fit", one, shape, method.compensates)
     return dict(given)
 
 
-def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...]) -> None:
+def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...], learns: bool) -> None:
     """DataError where the parts of a result are not what a study stores: it could not be read back."""
     if not isinstance(one.trials, list | tuple) or not all(isinstance(row, Mapping) for row in one.trials):
         raise DataError(f"{where}: trials must be a list of rows: make each by shipid.hybrid.trials.row_of")
@@ -274,6 +275,9 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...]) -> None:
         for key in ("number", "epochs"):
             whole_number(f"{where}: {key} of a trial", row[key], 0, DataError)
         one_of(f"{where}: state of a trial", row["state"], TRIAL_STATES, DataError)
+        if row["state"] != "diverged" and not np.isfinite(row["value"]):
+            words = f"must be finite, not {row['value']}, unless its state is 'diverged'"
+            raise DataError(f"{where}: value of a trial {words}")
         for key, value in row.items():
             try:
                 json_text(value)
@@ -281,15 +285,34 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...]) -> None:
                 words = f"must be plain data, numbers, texts or lists of them ({error})"
                 raise DataError(f"{where}: {key} of a trial {words}") from None
     number(f"{where}: seconds", one.seconds, DataError)
+    if not isinstance(one.sentence, str):
+        raise DataError(f"{where}: sentence must be a text, not {type(one.sentence).__name__}")
     if one.left_out is not None and np.shape(one.left_out) != shape:
         raise DataError(f"{where}: left_out must be {shape}, not {np.shape(one.left_out)}")
     if one.left_out is not None and np.asarray(one.left_out).dtype.kind not in "fiu":
         raise DataError(f"{where}: left_out must be real numbers, not {np.asarray(one.left_out).dtype}")
-    if one.corrector is not None:
-        chosen = one.corrector.hyperparameters
-        by_name(f"{where}: hyperparameters of the corrector", chosen, "a name to a number", DataError)
-        for key, value in chosen.items():
-            number(f"{where}: hyperparameters of the corrector: {key}", value, DataError)
+    if one.corrector is None:
+        return
+    if learns and not any(row["state"] == "complete" for row in one.trials):
+        remedy = "make it by shipid.hybrid.trials.row_of, or give Fitted(None, ...) where all failed"
+        raise DataError(f"{where}: a corrector needs a trial that is complete: {remedy}")
+    _check_corrector(where, one.corrector)
+
+
+def _check_corrector(where: str, corrector: Corrector) -> None:
+    """ShipidError where an object lacks what a corrector has, DataError for numbers that are none."""
+    with placed(where, type(corrector)):
+        if fault := fault_of_corrector(corrector):
+            raise ShipidError(f"{where}: {fault}")
+        chosen, past = corrector.hyperparameters, corrector.past
+    by_name(f"{where}: hyperparameters of the corrector", chosen, "a name to a number", DataError)
+    for key, value in chosen.items():
+        number(f"{where}: hyperparameters of the corrector: {key}", value, DataError)
+    if not 0 <= number(f"{where}: past of the corrector", past, DataError) < np.inf:
+        raise DataError(f"{where}: past of the corrector must be seconds, from 0 on, not {past!r}")
+
+
+READ_ONLY = ": what a method is given cannot be written to, make a new array: `paths + shift`, not `paths += shift`"
 
 
 @contextmanager
@@ -310,7 +333,9 @@ def placed(where: str, kind: type) -> Iterator[None]:
         place = place_of(error, kind)
         if not place:
             raise
-        raise ShipidError(f"{where}: {type(error).__name__}: {error}{place}") from error
+        said = f": {error}" if str(error) else ""
+        remedy = READ_ONLY if isinstance(error, ValueError) and "read-only" in said else ""
+        raise ShipidError(f"{where}: {type(error).__name__}{said}{place}{remedy}") from error
 
 
 def place_of(error: BaseException, kind: type) -> str:

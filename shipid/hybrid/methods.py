@@ -10,10 +10,11 @@ from shipid.document import parse
 from shipid.errors import DataError, DocumentError, choices
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.calibrator import Calibrator
+from shipid.hybrid.contract import fault_of_method
 from shipid.hybrid.forest import Forest
 from shipid.hybrid.hankel_dmd import HankelDMD
 from shipid.hybrid.learned_force import LearnedForce
-from shipid.hybrid.method import Method
+from shipid.hybrid.method import Method, placed
 from shipid.hybrid.modules import Modules
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
@@ -42,8 +43,11 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
     if not (isinstance(known, type) and issubclass(known, Method)) or known.__abstractmethods__:
         what = "needs `fit`" if isinstance(known, type) and issubclass(known, Method) else "must be a class of Method"
         raise DocumentError(f"METHODS[{kind!r}] {what}, such as shipid.hybrid.alone.Alone", path=f"{path}.kind")
+    if fault := fault_of_method(known):
+        raise DocumentError(f"METHODS[{kind!r}]: {fault}", path=f"{path}.kind")
     method: Method = parse(known, dict(settings), None, path)
-    past = method.past
+    with placed(f"{known.__name__}.past", known):
+        past = method.past
     if not isinstance(past, (int, float)) or not 0 <= past < math.inf:
         raise DocumentError(f"{known.__name__}.past must be seconds, from 0 on, not {past!r}", path=f"{path}.kind")
     return method
@@ -55,9 +59,11 @@ def listed(kind: str) -> str:
 
 
 def kind_of(method: Method) -> str:
-    """Return the name under which the class of a method is listed; DataError where it has none."""
+    """Return the name under which the class of a method is listed; DataError where it has none, or lacks a part."""
     kind = next((name for name, kind in METHODS.items() if type(method) is kind), None)
     if kind is None:
         name = type(method).__name__
         raise DataError(f"the method {name} has no name yet: write shipid.hybrid.methods.METHODS['mine'] = {name}")
+    if fault := fault_of_method(type(method)):
+        raise DataError(f"METHODS[{kind!r}]: {fault}")
     return kind

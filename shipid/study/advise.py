@@ -83,11 +83,14 @@ class Sides:
 
 @dataclass(frozen=True)
 class Case:
-    """Inputs of the sentences of one study: `rows` are `by_model` without families set aside."""
+    """Inputs of the sentences of one study: `rows` are `by_model` without families set aside.
+
+    best : as of `best_model`; None where no trial of a physics model has a value.
+    """
 
     results: Results
     rows: pd.DataFrame
-    best: str
+    best: str | None
 
     @property
     def smallest(self) -> int:
@@ -168,7 +171,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
         return [*sentences, (_nothing_learns(results, rows[rows["N_D"] == largest]), "cells"), *not_judged]
     if len(rows) and meets == {NO_MODEL}:
         return [*sentences, (_apart(results, largest), "cells"), *not_judged]
-    if best is None:
+    if rows[(rows["N_D"] == largest) & (rows["family"] != NO_MODEL)].empty:
         where = f" at {runs(largest)}" if largest else ""
         of = f" of the method {results.plan.judged!r}" if len(results.plan.methods) > 1 else ""
         counts = " that counts" if not_judged else ""
@@ -183,8 +186,8 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     sentences += which if len(learning) >= MANY else []
     if judged and (good := _good_enough(case)):
         sentences.append((good, chart))
-    if len(pure) and case.smallest < largest:
-        sentences.append((_enough_runs(case), chart))
+    if len(pure) and case.smallest < largest and best is not None:
+        sentences.append((_enough_runs(case, best), chart))
     sentences.append((_headline(case, any(BEST in text for text, _ in sentences)), "gain"))
     if len(learning) > 1:
         spoken = f"The study has {len(learning)} methods that learn from data; the other sentences speak of "
@@ -347,9 +350,9 @@ def _against_none(case: Case, amount: int) -> Sides:
     return replace(sides, left_out=len(case.at(amount)) - len(models), lacking=case.lacks(amount))
 
 
-def _enough_runs(case: Case) -> str:
+def _enough_runs(case: Case, best: str) -> str:
     """Error of the best model with the fewest runs, and how many runs give the same error without physics."""
-    fewest, largest, best = case.smallest, case.largest, case.best
+    fewest, largest = case.smallest, case.largest
     first = case.rows[(case.rows["model"] == best) & (case.rows["N_D"] == fewest)]
     if first.empty:
         return f"{best} has no result at {runs(fewest)}, so its worth in runs is unknown."
@@ -381,18 +384,23 @@ def _count(value: float, estimate: Estimate) -> str:
 
 
 def _headline(case: Case, introduced: bool) -> str:
-    """Error of the model with the lowest validation loss at the largest amount of data.
+    """Error of the model with the lowest validation loss at the largest amount of data; of all models without a loss.
 
     introduced : whether a sentence before has said that this model is the best in validation.
     """
     rows = case.at(case.largest).set_index("model")
-    alone, worst = float(str(rows.at[case.best, "A"])), float(str(rows.at[case.best, "H_90"]))
-    chosen = "" if introduced else f"{BEST}; "
-    text = (
-        f"With {runs(case.largest)}, {case.best} ({chosen}{metres(alone)} mean error alone) "
-        f"predicts {_ahead(case.results)} ahead with {case.H(case.best, case.largest)} mean error; "
-        f"nine errors in ten are below {metres(worst)}"
-    )
+    if case.best is None:
+        method, errors = case.results.plan.judged, _least(rows["H"])
+        text = f"With {runs(case.largest)} no trial of the method {method!r} has a value, so no model is {BEST}. "
+        text += f"Mean errors {_ahead(case.results)} ahead{errors}"
+    else:
+        alone, worst = float(str(rows.at[case.best, "A"])), float(str(rows.at[case.best, "H_90"]))
+        chosen = "" if introduced else f"{BEST}; "
+        text = (
+            f"With {runs(case.largest)}, {case.best} ({chosen}{metres(alone)} mean error alone) "
+            f"predicts {_ahead(case.results)} ahead with {case.H(case.best, case.largest)} mean error; "
+            f"nine errors in ten are below {metres(worst)}"
+        )
     pure = case.rows[(case.rows["family"] == NO_MODEL) & (case.rows["N_D"] == case.largest)]
     return f"{text}. Without physics: {case.H(NO_MODEL, case.largest)}." if len(pure) else f"{text}."
 
@@ -540,7 +548,7 @@ def _how_to_read(case: Case) -> list[str]:
         sentences.append(f"{text}.")
     top = case.at(case.largest)
     fitted = top[top["family"].isin(plan.fitted)]
-    if len(fitted) and not fitted["model"].eq(case.best).any():
+    if fitted["loss"].notna().any() and case.best not in set(fitted["model"]):
         lowest = fitted.iloc[int(fitted["loss"].argmin())]
         sentences.append(
             "Models that were identified, or whose observer was chosen, were fitted to their validation runs, too, so "

@@ -519,7 +519,7 @@ def trials_frame(results: Results) -> pd.DataFrame:
     searched = list(dict.fromkeys(name for method in methods.values() for name in method.varied()))
     rows = []
     for cell in results.rows:
-        done = [trial for trial in cell["trials"] if trial["state"] == "complete"]
+        done = [trial for trial in cell["trials"] if trial["state"] == "complete" and trial["value"] is not None]
         best = sorted(done, key=lambda trial: trial["value"])[: methods[cell["method"]].num_chosen()]
         for trial in cell["trials"]:
             row = {name: cell[name] for name in ("cell", "model", "N_D", "seed")}

@@ -25,7 +25,7 @@ from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.engines import check_device
 from shipid.engine.native import engine
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.errors import DataError, ShipidError
+from shipid.errors import DataError, ShipidError, legible
 from shipid.files import make_folder, write_json
 from shipid.hybrid.compensator import shared_units
 from shipid.hybrid.device import use_threads, vectors
@@ -363,7 +363,7 @@ def _cell(
     row |= {"seconds": result.seconds + one.seconds + seconds, "trials": result.trials}
     if result.corrector is None:
         why = result.sentence or one.sentence or "no training converged"
-        return store.Cell({**row, **_failed(why)}, None, None)
+        return store.Cell({**row, **_failed(legible(why))}, None, None)
     predictor = _predictor(plan, prepared, one.foundation, way, batch, result.corrector, windows)
     if one.foundation.family not in plan.fitted and result.left_out is not None:
         errors = result.left_out  # fair: numbers and observer were not taken from these runs

@@ -112,6 +112,20 @@ ROW = row_of(0, {}, 1.0, 0.0)
         ({"right": Fitted(None, None, 0.0)}, "trials must be a list of rows"),  # type: ignore[arg-type]
         ({"right": Fitted(None, [{**ROW, "params": None}], 0.0)}, "params of a trial must be a dict"),
         ({"right": Fitted(None, [{**ROW, "value": "low"}], 0.0)}, "value of a trial must be a number, not 'low'"),
+        ({"right": Fitted(None, [{**ROW, "value": np.nan}], 0.0)}, "value of a trial must be finite, not nan, unless"),
+        ({"right": Fitted(None, [{**ROW, "value": np.inf}], 0.0)}, "value of a trial must be finite, not inf, unless"),
+        (
+            {"right": Fitted(None, [{**ROW, "value": np.nan, "state": "stopped"}], 0.0)},
+            "value of a trial must be finite, not nan, unless",
+        ),
+        ({"right": Fitted(Unchanged({}), [], 0.0)}, "a corrector needs a trial that is complete: make it by .*row_of"),
+        ({"right": Fitted(Unchanged({}), [row_of(0, {}, np.nan, 0.0)], 0.0)}, "a corrector needs a trial that is comp"),
+        ({"right": Fitted(Unchanged({}, "1 s"), [ROW], 0.0)}, "past of the corrector must be a number, not '1 s'"),  # type: ignore[arg-type]
+        (
+            {"right": Fitted(Unchanged({}, -1.0), [ROW], 0.0)},
+            "past of the corrector must be seconds, from 0 on, not -1",
+        ),
+        ({"right": Fitted(None, [ROW], 0.0, sentence=3)}, "sentence must be a text, not int"),  # type: ignore[arg-type]
         ({"right": Fitted(None, [{**ROW, "number": "1"}], 0.0)}, "number of a trial must be a whole number, 0 or more"),
         ({"right": Fitted(None, [{**ROW, "state": "done"}], 0.0)}, "state of a trial 'done' is not known: valid: comp"),
         ({"right": Fitted(None, [{**ROW, "params": {"seed": 1.0}}], 0.0)}, "params of a trial: 'seed' is a name that"),
@@ -135,6 +149,17 @@ def test_what_a_method_gives_is_checked(gives: Any, message: str) -> None:
     with pytest.raises(DataError, match=rf"^Mine\.fit:? {message}") as caught:
         fit_all(Mine(), task())
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("corrector", [None, Unchanged({})])
+def test_a_trial_that_diverged_needs_no_value(corrector: Unchanged | None) -> None:
+    rows = [row_of(0, {}, np.nan, 0.0), *([ROW] if corrector else [])]
+
+    class Mine(Method):
+        def fit(self, given: Task) -> dict[str, Fitted]:
+            return dict.fromkeys(given.cases, Fitted(corrector, rows, 0.0))
+
+    assert fit_all(Mine(), task())["right"].trials == rows
 
 
 def test_errors_left_out_that_are_no_numbers_are_refused() -> None:
@@ -166,6 +191,55 @@ def test_a_mistake_in_the_code_of_a_user_has_its_file_and_line() -> None:
 
     with pytest.raises(ShipidError, match=rf"^Mine\.fit: KeyError: 'left' in {re.escape(__file__)}, line \d+$"):
         fit_all(Mine(), task())
+
+
+@pytest.mark.parametrize(
+    ("gives", "message"),
+    [
+        (Unchanged, "the corrector must be an object of Unchanged in .*, not the class"),
+        ({}, "dict lacks `predict`"),
+    ],
+)
+def test_what_lacks_a_part_of_a_corrector_is_named(gives: Any, message: str) -> None:
+    """No data can make it another: the run ends, and cells that are finished stay."""
+
+    class Mine(Method):
+        def fit(self, given: Task) -> dict[str, Fitted]:
+            return dict.fromkeys(given.cases, Fitted(gives, [ROW], 0.0))
+
+    with pytest.raises(ShipidError, match=rf"^Mine\.fit: {message}$") as caught:
+        fit_all(Mine(), task())
+    assert type(caught.value) is ShipidError  # a DataError is a result, of cells that then have none
+
+
+@pytest.mark.parametrize("of", ["fit", "hyperparameters", "past"])
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (ValueError("first\nsecond"), "ValueError: first second"),
+        (KeyError("left"), "KeyError: 'left'"),
+        (AssertionError(), "AssertionError"),
+        (StopIteration(), "StopIteration"),
+        (ValueError("output array is read-only"), "ValueError: output array is read-only"),
+    ],
+)
+def test_every_error_of_a_users_code_is_one_line(of: str, error: Exception, said: str) -> None:
+    def raised(*_: object) -> Any:
+        raise error
+
+    class Mine(Method):
+        def fit(self, given: Task) -> dict[str, Fitted]:
+            if of == "fit":
+                raised()
+            parts = {"hyperparameters": {}, "past": 0.0, of: property(raised)}
+            kind = type("Held", (Unchanged,), {**parts, "__init__": lambda _: None, "__module__": __name__})
+            return dict.fromkeys(given.cases, Fitted(kind(), [ROW], 0.0))  # type: ignore[arg-type]
+
+    with pytest.raises(ShipidError) as caught:
+        fit_all(Mine(), task())
+    remedy = r": what a method is given cannot be .*: `paths \+ shift`, .*" if "read-only" in said else ""
+    where = re.escape(__file__)
+    assert re.fullmatch(rf"Mine\.fit: {re.escape(said)} in {where}, line \d+{remedy}", str(caught.value))
 
 
 @pytest.mark.parametrize("kind", METHODS)

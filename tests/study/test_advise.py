@@ -406,6 +406,55 @@ def test_without_results_there_is_no_conclusion(made: Any) -> None:
     assert "there is no conclusion yet" in text(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (10,))))
 
 
+@pytest.mark.parametrize(
+    "trials",
+    [
+        [],
+        [{"value": None, "state": "complete"}],
+        [{"value": None, "state": "diverged"}],
+        [{"value": 2.0, "state": "stopped"}],
+        [{"value": None, "state": "complete"}] * 2,
+    ],
+)
+def test_results_are_answered_whatever_their_trials_say(made: Any, trials: list[dict[str, Any]]) -> None:
+    """The answer said that no cell had a result, where trials of a user's method had no value."""
+    H = {"good": (1.5, 1.0), "bad": (5.0, 4.5), "none": (9.0, 4.0)}
+    whole = made(grid(H), runs=20)
+    odd = replace(whole, cells=whole.cells.assign(trials=[trials] * len(whole.cells)))
+    assert best_model(odd) is None
+    with_best, without = (text(results).split("\n") for results in (whole, odd))
+    assert not any("no conclusion" in sentence for sentence in without)
+    of_best = ("How many runs?", "With 30 runs, good")
+    kept = [sentence for sentence in with_best if not sentence.startswith(of_best)]
+    added = [sentence for sentence in without if sentence not in kept]
+    assert [sentence for sentence in without if sentence not in added] == kept
+    begins = (
+        "With 30 runs no trial of the method 'drawn' has a value, so no model is best in validation. Mean errors 8 s"
+    )
+    assert len(added) == 1
+    assert added[0].startswith(f"{begins} ahead: good 1.00 m and bad 4.50 m. Without physics: 4.00 m")
+
+
+def test_a_trial_without_a_value_does_not_hide_the_others(made: Any) -> None:
+    results = made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}))
+    before = by_model(results)
+    odd = [[{"value": None, "state": "complete"}, *trials] for trials in results.cells["trials"]]
+    pd.testing.assert_frame_equal(by_model(replace(results, cells=results.cells.assign(trials=odd))), before)
+
+
+@pytest.mark.parametrize("trials", [[], [{"value": None, "state": "complete"}]])
+def test_identified_models_are_answered_whatever_their_trials_say(made: Any, trials: list[dict[str, Any]]) -> None:
+    families = [
+        {"name": "bad", "base": "gunnerus-28.9"},
+        {"name": "fitted", "extends": "bad", "identify": {"parameters": ["hull.derivatives.N_ur"]}},
+    ]
+    H = grid({"bad": (3.0, 2.0), "fitted": (0.8, 0.7), "none": (9.0, 4.0)})
+    results = made(H, alone={"bad": 6.0, "fitted": 3.0}, claims=None, changes={"family": families})
+    advice = text(replace(results, cells=results.cells.assign(trials=[trials] * len(results.cells))))
+    assert "Mean errors 8 s ahead: fitted 0.70 m and bad 2.00 m. Without physics: 4.00 m" in advice
+    assert "cannot be called" not in advice
+
+
 def test_where_the_method_that_judges_has_no_result_others_may_have_one(made: Any) -> None:
     methods = [{"name": "drawn", "kind": "path-drawn"}, {"name": "other", "kind": "path-drawn"}]
     results = made(grid({"good": (None, None), "none": (9.0, 4.0)}), changes={"method": methods}, planned=12)

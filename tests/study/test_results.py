@@ -241,12 +241,13 @@ def test_trials_know_the_chosen_one(read: Results) -> None:
     first = read.rows[0]
     two = [{**first["trials"][0], "number": k, "value": value} for k, value in enumerate((2.0, 1.0))]
     two.append({**two[0], "number": 2, "state": "diverged", "value": None})
-    for averaged, chosen in ((1, [False, True, False]), (8, [True, True, False])):
+    two += [{**two[0], "number": number, "value": None} for number in (3, 4)]  # not a number: it ended in a traceback
+    for averaged, chosen in ((1, [False, True, *[False] * 3]), (8, [True, True, *[False] * 3])):
         (way,) = read.plan.methods
         plan = replace(read.plan, methods=(replace(way, method=way.method.model_copy(update={"averaged": averaged})),))
         frame = frames.trials_frame(replace(read, plan=plan, cells=pd.DataFrame([{**first, "trials": two}])))
         assert frame["chosen"].tolist() == chosen
-    assert frame["value"].tolist() == pytest.approx([2.0, 1.0, np.nan], nan_ok=True)
+    assert frame["value"].tolist() == pytest.approx([2.0, 1.0, *[np.nan] * 3], nan_ok=True)
     diverged = [{**trial, "state": "diverged", "value": None} for trial in two]
     assert not frames.trials_frame(replace(read, cells=pd.DataFrame([{**first, "trials": diverged}])))["chosen"].any()
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import re
 import shutil
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
-from typing import Any
+from types import ModuleType, SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -18,11 +20,12 @@ import pytest
 import tomlkit
 
 from shipid.data.dataset import read_dataset
-from shipid.errors import ResultError, ShipidError
+from shipid.errors import DataError, ResultError, ShipidError
 from shipid.files import read_json, write_json
-from shipid.hybrid.method import Fitted, Task
+from shipid.hybrid.method import Fitted, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.trials import row_of
 from shipid.metrics import position_error, summary
 from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor
@@ -633,6 +636,105 @@ def test_methods_are_fitted_with_the_seed_of_their_batch(tmp_path: Path, monkeyp
         run_unit(plan, prepared, plan.whole(batch), "cpu")
     assert seen == [batch.seed for batch in plan.batches]
     assert sorted(seen) == [3, 8]
+
+
+MISTAKE = ""  # of `Faulty` and `Moved`
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A corrector that a user wrote, with a mistake."""
+
+    hyperparameters: Any
+    past: float = 0.0
+
+    def predict(self, physics: Any, instants: Any, paths: Any) -> Any:  # noqa: ARG002
+        if MISTAKE == "raises":
+            raise ValueError("first\nsecond")
+        if MISTAKE == "adds":
+            paths += 1.0
+        return paths
+
+    def header(self) -> dict[str, Any]:
+        return {}
+
+    def arrays(self) -> dict[str, Any]:
+        return {}
+
+    @classmethod
+    def from_arrays(cls, header: Any, arrays: Any) -> Any:  # noqa: ARG003
+        return None if MISTAKE == "returns nothing" else cls({})
+
+
+class Faulty(Method):
+    """A method that a user wrote, with a mistake."""
+
+    corrector: ClassVar[type[Any]] = Moved
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        if MISTAKE == "few runs":
+            raise DataError("too few runs:\nmake more")
+        given = SimpleNamespace(**vars(Moved({})), predict=None) if MISTAKE == "lacks" else Moved({})
+        rows = {"no trial": [], "NaN": [row_of(0, {}, 1.0, 0.0) | {"value": np.nan}]}
+        return dict.fromkeys(task.cases, Fitted(given, rows.get(MISTAKE, [row_of(0, {}, 1.0, 0.0)]), 0.0))
+
+
+def faulty_plan(folder: Path, monkeypatch: pytest.MonkeyPatch, mistake: str) -> Plan:
+    monkeypatch.setitem(METHODS, "faulty", Faulty)
+    monkeypatch.setattr(sys.modules[__name__], "MISTAKE", mistake)
+    methods = [
+        {"name": "drawn", "kind": "path-drawn", "trials": 1, "units": 8, "terms": 4},
+        {"name": "mine", "kind": "faulty"},
+    ]
+    return tiny_plan(folder, {"method": methods, "claims": {"method": "mine"}, "grid.N_D": [4]})
+
+
+@pytest.mark.parametrize(
+    ("mistake", "message"),
+    [
+        ("raises", r"Moved\.predict: ValueError: first second in FILE, line \d+"),
+        (
+            "adds",
+            r"Moved\.predict: ValueError: .* read-only in FILE, line \d+: .* make a new array: `paths \+ shift`, .*",
+        ),
+        ("returns nothing", "`from_arrays` of Moved in FILE must return a corrector: NoneType lacks `predict`"),
+        ("lacks", r"Faulty\.fit: SimpleNamespace in .* lacks `header`"),
+    ],
+)
+def test_a_mistake_of_a_user_is_one_line_and_loses_no_cell(
+    mistake: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The run ends; when the mistake is mended it goes on in the same folder."""
+    plan, folder = faulty_plan(tmp_path, monkeypatch, mistake), tmp_path / "run"
+    with pytest.raises(ShipidError) as caught:
+        run_here(plan, folder)
+    assert re.fullmatch(message.replace("FILE", re.escape(__file__)), str(caught.value))
+    finished = {file: file.read_bytes() for file in (folder / "cells").iterdir()}
+    assert len(finished) == len(plan.foundations)  # those of `drawn`
+    monkeypatch.setattr(sys.modules[__name__], "MISTAKE", "")
+    run_here(plan, folder)
+    assert {file: file.read_bytes() for file in finished} == finished
+    assert set(store.read_rows(folder)["status"]) == {"ok"}
+
+
+@pytest.mark.parametrize(
+    ("mistake", "sentence"),
+    [
+        ("few runs", "too few runs: make more"),
+        ("no trial", "Faulty.fit: a corrector needs a trial that is complete: "),
+        ("NaN", "Faulty.fit: value of a trial must be finite, not nan, unless its state is 'diverged'"),
+    ],
+)
+def test_what_a_method_gives_and_no_study_can_store_is_a_cell_without_a_result(
+    mistake: str, sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Cells without a trial that has a value had an H, and the answer said that there was none."""
+    plan = faulty_plan(tmp_path, monkeypatch, mistake)
+    run_here(plan, tmp_path / "run")
+    rows = store.read_rows(tmp_path / "run").set_index("method")
+    assert set(rows.loc["drawn", "status"]) == {"ok"}
+    assert set(rows.loc["mine", "status"]) == {"failed"}
+    assert all(said.startswith(sentence) and "\n" not in said for said in rows.loc["mine", "sentence"])
 
 
 @pytest.mark.parametrize("workers", [0, -1, 1.5, "2"])
