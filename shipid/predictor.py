@@ -22,7 +22,7 @@ from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrated
 from shipid.hybrid.contract import fault_of_corrector, named
-from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, place_of, placed, widened
+from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, widened
 from shipid.hybrid.methods import METHODS, kind_of, listed
 from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.metrics import lengths
@@ -30,6 +30,7 @@ from shipid.observer import AGE, Observer
 from shipid.physics.signals import SIGNALS, measurable
 from shipid.simulation.log import column_of
 from shipid.units import percent
+from shipid.users import place_of, placed
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 

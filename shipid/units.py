@@ -1,6 +1,7 @@
-"""Factors from common units to SI: value in SI = value * factor; gravity; how numbers, counts and lists are worded."""
+"""Factors from common units to SI: value in SI = value * factor; gravity; how units, numbers and lists are written."""
 
 import math
+import re
 from collections.abc import Sequence
 
 RPM = 1.0 / 60.0
@@ -13,6 +14,41 @@ MINUTE = 60.0
 """Seconds in one minute."""
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2], where a vessel gives no other one; 9.80665 (BIPM, SI Brochure) to three digits."""
+
+SYMBOLS = ("kg", "m", "s", "N", "rad", "deg", "rev", "Pa", "W", "J", "K", "Hz", "-", "prime")
+"""Symbols of units of parameters; `prime`: by half rho and powers of length and speed (SNAME 1950)."""
+_PRODUCT = rf"(?:{'|'.join(SYMBOLS)})(?:\^-?\d+)?"
+_PRODUCT = rf"{_PRODUCT}(?: {_PRODUCT})*"
+_UNIT = re.compile(rf"(?:{_PRODUCT}|1(?=/))(?:/{_PRODUCT})?")
+_WORDS = {
+    r"(?i:met(?:re|er)s?)": "m",
+    r"(?i:kilo(?:gram(?:me)?)?s?)": "kg",
+    r"(?i:sec(?:ond)?s?)": "s",
+    r"(?i:newtons?)|n": "N",
+    r"Nm": "N m",
+    r"(?i:radians?)": "rad",
+    r"(?i:degrees?)|°": "deg",
+}
+"""How units are written otherwise, as regular expressions -> right."""
+
+
+def unit_fault(unit: str) -> str:
+    """What to write in place of a unit that is no product of powers, such as `kg m^-1`; empty where it is one.
+
+    After one `/` are the units that divide: `m/s^2`.
+    """
+    if _UNIT.fullmatch(unit):
+        return ""
+    plain = unit.translate(str.maketrans("²³⁴⁵¹⁻", "23451-")).replace("**", "^")
+    plain = re.sub(r"\s*/\s*", "/", re.sub(r"[\s*·.]+", " ", plain)).strip()
+    for words, symbol in _WORDS.items():
+        plain = re.sub(rf"(?<![A-Za-z])(?:{words})(?![A-Za-z])", symbol, plain)
+    plain = re.sub(r"(?<=[A-Za-z])(?=-?\d)", "^", plain)
+    plain = "-" if plain.casefold() in ("", "1", "none", "dimensionless") else plain
+    remedy = (
+        "write a product of powers of the SI units kg, m, s, N and rad, such as 'kg m^-1', or '-' for a pure number"
+    )
+    return f"write {plain!r}" if _UNIT.fullmatch(plain) else remedy
 
 
 def decimals_of(length: float) -> int:

@@ -26,7 +26,8 @@ from shipid.simulation.standard import standards
 from shipid.study.schema import Study
 from shipid.vessel.load import Patch
 from shipid.vessel.perturb import Perturbation
-from shipid.vessel.schema import FIXED, term_model, vessel_model
+from shipid.vessel.schema import term_model, vessel_model
+from shipid.vessel.terms import FIXED
 from tests.measures.made_records import RECORDS, every
 
 DOCS = Path(__file__).parents[1] / "docs"

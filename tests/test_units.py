@@ -23,6 +23,7 @@ from shipid.units import (
     level_text,
     listed,
     percent,
+    unit_fault,
 )
 
 
@@ -130,3 +131,33 @@ def test_digits_have_no_exponent_above_one() -> None:
 def test_a_level_has_all_its_decimals() -> None:
     levels = {0.9: "90 %", 0.975: "97.5 %", 0.125: "12.5 %", 0.29: "29 %", 0.57: "57 %", 0.999: "99.9 %"}
     assert {level: level_text(level) for level in levels} == levels
+
+
+@pytest.mark.parametrize("unit", ["m", "N m", "kg m^-3", "kg m^-1 s^2", "m/s^2", "1/s", "rad/s", "-", "prime"])
+def test_products_of_powers_are_units(unit: str) -> None:
+    assert unit_fault(unit) == ""
+
+
+@pytest.mark.parametrize(
+    ("unit", "right"),
+    [
+        ("meter", "m"),
+        ("metres^2", "m^2"),
+        ("m2", "m^2"),
+        ("m²", "m^2"),
+        ("kg m⁻³", "kg m^-3"),
+        ("kg*m**-1", "kg m^-1"),
+        ("kg·m2 / s", "kg m^2/s"),
+        ("Nm", "N m"),
+        ("Seconds", "s"),
+        ("", "-"),
+        ("1", "-"),
+    ],
+)
+def test_another_spelling_of_a_unit_is_put_right(unit: str, right: str) -> None:
+    assert unit_fault(unit) == f"write {right!r}"
+
+
+@pytest.mark.parametrize("unit", ["kN", "knots", "rpm", "m/s/s", "m^1/2", "metre per second", "lb"])
+def test_no_unit_of_shipid_is_refused_with_what_is_one(unit: str) -> None:
+    assert "SI units kg, m, s, N and rad" in unit_fault(unit)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol, Self
 
@@ -21,6 +19,7 @@ from shipid.files import json_text
 from shipid.hybrid.contract import fault_of_corrector
 from shipid.hybrid.features import NOTHING, Inputs, Memory
 from shipid.hybrid.physics import Physics
+from shipid.users import placed
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -310,44 +309,6 @@ def _check_corrector(where: str, corrector: Corrector) -> None:
         number(f"{where}: hyperparameters of the corrector: {key}", value, DataError)
     if not 0 <= number(f"{where}: past of the corrector", past, DataError) < np.inf:
         raise DataError(f"{where}: past of the corrector must be seconds, from 0 on, not {past!r}")
-
-
-READ_ONLY = ": what a method is given cannot be written to, make a new array: `paths + shift`, not `paths += shift`"
-
-
-@contextmanager
-def placed(where: str, kind: type) -> Iterator[None]:
-    """Raise ShipidError, one line with its place, for a mistake in the code of a user's class, or a call of `sys.exit`.
-
-    Errors that arise elsewhere pass as they are.
-    """
-    try:
-        yield
-    except SystemExit as error:
-        words = (f" ({error.code})" if isinstance(error.code, str) else "") + place_of(error, kind)
-        remedy = "a method may not end the process, raise DataError instead"
-        raise ShipidError(f"{where} calls sys.exit{words}: {remedy}") from None
-    except (ShipidError, MemoryError):
-        raise
-    except Exception as error:
-        place = place_of(error, kind)
-        if not place:
-            raise
-        said = f": {error}" if str(error) else ""
-        remedy = READ_ONLY if isinstance(error, ValueError) and "read-only" in said else ""
-        raise ShipidError(f"{where}: {type(error).__name__}{said}{place}{remedy}") from error
-
-
-def place_of(error: BaseException, kind: type) -> str:
-    """Where in the module of a user's class an error arose, ` in FILE, line N`; empty where it did not arise there."""
-    if kind.__module__.startswith("shipid."):
-        return ""
-    file, trace, line = getattr(sys.modules.get(kind.__module__), "__file__", None), error.__traceback__, 0
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == file:
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return f" in {file}, line {line}" if line else ""
 
 
 def widened(low: float, high: float) -> tuple[float, float]:

@@ -14,12 +14,13 @@ from shipid.hybrid.contract import fault_of_method
 from shipid.hybrid.forest import Forest
 from shipid.hybrid.hankel_dmd import HankelDMD
 from shipid.hybrid.learned_force import LearnedForce
-from shipid.hybrid.method import Method, placed
+from shipid.hybrid.method import Method
 from shipid.hybrid.modules import Modules
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.recurrent import Recurrent
+from shipid.users import placed
 
 METHODS: dict[str, type[Method]] = {
     "alone": Alone,

@@ -6,6 +6,7 @@ All results come from numerical evaluation of the vessel's equations, so they ho
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
@@ -15,11 +16,14 @@ from numpy.typing import NDArray
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
+from shipid.physics import TERMS
 from shipid.physics.helm import Unit, course_keeping
 from shipid.physics.signals import ACTUAL, is_shaft, neutral, steers
 from shipid.units import GRAVITY, listed
+from shipid.users import begins_at
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
+from shipid.vessel.schema import term_blocks
 
 Array = NDArray[np.float64]
 
@@ -111,7 +115,7 @@ class Controls:
             weather = ", ".join(dynamics(vessel).environment)
             zeros = f" and {weather} 0, as where none is given" if weather else ""
             message = f"the forces on {vessel.name} are not finite at rest, with commands neutral{zeros}"
-            raise DocumentError(f"{message}: mend the term or its numbers", file=vessel.file)
+            raise DocumentError(f"{message}: mend {_not_finite(vessel)} or its numbers", file=vessel.file)
         ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in self.commands if is_shaft(name)}
         drives = tuple(name for name, rates in ahead.items() if rates[0] - idle[0] > NOTHING)
         yaw = [ahead[name][2] - idle[2] for name in drives]
@@ -151,6 +155,15 @@ class Controls:
             name: angles.get(name, n if name in self.drives else np.full(len(n), neutral(name)))
             for name in self.commands
         }
+
+
+def _not_finite(vessel: Vessel) -> str:
+    """The term without which the forces at rest are finite, with the place of a user's; `the term` for none alone."""
+    for path, key, _ in term_blocks(vessel.document):
+        with suppress(DocumentError):  # others are behind it
+            if np.isfinite(acceleration(vessel.with_values({f"{path}.off": True}), 0.0, {})).all():
+                return f"{path}{begins_at(TERMS[key].function)}"
+    return "the term"
 
 
 def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Array:

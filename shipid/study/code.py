@@ -12,6 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from shipid.users import of_users, written
+
 INSTALLED = ("site-packages", "dist-packages")
 
 
@@ -33,17 +35,6 @@ def asked(packed: bytes) -> tuple[str, str]:
     return code_digest(), ""
 
 
-def of_users(kind: Callable[..., Any]) -> bool:
-    """Whether a class or a function is none of shipid's: somebody wrote it."""
-    return _written(kind).__module__.partition(".")[0] != "shipid"
-
-
-def _written(kind: Callable[..., Any]) -> Callable[..., Any]:
-    """The class or function as it stands in a file: that of a `partial`, or the class of an object that is called."""
-    kind = getattr(kind, "func", kind)
-    return kind if hasattr(kind, "__qualname__") else type(kind)
-
-
 @cache
 def users_code(kinds: tuple[Callable[..., Any], ...]) -> str:
     """Digest (8 hex digits) of the files that a user's classes and functions are in, and what they import beside them.
@@ -51,7 +42,7 @@ def users_code(kinds: tuple[Callable[..., Any], ...]) -> str:
     Those of a notebook have none. As `code_digest`: the files at the first call in this process.
     """
     files: set[Path] = set()
-    for kind in map(_written, filter(of_users, kinds)):
+    for kind in map(written, filter(of_users, kinds)):
         with suppress(OSError, TypeError):  # of a notebook
             files |= _with_imported(Path(inspect.getfile(inspect.unwrap(kind))).resolve(), kind.__module__.count("."))
     texts = [file.read_bytes() for file in sorted(files)]

@@ -26,7 +26,7 @@ from shipid.logs.importing import digest_of, sha256_of
 from shipid.logs.mapping import read_mapping
 from shipid.simulation.manoeuvre import KINDS
 from shipid.simulation.truth import Truth, check_truth, vessel_of
-from shipid.study.code import of_users, users_code
+from shipid.study.code import users_code
 from shipid.study.declared import (
     NO_MODEL,
     Foundation,
@@ -39,6 +39,7 @@ from shipid.study.declared import (
 )
 from shipid.study.ranges import LONGEST_NAME, Cut, check_memory, check_ranges, check_seeds
 from shipid.study.schema import Claims, Data, Published, Study, check_version
+from shipid.users import of_users
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, resolve
 from shipid.vessel.schema import functions
@@ -46,6 +47,7 @@ from shipid.vessel.schema import functions
 WITH = "+"  # between a foundation and a method
 OF_PART = "/"  # between the name of a part and that of its source
 OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
+METHOD_CODE, TERM_CODE = "code of the method", "code of the term"  # entries of a session: name -> digest
 USER_SCRIPT = "my.py"  # a user's script with a method or a term, where its name is unknown
 
 
@@ -174,9 +176,9 @@ class Plan:
         kinds = {way.name: type(way.method) for way in self.methods}
         of_method = {name: (kind, getattr(kind, "corrector", kind)) for name, kind in kinds.items()}
         of_term = {key: held for vessel in self.used_vessels for key, held in functions(vessel.document).items()}
-        every: dict[str, Mapping[str, tuple[Callable[..., Any], ...]]] = {"method": of_method, "term": of_term}
+        every: dict[str, Mapping[str, tuple[Callable[..., Any], ...]]] = {METHOD_CODE: of_method, TERM_CODE: of_term}
         found = {
-            f"code of the {what}": {name: users_code(held) for name, held in named.items() if any(map(of_users, held))}
+            what: {name: users_code(held) for name, held in named.items() if any(map(of_users, held))}
             for what, named in every.items()
         }
         return {what: digests for what, digests in found.items() if digests}

@@ -36,7 +36,7 @@ from shipid.metrics import lengths, position_error, share_of, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
 from shipid.study.claims import WAIT, Holder, TakenOver, UnitClaims, pause
-from shipid.study.code import code_digest, of_users
+from shipid.study.code import code_digest
 from shipid.study.declared import Foundation, Way
 from shipid.study.envelope import envelope
 from shipid.study.foundations import Prediction, predictions
@@ -56,6 +56,7 @@ from shipid.study.prepare import (
 )
 from shipid.study.workers import import_for_workers, on_workers
 from shipid.units import percent
+from shipid.users import of_users
 from shipid.version import __version__
 
 PACKAGES = (

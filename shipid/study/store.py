@@ -17,6 +17,7 @@ from shipid import document as documents
 from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError
 from shipid.files import (
+    as_argument,
     make_folder,
     part_of,
     read_arrays,
@@ -29,10 +30,13 @@ from shipid.files import (
     write_table,
     write_text,
 )
+from shipid.hybrid.methods import METHODS
+from shipid.physics import TERMS
 from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.declared import Foundation
-from shipid.study.plan import WITH, Plan, Unit, build_plan
+from shipid.study.plan import METHOD_CODE, TERM_CODE, USER_SCRIPT, WITH, Plan, Unit, build_plan
+from shipid.units import listed, plural
 from shipid.version import __version__
 from shipid.vessel.load import check_vessel
 
@@ -45,8 +49,8 @@ PARTS = "parts"
 UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
 ENTRIES: dict[str, tuple[type | tuple[type, ...], type]] = {
-    **dict.fromkeys(("digest", "name", "file"), (str, object)),
-    **dict.fromkeys(("sources", "changes", "machine"), (dict, object)),
+    **dict.fromkeys(("digest", "name", "file", "program"), (str, object)),
+    **dict.fromkeys(("sources", "changes", "machine", METHOD_CODE, TERM_CODE), (dict, object)),
     **{"sessions": (list, dict), "notes": (list, str), "wall_seconds": ((float, int), object)},
 }
 """Entries of the provenance -> what each is, and what those in it are."""
@@ -167,6 +171,8 @@ def _describe(folder: Path, plan: Plan) -> None:
     """Write what a folder is: provenance, vessels and, last, the study."""
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
     origin["changes"] = dict(plan.changes)
+    if plan.code:
+        origin |= {"program": plan.program, **plan.code}
     write_json(folder / PROVENANCE, {"digest": plan.digest, **origin})
     _write_vessels(folder, plan)
     write_text(folder / STUDY, plan.text())
@@ -184,18 +190,19 @@ def stored_plan(folder: Path) -> Plan:
         document = documents.read(folder / STUDY)
     except DocumentError as error:
         raise ResultError(f"damaged ({error.message}): run the study again", file=folder / STUDY) from None
+    remedy = _needed_script(folder, record, document)
     stored = read_json(folder / VESSELS)
     try:
         vessels = {name: check_vessel(entry["document"], entry["file"]) for name, entry in stored.items()}
     except (TypeError, KeyError, AttributeError, ValueError):
         raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
     except DocumentError as error:
-        raise _not_taken(error, folder / VESSELS) from None
+        raise _not_taken(error, folder / VESSELS, remedy) from None
     try:
         sources, changes = (record.get(key, {}) for key in ("sources", "changes"))
         plan = build_plan(document, Path(record["file"]), vessels, sources, changes)
     except DocumentError as error:
-        raise _not_taken(error, folder / STUDY) from None
+        raise _not_taken(error, folder / STUDY, remedy) from None
     if plan.digest != record["digest"]:
         raise ResultError(
             "its study or vessels were changed by hand, or this shipid has other defaults: run the study again",
@@ -204,13 +211,35 @@ def stored_plan(folder: Path) -> Plan:
     return plan
 
 
-def _not_taken(error: DocumentError, file: Path) -> NotTaken:
+def _not_taken(error: DocumentError, file: Path, remedy: str) -> NotTaken:
     """The error for a document in the folder of a run that was right when the run began."""
-    message = (
-        f"shipid {__version__} does not take it ({error.message}): "
-        "if the run is of another version, read its report.html, and run the study again into a new folder"
-    )
-    return NotTaken(message, file=file, path=error.path)
+    other = "if the run is of another version, read its report.html, and run the study again into a new folder"
+    message = f"shipid {__version__} does not take it ({error.message}): {other}"
+    return NotTaken(remedy or message, file=file, path=error.path)
+
+
+def _needed_script(folder: Path, record: Mapping[str, Any], document: documents.Document) -> str:
+    """How to open a run with terms and methods of a user that this process lacks; empty where it has all.
+
+    Their names are in the provenance, or in its sessions where an earlier version made the folder.
+    """
+    noted = [record, *record.get("sessions", [])]
+    terms, methods = ({name for one in noted for name in _names_in(one, what)} for what in (TERM_CODE, METHOD_CODE))
+    blocks = document.get("method")
+    ways = [way for way in blocks if isinstance(way, dict)] if isinstance(blocks, list) else []
+    kinds = {str(way.get("kind")) for way in ways if way.get("name") in methods}
+    lacking = [*sorted(terms - TERMS.keys()), *sorted(kinds - METHODS.keys())]
+    if not lacking:
+        return ""
+    program = record.get("program", f"python {USER_SCRIPT}")
+    words = f"{listed(lacking)}, which a user wrote, {plural(len(lacking), 'is', 'are')} not known to this process"
+    script = f"open the run by the script that puts {plural(len(lacking), 'it', 'them')} into TERMS or METHODS"
+    return f"{words}: {script}: `{program} study report {as_argument(folder)}`"
+
+
+def _names_in(record: Mapping[str, Any], what: str) -> list[str]:
+    held = record.get(what)
+    return list(held) if isinstance(held, dict) else []
 
 
 def provenance(folder: Path) -> dict[str, Any]:

@@ -12,16 +12,20 @@ import numpy as np
 from casadi import SX
 
 from shipid.arguments import of_class
-from shipid.errors import DocumentError, choices
+from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics import ACTUATORS, GIVEN, TERMS, Term
 from shipid.physics.frames import current, heave_rate, kinematics, vector
 from shipid.physics.helm import Helmsman
 from shipid.physics.inertia import added_mass, coriolis, rigid_body
+from shipid.physics.returned import returned
 from shipid.physics.signals import named, units
+from shipid.units import plural
+from shipid.users import begins_at
 from shipid.vessel.bindings import Binding
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import BEHIND, actuators, behind, functions, signals, structural, term_blocks, term_parameters
 from shipid.vessel.schema import parameters as declared
+from shipid.vessel.terms import called, check_term, no_signal, states_of
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
 NU = ("u", "v", "w", "p", "q", "r")
@@ -30,6 +34,7 @@ LAST = {"rates": "tau_extra", "advance": "dt", "sum": "component"}  # input of e
 PLANE, HEAVE = (0, 1, 5), 2
 CORIOLIS = {"full": PLANE, "mmg": (0, 1), "none": ()}  # axes on which added mass turns with the ship by formula
 HELM = "(helm)"  # prefix of the states of a helmsman: no thruster has such a name
+WASH = 3  # numbers that a propeller gives to what is behind it, `shipid.physics.propeller.wash`
 UNROLL_UP_TO = 32  # components: beyond it a sum is mapped, not written out
 
 
@@ -115,6 +120,8 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     axes = vessel.axes
     rows = list(axes)
     terms = list(term_blocks(vessel.document))
+    for _, key, _ in terms:  # a notebook may have put another into TERMS since the vessel was read
+        check_term(key)
     names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)
     hidden = _hidden(terms)
     ordered = _orders_taken(terms)
@@ -161,7 +168,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     through_water = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
     acceleration = through_water + nu_c_dot[rows]
     more = [
-        _rates(TERMS[key], {**available, "state": states_of[path]}, _values(bound[path], value_of))
+        _rates(key, {**available, "state": states_of[path]}, _values(bound[path], value_of))
         for path, key, _ in terms
         if path in states_of
     ]
@@ -227,22 +234,34 @@ def _upright(eta: SX, nu: SX, m: SX) -> SX:
 
 def _hidden(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> dict[str, list[str]]:
     """Path of each term with additional states -> their names, `path.name`."""
-    kept = ((path, TERMS[key].states, block) for path, key, block in terms)
-    return {path: [f"{path}.{name}" for name in states(block)] for path, states, block in kept if states}
+    found = {path: states_of(key, block) for path, key, block in terms}
+    return {path: [f"{path}.{name}" for name in names] for path, names in found.items() if names}
 
 
-def _rates(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any]) -> SX:
+def _rates(key: str, available: Mapping[str, SX], keywords: Mapping[str, Any]) -> SX:
     """d(state)/dt of the additional states of a term."""
-    assert term.rates is not None
-    return SX(_called(term, term.rates, available, keywords))
+    function, where, count = TERMS[key].rates, f"rates of {key}", available["state"].numel()
+    assert function is not None
+    value, given = _called(where, key, function, available, keywords)
+    words = f"{count} {plural(count, 'number')}, one for each of its states"
+    return returned(where, function, value, given, count, words)
 
 
-def _called(term: Term, function: Callable[..., Any], available: Mapping[str, SX], keywords: Mapping[str, Any]) -> Any:
-    """A function of a term for its signals, selected by name, with those of the keywords that it takes."""
-    others = {parameter.name for parameter in term_parameters(term)}
+def _called(
+    where: str, key: str, function: Callable[..., Any], available: Mapping[str, SX], keywords: Mapping[str, Any]
+) -> tuple[Any, list[Any]]:
+    """What a function of a term returns for its signals, selected by name, and those keywords that it takes; and these.
+
+    where : the function in words, for errors.
+    """
+    others = {parameter.name for parameter in term_parameters(TERMS[key])}
     others -= {parameter.name for parameter in declared(function)}
     kept = {keyword: value for keyword, value in keywords.items() if keyword not in others}
-    return function(*(available[name] for name in signals(function)), **kept)
+    unknown = next((name for name in signals(function) if name not in available), None)
+    if unknown is not None:
+        raise ShipidError(f"{where}: {no_signal(unknown, tuple(available))}{begins_at(function)}")
+    taken = [available[name] for name in signals(function)]
+    return called(where, function, *taken, **kept), [*taken, *kept.values()]
 
 
 def _ordered(helmsman: Helmsman, ordered: Sequence[str], given: Mapping[str, Any], vessel: Vessel) -> dict[str, SX]:
@@ -274,8 +293,8 @@ def _sum_of_terms(
         extra = _of_component(path, term, block, available)
         if path in states_of:
             extra["state"] = states_of[path]
-        wrench = partial(_wrench, term, {**available, **extra}, _values(bound[path], value_of))
-        widths, arrays = _components(term, block)
+        wrench = partial(_wrench, key, {**available, **extra}, _values(bound[path], value_of))
+        widths, arrays = _components(key, block)
         if arrays is not None and len(arrays) <= UNROLL_UP_TO:
             for row in arrays:
                 total += wrench(dict(zip(widths, row, strict=True)))
@@ -308,29 +327,38 @@ def _gives(
         for name, function in TERMS[key].gives.items():
             if (name in GIVEN) != outputs:
                 here = {**available, **_of_component(path, TERMS[key], block, available)}
-                value = _called(TERMS[key], function, here, _values(bound[path], value_of))
+                where = f"{name} of {key}"
+                value, given = _called(where, key, function, here, _values(bound[path], value_of))
                 if value is not None:  # an output whose parameters the block lacks
-                    result[f"{path.rsplit('.', 1)[-1]}.{name}"] = value
+                    count = 1 if outputs else WASH
+                    result[f"{path.rsplit('.', 1)[-1]}.{name}"] = returned(where, function, value, given, count)
     return result
 
 
-def _components(term: Term, block: Mapping[str, Any]) -> tuple[dict[str, int], np.ndarray | None]:
+def _components(key: str, block: Mapping[str, Any]) -> tuple[dict[str, int], np.ndarray | None]:
     """Arguments that a term sums over, with their widths, and their values (num_components, num_entries).
 
     No values where they are drawn outside; one empty row for a term that sums over nothing.
     """
+    term = TERMS[key]
     keys = {name: block[name] for name in structural(term)}
     if term.drawn is not None:
-        return dict(term.drawn(**keys)), None
+        return dict(called(f"drawn of {key}", term.drawn, **keys)), None
     if term.components is None:
         return {}, np.zeros((1, 0))
-    columns = term.components(**keys)
-    return dict.fromkeys(columns, 1), np.column_stack(list(columns.values()))
+    columns = called(f"components of {key}", term.components, **keys)
+    try:
+        return dict.fromkeys(columns, 1), np.column_stack([np.array(values, float) for values in columns.values()])
+    except (AttributeError, TypeError, ValueError):
+        message = f"components of {key} must return a table, argument -> numbers (C,), equally many"
+        raise ShipidError(f"{message}, not {columns!r}{begins_at(term.components)}") from None
 
 
-def _wrench(term: Term, available: Mapping[str, SX], keywords: Mapping[str, Any], entries: Mapping[str, Any]) -> Any:
+def _wrench(key: str, available: Mapping[str, SX], keywords: Mapping[str, Any], entries: Mapping[str, Any]) -> SX:
     """Wrench of one term for its signals, selected by name; `entries` are those of one component."""
-    return _called(term, term.function, {**available, **entries}, keywords)
+    function = TERMS[key].function
+    value, given = _called(key, key, function, {**available, **entries}, keywords)
+    return returned(key, function, value, given, 6, "a wrench (6)")
 
 
 def _environment(vessel: Vessel) -> tuple[str, ...]:

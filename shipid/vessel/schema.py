@@ -16,8 +16,8 @@ from shipid.physics.grammar import POSITIVE, Grammar
 from shipid.physics.inertia import added_mass, rigid_body
 from shipid.physics.signals import named
 from shipid.vessel.ranges import UNUSUAL
+from shipid.vessel.terms import FIXED, POSITIONAL, check_term, split_keys
 
-FIXED = ("hull", "restoring", "radiation", "waves")  # groups whose members go by the name of their kind, one of each
 DOFS = {3: (0, 1, 5), 4: (0, 1, 3, 5), 6: (0, 1, 2, 3, 4, 5)}
 
 PARTICULARS = {
@@ -85,9 +85,7 @@ def term_parameters(term: Term) -> tuple[Parameter, ...]:
 def signals(function: Callable[..., Any]) -> tuple[str, ...]:
     """Positional arguments of a physics function."""
     return tuple(
-        name
-        for name, argument in inspect.signature(function).parameters.items()
-        if argument.kind is argument.POSITIONAL_OR_KEYWORD
+        name for name, argument in inspect.signature(function).parameters.items() if argument.kind in POSITIONAL
     )
 
 
@@ -196,7 +194,7 @@ def _dimension_model(name: str, units: Mapping[str, str]) -> type[Block]:
 @cache
 def term_model(key: str) -> type[Block]:
     """Model of one kind of term: its parameters, its structural counts, its actuators, and `off`."""
-    term = TERMS[key]
+    term = check_term(key)
     group, kind = key.split(".")
     extra: dict[str, Any] = {"off": (bool, False)}
     if group not in FIXED:
@@ -245,7 +243,7 @@ def kinds(group: str) -> list[str]:
 
 
 def _of_group(group: str) -> list[str]:
-    return [key for key in TERMS if key.split(".")[0] == group]
+    return [key for key, (of, _) in zip(TERMS, split_keys(tuple(TERMS)), strict=True) if of == group]
 
 
 def _named(group: str, of: Collection[str]) -> Any:
@@ -303,7 +301,7 @@ def components(document: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
 @cache
 def _groups(terms: tuple[str, ...]) -> tuple[str, ...]:
     """Blocks of a document in which these terms lie."""
-    return tuple(dict.fromkeys(key.split(".")[0] for key in terms))
+    return tuple(dict.fromkeys(group for group, _ in split_keys(terms)))
 
 
 def term_blocks(document: Mapping[str, Any], off: bool = False) -> Iterator[tuple[str, str, Mapping[str, Any]]]:

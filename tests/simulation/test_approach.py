@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import casadi as ca
 import numpy as np
 import pytest
+from casadi import SX
 from scipy.optimize import fsolve
 
 from shipid.errors import DocumentError, ShipidError
+from shipid.physics import TERMS, Term
+from shipid.physics.frames import force_at
 from shipid.simulation.approach import (
     Controls,
     NotStraight,
@@ -280,3 +286,12 @@ def test_a_vessel_that_cannot_hold_station_is_refused(changes: dict[str, float |
     vessel = SHIP.with_values({f"thruster.{path}": value for path, value in changes.items()})
     with pytest.raises(DocumentError, match=f"needs two azimuth units .* {has}"):
         thrust_sharing(vessel)
+
+
+def test_the_term_whose_force_is_not_finite_at_rest_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def dry(nu_r: SX, *, C: Annotated[SX, "kg m^-1"]) -> SX:
+        return force_at(SX(0), SX(0), SX(0), -C * nu_r[0] ** 2 * nu_r[0] / ca.fabs(nu_r[0]), SX(0))
+
+    monkeypatch.setitem(TERMS, "hull.dry", Term(dry))
+    with pytest.raises(DocumentError, match=rf"at rest, .*: mend hull\.dry in {__file__}, line \d+ or its numbers$"):
+        _ = Controls.of(SHIP.with_values({"hull.dry.C": 10.0}))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import socket
 import subprocess
@@ -17,10 +18,14 @@ import pytest
 
 from shipid.errors import ResultError
 from shipid.files import TEMPORARY, read_json, temporary_folder, write_json
+from shipid.hybrid.alone import Alone
+from shipid.hybrid.methods import METHODS
+from shipid.physics import TERMS
 from shipid.study import seals, store
 from shipid.study.check import check_folder
-from shipid.study.plan import Batch, Unit, read_plan
+from shipid.study.plan import Batch, Unit, build_plan, read_plan
 from shipid.study.results import read_results
+from tests.study.test_run import skeg_plan
 from tests.study.tiny import TINY, tiny_plan
 
 
@@ -148,6 +153,37 @@ def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(
     with pytest.raises(ResultError, match="does not take it") as caught:
         store.stored_plan(ship)
     assert caught.value.file == str(ship / store.VESSELS)
+
+
+@pytest.mark.parametrize("earlier", [False, True])
+def test_a_folder_with_a_term_and_a_method_of_a_user_names_the_script(
+    earlier: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It said that the run is of another version, and to compute it again."""
+    monkeypatch.setattr(sys, "argv", ["mine.py", "study", "run"])
+    monkeypatch.setitem(METHODS, "own", type("Own", (Alone,), {"__module__": __name__}))
+    _, plan = skeg_plan(tmp_path, monkeypatch)
+    plan = build_plan({**plan.document, "method": [{"name": "mine", "kind": "own"}]}, Path(plan.file))
+    folder = tmp_path / "run"
+    store.open_folder(folder, plan)
+    record = read_json(folder / store.PROVENANCE)
+    if earlier:
+        record["sessions"] = [{what: record.pop(what) for what in (*plan.code,)}]
+        assert record.pop("program") == "python mine.py"
+        write_json(folder / store.PROVENANCE, record)
+    assert store.stored_plan(folder).digest == plan.digest
+    monkeypatch.setattr(sys, "argv", ["shipid", "study", "report"])
+    script, words = "my.py" if earlier else "mine.py", r"hull\.skeg and own, which a user wrote, are not known"
+    remedy = rf"that puts them into TERMS or METHODS: `python {script} study report {re.escape(str(folder))}`$"
+    monkeypatch.delitem(METHODS, "own")
+    with monkeypatch.context() as without:
+        without.delitem(TERMS, "hull.skeg")
+        with pytest.raises(store.NotTaken, match=rf"{words}.*{remedy}") as caught:
+            store.stored_plan(folder)
+        assert "\n" not in str(caught.value)
+        assert remedy.partition("`")[2].partition(" study")[0] in check_folder(folder).lines[-1]
+    with pytest.raises(store.NotTaken, match=r"toml: .*: own, which a user wrote, is not known.* puts it into TERMS"):
+        store.stored_plan(folder)
 
 
 def test_rows_are_those_of_the_finished_batches(tmp_path: Path) -> None:

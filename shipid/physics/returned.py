@@ -1,0 +1,73 @@
+"""Checks of what functions of symbols return: CasADi adds one number to all six axes of a wrench without a word."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import casadi as ca
+from casadi import SX
+
+from shipid.errors import ShipidError
+from shipid.units import listed, plural
+from shipid.users import begins_at, of_users
+
+
+def returned(
+    where: str, function: Callable[..., Any], value: Any, given: Iterable[Any], count: int, words: str = ""
+) -> SX:
+    """What a function returned, as symbols (count); ShipidError, with the place of a user's function, for all else.
+
+    where : the function in words, the beginning of the line. words : what it must return.
+    given : its arguments: symbols, numbers, lists and tables of them. A user's function may return no others.
+    """
+    symbols = _symbols(value)
+    if symbols is None or symbols.shape != (count, 1):
+        words = words or f"{count} {plural(count, 'number')}"
+        raise ShipidError(f"{where} must return {words}, not {_found(value, symbols)}{begins_at(function)}")
+    if of_users(function) and (fault := _fault(symbols, ca.veccat(*_flat(given)))):
+        raise ShipidError(f"{where} {fault}{begins_at(function)}")
+    return symbols
+
+
+def _symbols(value: Any) -> SX | None:
+    """A value as symbols, also numbers of CasADi and NumPy; None for what is none."""
+    if isinstance(value, SX):
+        return value
+    try:
+        return SX(value)
+    except (NotImplementedError, TypeError, ValueError, RuntimeError):
+        return None
+
+
+def _found(value: Any, symbols: SX | None) -> str:
+    if value is None:
+        return "None: end it with `return`"
+    if symbols is None:
+        many = isinstance(value, list | tuple)
+        return f"{type(value).__name__}{': join its entries by ca.vertcat' if many else ''}"
+    return f"{symbols.numel()} {plural(symbols.numel(), 'number')}" if symbols.is_column() else f"{symbols.shape}"
+
+
+def _flat(given: Iterable[Any]) -> Iterable[Any]:
+    for one in given:
+        if isinstance(one, dict):
+            yield from one.values()
+        elif isinstance(one, list):
+            yield from one
+        else:
+            yield one
+
+
+def _fault(symbols: SX, given: SX) -> str:
+    """What is wrong with symbols that a user's function returned for others; empty for nothing."""
+    graph = ca.Function("term", [ca.veccat(*ca.symvar(given))], [symbols], {"allow_free": True})
+    if graph.has_free():
+        return f"returns symbols of its own, {listed(graph.get_free())}: make them parameters, or numbers"
+    constants = (
+        graph.instruction_constant(k) for k in range(graph.n_instructions()) if graph.instruction_id(k) == ca.OP_CONST
+    )
+    if any(map(math.isnan, constants)):
+        return "returns what is not a number (NaN): use functions of casadi, such as ca.sqrt, and not of `math`"
+    return ""

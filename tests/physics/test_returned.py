@@ -1,0 +1,59 @@
+"""What functions of symbols return is checked before CasADi makes something else of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+
+from shipid.errors import ShipidError
+from shipid.physics.hull import derivatives
+from shipid.physics.returned import returned
+
+v = SX.sym("v")
+C = SX.sym("C")
+
+
+def term() -> None: ...
+
+
+@pytest.mark.parametrize("value", [ca.vertcat(v, v), np.ones(2), [1.0, 2.0], ca.DM([1, 2]), np.array([v, C])])
+def test_symbols_and_numbers_pass(value: Any) -> None:
+    symbols = returned("mine", term, value, [v, {"C": C}], 2)
+    assert isinstance(symbols, SX)
+    assert symbols.shape == (2, 1)
+
+
+@pytest.mark.parametrize(
+    ("value", "found"),
+    [
+        (v, "1 number"),
+        (ca.vertcat(v, v, v), "3 numbers"),
+        (ca.horzcat(v, v), r"\(1, 2\)"),
+        (None, "None: end it with `return`"),
+        ([v, v], "list: join its entries by ca.vertcat"),
+        (ca.MX.sym("v", 2), "MX"),
+        ({}, "dict"),
+    ],
+)
+def test_anything_else_is_named(value: Any, found: str) -> None:
+    with pytest.raises(ShipidError, match=rf"^mine must return 2 numbers, not {found} in {__file__}, line \d+$"):
+        returned("mine", term, value, [v], 2)
+    with pytest.raises(ShipidError, match=rf"^mine must return two, not {found}$"):
+        returned("mine", derivatives, value, [v], 2, "two")
+
+
+@pytest.mark.parametrize("given", [[v, C], [v, [C, 1.0]], [{"v": v}, C], [ca.vertcat(v, C) ** 2]])
+def test_symbols_that_were_given_in_any_form_are_known(given: list[Any]) -> None:
+    assert returned("mine", term, v * C, given, 1).shape == (1, 1)
+    with pytest.raises(ShipidError, match=r"^mine returns symbols of its own, k and m: "):
+        returned("mine", term, v * SX.sym("k") * SX.sym("m"), given, 1)
+
+
+def test_numbers_that_are_none_are_refused_and_infinite_ones_pass() -> None:
+    with pytest.raises(ShipidError, match=r"^mine returns what is not a number \(NaN\)"):
+        returned("mine", term, v * np.nan, [v], 1)
+    assert returned("mine", term, ca.fmin(v, np.inf), [v], 1).shape == (1, 1)

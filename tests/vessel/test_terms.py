@@ -1,0 +1,325 @@
+"""A mistake in a term that a user wrote is one line that names the term, the file and the line."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shipid.errors import ShipidError
+from shipid.physics import ACTUATORS, TERMS, Term
+from shipid.units import unit_fault
+from shipid.vessel import schema
+from shipid.vessel.dynamics import dynamics
+from shipid.vessel.load import load_vessel
+from shipid.vessel.schema import parameters, vessel_model
+from shipid.vessel.terms import check_term, split_keys
+from tests.cli.running import ended
+from tests.documented import code
+
+HEAD = """
+import math
+import sys
+from collections.abc import Mapping
+from typing import Annotated
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from shipid.physics import Term
+from shipid.physics.frames import force_at
+
+
+def wrench(Y):
+    return force_at(SX(0), SX(0), SX(0), SX(0), Y)
+
+
+def plain(nu_r: SX, *, C: Annotated[SX, "kg m^-1"]) -> SX:
+    return wrench(-C * nu_r[1] * ca.fabs(nu_r[1]))
+
+
+"""
+DRAG = """
+def drag(nu_r: SX, *, C: Annotated[SX, "kg m^-1"]) -> SX:  # begins
+    v = nu_r[1]
+    Y = -C * v * ca.fabs(v)
+    {}  # body
+TERM = Term(drag)
+"""
+SHIPS = {
+    "hull": "[hull.{kind}]\nC = 100.0\n",
+    "thruster": '[thruster.{kind}]\nkind = "{kind}"\nC = 100.0\n',
+    "wind": '[wind]\nkind = "{kind}"\nC = 100.0\n',
+    "radiation": "[radiation.{kind}]\nC = 100.0\n",
+}
+CACHES = (schema.vessel_model, schema.term_model)
+
+
+@pytest.fixture(autouse=True)
+def _fresh() -> Iterator[None]:
+    for cached in CACHES:
+        cached.cache_clear()
+    yield
+    for cached in CACHES:
+        cached.cache_clear()
+
+
+def signature(arguments: str) -> str:
+    """A term with other arguments."""
+    return f"def drag({arguments}) -> SX:  # begins\n    return SX(6, 1)\nTERM = Term(drag)\n"
+
+
+def with_states(states: str, rates: str) -> str:
+    """A term with additional states."""
+    return f"""
+def rates(nu: SX, state: SX) -> SX:  # rates
+    return {rates}
+def states(block):  # states
+    return {states}
+def drag(nu_r: SX, state: SX, *, C: Annotated[SX, "kg m^-1"]) -> SX:  # begins
+    return wrench(-C * nu_r[1] * state[0])
+TERM = Term(drag, states=states, rates=rates)
+"""
+
+
+def sums(components: str, more: str = "") -> str:
+    """A sum over components."""
+    return f"""
+def parts():  # parts
+    return {components}
+def drag(nu_r: SX, share: SX, *, C: Annotated[SX, "kg m^-1"]{more}) -> SX:  # begins
+    return wrench(-C * nu_r[1] * share)
+TERM = Term(drag, components=parts)
+"""
+
+
+WRENCH = "hull.drag must return a wrench (6), not "
+FAULTS: dict[str, tuple[str, str, str, str]] = {
+    # name -> key, text of the module, the line that is named, words
+    "one number": ("hull.drag", DRAG.format("return Y"), "begins", f"{WRENCH}1 number"),
+    "a Python number": ("hull.drag", DRAG.format("return 3.0"), "begins", f"{WRENCH}1 number"),
+    "three numbers": ("hull.drag", DRAG.format("return ca.vertcat(0, Y, 0)"), "begins", f"{WRENCH}3 numbers"),
+    "a row": ("hull.drag", DRAG.format("return wrench(Y).T"), "begins", f"{WRENCH}(1, 6)"),
+    "numbers of NumPy": ("hull.drag", DRAG.format("return np.zeros(5)"), "begins", f"{WRENCH}5 numbers"),
+    "a list": ("hull.drag", DRAG.format("return [Y] * 6"), "begins", f"{WRENCH}list: join its entries by ca.vertcat"),
+    "a text": ("hull.drag", DRAG.format("return 'Y'"), "begins", f"{WRENCH}str"),
+    "nothing": ("hull.drag", DRAG.format("pass"), "begins", f"{WRENCH}None: end it with `return`"),
+    "one number of a thruster": (
+        "thruster.fin",
+        "def fin(nu_r: SX, delta: SX, *, C: Annotated[SX, 'kg m^-1']) -> SX:  # begins\n    return C * delta\n"
+        "TERM = Term(fin)\n",
+        "begins",
+        "thruster.fin must return a wrench (6), not 1 number",
+    ),
+    "one number of the wind": (
+        "wind.mine",
+        "def mine(V_w: SX, *, C: Annotated[SX, 'kg m^-1']) -> SX:  # begins\n    return C * V_w\nTERM = Term(mine)\n",
+        "begins",
+        "wind.mine must return a wrench (6), not 1 number",
+    ),
+    "not a number": (
+        "hull.drag",
+        DRAG.format("return wrench(Y * np.nan)"),
+        "begins",
+        "hull.drag returns what is not a",
+    ),
+    "math": ("hull.drag", DRAG.format("return wrench(Y * math.sqrt(v))"), "begins", "(NaN): use functions of casadi"),
+    "not at rest": (
+        "hull.drag",
+        DRAG.format("return wrench(Y * v / ca.fabs(v))"),
+        "begins",
+        "V_w, beta_w 0, as where none is given: mend hull.drag",
+    ),
+    "an error": ("hull.drag", DRAG.format("raise ValueError('no drag')"), "body", "hull.drag: ValueError: no drag"),
+    "an index": ("hull.drag", DRAG.format("return wrench(nu_r[7])"), "body", "hull.drag: RuntimeError: "),
+    "the end": ("hull.drag", DRAG.format("sys.exit('no')"), "body", "hull.drag calls sys.exit (no)"),
+    "if": ("hull.drag", DRAG.format("return wrench(Y if v > 0 else -Y)"), "body", "write ca.if_else(condition, one, o"),
+    "max": (
+        "hull.drag",
+        DRAG.format("return wrench(max(Y, 0))"),
+        "body",
+        "cannot decide by a symbol: write ca.if_else",
+    ),
+    "own symbols": (
+        "hull.drag",
+        DRAG.format("return wrench(Y * SX.sym('k'))"),
+        "begins",
+        "symbols of its own, k: make",
+    ),
+    "no Term": (
+        "hull.drag",
+        DRAG.replace("Term(drag)", "drag").format("pass"),
+        "begins",
+        "no Term: write TERMS['hull.",
+    ),
+    "no unit": ("hull.drag", signature("nu_r: SX, *, C"), "begins", "its parameter 'C' has no unit: write `C: Annota"),
+    "a type, no unit": ("hull.drag", signature("nu_r: SX, *, C: SX"), "begins", "its parameter 'C' has no unit"),
+    "before the star": (
+        "hull.drag",
+        signature("nu_r: SX, C: Annotated[SX, 'kg']"),
+        "begins",
+        "hull.drag: its parameter 'C' must be behind a `*`",
+    ),
+    "no signal": (
+        "hull.drag",
+        signature("nu_r: SX, depht: SX, *, C: Annotated[SX, 'kg']"),
+        "begins",
+        "hull.drag: its positional argument 'depht' is no signal",
+    ),
+    "no states": (
+        "hull.drag",
+        signature("state: SX, *, C: Annotated[SX, 'kg']"),
+        "begins",
+        "has no `states`: write Te",
+    ),
+    "any signals": ("hull.drag", signature("*nu: SX, C: Annotated[SX, 'kg']"), "begins", "`*nu` cannot be filled"),
+    "any parameters": ("hull.drag", signature("nu_r: SX, **C: SX"), "begins", "`**C` has no grammar"),
+    "a unit in words": (
+        "hull.drag",
+        signature("nu_r: SX, *, C: Annotated[SX, 'kg/meter']"),
+        "begins",
+        "hull.drag: the unit 'kg/meter' of its parameter 'C' is not known: write 'kg/m'",
+    ),
+    "a unit that is none": ("hull.drag", signature("nu_r: SX, *, C: Annotated[SX, 3]"), "begins", "must be a text"),
+    "a table": (
+        "hull.drag",
+        signature("nu_r: SX, *, C: Annotated[Mapping[str, SX], 'kg']"),
+        "begins",
+        "'C' is a table and needs a grammar of",
+    ),
+    "a default": ("hull.drag", signature("*, C: Annotated[SX, 'kg'] = 'a'"), "begins", "must be a number, not 'a'"),
+    "a name that is taken": ("hull.drag", signature("*, off: Annotated[SX, 'kg']"), "begins", "'off' is a key that bl"),
+    "types that are not there": ("hull.drag", signature("nu_r: 'Sx'"), "begins", "cannot be read (name 'Sx' is not de"),
+    "rates of another length": (
+        "radiation.mine",
+        with_states("('x', 'y')", "nu[0]"),
+        "rates",
+        "rates of radiation.mine must return 2 numbers, one for each of its states, not 1 number",
+    ),
+    "an error in rates": ("radiation.mine", with_states("('x',)", "1 / 0"), "rates + 1", "ZeroDivisionError"),
+    "no names of states": ("radiation.mine", with_states("3", "nu[0]"), "states", "must return names, such as"),
+    "no rates": ("radiation.mine", with_states("'x',", "0").replace(", rates=rates", ""), "begins", "needs both, or"),
+    "no components": ("hull.drag", sums("3"), "parts", "components of hull.drag must return a table"),
+    "components of other names": ("hull.drag", sums("{'part': [1.0]}"), "begins", "argument 'share' is no signal"),
+    "two numbers as output": (
+        "thruster.fin",
+        "def shown(nu_r: SX) -> SX:  # shown\n    return nu_r[:2]\nTERM = Term(plain, gives={'thrust': shown})\n",
+        "shown",
+        "thrust of thruster.fin must return 1 number, not 2 numbers",
+    ),
+    "one number as wash": (
+        "thruster.fin",
+        "def shown(nu_r: SX) -> SX:  # shown\n    return nu_r[0]\nTERM = Term(plain, gives={'wash': shown})\n",
+        "shown",
+        "wash of thruster.fin must return 3 numbers, not 1 number",
+    ),
+    "an output that is none": (
+        "thruster.fin",
+        "def fin(nu_r: SX, *, C: Annotated[SX, 'kg']) -> SX:  # begins\n    return SX(6, 1)\n"
+        "TERM = Term(fin, gives={'trust': plain})\n",
+        "begins",
+        "'trust', which is no output: did you mean 'thrust'?",
+    ),
+    "another block": (
+        "hul.drag",
+        DRAG.format("return wrench(Y)"),
+        "begins",
+        "TERMS['hul.drag']: 'hul' is no block of a vessel document: blocks are hull, restoring, radiation, waves, wind "
+        "and thruster: write TERMS['hull.drag']",
+    ),
+    "no block": ("drag", DRAG.format("return wrench(Y)"), "begins", "TERMS['drag']: it names no block"),
+    "a kind with a dot": ("hull.my.drag", DRAG.format("return wrench(Y)"), "begins", "'my.drag' is no name for a kind"),
+}
+
+
+def registered(key: str, text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A module of a user whose `TERM` is in TERMS by this key; its file."""
+    file = folder / "mine.py"
+    file.write_text(HEAD + text)
+    spec = importlib.util.spec_from_file_location("mine", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module: Any = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "mine", module)
+    spec.loader.exec_module(module)
+    monkeypatch.setitem(TERMS, key, module.TERM)
+    return file
+
+
+def ship(key: str, folder: Path) -> Path:
+    """The document of a ship with a block of this key."""
+    group, _, kind = key.rpartition(".")
+    file = folder / "ship.toml"
+    block = SHIPS.get(group, SHIPS["hull"]).format(kind=kind)
+    file.write_text(f'extends = "gunnerus-28.9"\n{block}')
+    return file
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_mistake_in_a_term_is_one_line(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One number was added to all six axes without a word; others were tracebacks, or blamed the document."""
+    key, text, line, words = FAULTS[name]
+    file = registered(key, text, tmp_path, monkeypatch)
+    mark, _, further = line.partition(" + ")
+    lines = file.read_text().split("\n")
+    place = (
+        f" in {file}, line {next(i for i, one in enumerate(lines, 1) if one.endswith(f'# {mark}')) + int(further or 0)}"
+    )
+    monkeypatch.chdir(tmp_path)
+    status, out, err = ended("manoeuvre", ship(key, tmp_path), "turning", 35)
+    assert status == 1
+    assert out == ""
+    assert err.count("\n") == 1, err
+    assert words in err
+    assert key in err
+    assert place in err
+    assert sorted(one.name for one in tmp_path.iterdir() if one.suffix == ".html") == []
+
+
+@pytest.mark.parametrize(
+    "body", ["return wrench(Y)", "return np.zeros(6)", "return ca.if_else(v > 0, 1, -1) * wrench(Y)"]
+)
+def test_a_right_term_passes(body: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    registered("hull.drag", DRAG.format(body), tmp_path, monkeypatch)
+    assert dynamics(load_vessel(ship("hull.drag", tmp_path))).num_dof == 3
+
+
+def test_the_terms_of_the_page_pass(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    text = code("A term")[1] + "\nTERM = Term(skeg)\n"
+    registered("hull.skeg", text, tmp_path, monkeypatch)
+    assert check_term("hull.skeg").function.__name__ == "skeg"
+
+
+@pytest.mark.parametrize("key", TERMS)
+def test_every_listed_term_passes(key: str) -> None:
+    assert check_term(key) is TERMS[key]
+    assert (key.partition(".")[0], key.partition(".")[2]) in split_keys(tuple(TERMS))
+
+
+@pytest.mark.parametrize("kind", ACTUATORS)
+def test_units_of_actuators_are_those_of_terms_or_of_the_command(kind: str) -> None:
+    units = [str(parameter.unit) for parameter in parameters(ACTUATORS[kind].advance)]
+    assert all(unit.endswith("of the command") or not unit_fault(unit) for unit in units)
+
+
+def test_the_schema_for_editors_names_a_wrong_term(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    registered("hull.drag", signature("nu_r: SX, *, C"), tmp_path, monkeypatch)
+    with pytest.raises(ShipidError, match="'C' has no unit"):
+        vessel_model()
+
+
+def test_a_term_that_is_put_in_later_is_checked_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a notebook, for a vessel that was read before."""
+    registered("hull.drag", DRAG.format("return wrench(Y)"), tmp_path, monkeypatch)
+    vessel = load_vessel(ship("hull.drag", tmp_path))
+    registered("hull.drag", signature("nu_r: SX, C: Annotated[SX, 'kg m^-1']"), tmp_path, monkeypatch)
+    with pytest.raises(ShipidError, match="must be behind a"):
+        dynamics(vessel)
+    monkeypatch.setitem(TERMS, "hull.drag", Term(3))  # type: ignore[arg-type]
+    with pytest.raises(ShipidError, match=r"^hull\.drag must be a function, not 3$"):
+        dynamics(vessel)
