@@ -27,8 +27,10 @@ Plane = np.ndarray[Any, np.dtype[np.complex128]]
 
 GAP = 3.0  # usual steps: a longer one is a time without rows
 JITTER, FROZEN, OVERLAP = 0.05, 0.02, 0.5
+ROUGHER = 1.2  # times: with an uneven clock; then its times are wrong by more than the noise shows
 CORRELATION, SCALE_ERROR, HEADING_ERROR, PATH_ERROR = 0.8, 0.1, 0.25, 0.05
 TURNING = np.radians(0.2)  # rms of r under which a run is too straight to compare headings
+TURNS, NO_DRIFT = 0.3, 0.005  # of the largest r, from which on the ship turns; of u: no ship has so little sway there
 FEW_ROWS, FAR, BRIEF, CALM = 30, np.radians(240.0), 600.0, 1.0  # rows; turn of the ship; s; m/s
 WITH_HER, GUSTY = 0.45, 0.55  # of her speed, of the wind speed: less is distortion of the flow, and gusts
 STEADIER, UNSTEADY = 0.5, 0.25  # where it is so much steadier if taken for an apparent wind; of the wind speed
@@ -50,9 +52,13 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     by_run, shared = pieces_by_run(dataset), shares_clock(dataset)
     whole = {run: _motion(pd.concat(stretches)) for run, stretches in by_run.items()}
+    headings = {run: [*_heading(stretches)] for run, stretches in by_run.items()}
+    contrary = any(not row["ok"] for heading in headings.values() for row in heading)
+    if contrary and _is_course(dataset.frame):
+        headings = {run: [*_of_course(headings[run], stretches)] for run, stretches in by_run.items()}
     table = []
     for run, stretches in by_run.items():
-        heading = [*_heading(stretches)]
+        heading = headings[run]
         proved = {"r"} if _proves_rate(heading) else set()  # a small craft turns faster than any ship
         results = [*_clock(stretches), *_ranges(stretches, proved), *heading, *_path(stretches), *_wind(stretches)]
         table += [{"run": run, **row} for row in [*results, *_repetition(run, stretches, whole, shared)]]
@@ -75,7 +81,32 @@ def _clock(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
         "gap", longest, "s", GAP * usual + slack, f"the longest step is {longest:.3g} s, the usual one {usual:.3g} s"
     )
     jitter = float(np.sqrt(np.mean((steps - usual) ** 2))) / usual
-    yield _row("jitter", jitter, "1", JITTER, f"steps differ from {usual:.3g} s by {100 * jitter:.2g} % (RMS)")
+    sentence = f"steps differ from {usual:.3g} s by {100 * jitter:.2g} % (RMS)"
+    harmless = longest <= GAP * usual + slack and _bears_out(stretches)
+    words = "positions and heading fit them" if harmless else "are the times those of the samples, or of their arrival?"
+    words = f"; {words}" if jitter > JITTER else ""
+    yield _row("jitter", jitter, "1", JITTER, f"{sentence}{words}", ok=harmless or jitter <= JITTER)
+
+
+def _bears_out(stretches: list[pd.DataFrame]) -> bool:
+    """Whether positions and heading are about as smooth on their clock as on one with even steps."""
+    long = [rows for rows in stretches if len(rows) >= 5]
+    for names in (("north", "east"), ("psi",)):
+        uneven, even = (
+            rms(np.array([_roughness(rows, name, clock) for rows in long for name in names] or [0.0]))
+            for clock in (True, False)
+        )
+        if uneven > ROUGHER * even:
+            return False
+    return len(long) > 0
+
+
+def _roughness(rows: pd.DataFrame, name: str, clock: bool) -> float:
+    """Median distance of the values of a column from the line between their neighbours, by the clock or even steps."""
+    values, t = rows[name].to_numpy(), rows["t"].to_numpy()
+    values = np.unwrap(values) if name == "psi" else values
+    share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2]) if clock else 0.5
+    return float(np.median(np.abs(values[1:-1] - (1 - share) * values[:-2] - share * values[2:])))
 
 
 def _ranges(stretches: list[pd.DataFrame], proved: set[str]) -> Iterator[dict[str, Any]]:
@@ -206,6 +237,22 @@ def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     yield _row("heading error", rms(error), "rad", HEADING_ERROR * change + chance, sentence)
     seen = [np.unwrap(rows["psi"]).astype(complex) for rows in stretches]
     yield from _latency("heading latency", "heading", "yaw rate", stretches, seen, [_turned(one) for one in stretches])
+
+
+def _is_course(frame: pd.DataFrame) -> bool:
+    """Whether the ship never drifts where she turns: psi looks like a course over ground."""
+    r, u, v = (frame[name].to_numpy() for name in ("r", "u", "v"))
+    turns = np.abs(r) > max(TURNING, TURNS * float(np.abs(r).max(initial=0.0)))
+    return bool(turns.sum() >= FEW_ROWS and rms(u[turns]) > 0 and rms(v[turns]) < NO_DRIFT * rms(u[turns]))
+
+
+def _of_course(heading: list[dict[str, Any]], stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
+    """The checks of a heading that looks like a course: that is said, and not that it is late, as a course is."""
+    yield from (row for row in heading if row["check"] != "heading latency")
+    u, v = (np.concatenate([rows[name].to_numpy() for rows in stretches]) for name in ("u", "v"))
+    share = rms(v) / max(rms(u), 1e-12)
+    sentence = f"v is {100 * share:.2g} % of u (RMS) although the ship turns: is psi the course over ground?"
+    yield _row("sway", share, "1", NO_DRIFT, sentence, ok=False)
 
 
 def _proves_rate(heading: list[dict[str, Any]]) -> bool:

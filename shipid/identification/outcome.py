@@ -43,6 +43,7 @@ from shipid.identification.statistics import (
     open_to_drift,
     statistics,
 )
+from shipid.identification.stream import current_fit
 from shipid.identification.unstable import grows, growth_in
 from shipid.interrupts import uninterrupted
 from shipid.simulation.measured import TRIALS, measure_standard
@@ -306,7 +307,7 @@ def run_identification(
         warnings = (
             *shared,
             *solution.warnings,
-            *filter(None, (antenna_fit(solution, dataset, judged) or late_fit(solution, dataset, judged),)),
+            *filter(None, (_in_log(solution, dataset, judged),)),
             *unmeasured(vessel, dataset, fitted, settings),
             *unrecorded(dataset, fitted, settings),
             *_warnings(solution, judged, pairs, growth_in(dataset, fitted, pair[AFTER])),
@@ -366,6 +367,12 @@ def _as_read(vessel: Vessel) -> tuple[str, dict[str, float]]:
         message = "more than numbers of it were changed after it was read: a patch on it is another vessel"
         raise ShipidError(f"{message}; write the change in a file that `extends` it, and load that", file=vessel.file)
     return read.digest, changed
+
+
+def _in_log(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
+    """A sentence on what the log lacks or has wrong, as the residuals show it: the first that is seen; else none."""
+    seen = (find(solution, dataset, judged) for find in (current_fit, antenna_fit, late_fit))
+    return next(filter(None, seen), "")
 
 
 def _implausible(vessel: Vessel, identified: Vessel, values: Mapping[str, float]) -> tuple[str, ...]:

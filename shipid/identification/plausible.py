@@ -63,7 +63,8 @@ KINDS = (
     Kind(r"added_mass\.N_rdot", "added moment in yaw over I_z", 0.15, 2.0, _over("inertia.I_z")),
     Kind(r"inertia\.I_z", "radius of gyration in yaw over L_pp", 0.18, 0.36, _gyration),
     Kind(
-        rf"{_HULL}(?:Y_u?v|N_u?r|Y_{_SQUARE.format('v')}|N_{_SQUARE.format('r')}|X_u|X_{_SQUARE.format('u')})",
+        rf"{_HULL}(?:Y_u?v|N_u?r|Y_{_SQUARE.format('v')}|N_{_SQUARE.format('r')}|X_u|X_{_SQUARE.format('u')})"
+        r"|hull\.abkowitz\.(?:Y_v|N_r)",
         "damping, on the force side",
         -math.inf,
         0.0,

@@ -56,6 +56,7 @@ FASTEST = 40.0  # m/s: 78 kn, above the speed of ships
 STRONG = 0.7  # of the median speed: a stronger current is none
 UNITS = (60.0, 1 / 60.0)  # rev/s read as rpm, and rpm as rev/s
 ALIKE = 1.5  # factor within which a speed is explained by a unit
+NEAR = 0.5  # of the error of constant u, v, r, at most, where vessel and log agree
 OFF = 1.15  # a factor by which speed or turning may differ before it is reported
 
 _HULL = r"hull\.(?:derivatives|prime_derivatives|mmg|abkowitz)\."
@@ -109,11 +110,24 @@ class Change:
 
 @dataclass(frozen=True)
 class Current:
-    """A steady current of all runs, V_c [m/s] towards beta_c [rad]. error : mean error [m] with it."""
+    """A steady current of all runs, V_c [m/s] towards beta_c [rad]. error : mean error [m] with it.
+
+    each : whether every run has another one; V_c is then their root mean square, and beta_c is NaN.
+    """
 
     V_c: float
     beta_c: float
     error: float
+    each: bool = False
+
+    @property
+    def words(self) -> str:
+        """What it is, in words."""
+        if self.each:
+            remedy = f"identify with --nuisance current={self.V_c:.1g}"
+            return f"another current in each run, {self.V_c:.2g} m/s, which is not in the log ({remedy}),"
+        towards = np.degrees(self.beta_c) % 360.0
+        return f"a steady current of {self.V_c:.2g} m/s towards {towards:.0f} deg, which is not in the log,"
 
 
 @dataclass(frozen=True)
@@ -172,16 +186,16 @@ class Look:
         if self.late is not None:
             causes.append((self.late[0].words, self.late[1]))
         if self.current is not None:
-            V_c, beta_c = self.current.V_c, np.degrees(self.current.beta_c) % 360.0
-            stream = f"a steady current of {V_c:.2g} m/s towards {beta_c:.0f} deg, which is not in the log,"
-            causes.append((stream, self.current.error))
+            causes.append((self.current.words, self.current.error))
         causes += [(_shown(self.vessel, one), one.error) for one in self.changes]
         if not causes:
             if self._worse:
                 return f"{self.vessel.name} is worse than constant u, v, r, and no single number explains it: {seen}"
             if self.facts:
                 return f"{self.vessel.name} and the log differ, and no single number explains it: {seen}"
-            return f"{self.vessel.name} and the log agree, and no single number would explain the rest: {seen}"
+            near = self.timely <= max(NEAR * self.constant, LEAST_ERROR)
+            how = "and the log agree" if near else "is better than constant u, v, r"
+            return f"{self.vessel.name} {how}, and no single number would explain the rest: {seen}"
         (first, error), *others = causes
         explained = (
             f"{first}{', which' * (self.late is not None)} would explain {self._part(error)} of it ({error:.3g} m)"
@@ -250,11 +264,15 @@ def first_look(
     mistaken = share is not None and share < 0  # a sign, which no factor mends
     done = mistaken or least < LEAST_ERROR
     changes = [] if done else _worthwhile(trial, least)
-    current = None if done else _current(trial)
-    if current is not None and current.error <= min(changes[-1].error if changes else least, (1 - SAVING) * least):
-        changes = _worthwhile(_in_current(trial, current.V_c, current.beta_c), current.error)
-    else:
-        current = None
+    limit = min(changes[-1].error if changes else least, (1 - SAVING) * least)
+    current: Current | None = None
+    for find in () if done else (_current, _own_currents):
+        found = find(trial)
+        if found is not None and found[0].error <= limit:
+            current, inside = found
+            limit = current.error - WORTH * least
+    if current is not None:
+        changes = _worthwhile(inside, current.error)
     length = windows.horizon * windows.step
     return Look(vessel, length, alone, constant, facts, tuple(changes), current, timely)
 
@@ -324,8 +342,8 @@ def _between(trial: _Trial) -> _Trial:
     return replace(trial, windows=replace(windows, planned=planned), known={}, reached={})
 
 
-def _in_current(trial: _Trial, V_c: float, beta_c: float) -> _Trial:
-    """The trial in a steady current [m/s, rad]."""
+def _in_current(trial: _Trial, V_c: float | Array, beta_c: float | Array) -> _Trial:
+    """The trial in a steady current [m/s, rad], or in that of each window (N,)."""
     vessel, windows = trial.vessel, trial.windows
     if "current" not in vessel.document:
         vessel = vessel.with_values({"current.kind": "uniform"})
@@ -333,31 +351,68 @@ def _in_current(trial: _Trial, V_c: float, beta_c: float) -> _Trial:
     return replace(trial, vessel=vessel, windows=replace(windows, columns=columns), known={})
 
 
-def _current(trial: _Trial) -> Current | None:
-    """The steady current of all runs with which the paths fit best, which no log has; None where none is found.
+def _current(trial: _Trial) -> tuple[Current, _Trial] | None:
+    """The steady current of all runs with which the paths fit best, and the trial in it; None where none is found.
 
     Runs of one heading cannot tell it from a thrust that is wrong: their error is then explained by both alike.
     """
+    currents = _currents(trial, np.zeros(len(trial.windows), dtype=int))
+    if not np.isfinite(currents).all():
+        return None
+    V_c, beta_c = float(np.hypot(*currents[0])), float(np.arctan2(currents[0, 1], currents[0, 0]))
+    inside = _in_current(trial, V_c, beta_c)
+    return Current(V_c, beta_c, inside.errors([{}])[0]), inside
 
-    def away(current: Array) -> Array:  # (N,) [m], of all points
-        one = _in_current(trial, float(np.hypot(*current)), float(np.arctan2(current[1], current[0])))
+
+def _own_currents(trial: _Trial) -> tuple[Current, _Trial] | None:
+    """The currents of the runs, each with its own, and the trial in them; None where there are too few windows.
+
+    Each half of a run is judged in the current of the other half, so that chance explains nothing.
+    """
+    run, t = trial.windows.run, trial.windows.t
+    names = np.unique(run)
+    middle = np.array([np.median(t[run == name]) for name in names])
+    number = np.searchsorted(names, run)
+    late = (t > middle[number]).astype(int)
+    groups = 2 * number + late
+    if len(names) < 2 or np.bincount(groups, minlength=2 * len(names)).min() < FEW:
+        return None
+    currents = _currents(trial, groups)
+    if not np.isfinite(currents).all():
+        return None
+    north, east = currents[2 * number + 1 - late].T
+    inside = _in_current(trial, np.hypot(north, east), np.arctan2(east, north))
+    size = float(np.sqrt(np.mean(np.sum(currents**2, axis=1))))
+    return Current(size, np.nan, inside.errors([{}])[0], each=True), inside
+
+
+def _currents(trial: _Trial, groups: NDArray[np.int_]) -> Array:
+    """The steady current (G, 2) [m/s], north and east, with which the paths of each group of windows (N,) fit best.
+
+    NaN where a group has none that is slower than the ship.
+    """
+
+    def away(currents: Array) -> Array:  # (T, N, 2) [m], of all points
+        north, east = currents[groups].T
+        one = _in_current(trial, np.hypot(north, east), np.arctan2(east, north))
         paths = Physics(one.vessel, one.windows.horizon, one.windows.step, "rk4").paths(one.instants())
-        return np.asarray((paths - one.windows.future).ravel())
+        return np.asarray(paths - one.windows.future)
 
     speed = float(np.median(np.hypot(trial.windows.columns["u"], trial.windows.columns["v"])))
-    current, step = np.zeros(2), 0.02 * speed
+    currents, step = np.zeros((int(groups.max()) + 1, 2)), 0.02 * speed
     for _ in range(NEWTON):
-        base = away(current)
+        base = away(currents)
         with np.errstate(invalid="ignore"):  # paths that diverge
-            slopes = np.stack([(away(current + step * axis) - base) / step for axis in np.eye(2)], axis=1)
-        sound = np.isfinite(base) & np.isfinite(slopes).all(axis=1)
-        if not sound.any():
-            return None
-        current = current - np.linalg.lstsq(slopes[sound], base[sound])[0]
-        if not 0 < float(np.hypot(*current)) < STRONG * speed:
-            return None
-    V_c, beta_c = float(np.hypot(*current)), float(np.arctan2(current[1], current[0]))
-    return Current(V_c, beta_c, _in_current(trial, V_c, beta_c).errors([{}])[0])
+            slopes = np.stack([(away(currents + step * axis) - base) / step for axis in np.eye(2)], axis=-1)
+        sound = np.isfinite(base) & np.isfinite(slopes).all(axis=-1)
+        for group in range(len(currents)):
+            here = sound & (groups == group)[:, None]
+            if not here.any():
+                return np.full_like(currents, np.nan)
+            currents[group] -= np.linalg.lstsq(slopes[here], base[here])[0]
+        if not np.all((np.hypot(*currents.T) > 0) & (np.hypot(*currents.T) < STRONG * speed)):
+            return np.full_like(currents, np.nan)
+    return currents
 
 
 def _worthwhile(trial: _Trial, alone: float) -> list[Change]:

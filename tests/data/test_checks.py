@@ -68,6 +68,62 @@ def test_defect_fails_its_check(defect: Callable[[pd.DataFrame], pd.DataFrame], 
     assert caught <= failed(defect(frame))
 
 
+def drifting(seed: int, course: bool) -> pd.DataFrame:
+    """A ship that weaves and drifts in turns, with noise; `course`: the heading is the course over ground."""
+    random, t = np.random.default_rng(seed), np.arange(0.0, 400.0, 0.5)
+    r = 0.03 * np.sin(2 * np.pi * t / random.uniform(60, 90))
+    psi = np.append(0.0, np.cumsum((r[1:] + r[:-1]) / 4))
+    drift = np.gradient(np.append(0.0, np.cumsum(-6.0 * r[1:] * 0.5)), t)
+    over_ground = psi + drift
+    rate = 5.0 * np.exp(1j * over_ground)
+    place = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 4))
+    heading = over_ground if course else psi
+    body = rate * np.exp(-1j * heading)
+    frame = (
+        turning(t)
+        .assign(
+            north=place.real,
+            east=place.imag,
+            psi=heading,
+            u=body.real,
+            v=body.imag,
+            r=r + random.normal(0, 1e-4, len(t)),
+        )
+        .assign(**{"port.n": 2.0})
+    )
+    return frame.assign(psi=frame["psi"] + random.normal(0, 1e-3, len(t)))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_heading_that_is_the_course_is_named_and_is_not_late(seed: int) -> None:
+    assert failed(drifting(seed, False)) == set()
+    wrong = failed(drifting(seed, True))
+    assert "sway" in wrong
+    assert "heading latency" not in wrong
+    table = check_dataset(as_dataset(drifting(seed, True)))
+    assert "is psi the course over ground?" in table.set_index("check").loc["sway", "sentence"]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_uneven_times_fail_where_the_motion_contradicts_them(seed: int) -> None:
+    """Steps of 0.95 and 1.04 s, as days with six decimals have, failed whatever the noise of the positions."""
+    random, t = np.random.default_rng(seed), np.arange(0.0, 300.0)
+    uneven = t + random.uniform(-0.2, 0.2, len(t))
+
+    def logged(of: np.ndarray, times: np.ndarray, noise: float) -> set[str]:
+        frame, sizes = (
+            turning(of).assign(t=times, **{"port.n": 2.0}),
+            {"north": noise, "east": noise, "psi": 0.01 * noise},
+        )
+        return failed(
+            frame.assign(**{name: frame[name] + random.normal(0, std, len(t)) for name, std in sizes.items()})
+        )
+
+    assert logged(uneven, uneven, 0.1) == set()  # sampled at these times
+    assert logged(t, uneven, 0.1) == {"jitter"}  # sampled each second
+    assert logged(t, 0.0864 * np.round(t / 0.0864), 0.5) == set()
+
+
 def test_a_small_craft_may_turn_faster_than_a_ship() -> None:
     """At 1.5 rad/s, as her heading shows; a yaw rate in degrees is still refused."""
     t = 0.1 * np.arange(600)

@@ -42,6 +42,14 @@ def test_a_signed_square_is_damping_however_it_is_written(path: str) -> None:
     assert "of ships below 0" in verdict(vessel, path, {path: -vessel.parameters[path]})
 
 
+@pytest.mark.parametrize("path", ["hull.abkowitz.Y_v", "hull.abkowitz.N_r"])
+def test_a_damping_of_abkowitz_that_changes_its_sign_is_reported(path: str) -> None:
+    """A fit of logs in a current made Y_v -0.145 times what it is, and no line said so."""
+    vessel = load_vessel("mariner")
+    assert "of ships below 0" in verdict(vessel, path, {path: -0.145 * vessel.parameters[path]})
+    assert verdict(vessel, path, {path: 0.5 * vessel.parameters[path]}) == ""
+
+
 def test_added_mass_is_judged_by_the_mass_that_was_fitted_too() -> None:
     vessel = load_vessel("kvlcc2-l7")
     heavier = {"inertia.m": 5 * vessel.parameters["inertia.m"]}

@@ -76,6 +76,51 @@ def test_a_ship_at_rest_with_stopped_shafts_corrects_no_number(log: Dataset) -> 
     assert "the log agree" in view.sentence
 
 
+@pytest.fixture(scope="module")
+def ways() -> list[dict[str, float]]:
+    """Currents [m/s, rad] of four runs, in one direction and in others."""
+    rng = np.random.default_rng(3)
+    return [{"V_c": float(rng.uniform(0.3, 0.6)), "beta_c": float(rng.uniform(-3, 3))} for _ in range(4)]
+
+
+def in_currents(ways: list[dict[str, float]]) -> Dataset:
+    """The runs of `log`, longer, with each in its current."""
+    how = {"n_rpm": RPM, "duration": 160.0, "execute_at": 10.0}
+    kinds = [Zigzag(name=f"zz {angle}", angle_deg=angle, **how) for angle in (10, 20)]
+    kinds += [TurningCircle(name=f"circle {side}", angle_deg=25, side=side, **how) for side in ("port", "starboard")]
+    vessel = load_vessel(SHIP).with_values({"current.kind": "uniform"})
+    frames = [
+        perform(vessel, [one], step=0.1, interval=1.0, environment=way) for one, way in zip(kinds, ways, strict=True)
+    ]
+    frame = pd.concat(frames, ignore_index=True)
+    kept = [name for name in frame if not str(name).startswith("actual.") and name not in ("V_c", "beta_c")]
+    return Dataset(frame[kept].astype({"run": "str"}), {"clock": "run", "flags": []})
+
+
+def test_another_current_in_each_run_is_named_with_its_remedy(ways: list[dict[str, float]]) -> None:
+    """The line said that vessel and log agree, at four fifths of the error of constant u, v, r."""
+    view = look(load_vessel(SHIP), in_currents(ways))
+    assert view.current is not None
+    assert view.current.each
+    assert view.current.V_c == pytest.approx(np.sqrt(np.mean([way["V_c"] ** 2 for way in ways])), rel=0.2)
+    assert view.corrected < 0.3 * view.alone
+    assert "another current in each run" in view.sentence
+    assert "--nuisance current=0." in view.sentence
+    assert view.wrong
+    same = look(load_vessel(SHIP), in_currents([ways[0]] * 4))
+    assert same.current is not None
+    assert not same.current.each
+    assert "a steady current of" in same.sentence
+
+
+def test_where_the_vessel_errs_nearly_as_much_as_constant_motion_nothing_agrees(log: Dataset) -> None:
+    view = replace(look(load_vessel(SHIP), log), late=None)
+    for share, agrees in ((0.4, True), (0.8, False)):
+        one = replace(view, alone=share * view.constant)
+        assert ("the log agree" in one.sentence) is agrees
+        assert not one.wrong
+
+
 def test_a_screw_too_large_is_reported_and_explained(log: Dataset) -> None:
     """Twice the thrust: the speed tells at once, and a smaller screw explains it."""
     truth = load_vessel(SHIP)

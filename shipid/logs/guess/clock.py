@@ -49,6 +49,7 @@ FEWEST_TIMES = 10  # of a second clock that are compared with the first
 APART, OFF = 10, 0.02  # steps of the first clock, and share of its span, by which a second one may go otherwise
 ROWS = 10  # of a day in a column of dates that are numbers, at least
 FEWEST, NEARLY = 0.3, 0.9  # shares of the rows of a clock with a fault that have a time, and that rise, at least
+PAUSE = 3.0  # usual steps, or roundings of the clock: a longer one is a pause
 LOST = 0.1  # share of the rows that may be lost at a rate, at most; a pause loses none
 REPEATED = 0.05  # share of the rows that may repeat the row before, at most
 CLOCK_WORDS = frozenset(
@@ -89,6 +90,7 @@ TICKS = {11_644_473_600: "1601, as Windows does", 62_135_596_800: "the year 1, a
 """Seconds from the begin of a clock of ticks of 100 ns to 1970 -> who counts so."""
 GPS, OF_GPS = 315_964_800, frozenset("gps gnss gpst".split())
 """Seconds from 1970 to 6 January 1980, from which GPS counts, and words of a clock that may."""
+OF_1970 = frozenset("unix epoch posix utc".split())  # words of a clock from 1970
 LEAP, LEAPS = 1_483_228_800, 18  # s since 1970 (UTC): from 2017 on GPS is so many seconds ahead of UTC
 OF_1904 = 2_082_844_800  # s from 1904, from which LabVIEW counts, to 1970
 COUNTERS, LONG_STEP = (2**16, 2**32), 10.0  # numbers of a counter; usual steps that lie over its end, at most
@@ -325,14 +327,17 @@ def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[
 def _other_begin(clock: dict[str, Any], first: float) -> Iterator[str]:
     """Yield a question where a clock of seconds that is read as since 1970, first [s], may count from another date.
 
-    GPS counts from 1980, which a name may say; a log of the future counts from 1904. No log is of the future.
+    GPS counts from 1980, which a name may say; without one that says 1970, numbers that are of late years then may. A
+    log of the future counts from 1904. No log is of the future.
     """
     now = datetime.now(UTC).timestamp()
     if clock["unit"] not in ("s", "ms", "us", "ns") or not DATED < first < LAST_DATE:
         return
     begins = f"{clock['from']!r} is read as seconds since 1970, {date_of(first)}: or does it count from"
     of_gps, of_1904 = first + GPS - (LEAPS if first + GPS > LEAP else 0), first - OF_1904
-    if OF_GPS & {*parts_of(clock["from"])} and of_gps < now:
+    parts = {*parts_of(clock["from"])}
+    of_late = of_gps > LEAP and not parts & OF_1970
+    if (OF_GPS & parts or of_late) and of_gps < now:
         ahead = f", less {LEAPS} s by which GPS is ahead" if of_gps > LEAP else ""
         yield f"{begins} 6 January 1980, as GPS does? Then add {GPS} s{ahead}: {date_of(of_gps)} UTC"
     elif first > now and of_1904 > DATED:
@@ -509,9 +514,11 @@ def _rate(t: Array) -> tuple[float, Array] | None:
         return None
     _values, first = np.unique(t, return_index=True)
     early = float(np.median(np.diff(t[: max(3, int(first[min(len(first) - 1, 40)]))])))
-    mean = float(t[-1] - t[0]) / (len(t) - 1)
     rounding = rounding_of(t)
-    slack = float(rounding[-1]) / (len(t) - 1)
+    steps = np.diff(t)
+    going = steps <= PAUSE * max(float(np.median(steps)), float(np.median(rounding)))  # on, without a pause
+    mean = float(steps[going].mean())
+    slack = float(rounding[-1]) * (1 + np.sum(~going)) / going.sum()
     stretches = [  # whatever rows were lost, most short stretches are whole
         _roundest(float(np.median(t[far:] - t[:-far])) / far, float(rounding[-1]) / far)
         for far in (min(len(t) - 1, most) for most in (200, 60))

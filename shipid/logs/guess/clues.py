@@ -26,7 +26,7 @@ from shipid.logs.guess.words import (
 )
 from shipid.logs.mapping import UNITS
 from shipid.logs.repairs import INPUTS
-from shipid.physics.signals import SIGNALS, signal_of
+from shipid.physics.signals import SIGNALS, signal_of, steers
 
 FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db|m/s\^?2|m/s²|kwh|kv|ma|bfts?|beaufort")
 """Units of quantities that no column of a dataset has, in lower case."""
@@ -130,7 +130,8 @@ def _unit_and_factor(name: str, si: str) -> tuple[str | None, float]:
 def unit_of_another(name: str, meaning: str) -> str | None:
     """Return the unit in a name where a column of this meaning cannot have it; None if it can, or no unit is there.
 
-    Only what is set off as a unit counts: in brackets, after a slash or a comma, or a unit of a shaft at the end.
+    Only what is set off as a unit counts: in brackets, after a slash or a comma, or a unit of a shaft at the end. An
+    angle that steers may be in per cent of its largest one.
     """
     si = si_of(meaning)
     if si not in UNITS or unit_in_name(name, si) is not None:
@@ -139,6 +140,8 @@ def unit_of_another(name: str, meaning: str) -> str | None:
     said = units_in(name) or ([last] if last in ("kN", "kNm", "Nm", "kW") or shaft_unit(name) else [])
     for word in said:
         text = word.strip().lower()
+        if meaning in SIGNALS and steers(meaning) and re.fullmatch(UNIT_WORDS["%"], text):
+            continue
         if (
             is_known(without_prefix(text)[0])
             or (si != "rev/s" and FOREIGN.fullmatch(text))

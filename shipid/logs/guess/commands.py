@@ -133,7 +133,7 @@ def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
     unit : a guess. Returned is what its name says of that, in words; empty where it says nothing.
     """
     top = float(np.abs(state.columns[name]).max())
-    said = {part for text in units_in(name) for part in [text.strip().lower()]} | set(parts_of(name)[-1:])
+    said = {text.strip().lower() for text in units_in(name)} | {*parts_of(name)[-1:], *re.findall("[%‰]", name)}
     for words, full in SHARES.items():
         if said & set(words):
             remedy = f"Write factor = (deg at {full:g}) / {full:g}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from shipid.data.checks import Delay, delay_of
 from shipid.data.dataset import DATED, Array
 from shipid.logs.dates import LAST_DATE, date_of, rolled_over
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State
+from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.mapping import to_si
@@ -38,6 +39,10 @@ FARTHER = 2.0  # times the way from row to row that a ship would go in a hole of
 OFF_RATE, RATE_LEFT = 0.03, 0.02  # factor of a yaw rate, at least; share of the heading that it then leaves, at most
 STREAM = 0.5  # of the misfit of positions and velocities: less is no current
 NOTHING, OFTEN = 0.3, 20.0  # share of the rows that are 0 for no value, at most; s of a speed that count as a spike
+TURN_SHOWS, SEVERAL = np.radians(3.0), 40  # of the heading in a window in which the ship turns; windows at least
+IDENTICAL, EQUAL, ROUND = 0.9, np.radians(0.01), np.radians(1.0)  # share of rows; apart; largest step of a column
+DELAYED, SURE, WITH_TRACK = 0.3, 4.0, 0.3  # s; standard errors; of that time, which the track may leave the heading by
+NO_HEADING = 0.4  # confidence of a heading that is a course
 HALF, AWAY = 0.5, 18.0  # share of the usual speed, and parts of a turn, by which the rows around are away from 0
 
 
@@ -129,8 +134,9 @@ def defects_of_motion(state: State) -> None:
     """Report contradictions between position, heading, velocity and yaw rate."""
     if state.psi is None:
         return
+    course = _ask_if_course(state)
     if state.r is not None:
-        delay = _delay(state, state.psi, evidence.integral(state.t, state.r))
+        delay = None if course else _delay(state, state.psi, evidence.integral(state.t, state.r))
         if delay is not None:
             _find_late(state, "heading", "yaw rate", delay)
             # or the tests below would report the same delay again
@@ -147,6 +153,90 @@ def defects_of_motion(state: State) -> None:
     path = evidence.integral(state.t, state.velocity)
     _jumps(state, _arm_or_delay(state, path))
     _heading_offset(state)
+
+
+def _ask_if_course(state: State) -> bool:
+    """Ask where the heading is a course over ground: the column of one has its values, or the track; whether it is so.
+
+    Sway and drift are 0 then. A course turns later than the ship, so that the yaw rate seems to lead.
+    """
+    assert state.psi is not None
+    place, heading = next((i, one) for i, one in enumerate(state.suggestions) if one.name == "psi")
+    same = _same_as(state, heading.source)
+    if same is not None:
+        other, share = same
+        seen = f"{heading.source!r} is {other!r} in {100 * share:.0f} % of the rows in which the ship turns"
+    elif _turns_with_track(state):
+        seen = f"{heading.source!r} turns later than the yaw rate says, and the track keeps to it in turns"
+    else:
+        return False
+    words = "is it the course over ground, and no heading? Then sway is not known, v is 0, and a heading is missing"
+    state.ask(("psi", "u", "v", "speed", "course"), f"{seen}: {words}: name the column of a gyro or a compass")
+    unsure = replace(heading, confidence=min(heading.confidence, NO_HEADING), evidence=f"{heading.evidence}; {seen}")
+    state.suggestions[place] = unsure
+    return True
+
+
+def _same_as(state: State, heading: str) -> tuple[str, float] | None:
+    """The column of a course that has the values of the heading where the ship turns, and in which share; else None."""
+    assert state.psi is not None
+    turns = np.abs(state.chosen.change(state.psi).real) > TURN_SHOWS
+    rows = ((state.chosen.first + state.chosen.last) // 2)[turns]
+    if len(rows) < SEVERAL:
+        return None
+    units = {one.source: one.unit for one in state.suggestions}
+    for name in state.all_called("course"):
+        if name == heading:
+            continue
+        turn = to_si(units.get(name) or unit_in_name(name, "rad") or units[heading], "psi")
+        apart = np.abs(np.angle(np.exp(1j * (state.psi[rows] - turn * state.columns[name][rows]))))
+        rounded = max(_quantum(state.columns[name]) * turn, _quantum(state.columns[heading]) * turn)
+        share = float(np.mean(apart <= 0.51 * min(rounded, ROUND) + EQUAL))
+        if share >= IDENTICAL:
+            return name, share
+    return None
+
+
+def _quantum(values: Array) -> float:
+    """The least step between two values of a column."""
+    steps = np.diff(np.unique(values))
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def _turns_with_track(state: State) -> bool:
+    """Whether the heading turns later than the yaw rate, and the track turns with it as with no heading in a turn.
+
+    A ship drifts by an angle that grows with her yaw rate: the track then leaves her heading by a time times that rate,
+    and so does the integral of the rate leave a course.
+    """
+    if state.r is None or state.position is None or state.psi is None:
+        return False
+    change = state.chosen.change
+    ran, rate = change(evidence.integral(state.t, state.r)).real, change(state.r).real
+    span = state.t[state.chosen.last] - state.t[state.chosen.first]
+    mean = change(evidence.integral(state.t, np.exp(1j * state.psi))) / span
+    track = change(state.position) / span
+    speed = np.abs(track)
+    moving = (speed > 0.3 * np.percentile(speed, 90)) & (np.abs(mean) > 0)
+    if moving.sum() < SEVERAL:
+        return False
+    drift = np.angle(track * np.conj(mean))
+    lead = _slope(change(state.psi).real[moving] - ran[moving], rate[moving])
+    beside = _slope(drift[moving], ran[moving] / span[moving])
+    return -lead[0] > max(DELAYED, SURE * lead[1]) and abs(beside[0]) + 2 * beside[1] < WITH_TRACK * -lead[0]
+
+
+def _slope(values: Array, by: Array) -> tuple[float, float]:
+    """Slope of values (N,) over others, and its standard error: the scatter between ten parts of the log."""
+    parts = np.array_split(np.arange(len(by)), 10)
+
+    def of(rows: NDArray[np.intp]) -> float:
+        design = np.stack([by[rows], np.ones(len(rows))], axis=1)
+        return float(np.linalg.lstsq(design, values[rows], rcond=None)[0][0])
+
+    every = np.arange(len(by))
+    without = [of(np.setdiff1d(every, part)) for part in parts]
+    return of(every), float(np.std(without)) * np.sqrt(len(without) - 1)
 
 
 def _factor_of_rate(state: State) -> None:

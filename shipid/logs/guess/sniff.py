@@ -68,6 +68,12 @@ BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
 SHIPS, UNKNOWN = ("mmsi", "userid", "imo", "imonumber", "callsign"), ("0", "unknown")
 """Names of columns that say the ship, in small letters alone, the surest first; what they hold for an unknown one."""
+SHIP = frozenset(
+    "ship vessel shipname vesselname shipid vesselid schiff skip skib fartyg navire buque nave schip".split()
+)
+NAMES = frozenset("name id no nr num number code names navn namn nom nombre naam".split())
+"""Words of the name of a column that says a ship, and words beside them that it may have: a ship state is no ship."""
+ROWS_EACH = 5  # rows of each ship, on average, at least
 
 
 @dataclass(frozen=True)
@@ -239,17 +245,35 @@ def _sample(file: Path, encoding: str, size: int) -> str:
 
 
 def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
-    """Raise DataError where a log holds several ships, as columns of AIS name them: the surest of these decides."""
-    names = {re.sub(r"[^a-z]", "", name.lower()): name for name in reversed([*map(str, table.columns)])}
-    name = next((names[one] for one in SHIPS if one in names), None)
+    """Raise DataError where a log holds several ships, as a column names them: the surest of these decides."""
+    columns = [*map(str, table.columns)]
+    names = {re.sub(r"[^a-z]", "", name.lower()): name for name in reversed(columns)}
+    name = next((names[one] for one in SHIPS if one in names), None) or next(filter(_says_ship, columns), None)
     if name is None:
         return
     texts = column_called(table, name).dropna().astype(str).str.strip()
-    ships = [one for one in texts.unique() if not NO_VALUE.fullmatch(one.lower()) and one.lower() not in UNKNOWN]
+    known = [one for one in texts.unique() if not NO_VALUE.fullmatch(one.lower()) and one.lower() not in UNKNOWN]
+    ships = [*{one.casefold(): one for one in reversed(known)}.values()][::-1]
+    if _says_ship(name) and (any(map(_is_measured, ships)) or len(texts) < ROWS_EACH * len(ships)):
+        return
     if len(ships) > 1:
         first = ", ".join(ships[:3])
         message = f"holds {len(ships)} ships ({name!r} is {first}{', ...' if len(ships) > 3 else ''})"
         raise DataError(f"{message}: write the rows of each ship to a separate log", file=file)
+
+
+def _says_ship(name: str) -> bool:
+    """Whether the name of a column says a ship, or its name or number, and nothing else of it."""
+    parts = {*parts_of(name)}
+    return bool(parts & SHIP) and parts <= SHIP | NAMES
+
+
+def _is_measured(text: str) -> bool:
+    """Whether a text is a number with decimals, as no name and no number of a ship is."""
+    try:
+        return float(text) % 1 != 0
+    except ValueError:
+        return False
 
 
 def _without_units(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, tuple[str, ...]], dict[str, str]]:

@@ -57,6 +57,21 @@ def test_a_date_and_a_time_in_one_number_are_no_seconds(step: float, stored: str
     np.testing.assert_allclose(sniffed.t, t + pd.Timestamp("2024-05-14 08:13:20").timestamp(), atol=5e-3)
 
 
+@pytest.mark.parametrize("pause", [200.0, 1500.0])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_days_with_few_decimals_have_the_step_of_the_rows_and_not_that_with_their_pauses(
+    seed: int, pause: float, tmp_path: Path
+) -> None:
+    """A step of 1 s became 1.46 s, for the pauses between the runs were counted."""
+    lengths = np.random.default_rng(seed).integers(150, 400, 8)
+    t = np.concatenate([k * pause + lengths[:k].sum() + np.arange(length) for k, length in enumerate(lengths)])
+    days = pd.Series(45_426.25 + t / 86_400).map("{:.6f}".format)
+    pd.DataFrame({"Time": days, "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = sniff(tmp_path / "log.csv")
+    assert sniffed.clock.get("every", 1.0) == pytest.approx(1.0, abs=1e-4)
+    assert np.abs(sniffed.t - sniffed.t[0] - t).max() < 0.1
+
+
 @pytest.mark.parametrize(("epoch", "who"), [(11_644_473_600, "Windows"), (62_135_596_800, ".NET")])
 def test_ticks_of_100_ns_are_refused_with_what_to_write(epoch: int, who: str, tmp_path: Path) -> None:
     rows = [f"{(1_715_673_600 + k + epoch) * 10**7},{k % 7}" for k in range(80)]
@@ -70,7 +85,10 @@ def test_ticks_of_100_ns_are_refused_with_what_to_write(epoch: int, who: str, tm
         ("gps_time", 315_964_800 - 18, 1, "6 January 1980, as GPS does? Then add 315964800 s, less 18 s"),
         ("GPS [ms]", 315_964_800 - 18, 1000, "by which GPS is ahead: 2024-05-14 08:00:00 UTC"),
         ("gps_time", 0, 1, ""),  # since 1970, as its name does not say
-        ("time", 315_964_800 - 18, 1, ""),
+        ("Time", 315_964_800 - 18, 1, "2014-05-10 08:00:18: or does it count from 6 January 1980, as GPS does?"),
+        ("unix_time", 315_964_800 - 18, 1, ""),
+        ("Time", 0, 1, ""),
+        ("Time", 315_964_800 + 346_896_000, 1, ""),  # of 2003, or of 2013: that is long ago, too
         ("Timestamp", -2_082_844_800, 1, "1904, as LabVIEW does? Then take 2082844800 s off: 2024-05-14 08:00:00"),
     ],
 )

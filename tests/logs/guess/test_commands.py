@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.logs.guess.clues import LIKELY, State
+from shipid.logs.guess.clues import LIKELY, State, unit_of_another
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from tests.logs.simulated import si_log, state_with_pose
 
@@ -243,6 +243,20 @@ def test_a_rudder_that_is_no_angle_is_asked_for_its_largest_angle(name: str, fac
     """Before, per mille, per cent and pulses were degrees without a word: an angle 2.9 or 29 times too large."""
     state = chosen({name: factor * RUDDER})
     assert any("angle" in question.sentence for question in state.questions)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("name", ["Rudder [%]", "Rudder (%)", "Rudder angle %", "Rudder Pct"])
+def test_a_rudder_in_per_cent_is_taken_and_asked_of_which_angle(name: str, seed: int) -> None:
+    """In brackets it was thrown away, for no angle has the unit %; behind the name it had no unit."""
+    noise = np.random.default_rng(seed).normal(0, 0.05, len(RUDDER))
+    state = chosen({name: (RUDDER + noise) * 100 / 35})
+    (found,) = (one for one in state.suggestions if one.name == "rudder.delta")
+    assert found.source == name
+    assert found.confidence < LIKELY
+    said = [one.sentence for one in state.questions if name in one.sentence]
+    assert said == [f"{name!r} is in per cent: of which angle? Write factor = (deg at 100) / 100"]
+    assert unit_of_another(name, "psi") == ("%" if "(" in name or "[" in name else None)
 
 
 @pytest.mark.parametrize("name", ["rudder", "rudder_deg", "rudder normal", "RudderAngle [deg]"])

@@ -12,6 +12,7 @@ import pytest
 from pymap3d import ned2geodetic
 
 from shipid.logs.guess import sniff
+from shipid.logs.guess.clues import LIKELY
 from shipid.logs.guess.columns import Guess, guess
 from shipid.logs.guess.defects import LEVELS, _piles_up
 from shipid.logs.guess.draft import draft_mapping, untried
@@ -28,6 +29,45 @@ def guessed(folder: Path, frame: pd.DataFrame) -> Guess:
 
 def test_a_clean_log_has_no_defect(tmp_path: Path) -> None:
     assert guessed(tmp_path, CLEAN).kinds == set()
+
+
+def with_course(seed: int) -> pd.DataFrame:
+    """A log with speed and course over ground in place of u and v."""
+    frame = si_log(seed)
+    course = np.degrees(frame["psi"] + np.arctan2(frame["v"], frame["u"])) % 360.0
+    bridge = as_bridge(frame).drop(columns=["u", "v"])
+    return bridge.assign(SOG=np.hypot(frame["u"], frame["v"]), COG=course).rename(columns={"psi": "HDG"}).round(4)
+
+
+def said_of_course(found: Guess) -> list[str]:
+    return [one.sentence for one in found.questions if "is it the course over ground" in one.sentence]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("digits", [4, 1, 0])
+def test_a_heading_that_is_the_course_is_asked_and_not_taken_for_late(seed: int, digits: int, tmp_path: Path) -> None:
+    """v became 0 in every row, and the yaw rate seemed to lead: a latency was drafted."""
+    clean = with_course(seed)
+    assert said_of_course(guessed(tmp_path, clean)) == []
+    found = guessed(tmp_path, clean.assign(HDG=clean["COG"].round(digits)))
+    (said,) = said_of_course(found)
+    assert re.match(r"'HDG' is 'COG' in (9\d|100) % of the rows in which the ship turns: is it the course", said)
+    assert "late heading" not in found.kinds
+    assert next(one for one in found.columns if one.name == "psi").confidence < LIKELY
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_course_under_the_name_of_a_heading_is_seen_by_the_yaw_rate_and_the_track(seed: int, tmp_path: Path) -> None:
+    clean = with_course(seed)
+    found = guessed(tmp_path, clean.assign(HDG=clean["COG"]).drop(columns="COG"))
+    (said,) = said_of_course(found)
+    assert said.startswith("'HDG' turns later than the yaw rate says, and the track keeps to it in turns: is it")
+    assert "late heading" not in found.kinds
+    for delay in (0.0, 1.5):
+        alone = clean.drop(columns="COG")
+        psi = np.degrees(np.unwrap(np.radians(alone["HDG"])))
+        moved = np.interp(alone["time"] - delay, alone["time"], psi) % 360.0
+        assert said_of_course(guessed(tmp_path, alone.assign(HDG=moved))) == []
 
 
 def late(frame: pd.DataFrame, columns: list[str], delay: float) -> pd.DataFrame:

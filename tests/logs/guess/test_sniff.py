@@ -155,6 +155,15 @@ def test_a_number_far_beyond_all_others_again_and_again_is_a_missing_value(
         ("mmsi", ("219001234", "219001234"), ""),
         ("IMO", ("9123456", "Unknown"), ""),
         ("Callsign", ("OXYZ", "OABC"), "holds 2 ships"),
+        ("Vessel", ("MV Anna", "MV Berta"), "holds 2 ships ('Vessel' is MV Anna, MV Berta)"),
+        ("Ship name", ("Anna", "Berta"), "holds 2 ships ('Ship name' is Anna, Berta)"),
+        ("ShipID", ("1", "2"), "holds 2 ships ('ShipID' is 1, 2)"),
+        ("vessel_name", ("Anna", "ANNA"), ""),
+        ("Ship", ("Anna", ""), ""),
+        ("Ship state", ("under way", "moored"), ""),
+        ("Ship run", ("Z_10_1", "Z_10_2"), ""),
+        ("Vessel speed", ("5", "6"), ""),
+        ("Vessel", ("5.25", "6.5"), ""),
     ],
 )
 def test_a_log_of_several_ships_is_refused(name: str, values: tuple[str, str], words: str, tmp_path: Path) -> None:
@@ -165,6 +174,11 @@ def test_a_log_of_several_ships_is_refused(name: str, values: tuple[str, str], w
         return
     with pytest.raises(DataError, match=f"{re.escape(words)}.*: write the rows of each ship to a separate log"):
         sniff(log)
+
+
+def test_a_column_that_changes_with_every_row_is_no_ship(tmp_path: Path) -> None:
+    rows = [f"{k},{k},{np.sin(k):.3f}" for k in range(80)]
+    assert "lat" in sniff(log_of(tmp_path, ["time,Ship no,lat", *rows])).columns
 
 
 def test_a_number_for_missing_values_is_one_in_every_column(tmp_path: Path) -> None:
