@@ -43,7 +43,9 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
     target, which is made if it is absent. Data are synced to disk before the target is replaced, and the
     folder after it, so that a power cut leaves the old file or the new one. A process that is killed leaves a
     temporary folder, which the next one that writes there removes. A link stays, and the file that it leads to is
-    replaced. Raises OSError where the place cannot be written, and for a device or a pipe, which a file would replace.
+    replaced. Who may read and write the old file may do so with the new one.
+
+    Raises OSError where the place cannot be written, and for a device or a pipe, which a file would replace.
     """
     name, target = Path(target).name, Path(os.path.realpath(target))
     if target.is_symlink():
@@ -52,16 +54,28 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
         raise OSError(errno.EINVAL, "a device or a pipe: name a file to write", str(target))
     try:
         make_folder(target.parent)
+        before = target.stat() if target.is_file() else None
         with temporary_folder(target.parent) as folder:
             temporary = folder / name
             yield temporary
             sync(temporary)
+            if before is not None:
+                _keep_mode(temporary, before)
             os.replace(temporary, target)
         sync(target.parent)
     except OSError as error:
         if error.errno is not None and TEMPORARY in str(error.filename or TEMPORARY):
             error.filename = str(target)  # a write that fails, as on a full disk, names no file, or the temporary one
         raise
+
+
+def _keep_mode(file: Path, before: os.stat_result) -> None:
+    """Give a file the permissions of the one that it replaces; where that is another user's, its own beside them."""
+    fresh = file.stat()
+    mode = before.st_mode | (fresh.st_mode if fresh.st_uid != before.st_uid else 0)
+    if (mode ^ fresh.st_mode) & 0o777:
+        with suppress(OSError):  # a file system without permissions
+            file.chmod(mode & 0o777)
 
 
 def make_folder(folder: Path) -> None:
@@ -207,11 +221,13 @@ def json_text(content: Any) -> str:
 
 
 def read_json(file: Path) -> Any:
-    """Read JSON; ResultError if the file is missing or damaged."""
+    """Read JSON; ResultError if the file is missing, damaged or cannot be read."""
     try:
         return json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError) as error:
         raise ResultError(f"cannot be read ({error.strerror}): is this the folder of a run?", file=file) from None
+    except OSError as error:
+        raise ResultError(f"cannot be read ({error.strerror}): let this user read it", file=file) from None
     except (ValueError, RecursionError):
         raise ResultError("damaged: run the study again into a new folder", file=file) from None
 

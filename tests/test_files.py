@@ -71,6 +71,40 @@ def test_an_error_inside_leaves_what_was_there(before: bytes | None, error: type
     assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == ([("out.txt", before)] if before else [])
 
 
+@pytest.mark.skipif(os.name != "posix", reason="no permissions of files")
+@pytest.mark.parametrize("mode", [0o664, 0o600, 0o644, 0o666])
+@pytest.mark.parametrize("name", WRITERS)
+def test_who_may_read_and_write_a_file_may_do_so_with_the_one_that_replaces_it(
+    name: str, mode: int, tmp_path: Path
+) -> None:
+    """A colleague with a closed umask locked all others out of a shared folder, file by file."""
+    file = tmp_path / name
+    file.write_bytes(b"old")
+    file.chmod(mode)
+    before = os.umask(0o077)
+    try:
+        WRITERS[name](file)
+    finally:
+        os.umask(before)
+    assert file.read_bytes() != b"old"
+    assert file.stat().st_mode & 0o777 == mode
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give files away")
+def test_a_file_in_place_of_a_colleagues_is_not_closed_to_him(tmp_path: Path) -> None:
+    file = tmp_path / "text.md"
+    file.write_text("old")
+    file.chmod(0o600)
+    os.chown(file, 12345, -1)
+    before = os.umask(0o022)
+    try:
+        files.write_text(file, "new")
+    finally:
+        os.umask(before)
+    assert file.stat().st_uid == 0
+    assert file.stat().st_mode & 0o777 == 0o644
+
+
 def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path: Path) -> None:
     file = tmp_path / "out.txt"
     file.write_text("old")

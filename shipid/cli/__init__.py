@@ -44,6 +44,7 @@ GROUPS = {"vessel": vessel.app, "data": data.app, "study": study.app}
 def main() -> None:
     """Run the command line: an error that the user can correct is one line, never a traceback."""
     try:
+        _check_umask()
         _check_utf_8(sys.argv[1:])
         _named(sys.argv[1:])()
     except ShipidError as error:
@@ -88,6 +89,17 @@ def _is_anywhere() -> bool:
         return bool(os.getcwd())
     except FileNotFoundError:
         return False
+
+
+def _check_umask() -> None:
+    """Raise ShipidError where this user could not use the files and folders that this process makes."""
+    if not hasattr(os, "geteuid") or os.geteuid() == 0:
+        return
+    mask = os.umask(0o077)
+    os.umask(mask)
+    if mask & 0o700:
+        message = "keeps you from the files that you make yourself: set another one, such as `umask 022`"
+        raise ShipidError(message, path=f"umask {mask:04o}")
 
 
 def _check_utf_8(arguments: Sequence[str]) -> None:

@@ -496,7 +496,7 @@ def _before_work(
 
 def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool) -> None:
     from shipid.files import as_argument
-    from shipid.study import run
+    from shipid.study import run, store
     from shipid.study.contents import ANSWER, share_pages
     from shipid.study.progress import Watch
 
@@ -509,7 +509,7 @@ def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, d
         left = f"{end.total - end.done} of {end.total} cells"
         typer.echo(f"others work on the last {left}: the one that ends last writes the report. If they die: {resume}")
         return
-    with steps() as say:
+    with store.in_place(folder, plan), steps() as say:
         report = share_pages(folder, say)
     for line in (folder / ANSWER).read_text(encoding="utf-8", errors="replace").splitlines():
         typer.echo(f"  {line}")

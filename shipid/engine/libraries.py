@@ -140,8 +140,8 @@ def stranger(place: Path) -> str | None:
     """Why a file may be the work of another user, in words; None if only this user or the system can have written it.
 
     The file and its folder must belong to this user and be writable by no other. The folders above must belong to this
-    user or the system, and may be open to all only where nobody can rename what is another's (as in /tmp).
-    FileNotFoundError if there is no such file.
+    user or the system, and may be open to others only where nobody can rename what is another's (as in /tmp); a group
+    that is the user's alone is no other. FileNotFoundError if there is no such file.
     """
     entry = os.lstat(place)
     if not hasattr(os, "geteuid"):
@@ -159,9 +159,29 @@ def stranger(place: Path) -> str | None:
         status = os.stat(part)
         if status.st_uid not in trusted:
             return f"{part} belongs to another user"
-        if status.st_mode & stat.S_IWOTH and not status.st_mode & stat.S_ISVTX:
+        if status.st_mode & stat.S_ISVTX:
+            continue
+        if status.st_mode & stat.S_IWOTH:
             return f"{part} can be written by other users"
+        if status.st_mode & stat.S_IWGRP and not _is_own(status.st_gid, user):
+            return f"{part} can be written by its group: `chmod g-w` ends that"
     return None
+
+
+@cache
+def _is_own(group: int, user: int) -> bool:
+    """Whether a group is the system's or the user's own, of the same number or name and without another member."""
+    import grp
+    import pwd
+
+    if group == 0:
+        return True
+    name, known, members = "", "", set[str]()
+    with suppress(KeyError):  # a number without a name
+        name = pwd.getpwuid(user).pw_name
+    with suppress(KeyError):
+        known, members = grp.getgrgid(group).gr_name, set(grp.getgrgid(group).gr_mem)
+    return (group == user or (known != "" and known == name)) and members <= {name}
 
 
 @cache

@@ -76,6 +76,7 @@ _FOR_GCC = """#ifndef __clang__
 #endif
 """
 PARTS = 12  # tasks for each core at least: for an even load
+LONGEST_VERSION = 80  # characters of the version text of a compiler that are noted
 NOTED = 128  # vectors of distances that are counted at a time: between the steps a count costs five times as much
 BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
 
@@ -120,6 +121,7 @@ def _trials() -> tempfile.TemporaryDirectory[str]:
 
 
 _refused: list[str] = []  # why this process compiles no more, if so
+_interpreted: set[str] = set()  # functions that this process could not compile, while it goes on with others
 
 
 def compiler() -> str | None:
@@ -136,7 +138,16 @@ def engine() -> str:
     version = (compiler_version(command).splitlines() or ["?"])[0]
     wanted = target()
     missing = ", no libmvec" if wanted.fused and not wanted.prefix else ""  # other functions round otherwise
-    return f"native, {version}, {wanted.lanes} lanes{missing}"
+    apart = "".join(f", {name} by CasADi" for name in sorted(_interpreted))
+    return f"native, {visible(version)[:LONGEST_VERSION]}, {wanted.lanes} lanes{missing}{apart}"
+
+
+def engine_so_far() -> str | None:
+    """What computes rollouts in this process by now, as `engine`: no longer the native one where a model was refused.
+
+    None where nothing has asked for a compiler yet; to look for one takes a moment.
+    """
+    return engine() if _refused or _probed.cache_info().currsize else None
 
 
 def refuse(reason: str) -> None:
@@ -144,6 +155,12 @@ def refuse(reason: str) -> None:
     if not _refused:
         log.warning("engine 'native' is not used, others are slower: %s", visible(reason))
     _refused.append(reason)
+
+
+def interpret(name: str, reason: str) -> None:
+    """Say why this process does not compile a function: CasADi computes it, and rollouts keep their engine."""
+    log.warning("%s is not compiled (%s): slower", name, visible(reason))
+    _interpreted.add(name)
 
 
 def _cache() -> str:

@@ -16,7 +16,7 @@ import numpy as np
 
 from shipid.engine.integrate import Array
 from shipid.engine.libraries import NoLibrary
-from shipid.engine.native import C, compiled, compiler, padded, target
+from shipid.engine.native import C, compiled, compiler, interpret, padded, target
 from shipid.engine.printing import print_function
 from shipid.engine.threads import in_parallel, threaded
 from shipid.engine.vectors import head
@@ -86,9 +86,11 @@ def _library(function: ca.Function, shared: tuple[str, ...]) -> Any:
     """The compiled function `run`; None where it cannot be compiled, which is logged once."""
     try:
         return compiled(_source(function, shared), QUICKER)
-    except (NoLibrary, ValueError) as error:
+    except NoLibrary as error:
+        interpret(function.name(), error.message)
+    except ValueError as error:
         log.warning("%s is not compiled (%s): slower, with the same results", function.name(), error)
-        return None
+    return None
 
 
 def _source(function: ca.Function, shared: tuple[str, ...]) -> str:

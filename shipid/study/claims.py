@@ -271,6 +271,8 @@ class UnitClaims:
             pass
         except FileNotFoundError:
             raise
+        except PermissionError:  # of another user, for whom alone it is: its time says the same
+            pass
         except OSError:
             return False
         age = self._now() - status.st_mtime

@@ -23,7 +23,7 @@ from shipid.capacity import cores, processor
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, covered
 from shipid.engine.engines import check_device
-from shipid.engine.native import engine
+from shipid.engine.native import engine, engine_so_far
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, ShipidError, legible
 from shipid.files import make_folder, write_json
@@ -124,33 +124,42 @@ def run_study(
     """
     of_class("plan", plan, Plan, "as of `read_plan`")
     folder = path_of("folder", folder)
-    begun = time.perf_counter()
     workers = None if workers is None else whole_number("workers", workers, 1)
     check_device(device)
     store.open_folder(folder, plan)
-    if plan.parts:
-        yield from _run_parts(plan, folder, workers, scheduler, device, leave)
-        return
+    with store.in_place(folder, plan):
+        run = _run_parts if plan.parts else _run_one
+        yield from run(plan, folder, workers, scheduler, device, leave)
+
+
+def _run_one(
+    plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool
+) -> Iterator[Event]:
+    """Run a study of one part."""
+    begun = time.perf_counter()
     if scheduler is None:
         import_for_workers()
     with UnitClaims(folder) as claims:
         for words in _mended(folder, claims):
             yield Event("note", words)
-        for words in _other_session(plan, folder, claims, device):
-            yield Event("note", words)
+        origin = Origin(folder, claims, session_on(device, plan.code))
+        if changed := origin.note(origin.session):
+            yield Event("note", f"earlier results were computed otherwise: {'; '.join(changed)}")
         if not seals.is_sealed(folder, DATA):
             yield Event("note", plan.obtaining)
-            claims.once(DATA, partial(seals.is_sealed, folder, DATA), partial(_write_data, plan, folder))
+            claims.once(DATA, partial(seals.is_sealed, folder, DATA), partial(_write_data, plan, folder, origin))
         dataset = read_dataset(folder / store.DATASET)
         yield Event("note", "rolling out the foundations")
         prepared = prepare(plan, dataset, device)
+        store.check_place(folder, plan)
+        origin.note_engine(engine_so_far())
         claims.once(COMMON, partial(seals.is_sealed, folder, COMMON), partial(_write_common, plan, folder, prepared))
         for note in prepared.notes:
             yield Event("note", note)
         make_folder(folder / store.JOURNALS)
 
         def compute(units: Iterable[Unit]) -> Computed:
-            return _compute(plan, prepared, units, workers, scheduler, device, claims.holder, folder)
+            return _compute(plan, prepared, units, workers, scheduler, device, origin)
 
         cells = 0
         for event in _shared(plan, folder, claims, compute, leave):
@@ -193,10 +202,11 @@ def _cells(units: Iterable[Unit]) -> int:
     return sum(len(unit.pairs) for unit in units)
 
 
-def _write_data(plan: Plan, folder: Path) -> None:
+def _write_data(plan: Plan, folder: Path, origin: Origin) -> None:
     """Store the runs of a study."""
     dataset = obtain(plan)
     store.check_place(folder, plan)
+    origin.note_engine(engine_so_far())
     write_dataset(dataset, folder / store.DATASET)
     seals.write_seal(folder, DATA, [folder / store.DATASET])
 
@@ -239,12 +249,31 @@ def _write_common(plan: Plan, folder: Path, prepared: Prepared) -> None:
     seals.write_seal(folder, COMMON, [folder / name for name in (store.TEST, store.ENVELOPE, store.FOUNDATIONS)])
 
 
-def _other_session(plan: Plan, folder: Path, claims: UnitClaims, device: str) -> Iterator[str]:
-    """Note what this run is computed with; a sentence where earlier results were computed with something else."""
-    with claims.alone(SESSIONS):
-        changed = store.note_session(folder, session_on(device, plan.code))
-    if changed:
-        yield f"earlier results were computed otherwise: {'; '.join(changed)}"
+@dataclass
+class Origin:
+    """What the results in a folder are computed with: noted there before they are stored, each kind once by a process.
+
+    session : of this process as it begins. Its engine, or that of a worker, is another one from the moment on at which
+        a model cannot be compiled.
+    """
+
+    folder: Path
+    claims: UnitClaims
+    session: dict[str, Any]
+    noted: list[Mapping[str, Any]] = field(default_factory=list)
+
+    def note(self, session: Mapping[str, Any]) -> list[str]:
+        """Note a session; returns a sentence per difference to the one before, of this process or of another."""
+        if session in self.noted:
+            return []
+        self.noted.append(session)
+        with self.claims.alone(SESSIONS):
+            return store.note_session(self.folder, session)
+
+    def note_engine(self, now: str | None) -> None:
+        """Note by which engine this process or a worker computes by now; a warning where it was another before."""
+        if now is not None and (changed := self.note({**self.session, "engine": now})):
+            log.warning("computed otherwise from here on: %s", "; ".join(changed))
 
 
 def session_on(device: str, code: Mapping[str, Mapping[str, str]]) -> dict[str, Any]:
@@ -600,35 +629,40 @@ def _compute(
     workers: int | None,
     scheduler: str | None,
     device: str,
-    holder: Holder,
-    folder: Path,
+    origin: Origin,
 ) -> Computed:
-    """Units and their results in the order in which they finish."""
-    trials = (folder / store.JOURNALS).absolute()
+    """Units and their results in the order in which they finish; what they were computed with is noted before."""
+    trials, holder = (origin.folder / store.JOURNALS).absolute(), origin.claims.holder
     if scheduler is None:
-        work = partial(_claimed, plan, prepared, device=device, trials=trials, holder=holder)
-        yield from on_workers(work, units, workers or cores())
+        work = partial(_here, plan, prepared, device=device, trials=trials, holder=holder)
+        for unit, (now, results) in on_workers(work, units, workers or cores()):
+            origin.note_engine(now)
+            yield unit, results
         return
     from shipid.study.cluster import on_dask  # takes time to import, and memory in every worker
 
     shared = plan, prepared, device, trials, holder, plan.code
     of_user = [way.method for way in plan.methods if of_users(type(way.method))]
-    noted: list[Mapping[str, Any]] = []
     named = ((unit.key, unit) for unit in units)
-    for unit, (session, results) in on_dask(scheduler, _there, shared, named, plan.digest, of_user):
-        if session not in noted:
-            noted.append(session)
-            with UnitClaims(folder) as claims, claims.alone(SESSIONS):
-                changed = store.note_session(folder, session)
-            if changed:
+    for unit, (sessions, results) in on_dask(scheduler, _there, shared, named, plan.digest, of_user):
+        for session in sessions:
+            if changed := origin.note(session):
                 log.warning("computed otherwise on the cluster: %s", "; ".join(changed))
         yield unit, results
 
 
+def _here(
+    plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path, holder: Holder
+) -> tuple[str | None, Results | str]:
+    """A unit on a worker of this machine: the engine that the worker has by now, and the results."""
+    results = _claimed(plan, prepared, unit, device, trials, holder)
+    return engine_so_far(), results
+
+
 def _there(
     shared: tuple[Plan, Prepared, str, Path, Holder, Mapping[str, Mapping[str, str]]], unit: Unit
-) -> tuple[dict[str, Any], Results | str]:
-    """A unit on a machine of a cluster: what it was computed with, and the results."""
+) -> tuple[list[dict[str, Any]], Results | str]:
+    """A unit on a machine of a cluster: what it was computed with, before and after, and the results."""
     plan, prepared, device, trials, holder, code = shared
     imported = replace(plan, methods=tuple(way for way in plan.methods if type(way.method).__module__ != "__main__"))
     try:
@@ -637,7 +671,8 @@ def _there(
         words = f"its workers lack the term {unknown}: start them with --preload and your file that puts it into TERMS"
         raise ShipidError(words, path="--scheduler") from None
     session = session_on(device, {what: {**code.get(what, {}), **here.get(what, {})} for what in {**code, **here}})
-    return session, _claimed(plan, prepared, unit, device, trials, holder)
+    results = _claimed(plan, prepared, unit, device, trials, holder)
+    return [session, {**session, "engine": engine()}], results
 
 
 def _claimed(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path, holder: Holder) -> Results | str:

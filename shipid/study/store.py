@@ -5,7 +5,9 @@ from __future__ import annotations
 import errno
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+import stat
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,10 +17,11 @@ import pandas as pd
 
 from shipid import document as documents
 from shipid.data.windows import Windows
-from shipid.errors import DocumentError, ResultError
+from shipid.errors import DocumentError, ResultError, ShipidError
 from shipid.files import (
     as_argument,
     make_folder,
+    open_file,
     part_of,
     read_arrays,
     read_json,
@@ -44,8 +47,10 @@ STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", seals.PR
 DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
 JOURNALS, TRIALS = "trials", "trials.log"
 FOLDERS = ("cells", "predictions", "batches", "claims", seals.FOLDER, JOURNALS)
+LISTED = ("batches", "claims", seals.FOLDER, JOURNALS)  # folders whose files say how far a run is
 RESULTS = "results"  # name of the seal of the tables
 PARTS = "parts"
+COPY = "copy the folder of the run, and name the copy"  # what helps where this user may not write
 UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
 ENTRIES: dict[str, tuple[type | tuple[type, ...], type]] = {
@@ -87,20 +92,76 @@ def open_folder(folder: Path, plan: Plan) -> None:
             _make(folder, plan)
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
+    check_readable(folder)
     if provenance(folder)["digest"] != plan.digest:
         raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
-    check_writable(folder)
     for name in FOLDERS:
         if os.path.lexists(folder / name) and not (folder / name).is_dir():
             raise ResultError("is no folder, where one belongs: move it away, and resume", file=folder / name)
+    check_writable(folder)
+    _check_journals(folder, plan)
     _mend(folder, plan)
     sweep_run(folder)
 
 
+def check_readable(folder: Path) -> None:
+    """Raise ResultError for what says which run a folder holds, and how far, where this user may not read it."""
+    for name in (STUDY, VESSELS, PROVENANCE):
+        try:
+            with open_file(folder / name) as stream:
+                stream.read()
+        except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
+            continue  # said elsewhere
+        except OSError as error:
+            raise ResultError(f"cannot be read ({error.strerror}): let this user read it", file=folder / name) from None
+    for name in LISTED:
+        if (folder / name).is_dir() and not os.access(folder / name, os.R_OK | os.X_OK):
+            raise ResultError("is a folder that this user may not read: let this user read it", file=folder / name)
+
+
 def check_writable(folder: Path) -> None:
-    """Raise ResultError for the folder of a run that this user may read alone."""
+    """Raise ResultError for the folder of a run, or one in it, where this user may not write or replace files."""
     if not os.access(folder, os.W_OK | os.X_OK):
         raise ResultError("is a folder that this user may not write into: copy it, and name the copy", file=folder)
+    for place in (folder, *(folder / name for name in (*FOLDERS, PARTS))):
+        if place.is_dir() and not os.access(place, os.W_OK | os.X_OK):
+            raise ResultError(f"is a folder that this user may not write into: let this user, or {COPY}", file=place)
+        if place.is_dir() and (kept := _kept(place)):
+            message = f"its files may be replaced by their owners alone (sticky), such as {kept}"
+            raise ResultError(f"{message}: `chmod -t` ends that; or {COPY}", file=place)
+
+
+def _kept(place: Path) -> str:
+    """Name of a file that another user has and that the system lets nobody else replace; empty if there is none."""
+    status = place.stat()
+    user = os.geteuid() if hasattr(os, "geteuid") else 0
+    if not status.st_mode & stat.S_ISVTX or user in (0, status.st_uid):
+        return ""
+    with os.scandir(place) as entries:
+        return next((entry.name for entry in entries if entry.stat(follow_symlinks=False).st_uid != user), "")
+
+
+def _check_journals(folder: Path, plan: Plan) -> None:
+    """Raise ResultError for the journal of a search that is not finished where this user may not go on with it."""
+    units = {} if plan.parts else {unit.key: unit for unit in plan.units}
+    left = units.keys() - finished_keys(folder, units)
+    for file in (folder / JOURNALS).glob("*.log"):
+        if file.stem in left and not os.access(file, os.R_OK | os.W_OK):
+            message = f"is a journal that this user may not read and write: let this user, or {COPY}"
+            raise ResultError(message, file=file)
+
+
+@contextmanager
+def in_place(folder: Path, plan: Plan) -> Iterator[None]:
+    """Raise ResultError in place of an error in the folder of a run that is gone, or that this user may not change."""
+    try:
+        yield
+    except (OSError, ShipidError) as error:
+        check_place(folder, plan)
+        if isinstance(error, PermissionError):
+            check_readable(folder)
+            check_writable(folder)
+        raise
 
 
 def check_place(folder: Path, plan: Plan) -> None:
@@ -181,8 +242,9 @@ def _describe(folder: Path, plan: Plan) -> None:
 def stored_plan(folder: Path) -> Plan:
     """The plan of a run from its folder alone: the study and the vessels as they were when the run began.
 
-    Raises ResultError where it is no folder of a run or is damaged, `NotTaken` where it may be whole.
+    Raises ResultError where it is no folder of a run, is damaged or cannot be read, `NotTaken` where it may be whole.
     """
+    check_readable(folder)
     if not (folder / STUDY).is_file():
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
     record = provenance(folder)

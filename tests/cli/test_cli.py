@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 import shipid
 from shipid import cli
 from shipid.cli import app
+from shipid.errors import ShipidError
 from tests.cli.running import BAD, ended, output_of, shell
 from tests.study.tiny import TINY
 
@@ -253,3 +254,23 @@ def test_a_locale_that_cannot_read_an_argument_is_named() -> None:
         pytest.skip("a system whose names are UTF-8 in every locale")
     assert result.stderr.endswith(": cannot be read in this locale (ascii): set LC_ALL=C.UTF-8, and no PYTHONUTF8=0\n")
     assert len(result.stderr.splitlines()) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no umask")
+@pytest.mark.parametrize("mask", [0o277, 0o777, 0o177, 0o022, 0o077])
+def test_a_umask_that_closes_files_to_their_owner_is_one_line(mask: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers could not start, and a traceback came from the end of the process; root may do all."""
+    before = os.umask(mask)
+    try:
+        monkeypatch.setattr(os, "geteuid", lambda: 0)
+        cli._check_umask()
+        monkeypatch.setattr(os, "geteuid", lambda: 12345)
+        if mask in (0o022, 0o077):
+            cli._check_umask()
+        else:
+            with pytest.raises(
+                ShipidError, match=rf"umask {mask:04o}: keeps you from the files .* such as `umask 022`"
+            ):
+                cli._check_umask()
+    finally:
+        assert os.umask(before) == mask

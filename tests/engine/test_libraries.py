@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -126,6 +127,44 @@ def test_the_work_of_others_is_never_loaded(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(os, "geteuid", lambda: 12345)
     with pytest.raises(NoLibrary, match="belongs to another user"):
         load(library)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no owners of files")
+def test_a_folder_above_that_a_group_may_change_is_that_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its members could put another folder in the place of the cache."""
+    library = made(tmp_path / "a")
+    tmp_path.chmod(0o770)
+    for own in (False, True):
+        monkeypatch.setattr(libraries, "_is_own", lambda *_, own=own: own)
+        assert stranger(library) == (None if own else f"{tmp_path} can be written by its group: `chmod g-w` ends that")
+    monkeypatch.setattr(libraries, "_is_own", lambda *_: False)
+    tmp_path.chmod(0o1770)
+    assert stranger(library) is None
+
+
+@pytest.mark.parametrize(
+    ("group", "user", "own"),
+    [
+        (0, 1001, True),  # the system's
+        (1001, 1001, True),  # as most distributions make them, with the same number
+        (1002, 1001, True),  # or with the same name alone
+        (1003, 1003, False),  # with another member
+        (100, 1001, False),  # of all users
+        (5555, 5555, True),  # numbers without names, as in a container
+        (5556, 5555, False),
+    ],
+)
+def test_a_group_is_ones_own_by_number_or_name_and_without_others(
+    group: int, user: int, own: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grp, pwd = pytest.importorskip("grp"), pytest.importorskip("pwd")
+    groups = {1001: ("ann", []), 1002: ("ann", ["ann"]), 1003: ("bob", ["ann"]), 100: ("users", [])}
+    users = {1001: "ann", 1003: "bob"}
+    monkeypatch.setattr(grp, "getgrgid", lambda one: SimpleNamespace(gr_name=groups[one][0], gr_mem=groups[one][1]))
+    monkeypatch.setattr(pwd, "getpwuid", lambda one: SimpleNamespace(pw_name=users[one]))
+    assert libraries._is_own.__wrapped__(group, user) == own
 
 
 @pytest.mark.slow

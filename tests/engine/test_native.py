@@ -265,6 +265,32 @@ def test_a_machine_without_a_compiler_is_told_once(
     assert line == "engine 'native' is not used, others are slower: there is no C compiler (gcc, cc or clang)"
 
 
+def test_the_engine_of_a_process_is_the_one_that_it_has_by_now(
+    libraries_kept: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No compiler is looked for to say so; a model that could not be compiled ends the native engine."""
+    if native.compiler() is None:
+        pytest.skip("no compiler")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(libraries_kept))
+    monkeypatch.setattr(native, "_refused", [])
+    native._probed.cache_clear()
+    assert native.engine_so_far() is None
+    assert native.engine() == native.engine_so_far()
+    native.refuse("the C compiler failed (Killed)")
+    assert native.engine_so_far() == "casadi"
+
+
+def test_what_a_compiler_calls_itself_is_noted_in_short_and_printable(monkeypatch: pytest.MonkeyPatch) -> None:
+    if native.compiler() is None:
+        pytest.skip("no compiler")
+    said = "\033[31mgcc \x00\ufffd\x9b " + "9" * 200000 + "\nCopyright"
+    monkeypatch.setattr(native, "compiler_version", lambda _: said)
+    name = native.engine()
+    assert name.isprintable()
+    assert name.startswith("native, \\x1b[31mgcc")
+    assert len(name) < 120
+
+
 @pytest.mark.parametrize("found", [True, False])
 def test_the_engine_says_where_vector_functions_are_missing(found: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Others round otherwise: a run that goes on without them notes it, as it does for another compiler."""

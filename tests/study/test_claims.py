@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import os
 import pickle
 import random
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -101,6 +103,29 @@ def test_a_claim_of_before_the_clock_was_set_back_is_taken_over_when_nobody_rene
             clock[0] += claims.LATE - 5
             assert not mine.take("a")
         clock[0] += 10.0
+        assert mine.take("a")
+
+
+def test_a_claim_that_only_its_owner_may_read_is_taken_over_when_nobody_renews_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That of a killed run of a colleague with a closed umask: others waited for it without end."""
+    claim = tmp_path / "claims" / "a"
+    claim.parent.mkdir()
+    claim.write_text("{}")
+    really = Path.read_text
+
+    def closed(file: Path, *how: Any, **named: Any) -> str:
+        if file == claim:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(file))
+        return really(file, *how, **named)
+
+    monkeypatch.setattr(Path, "read_text", closed)
+    with UnitClaims(tmp_path) as mine:
+        assert not mine.take("a")
+        late = time.time() - claims.LATE - 5
+        os.utime(claim, (late, late))
+        monkeypatch.setattr(mine, "_set", -math.inf)
         assert mine.take("a")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import threading
 from pathlib import Path
@@ -64,7 +65,7 @@ def test_pages_are_written_anew_from_the_folder(tiny_run: Path, tmp_path: Path) 
 def test_a_folder_of_another_user_is_named_before_anything_is_read(
     tiny_run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("os.access", lambda *_: False)
+    monkeypatch.setattr("os.access", lambda _, mode: not mode & os.W_OK)
     with pytest.raises(ResultError, match="is a folder that this user may not write into: copy it, and name the copy"):
         write_pages(tiny_run)
 

@@ -20,6 +20,7 @@ import pytest
 import tomlkit
 
 from shipid.data.dataset import read_dataset
+from shipid.engine import native
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.files import read_json, write_json
 from shipid.hybrid.method import Fitted, Method, Task
@@ -97,6 +98,57 @@ def test_another_shipid_that_goes_on_is_noted(
         assert read_json(folder / store.PROVENANCE)["machine"]["packages"]["shipid"] == other
         stored = [Predictor.load(file).provenance["shipid"] for file in (folder / "cells").glob("*.npz")]
         assert set(stored) == {__version__, other}
+
+
+@pytest.mark.parametrize(
+    ("step", "before", "after"),
+    [("obtain", [], [run.DATA, run.COMMON]), ("prepare", [run.DATA], [run.COMMON]), ("run_unit", [run.COMMON], [])],
+)
+def test_an_engine_that_is_given_up_is_noted_before_anything_of_another_is_stored(
+    step: str, before: list[str], after: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A compiler that passed its probe and failed on a model: the numbers of two engines were mixed without a word."""
+    monkeypatch.setattr(native, "_refused", [])
+    if native.compiler() is None:
+        pytest.skip("no compiler")
+    plan, folder, stored = tiny_plan(tmp_path), tmp_path / "run", dict[str, str]()
+    work, write_seal = getattr(run, step), seals.write_seal
+
+    def refused(*given: Any, **named: Any) -> Any:
+        native.refuse("the C compiler failed (Killed)")
+        return work(*given, **named)
+
+    def noted(place: Path, name: str, files: Any) -> None:
+        stored[name] = read_json(folder / store.PROVENANCE)["sessions"][-1]["engine"]
+        write_seal(place, name, files)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(run, step, refused)
+        patch.setattr(seals, "write_seal", noted)
+        events = events_here(plan, folder)
+        while next(events).kind != "cell":
+            pass
+        events.close()
+    assert all(stored.pop(name).startswith("native, ") for name in before)
+    assert {stored[name] for name in [*after, plan.units[0].key]} == {"casadi"}
+    one, other = (session["engine"] for session in read_json(folder / store.PROVENANCE)["sessions"])
+    assert f"computed in parts: engine was {one}, now {other}" in check_folder(folder).lines
+    assert provenance_words(read_results(folder))["computed in parts"] == f"engine was {one}, now {other}"
+    monkeypatch.setattr(native, "_refused", [])
+    notes = [event.text for event in events_here(plan, folder) if event.kind == "note"]
+    assert f"earlier results were computed otherwise: engine was {other}, now {one}" in notes
+
+
+def test_an_engine_that_a_worker_of_a_cluster_gives_up_is_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(native, "_refused", [])
+    if native.compiler() is None:
+        pytest.skip("no compiler")
+    monkeypatch.setattr(run, "_claimed", lambda *_: native.refuse("the C compiler failed (Killed)"))
+    plan = tiny_plan(tmp_path)
+    sessions, _ = run._there((plan, None, "cpu", tmp_path, None, {}), plan.units[0])  # type: ignore[arg-type]
+    assert [session["engine"].partition(",")[0] for session in sessions] == ["native", "casadi"]
 
 
 @pytest.mark.parametrize("package", ["scikit-learn", "scipy"])
@@ -514,6 +566,20 @@ def test_a_folder_that_is_moved_or_replaced_gets_nothing_more(
     assert numbers(tmp_path / "moved") == numbers(tiny_run)
 
 
+def test_a_folder_that_is_moved_while_a_worker_writes_there_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ended with `trials/none+plain-N0010-s0.log: No such file or directory`."""
+
+    def moved(*_: Any, **__: Any) -> None:
+        (tmp_path / "run").rename(tmp_path / "moved")
+        (tmp_path / "run" / store.JOURNALS / "a.log").open("r+b")
+
+    monkeypatch.setattr(run, "run_unit", moved)
+    with pytest.raises(ResultError, match="was moved, removed or replaced while this run worked in it"):
+        run_here(tiny_plan(tmp_path), tmp_path / "run")
+
+
 def test_folder_with_other_things_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "photos"
     folder.mkdir()
@@ -753,5 +819,6 @@ def test_a_method_in_the_script_itself_has_the_code_of_the_script_on_a_cluster(
     monkeypatch.setattr(run, "_claimed", lambda *_: "left")
     plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine"}, {"name": "bare", "kind": "alone"}]})
     written = {"code of the method": {"mine": "01234567"}}
-    session, _ = run._there((plan, None, "cpu", tmp_path, None, written), plan.units[0])  # type: ignore[arg-type]
+    (session, after), _ = run._there((plan, None, "cpu", tmp_path, None, written), plan.units[0])  # type: ignore[arg-type]
     assert session["code of the method"] == {"mine": "01234567"}
+    assert after == session

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import re
 import shutil
 import socket
 import subprocess
 import sys
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,7 @@ from shipid.hybrid.methods import METHODS
 from shipid.physics import TERMS
 from shipid.study import seals, store
 from shipid.study.check import check_folder
+from shipid.study.contents import write_pages
 from shipid.study.plan import Batch, Unit, build_plan, read_plan
 from shipid.study.results import read_results
 from tests.study.test_run import skeg_plan
@@ -47,6 +51,111 @@ def test_a_folder_of_another_user_is_named_before_anything_is_computed(
     monkeypatch.setattr("os.access", lambda *_: False)
     with pytest.raises(ResultError, match=r"run: is a folder that this user may not write into: copy it"):
         store.open_folder(tmp_path / "run", plan)
+
+
+@pytest.mark.parametrize("name", [store.STUDY, store.VESSELS, store.PROVENANCE])
+def test_a_file_that_this_user_may_not_read_is_named_and_never_replaced(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run replaced it, and the others called it damaged."""
+    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
+    store.open_folder(folder, plan)
+    held = {file: file.read_bytes() for file in folder.iterdir()}
+    really = Path.open
+
+    def closed(file: Path, *how: Any, **named: Any) -> Any:
+        if file == folder / name:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(file))
+        return really(file, *how, **named)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", closed)
+        for look in (partial(store.open_folder, plan=plan), check_folder, write_pages):
+            with pytest.raises(ResultError, match=rf"{name}: cannot be read \(Permission denied\): let this user"):
+                look(folder)
+    assert {file: file.read_bytes() for file in folder.iterdir()} == held
+
+
+def closed_to_me(monkeypatch: pytest.MonkeyPatch, *places: Path) -> None:
+    """Let this user write and list none of some places, whoever runs the tests."""
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda place, mode: Path(place) not in places and access(place, mode))
+
+
+@pytest.mark.parametrize("name", store.LISTED)
+def test_a_folder_in_it_that_this_user_may_not_list_is_named(
+    name: str, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A check of seals that nobody may list found no fault."""
+    folder = shutil.copytree(tiny_run, tmp_path / "run")
+    (folder / name).mkdir(exist_ok=True)
+    closed_to_me(monkeypatch, folder / name)
+    with pytest.raises(ResultError, match=rf"{name}: is a folder that this user may not read: let this user read it"):
+        check_folder(folder)
+
+
+@pytest.mark.parametrize("name", ["cells", "trials", "claims"])
+def test_a_folder_in_it_that_this_user_may_not_write_into_is_named_before_anything_is_computed(
+    name: str, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where only the top folder was opened to a group: it said `trials: Permission denied` when it came there."""
+    folder = shutil.copytree(tiny_run, tmp_path / "run")
+    (folder / name).mkdir(exist_ok=True)
+    access = os.access
+    monkeypatch.setattr(
+        os, "access", lambda place, mode: access(place, mode) and not (place == folder / name and mode & os.W_OK)
+    )
+    words = rf"{name}: is a folder that this user may not write into: let this user, or copy the folder of the run"
+    for look in (lambda: store.open_folder(folder, store.stored_plan(folder)), lambda: write_pages(folder)):
+        with pytest.raises(ResultError, match=words):
+            look()
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no owners of files")
+@pytest.mark.parametrize("name", [".", "cells", "seals"])
+def test_a_sticky_folder_with_files_of_others_is_named(
+    name: str, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = shutil.copytree(tiny_run, tmp_path / "run")
+    plan = store.stored_plan(folder)
+    (folder / name).chmod(0o1777)
+    store.open_folder(folder, plan)  # its owner may replace all
+    monkeypatch.setattr(os, "geteuid", lambda: 12345)
+    with pytest.raises(ResultError, match=r"owners alone \(sticky\), such as .*: `chmod -t` ends that"):
+        store.open_folder(folder, plan)
+    (folder / name).chmod(0o777)
+    store.open_folder(folder, plan)
+
+
+def test_a_journal_that_this_user_may_not_go_on_with_is_named(
+    tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = shutil.copytree(tiny_run, tmp_path / "run")
+    plan = store.stored_plan(folder)
+    file = folder / store.JOURNALS / f"{plan.units[0].key}.log"
+    assert file.is_file()
+    closed_to_me(monkeypatch, file)
+    store.open_folder(folder, plan)  # its search has ended
+    seals.remove(folder, plan.units[0].key)
+    with pytest.raises(ResultError, match=r"\.log: is a journal that this user may not read and write: let this user"):
+        store.open_folder(folder, plan)
+
+
+@pytest.mark.parametrize("parts", [False, True])
+def test_an_error_in_a_folder_that_is_gone_or_closed_says_so(
+    parts: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, folder = tiny_plan(tmp_path, {"repeat": {"seed": [0, 1]}} if parts else {}), tmp_path / "run"
+    store.open_folder(folder, plan)
+    with pytest.raises(FileNotFoundError), store.in_place(folder, plan):
+        raise FileNotFoundError(errno.ENOENT, "No such file or directory", "elsewhere")
+    with monkeypatch.context() as patch:
+        closed_to_me(patch, folder)
+        with pytest.raises(ResultError, match="may not write into"), store.in_place(folder, plan):
+            raise PermissionError(errno.EACCES, "Permission denied", str(folder / "cells"))
+    folder.rename(tmp_path / "moved")
+    with pytest.raises(ResultError, match="was moved, removed or replaced"), store.in_place(folder, plan):
+        raise FileNotFoundError(errno.ENOENT, "No such file or directory", str(folder / "trials" / "a.log"))
 
 
 def test_a_folder_of_other_things_is_left_alone(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,8 @@ import pandas as pd
 from shipid.data.dataset import Dataset
 from shipid.report import page
 from shipid.report.sections import SECTIONS
-from shipid.study import run, store
+from shipid.study import run
 from shipid.study.plan import Plan, Unit, build_plan, read_plan
-from shipid.study.prepare import Prepared
 
 TINY = Path(__file__).parents[1] / "bad" / "studies" / "plain.toml"
 
@@ -80,12 +79,10 @@ def without_figures() -> Iterator[None]:
 def without_workers() -> Iterator[None]:
     """Whatever runs a study computes it in this process."""
 
-    def compute(plan: Plan, prepared: Prepared, units: Iterable[Unit], *rest: Any) -> Iterator[Any]:
-        for unit in units:
-            *_, holder, place = rest
-            yield unit, run._claimed(plan, prepared, unit, "cpu", place / store.JOURNALS, holder)
+    def in_turn(work: Callable[[Unit], Any], units: Iterable[Unit], _: int) -> Iterator[Any]:
+        return ((unit, work(unit)) for unit in units)
 
-    with patch.object(run, "_compute", compute):
+    with patch.object(run, "on_workers", in_turn):
         yield
 
 
