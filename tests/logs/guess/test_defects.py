@@ -377,6 +377,17 @@ def test_a_compass_that_goes_to_359_is_in_degrees_whatever_the_positions_do(tmp_
     assert (heading.source, heading.unit) == ("HDG", "deg")
 
 
+@pytest.mark.parametrize(
+    ("name", "value"), [("Lat", 91.0), ("Lat", 99.0), ("Lon", 181.0), ("Lat", -9999.0), ("Lon", 999.0)]
+)
+def test_a_coordinate_that_no_place_has_is_a_missing_value(name: str, value: float, tmp_path: Path) -> None:
+    frame = globe(0)
+    frame.loc[300:304, name] = value
+    proposal = guessed(tmp_path, frame)
+    assert proposal.kinds == {"missing values"}
+    assert {("latitude", "Lat"), ("longitude", "Lon")} <= {(one.name, one.source) for one in proposal.columns}
+
+
 @pytest.mark.parametrize(("value", "lost"), [(0.0, True), (180.0, True), (12.0, False)])
 def test_a_coordinate_that_a_receiver_writes_is_lost_where_it_is_far_away(value: float, lost: bool) -> None:
     values = 10.0 + 1e-5 * np.arange(100.0)
