@@ -20,6 +20,7 @@ from shipid.data.dataset import (
     shares_clock,
     unit_of,
 )
+from shipid.data.lapses import Lapse, lapses
 from shipid.errors import DataError
 from shipid.physics.signals import row_of
 
@@ -39,6 +40,11 @@ SURE = 4.0  # standard errors beyond which a difference is no chance: one clean 
 EXACT = 1e-4  # of a change: a smaller misfit is none
 DELAY, DELAYS, EXPLAINED = 0.3, 3.0, 0.35  # s: least delay reported, longest tried; share of the misfit it explains
 FEWEST, MOST = 20, 5000  # windows that show a delay
+LAPSES = {
+    "zero": "is 0 for a moment, faster than it moves elsewhere",
+    "spike": "leaves its course and comes back, faster than it moves elsewhere",
+    "still": "repeats one value while the ship turns, and is noisy in other turns",
+}
 LIVELY, WILD = 0.1, 6.0  # of the larger changes: less says nothing; of the usual misfit: more is a spike
 
 
@@ -56,12 +62,14 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     contrary = any(not row["ok"] for heading in headings.values() for row in heading)
     if contrary and _is_course(dataset.frame):
         headings = {run: [*_of_course(headings[run], stretches)] for run, stretches in by_run.items()}
+    lapsed = _lapsed(dataset)
     table = []
     for run, stretches in by_run.items():
         heading = headings[run]
         proved = {"r"} if _proves_rate(heading) else set()  # a small craft turns faster than any ship
         results = [*_clock(stretches), *_ranges(stretches, proved), *heading, *_path(stretches), *_wind(stretches)]
-        table += [{"run": run, **row} for row in [*results, *_repetition(run, stretches, whole, shared)]]
+        results += [*_repetition(run, stretches, whole, shared), *lapsed.get(run, [])]
+        table += [{"run": run, **row} for row in results]
     return pd.DataFrame(table)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
 
 
@@ -118,6 +126,33 @@ def _ranges(stretches: list[pd.DataFrame], proved: set[str]) -> Iterator[dict[st
             unit = unit_of(name) or ""
             sentence = f"{name} reaches {largest:.3g} {unit}" + ("" if name in proved else ": right unit?")
             yield _row(f"range {name}", largest, unit, row.plausible, sentence, ok=name in proved or None)
+
+
+def _lapsed(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
+    """Run -> a failure for each command that lapses in it; what is usual for a command say all runs together."""
+    parts = [*pieces(dataset)]
+    psi = np.concatenate([np.unwrap(rows["psi"]) for _, rows in parts])
+    t = np.concatenate([rows["t"] for _, rows in parts])
+    runs = np.concatenate([np.full(len(rows), run, dtype=object) for run, rows in parts])
+    steps = np.diff(t)
+    follows = np.ones(len(steps), dtype=bool)
+    follows[np.cumsum([len(rows) for _, rows in parts])[:-1] - 1] = False
+    if not follows.any():
+        return {}
+    follows &= steps <= GAP * np.median(steps[follows])
+    found: dict[str, list[dict[str, Any]]] = {}
+    for name in dataset.commands:
+        values = np.concatenate([rows[name] for _, rows in parts])
+        by_run: dict[str, list[Lapse]] = {}
+        for lapse in lapses(name, t, values, psi, follows):
+            by_run.setdefault(runs[lapse.first], []).append(lapse)
+        for run, some in by_run.items():
+            count = sum(lapse.end - lapse.first for lapse in some)
+            said = [words for kind, words in LAPSES.items() if any(lapse.kind == kind for lapse in some)]
+            where = f"{count} row{'s' * (count > 1)}, the first at t = {t[some[0].first]:.10g} s"
+            sentence = f"{name} {' and '.join(said)}: {where}. In the mapping, mend it by despike or a break"
+            found.setdefault(run, []).append(_row(f"lapses {name}", float(count), "1", 0.0, sentence))
+    return found
 
 
 def _wind(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:

@@ -29,6 +29,7 @@ from shipid.logs.guess.defects import (
     take_spikes,
     take_zeros,
 )
+from shipid.logs.guess.lapses import find_lapses
 from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import Frame, choose_pose
@@ -151,6 +152,7 @@ def guess(
     choose_wind(state)
     defects_of_rows(state, sniffed)
     find_stuck(state)
+    find_lapses(state, sniffed)
     defects_of_spikes(state)
     ask_for_changes(state)
     defects_of_motion(state)

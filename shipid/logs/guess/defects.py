@@ -33,7 +33,9 @@ ORDERED = 20  # values of a shaft that is held at what was ordered, the largest 
 ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
 CLEAR = 0.008  # rad: standard error of a heading that is off, at most
 ONE_WAY = 0.9  # length of the mean of all directions, at most, of a ship on many courses
-NO_PLACE, LOST = 0.1, 0.5  # deg from 0 N 0 E, where other rows are; share of the rows without a fix, at most
+FILLS = (0.0, 90.0, -90.0, 180.0, -180.0)  # deg: what receivers write without a fix
+NO_PLACE, FAR_STEPS = 0.01, 20.0  # deg, and usual steps, by which rows about it are away from it, at least
+LOST = 0.5  # share of the rows without a fix, at most
 STEPS_ABOUT = 5  # steps before and after a row, at least, whose median is usual there
 FARTHER = 2.0  # times the way from row to row that a ship would go in a hole of the clock, at least
 OFF_RATE, RATE_LEFT = 0.03, 0.02  # factor of a yaw rate, at least; share of the heading that it then leaves, at most
@@ -470,24 +472,49 @@ def _times(state: State, rows: NDArray[np.intp]) -> str:
 
 
 def take_lost_fixes(state: State) -> None:
-    """Interpolate, in place, positions of 0 N 0 E far from all others, as receivers write them without a fix."""
+    """Interpolate, in place, positions that receivers write without a fix, such as 0 N, far from those about them."""
     pairs = [(a, b) for a in state.called("latitude") for b in state.called("longitude") if a != b]
     for north, east in pairs[:1]:
-        values = state.columns[north], state.columns[east]
-        lost = (values[0] == 0.0) & (values[1] == 0.0)
-        if not 0 < lost.mean() < LOST or np.hypot(*(one[~lost] for one in values)).min() < NO_PLACE:
+        lost = {name: lost_fixes(state.columns[name]) for name in (north, east)}
+        rows = lost[north] | lost[east]
+        if not 0 < rows.mean() < LOST:
             continue
-        for name, one in zip((north, east), values, strict=True):
-            state.columns[name] = np.interp(state.t, state.t[~lost], one[~lost])
+        said = []
+        for name, hit in lost.items():
+            if hit.any():
+                fills = " or ".join(f"{value:g}" for value in np.unique(state.columns[name][hit]))
+                said.append((name, fills, _times(state, evidence.spans_of(hit)[:, 0])))
+                state.columns[name] = np.interp(state.t, state.t[~hit], state.columns[name][~hit])
         step, unit = float(np.median(np.diff(state.t))), to_si(state.clock_unit, "t")
-        edges = evidence.spans_of(lost)
         t = np.concatenate([[state.t[0] - step], state.t, [state.t[-1] + step]])
-        breaks = [[t[first] / unit, t[end + 1] / unit] for first, end in edges]
-        sentence = f"{north!r} and {east!r} are 0 {_times(state, edges[:, 0])}: the receiver had no fix"
+        breaks = [[t[first] / unit, t[end + 1] / unit] for first, end in evidence.spans_of(rows)]
+        if len(said) > 1 and said[0][1:] == said[1][1:]:
+            words = f"{north!r} and {east!r} are {said[0][1]} {said[0][2]}"
+        else:
+            words = ", and ".join(f"{name!r} is {fills} {times}" for name, fills, times in said)
+        sentence = f"{words}: the receiver had no fix"
         if state.joined:
             state.ask(("latitude", "longitude"), f"{sentence}. Leave these cells empty, and draft again")
         repair = None if state.joined else {"kind": "break", "intervals": breaks}
-        state.find("no fix", (north, east), 0.95, sentence, repair)
+        state.find("no fix", tuple(name for name, hit in lost.items() if hit.any()), 0.95, sentence, repair)
+
+
+def lost_fixes(values: Array) -> NDArray[np.bool_]:
+    """Rows (N,) of a latitude or longitude [deg] of exactly 0, 90 or 180 that is far from the rows before and after.
+
+    Where a ship crosses it, these are near it, or on both sides of it.
+    """
+    lost = np.zeros(len(values), dtype=bool)
+    for value in FILLS:
+        hit = values == value
+        if not hit.any() or hit.all():
+            continue
+        steps = np.abs(np.diff(values[~hit]))
+        least = max(NO_PLACE, FAR_STEPS * float(np.percentile(steps, 99))) if len(steps) else NO_PLACE
+        for first, end in evidence.spans_of(hit):
+            about = [values[row] - value for row in (first - 1, end) if 0 <= row < len(values)]
+            lost[first:end] |= min(map(abs, about)) > least and (about[0] > 0) == (about[-1] > 0)
+    return lost
 
 
 def take_zeros(state: State) -> None:

@@ -16,6 +16,7 @@ from shipid.logs import segments as cutting
 from shipid.logs.dates import date_of
 from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
 from shipid.logs.guess.columns import Guess
+from shipid.logs.guess.defects import lost_fixes
 from shipid.logs.importing import import_log, sha256_of
 from shipid.logs.mapping import Mapping, Segment, degrees_of, is_date, is_dated, parse_mapping, to_si
 from shipid.logs.readers import LARGE
@@ -158,9 +159,10 @@ def _origin(guess: Guess) -> Iterator[str]:
     if columns and (guess.source.pattern is not None or "no fix" in guess.kinds):
         yield f"\n[origin]    # the first position{', of all runs' if guess.source.pattern is not None else ''}"
         places = [guess.sniffed.columns[column.source] for column in columns]
-        known = np.isfinite(places).all(axis=0) & np.any(np.array(places) != 0.0, axis=0)
+        known = np.isfinite(places).all(axis=0)
+        fixed = ~np.any([lost_fixes(values[known]) for values in places], axis=0)
         for column, values in zip(columns, places, strict=True):
-            first = values[known][:1]
+            first = values[known][fixed][:1]
             first = degrees_of(first) if column.unit == "ddmm" else first * column.extra.get("factor", 1.0)
             first = np.degrees(first) if column.unit == "rad" else first
             yield from _lines({column.name: round(column.extra.get("sign", 1) * float(first[0]), 7)})

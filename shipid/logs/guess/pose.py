@@ -34,6 +34,7 @@ DIRECTIONS = frozenset("north northing nord norte noord east easting ost oest es
 YAW = frozenset(["yaw", "gier", "gir", "theta"])
 TURNED = np.radians(8.0)  # range of a heading that no name says, at least
 NEARLY_ALWAYS = 0.9  # share of the rows with a turning shaft in which it turns astern, of a ship that goes astern
+FIRST, LAST = 30.0, 330.0  # deg: a heading in degrees that goes all round comes below and above
 SEARCHED = 24  # columns at most, where no name helps
 
 RADIUS, OFF_RADIUS = 6.368e6, 2.5e4  # m: from the centre of the Earth to its ellipsoid, with hills
@@ -310,7 +311,7 @@ def _best(
     thin = max(1, len(middle) // limit)
     angles = {}
     for heading in headings:
-        for unit in ("deg", "rad"):
+        for unit in ("deg",) if _is_in_deg(heading, state.columns[heading]) else ("deg", "rad"):
             turn = 2 * np.pi / to_si(unit, "psi")
             psi, _ = evidence.heal(state.columns[heading], turn, state.t)
             turned = np.exp(-1j * to_si(unit, "psi") * psi[middle][::thin])
@@ -337,6 +338,13 @@ def _best(
             if best is None or cost < best.cost:
                 best = Pose(north, east, heading, unit, on_globe, same, mirrored, cost)
     return best
+
+
+def _is_in_deg(name: str, values: Array) -> bool:
+    """Whether a column of a compass takes all angles of a turn in degrees, and its name says no other unit."""
+    low, high = float(values.min()), float(values.max())
+    whole = (0.0 <= low < FIRST and LAST < high <= 360.0) or (-180.0 <= low < FIRST - 180 and LAST - 180 < high <= 180)
+    return whole and _is_compass(name) and unit_in_name(name, "rad") is None
 
 
 def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: list[str]) -> Pose | None:

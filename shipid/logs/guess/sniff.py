@@ -58,11 +58,11 @@ SENTINELS = tuple(
 NOT_AVAILABLE = {
     "psi": {511.0: 360.0},
     "speed": {102.3: 51.0, 1023.0: 600.0},
-    "latitude": {91.0: 90.0, 54_600_000.0: 54e6},
+    "latitude": {91.0: 90.0, 99.0: 90.0, 54_600_000.0: 54e6},
     "longitude": {181.0: 180.0, 108_600_000.0: 108e6},
     "r": {-128.0: 127.0},
 }
-"""Meaning -> number that AIS writes for none (ITU-R M.1371), decoded or not -> the largest of the others."""
+"""Meaning -> number for none, as AIS writes it (ITU-R M.1371), decoded or not, or 99 N -> the largest of the others."""
 VISITS, SELDOM = 3, 0.3  # rows at which a number for no value begins, at least; share of the rows, at most
 BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one that has so few values, an order, more
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}

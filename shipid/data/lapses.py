@@ -1,0 +1,224 @@
+"""Lapses of commands: rows in which a rudder or a shaft is 0, far off or still, and none can have been so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Array
+from shipid.physics.signals import is_shaft, steers, turns_round
+
+Rows = NDArray[np.bool_]
+
+SLOW = 2.0  # s: in longer steps a rudder goes anywhere and back
+LONGEST, MOMENT = 20.0, 5.0  # s: of a zero, and of one in an order
+FEW_ROWS, FEWEST = 50, 3  # rows of a log; zeros of an order, at least
+ANGLE, SHARE, PART = np.radians(5.0), 0.1, 0.25  # least size of an angle, of a usual value, of the range
+AGREE = 0.25  # of its size: by so much at most are the values before and after a lapse apart
+FAST, FASTER, FASTEST = 1.2, 2.0, 4.0  # times the largest other step: rows of 0 in noise, other zeros, spikes
+ODD = 4  # larger steps that do not count, such as at the ends of a log
+BEYOND = 0.1  # of the range, that a spike of 1.2 times the largest other step lies outside of it
+STEPPED = 0.2  # share of the changes that are large, of an order, at least
+LIVELY, TO_AND_FRO = 0.3, 0.3  # of noise: share of the rows that change, and of the changes that turn back, at least
+HELD = 3  # times as long as a zero an order is held before and after it
+SELDOM, OFTEN = 0.05, 0.02  # share of the rows that are zeros, and spikes, at most
+WIDE, GEAR = np.radians(47.0), np.radians(40.0)  # rad, no rudder is there; rad/s, no gear is faster
+STILL, TIMES, REST = 50, 10.0, 0.5  # rows; times nearly all other repetitions; share of rows in shorter ones, at least
+TURNED, BOTH = np.radians(30.0), np.radians(10.0)  # by which the ship turns meanwhile, to one side; to each of both
+TURNING = np.radians(5.0)  # by which she turns in `STILL` rows of another turn
+
+
+@dataclass(frozen=True)
+class Lapse:
+    """Rows from `first` until before `end` of a command that lapses, and how.
+
+    size : distance [SI] from the values before and after, at least.
+    """
+
+    first: int
+    end: int
+    kind: Literal["zero", "spike", "still"]
+    size: float
+
+
+def lapses(name: str, t: Array, values: Array, psi: Array, follows: Rows) -> list[Lapse]:
+    """Return the rows in which a command lapses, by time.
+
+    Parameters
+    ----------
+    name : of the command. t, values, psi : (N,) [s], [SI], [rad], psi without jumps.
+    follows : (N - 1,) whether nothing is missing between a row and the next.
+
+    A zero comes and goes faster than the column moves elsewhere, and the value before is the one after; of a column
+    of noise it may be another one. In an order, which steps, zeros count from three on, if they last a moment and the
+    same order is held before and after. A spike is a row or two far from the rows before and after, which agree.
+    A value stands still where it is the same to the digit for long while the ship turns, and in other turns is not.
+    """
+    if len(values) < FEW_ROWS or not follows.any() or not np.ptp(values) > 0:
+        return []
+    found = [*_zeros_and_spikes(name, t, values, follows), *_still(name, values, psi, follows)]
+    return sorted(found, key=lambda one: one.first)
+
+
+def _zeros_and_spikes(name: str, t: Array, values: Array, follows: Rows) -> Iterator[Lapse]:
+    step = float(np.median(np.diff(t)[follows]))
+    if step > SLOW:
+        return
+    low, high = np.percentile(values, [0.5, 99.5])
+    floor = ANGLE if steers(name) else SHARE * float(np.percentile(np.abs(values), 75))
+    least = max(floor, PART * float(high - low)) if steers(name) else floor
+    zeros = _zeros(t, values, follows, floor, step)
+    spikes = _spikes(name, values, follows, least)
+    other = follows.copy()  # steps that no lapse makes
+    kept = np.ones(len(values), dtype=bool)
+    for one in (*zeros, *spikes):
+        other[one.first - 1 : one.end] = False
+        kept[one.first : one.end] = False
+    steps = np.abs(np.diff(values))
+    changes = steps[other & (steps > 0)]
+    most = float(np.sort(changes)[-1 - ODD :].min(initial=np.inf)) if len(changes) else 0.0
+    if not len(changes) or np.mean(changes > least) > STEPPED:
+        zeros = [] if steers(name) else _of_order(t, values, zeros, step)
+        spikes = [one for one in spikes if _beyond_orders(values, one, kept)]
+    else:
+        noise = _is_noise(np.diff(values)[other])
+        zeros = [one for one in zeros if _is_fast(name, values, one, most, noise)]
+        spikes = [one for one in spikes if one.size > FASTEST * most or _beyond(values, one, kept, most)]
+    spikes = [one for one in spikes if _is_no_kick(name, values, one, step)]
+    for some, share in ((zeros, SELDOM), (spikes, OFTEN)):
+        if sum(one.end - one.first for one in some) <= share * len(values):
+            yield from some
+
+
+def _is_fast(name: str, values: Array, zero: Lapse, most: float, noise: bool) -> bool:
+    """Whether a zero comes and goes faster than a column does elsewhere, whose largest other step is `most`.
+
+    Among noise, some rows of exactly 0 say more, also where an angle is another one afterwards.
+    """
+    long, back = noise and zero.end - zero.first > 1, _is_back(values, zero)
+    return zero.size > (FAST if long and back else FASTER) * most and (back or (long and steers(name)))
+
+
+def _is_back(values: Array, lapse: Lapse) -> bool:
+    """Whether the values before and after a lapse agree."""
+    return bool(abs(values[lapse.end] - values[lapse.first - 1]) < AGREE * lapse.size)
+
+
+def _is_no_kick(name: str, values: Array, spike: Lapse, step: float) -> bool:
+    """Whether a spike of an angle begins away from 0, goes where no rudder goes, or is faster than all gears."""
+    beside, top = abs(values[spike.first - 1]), float(np.abs(values[spike.first : spike.end]).min())
+    away = bool(beside > ANGLE) or (top > WIDE and not turns_round(name))
+    return away or spike.size > GEAR * step or not steers(name)
+
+
+def _zeros(t: Array, values: Array, follows: Rows, least: float, step: float) -> list[Lapse]:
+    """Stretches of 0 between values far from it."""
+    found = []
+    for first, end in _spans(values == 0.0):
+        if first == 0 or end == len(values) or not follows[first - 1 : end].all():
+            continue
+        size = float(min(abs(values[first - 1]), abs(values[end])))
+        if size > least and t[end] - t[first - 1] < LONGEST + 1.5 * step:
+            found.append(Lapse(first, end, "zero", size))
+    return found
+
+
+def _spikes(name: str, values: Array, follows: Rows, least: float) -> list[Lapse]:
+    """One or two rows that leave the values before and after, which agree."""
+    found: dict[int, Lapse] = {}
+    for rows in (1, 2):
+        before, after = values[: -rows - 1], values[rows + 1 :]
+        inside = np.stack([values[1 + k : len(values) - rows + k] for k in range(rows)])
+        off = inside - (before + after) / 2
+        size = np.minimum(np.abs(inside - before), np.abs(inside - after)).min(axis=0)
+        one_side = np.abs(np.sum(np.sign(off), axis=0)) == rows
+        whole = np.stack([follows[k : len(follows) - rows + k] for k in range(rows + 1)]).all(axis=0)
+        hit = (size > least) & one_side & (np.abs(after - before) < AGREE * size) & whole & ~(inside == 0).any(axis=0)
+        if turns_round(name):
+            hit &= np.abs(size / (2 * np.pi) - 1) > 0.05  # it crosses its 0 for a row
+        if not steers(name):
+            hit &= np.abs(before) > SHARE * size  # a thruster that runs for a moment lapses not
+        for row in map(int, np.flatnonzero(hit) + 1):
+            if row not in found and row - 1 not in found:
+                found[row] = Lapse(row, row + rows, "spike", float(size[row - 1]))
+    return list(found.values())
+
+
+def _of_order(t: Array, values: Array, zeros: list[Lapse], step: float) -> list[Lapse]:
+    """Zeros in orders of thrust, which step: some, of a moment each, with one order held before and after."""
+    chosen = []
+    for one in zeros:
+        rows = HELD * (one.end - one.first)
+        about = np.append(values[max(one.first - rows, 0) : one.first], values[one.end : one.end + rows])
+        moment = t[one.end] - t[one.first - 1] < MOMENT + 1.5 * step
+        if moment and len(about) == 2 * rows and np.all(about == about[0]):
+            chosen.append(one)
+    return chosen if len(chosen) >= FEWEST else []
+
+
+def _beyond(values: Array, spike: Lapse, kept: Rows, most: float) -> bool:
+    """Whether a spike lies outside of all that is no lapse, and is larger than all other steps."""
+    low, high = float(values[kept].min()), float(values[kept].max())
+    inside = values[spike.first : spike.end]
+    off = np.maximum(low - inside, inside - high).min()
+    return bool(off > BEYOND * (high - low) and spike.size > FAST * most)
+
+
+def _beyond_orders(values: Array, spike: Lapse, kept: Rows) -> bool:
+    """Whether a spike in orders is farther than all orders are apart."""
+    return spike.size > float(np.ptp(values[kept])) and _beyond(values, spike, kept, 0.0)
+
+
+def _still(name: str, values: Array, psi: Array, follows: Rows) -> Iterator[Lapse]:
+    """Stretches of one value, to the digit, in which the ship turns, of a column that changes in other turns."""
+    edges = np.flatnonzero(np.concatenate([[True], (np.diff(values) != 0) | ~follows, [True]]))
+    lengths = np.diff(edges)
+    long = lengths >= STILL
+    if not long.any() or long.all():
+        return
+    rows = np.repeat(lengths, lengths)
+    elsewhere = rows < STILL
+    if np.mean(elsewhere) < REST:
+        return
+    usual = float(np.percentile(rows[elsewhere], 90))
+    turning = _turning(psi) & follows & elsewhere[1:]
+    if turning.sum() < STILL or not _is_noise(np.diff(values)[turning]):
+        return
+    ends = float(values.min()), float(values.max())
+    for first, count in zip(edges[:-1][long], lengths[long], strict=True):
+        value = float(values[first])
+        stopped = value in ends or (value == 0.0 and is_shaft(name))
+        if count > TIMES * usual and not stopped and _turns(psi[first : first + count]):
+            yield Lapse(int(first), int(first + count), "still", 0.0)
+
+
+def _is_noise(changes: Array) -> bool:
+    """Whether changes (N,) from row to row are those of a noisy column: there are many, to and fro."""
+    signs = np.sign(changes[changes != 0])
+    many = len(signs) > LIVELY * len(changes) and len(signs) > 1
+    return bool(many and np.mean(signs[1:] != signs[:-1]) > TO_AND_FRO)
+
+
+def _turning(psi: Array) -> Rows:
+    """Steps (N - 1,) about which the ship turns, in `STILL` rows."""
+    reach = STILL // 2
+    rows = np.arange(len(psi) - 1)
+    change = psi[np.minimum(rows + reach, len(psi) - 1)] - psi[np.maximum(rows - reach, 0)]
+    return np.asarray(np.abs(change) > TURNING)
+
+
+def _turns(psi: Array) -> bool:
+    """Whether the ship turns, far to one side or less far to both."""
+    rise = float(np.max(psi - np.minimum.accumulate(psi)))
+    fall = float(np.max(np.maximum.accumulate(psi) - psi))
+    return bool(max(rise, fall) > TURNED or min(rise, fall) > BOTH)
+
+
+def _spans(rows: Rows) -> list[tuple[int, int]]:
+    """First row of each stretch of chosen rows (N,), and the row after its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(int), [0]])))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

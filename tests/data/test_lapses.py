@@ -1,0 +1,100 @@
+"""Zeros, spikes and still stretches of commands are found in noisy and plain columns, and in clean ones nothing is."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from shipid.data.dataset import Array
+from shipid.data.lapses import LONGEST, lapses
+
+SEEDS = range(6)
+NAMES = {"rudder.delta": np.radians(1.0), "propeller.n": 1 / 60}
+"""Commands, and the SI units in what their columns count."""
+
+
+def column(name: str, seed: int, noise: bool) -> tuple[Array, Array, Array]:
+    """t [s], a zigzag's rudder [deg] or a shaft [rpm] at two speeds, in tenths, and the heading [rad]."""
+    random = np.random.default_rng(seed)
+    t = np.arange(2000.0)
+    order = 20.0 * np.sign(np.sin(2 * np.pi * t / random.uniform(60.0, 120.0)))
+    rudder = np.zeros(len(t))
+    for row in range(1, len(t)):
+        rudder[row] = rudder[row - 1] + np.clip(order[row] - rudder[row - 1], -3.0, 3.0)
+    psi = np.cumsum(np.convolve(rudder, np.ones(10) / 10, "same")) * 1e-3
+    values = rudder if name == "rudder.delta" else np.where(t < 1000.0, 84.0, 60.0 + 24.0 * np.exp((1000.0 - t) / 10))
+    return t, np.round(values + noise * random.normal(0, 0.1, len(t)), 1), psi
+
+
+def found(name: str, t: Array, values: Array, psi: Array) -> tuple[set[str], set[int]]:
+    """Kinds and rows of all lapses."""
+    some = lapses(name, t, NAMES[name] * values, psi, np.diff(t) < 3 * np.median(np.diff(t)))
+    return {one.kind for one in some}, {row for one in some for row in range(one.first, one.end)}
+
+
+@pytest.mark.parametrize("noise", [True, False])
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_lapses_are_found_and_nothing_else(seed: int, name: str, noise: bool) -> None:
+    t, values, psi = column(name, seed, noise)
+    assert found(name, t, values, psi) == (set(), set())
+    away = [place for place in range(50, 1900) if np.abs(values[place - 2 : place + 8]).min() > 15.0]
+    places = [away[0]]
+    places += [place for last, place in pairwise(away) if place // 150 > last // 150]
+    assert len(places) > 9
+    four = values.copy()
+    for place in places:
+        four[place : place + 4] = 0.0
+    rows = {place + row for place in places for row in range(4)}
+    assert found(name, t, four, psi) == ({"zero"}, rows)
+    wild = values.copy()
+    wild[places] = 90.0 if name == "rudder.delta" else 4 * values[places]
+    assert found(name, t, wild, psi) == ({"spike"}, {*places})
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_noisy_column_that_stands_still_in_turns_is_found(seed: int, name: str) -> None:
+    t, values, psi = column(name, seed, noise=True)
+    stood = values.copy()
+    stood[300:600] = stood[300]
+    kinds, rows = found(name, t, stood, psi)
+    assert kinds == {"still"}
+    assert {*range(300, 600)} <= rows <= {*range(290, 610)}
+    straight = np.concatenate([psi[:290], np.full(320, psi[290]), psi[610:] - psi[610] + psi[290]])
+    assert found(name, t, stood, straight) == (set(), set()), "on a straight course it may stand still"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("step", [0.2, 1.0, 10.0])
+def test_orders_that_go_to_0_and_back_are_no_lapses(step: float, seed: int) -> None:
+    """Bang-bang, kicks, a binary order and a telegraph, plain and as a fast gear with noise follows them."""
+    random = np.random.default_rng([seed, round(10 * step)])
+    count = 3000
+    t, psi = step * np.arange(count), np.cumsum(random.normal(0, 1e-3, count))
+    hold = max(1, round(4.0 / step))
+
+    def held(levels: list[float], rows: int) -> Array:
+        return np.repeat(random.choice(levels, count // rows + 1), rows)[:count]
+
+    kicks = np.zeros(count)
+    for place in random.choice(count - 100, 6):
+        kicks[place : place + hold] = 20.0
+    helm = {"bang-bang": held([20.0, 0.0, -20.0], hold), "binary": held([0.0, 10.0], hold), "kicks": kicks}
+    for what, values in helm.items():
+        for noise in (0.0, 0.1):
+            noisy = np.round(values + random.normal(0, noise, count), 1)
+            assert found("rudder.delta", t, noisy, psi) == (set(), set()), (what, noise)
+    telegraph = held([0.0, 40.0, 80.0, -40.0], max(1, round(1.5 * LONGEST / step)))
+    assert found("propeller.n", t, telegraph, psi) == (set(), set())
+
+
+def test_a_hard_rudder_that_rests_on_its_stop_is_not_still() -> None:
+    """Held to the digit in each circle, it moves on straight courses alone."""
+    random = np.random.default_rng(0)
+    circle = np.arange(2000) % 500 >= 300
+    values = np.where(circle, 35.0, np.round(random.normal(0, 1.0, 2000), 1))
+    psi = np.cumsum(np.where(circle, 0.02, 0.0))
+    assert found("rudder.delta", np.arange(2000.0), values, psi) == (set(), set())
