@@ -22,7 +22,7 @@ from shipid.data.dataset import (
 )
 from shipid.data.lapses import Lapse, lapses
 from shipid.errors import DataError
-from shipid.physics.signals import row_of
+from shipid.physics.signals import row_of, turns_round
 
 Plane = np.ndarray[Any, np.dtype[np.complex128]]
 
@@ -43,7 +43,8 @@ FEWEST, MOST = 20, 5000  # windows that show a delay
 LAPSES = {
     "zero": "is 0 for a moment, faster than it moves elsewhere",
     "spike": "leaves its course and comes back, faster than it moves elsewhere",
-    "still": "repeats one value while the ship turns, and is noisy in other turns",
+    "still": "repeats one value while the ship turns to both sides, and is noisy in other turns",
+    "pause": "is 0 for a moment, with the same order before and after, which may have been ordered",
 }
 LIVELY, WILD = 0.1, 6.0  # of the larger changes: less says nothing; of the usual misfit: more is a spike
 
@@ -142,7 +143,7 @@ def _lapsed(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
     follows &= steps <= GAP * np.median(steps[follows])
     found: dict[str, list[dict[str, Any]]] = {}
     for name in dataset.commands:
-        values = np.concatenate([rows[name] for _, rows in parts])
+        values = np.concatenate([np.unwrap(rows[name]) if turns_round(name) else rows[name] for _, rows in parts])
         by_run: dict[str, list[Lapse]] = {}
         for lapse in lapses(name, t, values, psi, follows):
             by_run.setdefault(runs[lapse.first], []).append(lapse)
@@ -150,8 +151,10 @@ def _lapsed(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
             count = sum(lapse.end - lapse.first for lapse in some)
             said = [words for kind, words in LAPSES.items() if any(lapse.kind == kind for lapse in some)]
             where = f"{count} row{'s' * (count > 1)}, the first at t = {t[some[0].first]:.10g} s"
-            sentence = f"{name} {' and '.join(said)}: {where}. In the mapping, mend it by despike or a break"
-            found.setdefault(run, []).append(_row(f"lapses {name}", float(count), "1", 0.0, sentence))
+            ordered = all(lapse.kind == "pause" for lapse in some)
+            by = "a break" if any(lapse.kind == "still" for lapse in some) else "despike or a break"
+            sentence = f"{name} {' and '.join(said)}: {where}. If it was not so, mend it in the mapping by {by}"
+            found.setdefault(run, []).append(_row(f"lapses {name}", float(count), "1", 0.0, sentence, ok=ordered))
     return found
 
 

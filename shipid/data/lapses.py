@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -20,7 +20,6 @@ FEW_ROWS, FEWEST = 50, 3  # rows of a log; zeros of an order, at least
 ANGLE, SHARE, PART = np.radians(5.0), 0.1, 0.25  # least size of an angle, of a usual value, of the range
 AGREE = 0.25  # of its size: by so much at most are the values before and after a lapse apart
 FAST, FASTER, FASTEST = 1.2, 2.0, 4.0  # times the largest other step: rows of 0 in noise, other zeros, spikes
-ODD = 4  # larger steps that do not count, such as at the ends of a log
 BEYOND = 0.1  # of the range, that a spike of 1.2 times the largest other step lies outside of it
 STEPPED = 0.2  # share of the changes that are large, of an order, at least
 LIVELY, TO_AND_FRO = 0.3, 0.3  # of noise: share of the rows that change, and of the changes that turn back, at least
@@ -28,7 +27,9 @@ HELD = 3  # times as long as a zero an order is held before and after it
 SELDOM, OFTEN = 0.05, 0.02  # share of the rows that are zeros, and spikes, at most
 WIDE, GEAR = np.radians(47.0), np.radians(40.0)  # rad, no rudder is there; rad/s, no gear is faster
 STILL, TIMES, REST = 50, 10.0, 0.5  # rows; times nearly all other repetitions; share of rows in shorter ones, at least
-TURNED, BOTH = np.radians(30.0), np.radians(10.0)  # by which the ship turns meanwhile, to one side; to each of both
+BOTH = np.radians(
+    20.0
+)  # by which the ship turns meanwhile, to each side: to one she turns as well by a helm that is held
 TURNING = np.radians(5.0)  # by which she turns in `STILL` rows of another turn
 
 
@@ -36,12 +37,13 @@ TURNING = np.radians(5.0)  # by which she turns in `STILL` rows of another turn
 class Lapse:
     """Rows from `first` until before `end` of a command that lapses, and how.
 
+    kind : a `pause` is a zero in an order, which somebody may have given.
     size : distance [SI] from the values before and after, at least.
     """
 
     first: int
     end: int
-    kind: Literal["zero", "spike", "still"]
+    kind: Literal["zero", "pause", "spike", "still"]
     size: float
 
 
@@ -56,7 +58,8 @@ def lapses(name: str, t: Array, values: Array, psi: Array, follows: Rows) -> lis
     A zero comes and goes faster than the column moves elsewhere, and the value before is the one after; of a column
     of noise it may be another one. In an order, which steps, zeros count from three on, if they last a moment and the
     same order is held before and after. A spike is a row or two far from the rows before and after, which agree.
-    A value stands still where it is the same to the digit for long while the ship turns, and in other turns is not.
+    A value stands still where it is the same to the digit for long while the ship turns to both sides, and in other
+    turns is not.
     """
     if len(values) < FEW_ROWS or not follows.any() or not np.ptp(values) > 0:
         return []
@@ -80,7 +83,7 @@ def _zeros_and_spikes(name: str, t: Array, values: Array, follows: Rows) -> Iter
         kept[one.first : one.end] = False
     steps = np.abs(np.diff(values))
     changes = steps[other & (steps > 0)]
-    most = float(np.sort(changes)[-1 - ODD :].min(initial=np.inf)) if len(changes) else 0.0
+    most = float(changes.max(initial=0.0))
     if not len(changes) or np.mean(changes > least) > STEPPED:
         zeros = [] if steers(name) else _of_order(t, values, zeros, step)
         spikes = [one for one in spikes if _beyond_orders(values, one, kept)]
@@ -156,7 +159,7 @@ def _of_order(t: Array, values: Array, zeros: list[Lapse], step: float) -> list[
         about = np.append(values[max(one.first - rows, 0) : one.first], values[one.end : one.end + rows])
         moment = t[one.end] - t[one.first - 1] < MOMENT + 1.5 * step
         if moment and len(about) == 2 * rows and np.all(about == about[0]):
-            chosen.append(one)
+            chosen.append(replace(one, kind="pause"))
     return chosen if len(chosen) >= FEWEST else []
 
 
@@ -212,10 +215,10 @@ def _turning(psi: Array) -> Rows:
 
 
 def _turns(psi: Array) -> bool:
-    """Whether the ship turns, far to one side or less far to both."""
+    """Whether the ship turns far to both sides."""
     rise = float(np.max(psi - np.minimum.accumulate(psi)))
     fall = float(np.max(np.maximum.accumulate(psi) - psi))
-    return bool(max(rise, fall) > TURNED or min(rise, fall) > BOTH)
+    return bool(min(rise, fall) > BOTH)
 
 
 def _spans(rows: Rows) -> list[tuple[int, int]]:

@@ -91,6 +91,41 @@ def test_orders_that_go_to_0_and_back_are_no_lapses(step: float, seed: int) -> N
     assert found("propeller.n", t, telegraph, psi) == (set(), set())
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("angle", [20.0, 35.0])
+def test_a_helm_that_is_held_in_circles_is_not_still(angle: float, seed: int) -> None:
+    """An autopilot, and circles of one day, of which only the hardest are at the stop."""
+    random = np.random.default_rng(seed)
+    t = np.arange(4000.0)
+    rudder = np.round(3.0 * np.sin(t / 40.0) + random.normal(0, 0.5, len(t)), 1)
+    for place, side in ((500, 1.0), (1500, -1.0), (2500, 1.0), (3300, -1.0)):
+        rudder[place : place + 300] = side * (angle if place < 2000 else 35.0)
+    psi = np.cumsum(np.convolve(rudder, np.ones(20) / 20, "same")) * 1e-3
+    assert found("rudder.delta", t, rudder, psi) == (set(), set())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("step", "rows"), [(1.0, 15), (1.0, 6), (0.2, 60)])
+@pytest.mark.parametrize("angle", [10.0, 20.0, 35.0])
+def test_a_helm_that_goes_amidships_between_two_equal_orders_is_no_lapse(
+    angle: float, step: float, rows: int, seed: int
+) -> None:
+    random = np.random.default_rng(seed)
+    rudder = np.round(random.normal(0, 0.3, 1200), 1)
+    rudder[600:640], rudder[640 : 640 + rows], rudder[640 + rows : 690 + rows] = angle, 0.0, angle
+    assert found("rudder.delta", step * np.arange(1200.0), rudder, np.cumsum(rudder) * 1e-3) == (set(), set())
+
+
+def test_pauses_of_a_shaft_between_equal_orders_may_be_orders() -> None:
+    order = np.full(1200, 120.0)
+    order[1000:] = 60.0
+    for place in (200, 500, 800):
+        order[place : place + 4] = 0.0
+    kinds, rows = found("propeller.n", np.arange(1200.0), order, np.zeros(1200))
+    assert kinds == {"pause"}
+    assert len(rows) == 12
+
+
 def test_a_hard_rudder_that_rests_on_its_stop_is_not_still() -> None:
     """Held to the digit in each circle, it moves on straight courses alone."""
     random = np.random.default_rng(0)

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
+from pymap3d import ned2geodetic
 
 from shipid.engine.rollout import rollout
 from shipid.logs.guess.clues import State
@@ -88,3 +89,11 @@ def state_with_pose(columns: dict[str, np.ndarray], wrong: float = 1.0, unit: st
     state.position = np.asarray(log["north"] + 1j * log["east"])
     state.psi = log["psi"].to_numpy()
     return state
+
+
+def globe(seed: int) -> pd.DataFrame:
+    """The clean log with the noise of another seed and positions on the Earth, in a bridge's words."""
+    log = si_log(seed)
+    lat, lon, _ = ned2geodetic(log["north"], log["east"], 0.0, 63.44, 10.40, 0.0)
+    frame = as_bridge(log).round(4).drop(columns=["N", "E", "u", "v"]).rename(columns={"psi": "HDG", "r": "ROT"})
+    return frame.assign(Lat=lat.round(7), Lon=lon.round(7))

@@ -20,6 +20,7 @@ from shipid.physics.signals import is_command, is_shaft, read_unit, steers
 SHARES = (0.5, 0.75, 0.9)  # of the size of the smallest lapse, that may part lapses from all other rows
 
 SAME = 0.05  # of that size: a row that is changed by less stays as it is
+SURE, UNSURE = 0.9, 0.6  # that it is no order: of what is unsure the repair is drafted switched off
 
 
 def find_lapses(state: State, sniffed: Sniffed) -> None:
@@ -38,15 +39,16 @@ def find_lapses(state: State, sniffed: Sniffed) -> None:
             continue
         follows = np.diff(t) <= GAP * np.median(np.diff(t))
         found = lapses(one.name, t, values, psi, follows)
-        brief = [lapse for lapse in found if lapse.kind != "still"]
+        brief = [lapse for lapse in found if lapse.kind in ("zero", "spike")]
         repair, mended = _despike(one.name, brief, t, values, follows) if brief else (None, [])
         if mended:
             _report_brief(state, one, mended, t, repair)
         left = [lapse for lapse in brief if lapse not in mended]
         if left:
             _report_brief(state, one, left, t, None)
-        still = [lapse for lapse in found if lapse.kind == "still"]
-        if still:
+        if pauses := [lapse for lapse in found if lapse.kind == "pause"]:
+            _report_pauses(state, one, pauses, t)
+        if still := [lapse for lapse in found if lapse.kind == "still"]:
             _report_still(state, one, still, t, psi)
 
 
@@ -66,7 +68,19 @@ def _report_brief(state: State, one: Suggestion, found: list[Lapse], t: Array, r
         state.ask((one.name,), f"{sentence}. Leave these cells empty, and draft again")
     elif repair is None:
         repair = _breaks(state, found, t)
-    state.find("lapses of a command", (one.source,), 0.9, sentence, repair)
+    state.find("lapses of a command", (one.source,), SURE, sentence, repair)
+
+
+def _report_pauses(state: State, one: Suggestion, found: list[Lapse], t: Array) -> None:
+    sentence = f"{one.source!r} is 0 {_places(state, found, t)} with the same order before and after"
+    _report_unsure(state, one, "lapses of a command", found, t, f"{sentence}. Was that ordered?")
+
+
+def _report_unsure(state: State, one: Suggestion, kind: str, found: list[Lapse], t: Array, sentence: str) -> None:
+    """Ask of what may be as it is in the log; the repair is there, switched off."""
+    remedy = "leave these cells empty, and draft again" if state.joined else "switch the repair on"
+    state.ask((one.name,), f"{sentence} If not, {remedy}")
+    state.find(kind, (one.source,), UNSURE, sentence, None if state.joined else _breaks(state, found, t))
 
 
 def _places(state: State, some: list[Lapse], t: Array) -> str:
@@ -86,8 +100,10 @@ def _report_still(state: State, one: Suggestion, found: list[Lapse], t: Array, p
         times = f"{when(state, float(t[lapse.first]))} to {when(state, float(t[lapse.end - 1]))}"
         words.append(f"{times} ({np.degrees(np.ptp(psi[span])):.0f} deg)")
     where = f"at {len(found)} places of the files" if state.joined else f"from {', '.join(words)}"
-    sentence = f"{one.source!r} repeats one value while the ship turns, {where}, and is noisy in other turns"
-    state.find("frozen sensor", (one.source,), 0.9, sentence, None if state.joined else _breaks(state, found, t))
+    sentence = (
+        f"{one.source!r} repeats one value while the ship turns to both sides, {where}, and is noisy in other turns"
+    )
+    _report_unsure(state, one, "frozen sensor", found, t, f"{sentence}. Was it held so?")
 
 
 def _breaks(state: State, found: list[Lapse], t: Array) -> dict[str, Any]:

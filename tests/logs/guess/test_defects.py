@@ -11,14 +11,13 @@ import pandas as pd
 import pytest
 from pymap3d import ned2geodetic
 
-from shipid.data.checks import check_dataset
 from shipid.logs.guess import sniff
 from shipid.logs.guess.clues import LIKELY
 from shipid.logs.guess.columns import Guess, guess
 from shipid.logs.guess.defects import LEVELS, _piles_up, lost_fixes
 from shipid.logs.guess.draft import draft_mapping, untried
 from shipid.logs.importing import import_log, read_mapping
-from tests.logs.simulated import as_bridge, si_log
+from tests.logs.simulated import as_bridge, globe, si_log
 
 CLEAN = as_bridge(si_log()).round(4)
 
@@ -335,14 +334,6 @@ def test_positions_of_0_north_0_east_are_no_fix(rows: slice, tmp_path: Path) -> 
         assert np.ptp(off) < 1.0, "centimetres of rounding, and a plane that touches the Earth elsewhere"
 
 
-def globe(seed: int) -> pd.DataFrame:
-    """The clean log with the noise of another seed and positions on the Earth, in a bridge's words."""
-    log = si_log(seed)
-    lat, lon, _ = ned2geodetic(log["north"], log["east"], 0.0, 63.44, 10.40, 0.0)
-    frame = as_bridge(log).round(4).drop(columns=["N", "E", "u", "v"]).rename(columns={"psi": "HDG", "r": "ROT"})
-    return frame.assign(Lat=lat.round(7), Lon=lon.round(7))
-
-
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("where", [{"Lat": [300]}, {"Lon": [300, 1500]}, {"Lat": [300], "Lon": [304, 1500]}])
 def test_one_coordinate_of_0_is_no_fix(where: dict[str, list[int]], seed: int, tmp_path: Path) -> None:
@@ -395,36 +386,6 @@ def test_a_coordinate_that_a_receiver_writes_is_lost_where_it_is_far_away(value:
     assert list(np.flatnonzero(lost_fixes(values))) == (list(range(40, 45)) if lost else [])
     across = 1e-4 * (np.arange(100.0) - 50.0)
     assert not lost_fixes(across).any(), "the ship crosses the meridian"
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_lapses_of_commands_are_drafted_mended_and_checked(seed: int, tmp_path: Path) -> None:
-    """Before, a shaft that is 0 for two seconds, and a rudder of 90 deg in one row, came into the dataset silently."""
-    clean = globe(seed)
-    frame = clean.copy()
-    for place in (300, 1200, 2000):
-        frame.loc[place : place + 3, "rpm"] = 0.0
-        frame.loc[place + 20, "rudder"] = 90.0
-    expected, proposal = guessed(tmp_path, clean), guessed(tmp_path, frame)
-    assert "lapses of a command" not in expected.kinds
-    found = {one.columns: one for one in proposal.findings if one.kind == "lapses of a command"}
-    assert set(found) == {("rpm",), ("rudder",)}
-    assert "is 0 in 12 rows at 3 places" in found["rpm",].sentence
-    assert f"t = {clean['time'][300]:g}" in found["rpm",].sentence
-    (tmp_path / "draft.toml").write_text(draft_mapping(proposal))
-    mapping = read_mapping(tmp_path / "draft.toml").model_copy(update={"segment": ()})
-    log, unmended = si_log(seed), import_log(mapping, tmp_path / "log.csv", without=("despike",))
-    table = check_dataset(unmended)
-    failed = table[~table["ok"] & table["check"].str.startswith("lapses")]
-    assert dict(zip(failed["check"], failed["value"], strict=True)).keys() == {
-        f"lapses {one.name}" for one in proposal.columns if one.source in ("rpm", "rudder")
-    }
-    assert all("despike or a break" in sentence for sentence in failed["sentence"])
-    mended = import_log(mapping, tmp_path / "log.csv")
-    assert not check_dataset(mended)["check"].str.startswith("lapses").any()
-    shaft = next(one.name for one in proposal.columns if one.source == "rpm")
-    truth = np.interp(mended.frame["t"], log["t"], log["n"])
-    assert mended.frame[shaft].to_numpy() == pytest.approx(truth, abs=0.05)
 
 
 @pytest.mark.parametrize("count", [LEVELS - 6, LEVELS + 6])
