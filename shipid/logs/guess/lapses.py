@@ -63,7 +63,7 @@ def _report_brief(state: State, one: Suggestion, found: list[Lapse], t: Array, r
             beside = f" between values of {far}" * (kind == "zero")
             said.append(f"{how} {_places(state, some, t)}{beside}")
     what = "shaft" if is_shaft(one.name) else "rudder" if steers(one.name) else "gear"
-    sentence = f"{one.source!r} {', and '.join(said)}: faster than the {what} moves elsewhere"
+    sentence = f"{one.source!r} {', and '.join(said).rstrip(',')}: faster than the {what} moves elsewhere"
     if repair is None and state.joined:
         state.ask((one.name,), f"{sentence}. Leave these cells empty, and draft again")
     elif repair is None:
