@@ -43,7 +43,9 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
     target, which is made if it is absent. Data are synced to disk before the target is replaced, and the
     folder after it, so that a power cut leaves the old file or the new one. A process that is killed leaves a
     temporary folder, which the next one that writes there removes. A link stays, and the file that it leads to is
-    replaced. Who may read and write the old file may do so with the new one.
+    replaced. The new file has the group and the permissions of the old one. Where this user may not give it that group,
+    the group that it has gets no more than a new file gives it: `chmod g+s` on the folder keeps the group there, too.
+    In place of a file of another user, it also has the permissions of a new file.
 
     Raises OSError where the place cannot be written, and for a device or a pipe, which a file would replace.
     """
@@ -70,9 +72,16 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def _keep_mode(file: Path, before: os.stat_result) -> None:
-    """Give a file the permissions of the one that it replaces; where that is another user's, its own beside them."""
+    """Give a file the group and permissions of the one that it replaces; where that is another user's, its own, too.
+
+    A group that was not that of the old file gets nothing that it did not have.
+    """
+    with suppress(OSError, AttributeError):  # a group that this user is not in; Windows
+        os.chown(file, -1, before.st_gid)
     fresh = file.stat()
     mode = before.st_mode | (fresh.st_mode if fresh.st_uid != before.st_uid else 0)
+    if fresh.st_gid != before.st_gid:
+        mode &= fresh.st_mode | ~0o070
     if (mode ^ fresh.st_mode) & 0o777:
         with suppress(OSError):  # a file system without permissions
             file.chmod(mode & 0o777)

@@ -15,7 +15,13 @@ READ_ONLY = ": what a method is given cannot be written to, make a new array: `p
 
 def of_users(kind: Callable[..., Any]) -> bool:
     """Whether a class or a function is none of shipid's: somebody wrote it."""
-    return written(kind).__module__.partition(".")[0] != "shipid"
+    module = _module(kind)
+    return bool(module) and module.partition(".")[0] != "shipid"
+
+
+def _module(kind: Callable[..., Any]) -> str:
+    """Name of the module of a class or function; empty for what has none, such as `str.upper`."""
+    return getattr(written(kind), "__module__", None) or ""
 
 
 def written(kind: Callable[..., Any]) -> Callable[..., Any]:
@@ -71,4 +77,4 @@ def _file_and_line(kind: Callable[..., Any]) -> tuple[str | None, int]:
     code = getattr(kind, "__code__", None)
     if code is not None:
         return code.co_filename, code.co_firstlineno
-    return getattr(sys.modules.get(kind.__module__), "__file__", None), 0
+    return getattr(sys.modules.get(_module(kind)), "__file__", None), 0

@@ -32,6 +32,11 @@ def full(*_: Any, **__: Any) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
+def forbidden(*_: Any) -> None:
+    """A group that this user is not in."""
+    raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+
 @pytest.mark.parametrize("name", WRITERS)
 def test_only_the_file_is_left(name: str, tmp_path: Path) -> None:
     file = tmp_path / "deep" / "er" / name
@@ -103,6 +108,28 @@ def test_a_file_in_place_of_a_colleagues_is_not_closed_to_him(tmp_path: Path) ->
         os.umask(before)
     assert file.stat().st_uid == 0
     assert file.stat().st_mode & 0o777 == 0o644
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give files away")
+@pytest.mark.parametrize(
+    ("may", "group", "mode"), [(True, 12345, 0o664), (False, os.getgid() if os.name == "posix" else 0, 0o604)]
+)
+def test_a_file_keeps_its_group_or_opens_to_no_other(
+    may: bool, group: int, mode: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "text.md"
+    file.write_text("old")
+    os.chown(file, -1, 12345)
+    file.chmod(0o664)
+    if not may:
+        monkeypatch.setattr(files.os, "chown", forbidden)
+    before = os.umask(0o077)
+    try:
+        files.write_text(file, "new")
+    finally:
+        os.umask(before)
+    assert file.read_text() == "new"
+    assert (file.stat().st_gid, file.stat().st_mode & 0o777) == (group, mode)
 
 
 def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path: Path) -> None:

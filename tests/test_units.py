@@ -133,7 +133,12 @@ def test_a_level_has_all_its_decimals() -> None:
     assert {level: level_text(level) for level in levels} == levels
 
 
-@pytest.mark.parametrize("unit", ["m", "N m", "kg m^-3", "kg m^-1 s^2", "m/s^2", "1/s", "rad/s", "-", "prime"])
+QUOTIENTS = ["N s^1.5 m^-1.5", "m^0.5", "kg/m/s", "N/(m/s)^2", "1/(m s)", "N/(m (rad/s)^2)", "deg/s", "rev/s"]
+
+
+@pytest.mark.parametrize(
+    "unit", ["m", "N m", "kg m^-3", "kg m^-1 s^2", "m/s^2", "1/s", "rad/s", "-", "prime", *QUOTIENTS]
+)
 def test_products_of_powers_are_units(unit: str) -> None:
     assert unit_fault(unit) == ""
 
@@ -150,6 +155,10 @@ def test_products_of_powers_are_units(unit: str) -> None:
         ("kg·m2 / s", "kg m^2/s"),
         ("Nm", "N m"),
         ("Seconds", "s"),
+        ("kg*m^1.5", "kg m^1.5"),
+        ("N/(metre*s)", "N/(m s)"),
+        ("m^(-1)", "m^-1"),
+        ("metre per second", "m/s"),
         ("", "-"),
         ("1", "-"),
     ],
@@ -158,6 +167,26 @@ def test_another_spelling_of_a_unit_is_put_right(unit: str, right: str) -> None:
     assert unit_fault(unit) == f"write {right!r}"
 
 
-@pytest.mark.parametrize("unit", ["kN", "knots", "rpm", "m/s/s", "m^1/2", "metre per second", "lb"])
-def test_no_unit_of_shipid_is_refused_with_what_is_one(unit: str) -> None:
-    assert "SI units kg, m, s, N and rad" in unit_fault(unit)
+@pytest.mark.parametrize(
+    ("unit", "part", "right"),
+    [
+        ("kN", "kN", "N"),
+        ("kN m", "kN", "N"),
+        ("kg/mm^2", "mm", "m"),
+        ("%", "%", "-"),
+        ("N/knots", "knots", "m/s"),
+        ("rpm", "rpm", "rev/s"),
+        ("lb", "lb", "kg"),
+        ("kPa", "kPa", "Pa"),
+    ],
+)
+def test_the_part_that_is_none_of_the_units_is_named_with_one_that_is(unit: str, part: str, right: str) -> None:
+    assert unit_fault(unit) == f"{part} is none of the units: write {right}"
+
+
+@pytest.mark.parametrize(
+    ("unit", "begin"), [("foo m^2", "foo is none of the units: write a"), ("m/(s", "write a"), ("m^", "m^ is none")]
+)
+def test_no_unit_of_shipid_is_refused_with_all_that_are(unit: str, begin: str) -> None:
+    assert unit_fault(unit).startswith(begin)
+    assert "kg, m, s, N, rad, deg, rev, Pa, W, J, K and Hz" in unit_fault(unit)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from functools import partial
 
+import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
@@ -32,6 +33,7 @@ def test_functions_and_classes_of_a_user_are_known_in_any_dress() -> None:
     """A term may hold a plain function, a part of one, or an object that is called."""
     assert all(map(of_users, (plain, partial(plain), Called(), Called, lambda: None)))
     assert not any(map(of_users, (fit_all, partial(fit_all), Alone, *TERMS["radiation.roll"].functions)))
+    assert not any(map(of_users, (str.upper, np.ndarray.sum)))
     assert written(partial(plain)) is plain
     assert written(Called()) is Called
 
@@ -40,6 +42,7 @@ def test_a_function_has_a_first_line() -> None:
     assert begins_at(plain) == begins_at(partial(plain)) == f" in {__file__}, line {BEGIN}"
     assert begins_at(fit_all) == ""
     assert begins_at(Called) == ""
+    assert begins_at(str.upper) == ""
 
 
 @pytest.mark.parametrize("kind", [plain, Called])

@@ -273,7 +273,7 @@ class Origin:
     def note_engine(self, now: str | None) -> None:
         """Note by which engine this process or a worker computes by now; a warning where it was another before."""
         if now is not None and (changed := self.note({**self.session, "engine": now})):
-            log.warning("computed otherwise from here on: %s", "; ".join(changed))
+            log.warning("computed otherwise in this process or a worker: %s", "; ".join(changed))
 
 
 def session_on(device: str, code: Mapping[str, Mapping[str, str]]) -> dict[str, Any]:

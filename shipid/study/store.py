@@ -121,8 +121,6 @@ def check_readable(folder: Path) -> None:
 
 def check_writable(folder: Path) -> None:
     """Raise ResultError for the folder of a run, or one in it, where this user may not write or replace files."""
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise ResultError("is a folder that this user may not write into: copy it, and name the copy", file=folder)
     for place in (folder, *(folder / name for name in (*FOLDERS, PARTS))):
         if place.is_dir() and not os.access(place, os.W_OK | os.X_OK):
             raise ResultError(f"is a folder that this user may not write into: let this user, or {COPY}", file=place)

@@ -6,6 +6,7 @@ import inspect
 import re
 from collections.abc import Callable, Mapping
 from functools import cache
+from numbers import Real
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from shipid.errors import ShipidError, choices
@@ -113,7 +114,8 @@ def no_signal(name: str, valid: tuple[str, ...]) -> str:
 def _without_unit(name: str, argument: inspect.Parameter) -> str:
     if argument.kind is argument.VAR_KEYWORD:
         return f"`**{name}` has no grammar: write `**{name}: Annotated[SX, ...]` with one of shipid.physics.grammar"
-    return f'its parameter {name!r} has no unit: write `{name}: Annotated[SX, "m"]` with its unit'
+    constant = "" if argument.default is argument.empty else "; a constant belongs outside the signature"
+    return f'its parameter {name!r} has no unit: write `{name}: Annotated[SX, "m"]` with its unit{constant}'
 
 
 def _fault(name: str, argument: inspect.Parameter, parts: tuple[Any, ...]) -> str:
@@ -130,7 +132,7 @@ def _fault(name: str, argument: inspect.Parameter, parts: tuple[Any, ...]) -> st
     if isinstance(unit, str) and (remedy := unit_fault(unit)):
         return f"the unit {unit!r} of its parameter {name!r} is not known: {remedy}"
     default = None if argument.default is argument.empty else argument.default
-    if default is not None and not isinstance(default, int | float):
+    if default is not None and (isinstance(default, bool) or not isinstance(default, Real)):
         return f"the default of its parameter {name!r} must be a number, not {default!r}"
     return ""
 

@@ -66,7 +66,7 @@ def test_a_folder_of_another_user_is_named_before_anything_is_read(
     tiny_run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("os.access", lambda _, mode: not mode & os.W_OK)
-    with pytest.raises(ResultError, match="is a folder that this user may not write into: copy it, and name the copy"):
+    with pytest.raises(ResultError, match="is a folder that this user may not write into: let this user, or copy"):
         write_pages(tiny_run)
 
 

@@ -49,7 +49,9 @@ def test_a_folder_of_another_user_is_named_before_anything_is_computed(
     plan = tiny_plan(tmp_path)
     store.open_folder(tmp_path / "run", plan)
     monkeypatch.setattr("os.access", lambda *_: False)
-    with pytest.raises(ResultError, match=r"run: is a folder that this user may not write into: copy it"):
+    with pytest.raises(
+        ResultError, match=r"run: is a folder that this user may not write into: let this user, or copy"
+    ):
         store.open_folder(tmp_path / "run", plan)
 
 

@@ -193,6 +193,18 @@ FAULTS: dict[str, tuple[str, str, str, str]] = {
         "'C' is a table and needs a grammar of",
     ),
     "a default": ("hull.drag", signature("*, C: Annotated[SX, 'kg'] = 'a'"), "begins", "must be a number, not 'a'"),
+    "a default that is no number": (
+        "hull.drag",
+        signature("*, C: Annotated[SX, 'kg'] = True"),
+        "begins",
+        "must be a number, not True",
+    ),
+    "a constant": (
+        "hull.drag",
+        signature("nu_r: SX, *, scale=2.0"),
+        "begins",
+        "with its unit; a constant belongs outside the signature",
+    ),
     "a name that is taken": ("hull.drag", signature("*, off: Annotated[SX, 'kg']"), "begins", "'off' is a key that bl"),
     "types that are not there": ("hull.drag", signature("nu_r: 'Sx'"), "begins", "cannot be read (name 'Sx' is not de"),
     "rates of another length": (
@@ -287,6 +299,14 @@ def test_a_mistake_in_a_term_is_one_line(name: str, tmp_path: Path, monkeypatch:
 def test_a_right_term_passes(body: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     registered("hull.drag", DRAG.format(body), tmp_path, monkeypatch)
     assert dynamics(load_vessel(ship("hull.drag", tmp_path))).num_dof == 3
+
+
+@pytest.mark.parametrize("default", ["2", "np.int64(2)", "np.float32(2)"])
+def test_any_number_is_a_default(default: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = DRAG.replace('"kg m^-1"]', f'"kg m^-1"], k: Annotated[SX, "-"] = {default}').format("return wrench(k * Y)")
+    registered("hull.drag", text, tmp_path, monkeypatch)
+    load_vessel(ship("hull.drag", tmp_path))
+    assert parameters(check_term("hull.drag").function)[-1].default == 2.0
 
 
 def test_the_terms_of_the_page_pass(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
