@@ -28,7 +28,7 @@ Plane = np.ndarray[Any, np.dtype[np.complex128]]
 
 GAP = 3.0  # usual steps: a longer one is a time without rows
 JITTER, FROZEN, OVERLAP = 0.05, 0.02, 0.5
-ROUGHER = 1.2  # times: with an uneven clock; then its times are wrong by more than the noise shows
+ROUGHER = 1.2  # times, on an uneven clock or on an even one: this one is wrong, by more than the noise hides
 CORRELATION, SCALE_ERROR, HEADING_ERROR, PATH_ERROR = 0.8, 0.1, 0.25, 0.05
 TURNING = np.radians(0.2)  # rms of r under which a run is too straight to compare headings
 TURNS, NO_DRIFT = 0.3, 0.005  # of the largest r, from which on the ship turns; of u: no ship has so little sway there
@@ -91,15 +91,27 @@ def _clock(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     )
     jitter = float(np.sqrt(np.mean((steps - usual) ** 2))) / usual
     sentence = f"steps differ from {usual:.3g} s by {100 * jitter:.2g} % (RMS)"
-    harmless = longest <= GAP * usual + slack and _bears_out(stretches)
-    words = "positions and heading fit them" if harmless else "are the times those of the samples, or of their arrival?"
-    words = f"; {words}" if jitter > JITTER else ""
-    yield _row("jitter", jitter, "1", JITTER, f"{sentence}{words}", ok=harmless or jitter <= JITTER)
+    fits = _bears_out(stretches) if jitter > JITTER and longest <= GAP * usual + slack else False
+    rounded = fits is None and float(np.std(steps)) <= JITTER * usual
+    words = "; are the times those of the samples, or of their arrival?"
+    if jitter <= JITTER:
+        words = ""
+    elif fits:
+        words = "; positions and heading bear them out"
+    elif rounded:
+        words = "; so little comes of a clock that rounds"
+    elif fits is None:
+        words += " Positions and heading are too noisy, or too steady, to tell"
+    yield _row("jitter", jitter, "1", JITTER, f"{sentence}{words}", ok=jitter <= JITTER or rounded or bool(fits))
 
 
-def _bears_out(stretches: list[pd.DataFrame]) -> bool:
-    """Whether positions and heading are about as smooth on their clock as on one with even steps."""
+def _bears_out(stretches: list[pd.DataFrame]) -> bool | None:
+    """Whether positions or heading are smoother on their clock than on one with even steps; None: they cannot tell.
+
+    Neither may be rougher on it. Noise hides both a clock that is right and one that is wrong.
+    """
     long = [rows for rows in stretches if len(rows) >= 5]
+    smoother = False
     for names in (("north", "east"), ("psi",)):
         uneven, even = (
             rms(np.array([_roughness(rows, name, clock) for rows in long for name in names] or [0.0]))
@@ -107,7 +119,8 @@ def _bears_out(stretches: list[pd.DataFrame]) -> bool:
         )
         if uneven > ROUGHER * even:
             return False
-    return len(long) > 0
+        smoother |= even > ROUGHER * uneven
+    return True if smoother else None
 
 
 def _roughness(rows: pd.DataFrame, name: str, clock: bool) -> float:

@@ -1,4 +1,4 @@
-"""Currents that the log does not have, another one in each run: whether the residuals of a fit show them."""
+"""Currents that the log does not have, one for each run: whether the residuals of a fit show them."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 TRIAL = 0.05  # m/s of the derivatives
 EXPLAINED = 0.4  # of the squares of the residuals that no steady error aboard takes: slow random forces have taken 0.37
 LONG = 0.1  # of the mean length of a run, at least, over which residuals are then correlated
+ALIKE = 1 / 3  # of the mean current: runs whose currents scatter less are taken to be in one and the same
 LEAST_RUNS = 2  # of one run a current is as well a wrong vessel
 
 
@@ -38,6 +39,13 @@ class Stream:
         """Root mean square over the runs [m/s]."""
         return float(np.sqrt(np.mean(np.sum(self.currents**2, axis=1))))
 
+    @property
+    def same(self) -> bool:
+        """Whether the currents scatter little about their mean."""
+        mean = self.currents.mean(axis=0)
+        scatter = np.sum((self.currents - mean) ** 2) / (len(self.currents) - 1)
+        return bool(np.sqrt(scatter) <= ALIKE * np.hypot(*mean))
+
 
 def streams(solution: Solution, dataset: Dataset) -> Stream | None:
     """The currents after one step of Gauss-Newton with the factors; None where they are known or cannot be computed."""
@@ -56,17 +64,22 @@ def streams(solution: Solution, dataset: Dataset) -> Stream | None:
 
 
 def current_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
-    """A sentence where a current of its own in each run would take most of the squares of the residuals; else none."""
+    """A sentence where currents, by run, would take most of the squares of the residuals; else none.
+
+    It names wind, too, if the vessel feels it: the two look alike.
+    """
     slow = (one.memory * len(solution.runs) / one.samples >= LONG for one in judged.whiteness.values() if not one.white)
     if not any(slow):
         return ""
     seen = streams(solution, dataset)
     if seen is None or seen.explained < EXPLAINED:
         return ""
+    which = "a current, about the same in all runs" if seen.same else "another current in each run"
+    wind = ", or of wind that the log lacks" if solution.vessel.document.get("wind") else ""
     return (
-        f"residuals look like those of another current in each run, {digits(seen.size, 2)} m/s, which takes "
-        f"{percent(seen.explained)} of their squares away: estimates make up for it and may be far outside of their "
-        f"intervals; identify again with --nuisance current={digits(seen.size, 1)}"
+        f"residuals look like those of {which}, {digits(seen.size, 2)} m/s, which takes "
+        f"{percent(seen.explained)} of their squares away{wind}: estimates make up for it and may be far outside of "
+        f"their intervals; identify again with --nuisance current={digits(seen.size, 1)}"
     )
 
 

@@ -124,6 +124,27 @@ def test_uneven_times_fail_where_the_motion_contradicts_them(seed: int) -> None:
     assert logged(t, 0.0864 * np.round(t / 0.0864), 0.5) == set()
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_noise_that_hides_wrong_times_does_not_bear_them_out(seed: int) -> None:
+    """At 5 m/s, with times wrong by 0.1 s and positions by 1 m, the sentence was: positions and heading fit them."""
+    random, t = np.random.default_rng(seed), np.arange(0.0, 600.0)
+    uneven = t + np.clip(random.normal(0, 0.1, len(t)), -0.4, 0.4)
+
+    def jitter(of: np.ndarray, noise: float) -> pd.Series:
+        frame = turning(of, u=5.0).assign(t=uneven, **{"port.n": 2.0})
+        for name, std in {"north": noise, "east": noise, "psi": 0.03}.items():
+            frame[name] += random.normal(0, std, len(t))
+        return check_dataset(as_dataset(frame)).set_index("check").loc["jitter"]
+
+    right, wrong, hidden = jitter(uneven, 0.1), jitter(t, 0.1), jitter(t, 1.0)
+    assert right["ok"]
+    assert right["sentence"].endswith("positions and heading bear them out")
+    assert not wrong["ok"]
+    assert wrong["sentence"].endswith("or of their arrival?")
+    assert not hidden["ok"]
+    assert hidden["sentence"].endswith("of their arrival? Positions and heading are too noisy, or too steady, to tell")
+
+
 def test_a_small_craft_may_turn_faster_than_a_ship() -> None:
     """At 1.5 rad/s, as her heading shows; a yaw rate in degrees is still refused."""
     t = 0.1 * np.arange(600)

@@ -13,7 +13,7 @@ from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.identification.stream import current_fit, streams
-from shipid.vessel.load import load_vessel
+from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -65,6 +65,28 @@ def test_another_current_in_each_run_is_named_with_the_nuisance_that_estimates_i
     mended = fitted(log, nuisance={"current": 0.3})
     assert np.abs(mended.factors - 1).max() < 0.3 * np.abs(solution.factors - 1).max()
     assert sentence(mended, log) == ""
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_one_current_of_all_runs_is_not_called_another_one_in_each(seed: int) -> None:
+    log = log_of(seed, np.tile([0.3, 0.2], (6, 1)))
+    said = sentence(fitted(log), log)
+    assert re.search(
+        r"those of a current, about the same in all runs, 0\.3\d m/s, .* with --nuisance current=0\.4", said
+    )
+    assert "another current" not in said
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_wind_that_the_log_lacks_is_named_for_a_vessel_that_feels_it(seed: int) -> None:
+    windy = trials(SHIP, steps=90, seed=seed, weather={"V_w": np.full(6, 12.0), "beta_w": np.full(6, 1.0)})
+    log = noisy(changed(windy, V_w=np.zeros(len(windy.frame)), beta_w=np.zeros(len(windy.frame))), seed)
+    assert "away, or of wind that the log lacks: estimates" in sentence(fitted(log), log)
+    ship = Vessel({key: block for key, block in SHIP.document.items() if key != "wind"}, SHIP.file)
+    log = log_of(seed, drawn(seed))
+    solution = identify(ship, log, log.runs, Identify(parameters=FEW, weights=NOISE, horizon=0, start="base"))
+    assert "another current in each run" in sentence(solution, log)
+    assert "wind" not in sentence(solution, log)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])

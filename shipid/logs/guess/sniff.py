@@ -73,7 +73,7 @@ SHIP = frozenset(
 )
 NAMES = frozenset("name id no nr num number code names navn namn nom nombre naam".split())
 """Words of the name of a column that says a ship, and words beside them that it may have: a ship state is no ship."""
-ROWS_EACH = 5  # rows of each ship, on average, at least
+ROWS_EACH, MOST_NUMBERS = 5, 20  # rows of each ship, on average, at least; ships that have numbers alone, at most
 
 
 @dataclass(frozen=True)
@@ -254,12 +254,13 @@ def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
     texts = column_called(table, name).dropna().astype(str).str.strip()
     known = [one for one in texts.unique() if not NO_VALUE.fullmatch(one.lower()) and one.lower() not in UNKNOWN]
     ships = [*{one.casefold(): one for one in reversed(known)}.values()][::-1]
-    if _says_ship(name) and (any(map(_is_measured, ships)) or len(texts) < ROWS_EACH * len(ships)):
+    if _says_ship(name) and (_are_measured(ships) or len(texts) < ROWS_EACH * len(ships)):
         return
     if len(ships) > 1:
         first = ", ".join(ships[:3])
         message = f"holds {len(ships)} ships ({name!r} is {first}{', ...' if len(ships) > 3 else ''})"
-        raise DataError(f"{message}: write the rows of each ship to a separate log", file=file)
+        remedy = "write the rows of each ship to a separate log, or take the column out of the log if it is one ship"
+        raise DataError(f"{message}: {remedy}", file=file)
 
 
 def _says_ship(name: str) -> bool:
@@ -268,12 +269,10 @@ def _says_ship(name: str) -> bool:
     return bool(parts & SHIP) and parts <= SHIP | NAMES
 
 
-def _is_measured(text: str) -> bool:
-    """Whether a text is a number with decimals, as no name and no number of a ship is."""
-    try:
-        return float(text) % 1 != 0
-    except ValueError:
-        return False
+def _are_measured(texts: list[str]) -> bool:
+    """Whether the texts of a column are measured: one has decimals, or all are numbers, and many."""
+    numbers = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce")
+    return bool((numbers.dropna() % 1 != 0).any() or (numbers.notna().all() and len(texts) > MOST_NUMBERS))
 
 
 def _without_units(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, tuple[str, ...]], dict[str, str]]:

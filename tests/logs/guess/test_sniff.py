@@ -172,13 +172,23 @@ def test_a_log_of_several_ships_is_refused(name: str, values: tuple[str, str], w
     if not words:
         assert "lat" in sniff(log).columns
         return
-    with pytest.raises(DataError, match=f"{re.escape(words)}.*: write the rows of each ship to a separate log"):
+    remedy = "write the rows of each ship to a separate log, or take the column out of the log if it is one ship$"
+    with pytest.raises(DataError, match=f"{re.escape(words)}.*: {remedy}"):
         sniff(log)
 
 
 def test_a_column_that_changes_with_every_row_is_no_ship(tmp_path: Path) -> None:
     rows = [f"{k},{k},{np.sin(k):.3f}" for k in range(80)]
     assert "lat" in sniff(log_of(tmp_path, ["time,Ship no,lat", *rows])).columns
+
+
+def test_a_column_of_whole_degrees_is_no_list_of_ships(tmp_path: Path) -> None:
+    """A heading `Ship` was refused as 84 ships."""
+    rows = [f"{k},{k // 10},{np.sin(k):.3f}" for k in range(840)]
+    assert "Ship" in sniff(log_of(tmp_path, ["time,Ship,lat", *rows])).columns
+    names = [f"{k},Ship {k // 10},{np.sin(k):.3f}" for k in range(840)]
+    with pytest.raises(DataError, match="holds 84 ships"):
+        sniff(log_of(tmp_path, ["time,Ship,lat", *names]))
 
 
 def test_a_number_for_missing_values_is_one_in_every_column(tmp_path: Path) -> None:
