@@ -71,6 +71,11 @@ def begins_at(function: Callable[..., Any]) -> str:
     return f" in {file}, line {line}" if line and of_users(function) else ""
 
 
+def file_of(kind: Callable[..., Any]) -> str:
+    """File of a class or function; empty where there is none, as in a notebook."""
+    return _file_and_line(kind)[0] or ""
+
+
 def _file_and_line(kind: Callable[..., Any]) -> tuple[str | None, int]:
     """File of a class or function, and the first line of a function; no file where there is none, else 0."""
     kind = inspect.unwrap(written(kind))

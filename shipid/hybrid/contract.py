@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import inspect
-import sys
 from collections.abc import Sequence
 from typing import Any
 
 from pydantic import BaseModel
+
+from shipid.users import file_of
 
 CALLED = {"predict": ("physics", "instants", "paths"), "header": (), "arrays": ()}  # functions of a corrector
 REBUILT = ("header", "arrays")  # what `from_arrays` takes
@@ -24,13 +25,13 @@ def fault_of_method(kind: type[BaseModel]) -> str:
             return f"{named(kind)} must have `{name}` as a class variable: `{name}: ClassVar[{what}] = ...`"
     if getattr(kind, "validation", None) not in SPLITS:
         return f"`validation` of {named(kind)} must be one of {SPLITS}, not {getattr(kind, 'validation', None)!r}"
-    for listed in LISTS:
-        names: Any = getattr(kind, listed, ())
+    for group in LISTS:
+        names: Any = getattr(kind, group, ())
         if isinstance(names, str):
-            return f"`{listed}` of {named(kind)} must be a tuple, such as ({names!r},)"
+            return f"`{group}` of {named(kind)} must be a tuple, such as ({names!r},)"
         unknown = next((name for name in names if name not in kind.model_fields), None)
         if unknown is not None:
-            return f"`{listed}` of {named(kind)} names {unknown!r}, which is none of its settings"
+            return f"`{group}` of {named(kind)} names {unknown!r}, which is none of its settings"
     if fault := _uncallable(kind, "fit", ("task",)):
         return fault
     if not hasattr(kind, "corrector"):
@@ -77,5 +78,4 @@ def _uncallable(kind: type, name: str, taken: Sequence[str]) -> str:
 
 def named(kind: type) -> str:
     """The name of a class, and its file where it has one."""
-    file = getattr(sys.modules.get(kind.__module__), "__file__", None)
-    return f"{kind.__name__} in {file}" if file else kind.__name__
+    return f"{kind.__name__} in {file}" if (file := file_of(kind)) else kind.__name__

@@ -37,7 +37,7 @@ def _symbols(value: Any) -> SX | None:
         return value
     try:
         return SX(value)
-    except (NotImplementedError, TypeError, ValueError, RuntimeError):
+    except (NotImplementedError, TypeError, ValueError, RuntimeError):  # CasADi, for what it takes for no matrix
         return None
 
 
