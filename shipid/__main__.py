@@ -5,7 +5,7 @@ import io
 import os
 import sys
 
-FEW_LOOKS = 50_000  # objects made between two looks for garbage: imports make many objects, and no garbage
+FEW_LOOKS = 100_000  # objects made between two looks for garbage: imports make many objects, and no garbage
 
 
 def open_streams() -> None:

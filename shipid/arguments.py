@@ -7,12 +7,13 @@ import operator
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from shipid.errors import ShipidError, choices
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 Kind = type[ShipidError]
 MULTIPLE = 1e-6  # of a step: by so much less or more a time is still a multiple
@@ -20,6 +21,8 @@ MULTIPLE = 1e-6  # of a step: by so much less or more a time is still a multiple
 
 def whole_number(name: str, value: Any, least: int = 0, error: Kind = ShipidError) -> int:
     """Return a whole number, also one that NumPy holds or that is written as 10.0; raise `error` for anything else."""
+    import numpy as np
+
     try:
         number = int(value) if isinstance(value, float | np.floating) and value == int(value) else operator.index(value)
     except (TypeError, ValueError, OverflowError):
@@ -31,6 +34,8 @@ def whole_number(name: str, value: Any, least: int = 0, error: Kind = ShipidErro
 
 def number(name: str, value: Any, error: Kind = ShipidError) -> float:
     """Return a number as a float, whatever type of number it was; raise `error` for anything else."""
+    import numpy as np
+
     if isinstance(value, bool) or not isinstance(value, int | float | np.number) or np.iscomplexobj(value):
         raise error(f"{name} must be a number, not {value!r}")
     return float(value)
@@ -38,6 +43,8 @@ def number(name: str, value: Any, error: Kind = ShipidError) -> float:
 
 def positive(name: str, value: Any, error: Kind = ShipidError) -> float:
     """Return a number above 0 as a float, whatever type of number it was; raise `error` for anything else."""
+    import numpy as np
+
     number = float(value) if isinstance(value, int | float | np.number) and not np.iscomplexobj(value) else np.nan
     if not 0 < number < np.inf or isinstance(value, bool):
         raise error(f"{name} must be a number above 0 and finite, not {value!r}")
@@ -99,6 +106,8 @@ def numbers(name: str, values: Any, error: Kind = ShipidError) -> NDArray[np.flo
 
     An array of floats is not copied. Raises `error` for text, complex numbers and whatever else holds no real numbers.
     """
+    import numpy as np
+
     try:
         if isinstance(values, np.ma.MaskedArray):
             values = np.ma.filled(values.astype(float), np.nan)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import os
 import shlex
 import shutil
@@ -18,11 +19,10 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-import numpy as np
-
 from shipid.errors import DataError, ResultError
 
 if TYPE_CHECKING:
+    import numpy as np
     from pandas import DataFrame
     from pyarrow import Table
 
@@ -279,6 +279,8 @@ def read_table(file: Path) -> DataFrame:
 
 def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bool = False) -> None:
     """Write arrays by name as one `.npz` without pickles."""
+    import numpy as np
+
     with whole(file) as temporary, temporary.open("wb") as stream:
         (np.savez_compressed if compressed else np.savez)(stream, allow_pickle=False, **arrays)
 
@@ -295,6 +297,8 @@ def read_arrays(file: str | os.PathLike[str], *beginnings: str) -> dict[str, np.
 
     OSError if it cannot be opened, ValueError for anything else.
     """
+    import numpy as np
+
     try:
         with open_file(file) as stream, np.load(stream, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files if name.startswith(beginnings or "")}
@@ -321,10 +325,10 @@ def _plain(value: Any) -> Any:
         return {str(key): _plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(entry) for entry in value]
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):  # of NumPy
         return _plain(value.tolist())
     if isinstance(value, Path):
         return str(value)
-    if isinstance(value, float) and not np.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-import casadi as ca
-from casadi import SX
+from typing import TYPE_CHECKING
+
+from shipid.physics import symbols as ca
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 
 def vector(*entries: float | SX) -> SX:
     """Column vector of the given scalars; zeros stay structural, so that later operations skip them."""
-    return ca.vertcat(*(SX(1, 1) if isinstance(entry, int | float) and entry == 0 else entry for entry in entries))
+    return ca.vertcat(*(ca.SX(1, 1) if isinstance(entry, int | float) and entry == 0 else entry for entry in entries))
 
 
 def given(value: SX | float, neutral: float) -> bool:
     """Whether a parameter has another value than its neutral default: what has not stays out of the equations."""
-    return isinstance(value, SX) or value != neutral
+    return isinstance(value, ca.SX) or value != neutral
 
 
 def skew(a: SX) -> SX:
     """S(a), with S(a) b = a x b, for a (3)."""
     return ca.vertcat(
-        ca.horzcat(SX(1, 1), -a[2], a[1]),
-        ca.horzcat(a[2], SX(1, 1), -a[0]),
-        ca.horzcat(-a[1], a[0], SX(1, 1)),
+        ca.horzcat(ca.SX(1, 1), -a[2], a[1]),
+        ca.horzcat(a[2], ca.SX(1, 1), -a[0]),
+        ca.horzcat(-a[1], a[0], ca.SX(1, 1)),
     )
 
 
@@ -71,11 +75,11 @@ def current(eta: SX, nu: SX, V_c: SX, beta_c: SX, *, heaves: bool = True) -> tup
         linear = rotation(eta[3], eta[4], eta[5]).T @ towards
         rate = -skew(nu[3:]) @ linear
     else:
-        level = rotation(SX(1, 1), SX(1, 1), eta[5]).T @ towards
+        level = rotation(ca.SX(1, 1), ca.SX(1, 1), eta[5]).T @ towards
         c_phi, turning = ca.cos(eta[3]), ca.cos(eta[3]) * nu[5]
         linear = vector(level[0], level[1] / c_phi, 0)
         rate = vector(turning * level[1], (nu[3] * ca.tan(eta[3]) * level[1] - turning * level[0]) / c_phi, 0)
-    return ca.vertcat(linear, SX(3, 1)), ca.vertcat(rate, SX(3, 1))
+    return ca.vertcat(linear, ca.SX(3, 1)), ca.vertcat(rate, ca.SX(3, 1))
 
 
 def force_at(x: SX, y: SX, z: SX | float, F_x: SX, F_y: SX) -> SX:

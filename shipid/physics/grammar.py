@@ -10,9 +10,12 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
+from typing import TYPE_CHECKING
 
-import casadi as ca
-from casadi import SX
+from shipid.physics import symbols as ca
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 AXES = "XYZKMN"
 MOTIONS = "uvwpqr"
@@ -46,7 +49,7 @@ class Monomial:
 
     def value(self, symbols: Mapping[str, SX]) -> SX:
         """Product of the factors; `symbols` maps each symbol to its value."""
-        product = SX(1)
+        product = ca.SX(1)
         for symbol, absolute in self.factors:
             product *= ca.fabs(symbols[symbol]) if absolute else symbols[symbol]
         return product

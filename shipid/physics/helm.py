@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import casadi as ca
-from casadi import SX
-
+from shipid.physics import symbols as ca
 from shipid.physics.signals import steers, units
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 DAMPING = 1.0  # of station keeping: critical
 INTEGRAL = 0.1  # of station keeping: integral gain over omega x proportional gain (Fossen 2021, sec. 15.3)
@@ -119,7 +120,7 @@ def _limit(share: SX) -> SX:
 
 def _wrapped(angle: SX) -> SX:
     """The angle [rad] within half a turn to either side."""
-    return SX(ca.atan2(ca.sin(angle), ca.cos(angle)))
+    return ca.SX(ca.atan2(ca.sin(angle), ca.cos(angle)))
 
 
 def _steered(commands: Iterable[str], inputs: Named, share: SX) -> Named:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import casadi as ca
-import numpy as np
-from casadi import SX
-
+from shipid.physics import symbols as ca
 from shipid.physics.frames import given, vector
 from shipid.physics.grammar import (
     AXES,
@@ -26,6 +23,10 @@ from shipid.physics.grammar import (
     prime_scale,
     turns_round,
 )
+
+if TYPE_CHECKING:
+    import numpy as np
+    from casadi import SX
 
 SPEED_FLOOR = 0.01  # m/s: keeps 1/U finite at rest
 TIGHTEST = 2.0  # r L / U: turns of ships under rudders are wider, with r L / U up to 1.2
@@ -49,7 +50,7 @@ def summed(
     lever: SX | float = 1,
 ) -> SX:
     """Wrench (6) = sum over names of value x monomial, times `force` [N], moments also times `lever` [m]."""
-    wrench = [SX(1, 1)] * 6
+    wrench = [ca.SX(1, 1)] * 6
     for name, value in values.items():
         formula = formula_of(name)
         axis = AXES.index(formula.axis)
@@ -144,7 +145,7 @@ def about_service_speed(nu_r: SX, delta: SX | float, values: Mapping[str, SX], L
 
     Factors u' = (u - U_0) / U_0, v' = v / U_0, r' = r L / U_0, delta [rad].
     """
-    factors = {"u": nu_r[0] / U_0 - 1, "v": nu_r[1] / U_0, "r": nu_r[5] * L_pp / U_0, "delta": SX(delta)}
+    factors = {"u": nu_r[0] / U_0 - 1, "v": nu_r[1] / U_0, "r": nu_r[5] * L_pp / U_0, "delta": ca.SX(delta)}
     return summed(values, deviation, factors, rho / 2 * L_pp**2 * U_0**2, L_pp)
 
 
@@ -165,6 +166,8 @@ def abkowitz(
 
 def strips(*, strips: int) -> dict[str, np.ndarray]:
     """Midpoints of equal strips as a fraction of the length, and the fraction that each strip covers."""
+    import numpy as np
+
     return {"fraction": (np.arange(strips) + 0.5) / strips, "share": np.full(strips, 1.0 / strips)}
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Annotated
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
 
-import casadi as ca
-from casadi import SX
-
+from shipid.physics import symbols as ca
 from shipid.physics.frames import skew
 from shipid.physics.grammar import ADDED_MASS, AXES, MOTIONS, POSITIVE
+
+if TYPE_CHECKING:
+    from casadi import SX
+
+Entries = dict[tuple[int, int], Any]
+"""Row and column in a matrix [6 x 6] -> entry, a symbol, a number or an array (members,); what is not named is zero."""
 
 
 def rigid_body(
@@ -20,36 +24,37 @@ def rigid_body(
     z_G: Annotated[SX | float, "m"] = 0.0,
     I_x: Annotated[SX | float, "kg m^2"] = 0.0,
     I_y: Annotated[SX | float, "kg m^2"] = 0.0,
-) -> SX:
-    """M_RB [6 x 6] about the origin, with the centre of gravity at (x_G, 0, z_G) (Fossen 2021, eq. 3.49).
+) -> Entries:
+    """M_RB about the origin, with the centre of gravity at (x_G, 0, z_G) (Fossen 2021, eq. 3.49).
 
     I_x, I_y, I_z [kg m^2] are about the origin. Three degrees of freedom need m, I_z and x_G only.
     """
-    S_G = skew(ca.vertcat(SX(x_G), SX(1, 1), SX(z_G)))
-    top = ca.horzcat(m * SX.eye(3), -m * S_G)
-    bottom = ca.horzcat(m * S_G, ca.diag(ca.vertcat(SX(I_x), SX(I_y), SX(I_z))))
-    return ca.vertcat(top, bottom)
+    masses, moments = {(i, i): m for i in range(3)}, {(3, 3): I_x, (4, 4): I_y, (5, 5): I_z}
+    right = {(0, 4): -m * -z_G, (1, 3): -m * z_G, (1, 5): -m * -x_G, (2, 4): -m * x_G}  # -m S(x_G, 0, z_G)
+    left = {(3, 1): m * -z_G, (4, 0): m * z_G, (4, 2): m * -x_G, (5, 1): m * x_G}
+    return masses | right | left | moments
 
 
-def added_mass(**derivatives: Annotated[SX, ADDED_MASS]) -> SX:
-    """M_A [6 x 6] = -[X_udot ...]: the named acceleration derivatives with their sign turned (SNAME 1950).
+def added_mass(**derivatives: Annotated[SX, ADDED_MASS]) -> Entries:
+    """M_A = -[X_udot ...]: the named acceleration derivatives with their sign turned (SNAME 1950).
 
     Derivatives are on the force side (X_udot < 0), in kg, kg m or kg m^2 by their name; what is not named is zero.
     """
-    M_A = SX(6, 6)
-    for name, value in derivatives.items():
-        row, column = AXES.index(name[0]), MOTIONS.index(name[2])
-        M_A[row, column] = -value
-    return M_A
+    return {(AXES.index(name[0]), MOTIONS.index(name[2])): -value for name, value in derivatives.items()}
 
 
-@lru_cache(maxsize=64)
-def mass(inertia: tuple[str, ...], added: tuple[str, ...]) -> ca.Function:
-    """M_RB + M_A [6 x 6] as a function of one vector: the named arguments of `rigid_body`, then of `added_mass`."""
-    values = SX.sym("values", len(inertia) + len(added))
-    known, derivatives = ca.vertsplit(values)[: len(inertia)], ca.vertsplit(values)[len(inertia) :]
-    M = rigid_body(**dict(zip(inertia, known, strict=True))) + added_mass(**dict(zip(added, derivatives, strict=True)))
-    return ca.Function("mass", [values], [ca.densify(M)])
+def matrix(entries: Entries) -> SX:
+    """A matrix [6 x 6] of symbols; its zeros stay structural."""
+    M = ca.SX(6, 6)
+    for place, value in entries.items():
+        M[place] = value
+    return M
+
+
+def mass(inertia: Mapping[str, Any], added: Mapping[str, Any]) -> list[list[Any]]:
+    """Rows of M_RB + M_A [6 x 6] of numbers: the named arguments of `rigid_body`, and those of `added_mass`."""
+    M_RB, M_A = rigid_body(**inertia), added_mass(**added)
+    return [[M_RB.get((i, j), 0.0) + M_A.get((i, j), 0.0) for j in range(6)] for i in range(6)]
 
 
 def coriolis(M: SX, nu: SX) -> SX:

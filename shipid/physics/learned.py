@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import casadi as ca
-from casadi import SX
-
+from shipid.physics import symbols as ca
 from shipid.physics.frames import vector
 from shipid.physics.grammar import POSITIVE
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 
 def learned(
@@ -40,7 +41,7 @@ def learned(
     arXiv:2001.04385); for the damping of a marine vehicle see van de Ven et al. (2007).
     """
     u, v, r = nu_r[0] / u_scale, nu_r[1] / v_scale, nu_r[5] / r_scale
-    X, Y, N = SX(0), SX(0), SX(0)
+    X, Y, N = ca.SX(0), ca.SX(0), ca.SX(0)
     for a_u, a_v, a_r, a_0, b_X, b_Y, b_N in zip(w_u, w_v, w_r, w_0, c_X, c_Y, c_N, strict=True):
         along, across = a_u * u + a_0, a_v * v + a_r * r
         one, other = ca.tanh(along + across), ca.tanh(along - across)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import wraps
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import casadi as ca
-from casadi import SX
-
+from shipid.physics import symbols as ca
 from shipid.physics.frames import force_at, given, vector
 from shipid.physics.grammar import ADVANCE, POSITIVE
 from shipid.physics.hull import SPEED_FLOOR
 from shipid.physics.thruster import SHAFT_FLOOR, polynomial
 from shipid.physics.wind import interpolate
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 ROOT_FLOOR = 1e-4  # m/s: below it the root of a square is a line
 
@@ -67,7 +68,7 @@ def thrust_coefficient(u_P: SX, n: SX, D_p: SX, K_T: Mapping[str, SX], J_min: SX
     """K_T(J) with J = u_P / (|n| D_p), its sign reversed for n < 0, limited to J_min..J_max."""
     sense = ca.if_else(n >= 0, 1, -1)
     J = sense * u_P / (ca.fmax(ca.fabs(n), SHAFT_FLOOR) * D_p)
-    return polynomial(K_T, ca.fmin(ca.fmax(J, J_min), J_max), SX(1, 1), SX(1))
+    return polynomial(K_T, ca.fmin(ca.fmax(J, J_min), J_max), ca.SX(1, 1), ca.SX(1))
 
 
 def beyond(u_P: SX, n: SX, D_p: SX, J_min: SX, J_max: SX) -> SX:
@@ -138,12 +139,12 @@ def propeller(
     the origin N = rho n^2 D_p^5 N_astern(J); for a right-handed screw, which moves the stern to port,
     Y_astern < 0 < N_astern.
     """
-    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
-    thrust = polynomial_thrust(u_P, n, D_p, K_T, K_T_astern, SX(J_min), SX(J_max), k_astern, k_drag, rho)
-    wrench = force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
+    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
+    thrust = polynomial_thrust(u_P, n, D_p, K_T, K_T_astern, ca.SX(J_min), ca.SX(J_max), k_astern, k_drag, rho)
+    wrench = force_at(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
     if Y_astern or N_astern:
         unit = ca.if_else(n >= 0, 0, rho * n**2 * D_p**2 * D_p**2)
-        Y, N = (thrust_coefficient(u_P, n, D_p, K or {}, SX(J_min), SX(J_max)) for K in (Y_astern, N_astern))
+        Y, N = (thrust_coefficient(u_P, n, D_p, K or {}, ca.SX(J_min), ca.SX(J_max)) for K in (Y_astern, N_astern))
         wrench += unit * vector(0, Y, 0, -z * Y, 0, D_p * N)
     return wrench
 
@@ -178,8 +179,8 @@ def propeller_torque(
     """
     if K_Q is None:
         return None
-    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
-    K = thrust_coefficient(u_P, n, D_p, K_Q, SX(J_min), SX(J_max))
+    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
+    K = thrust_coefficient(u_P, n, D_p, K_Q, ca.SX(J_min), ca.SX(J_max))
     return rho * n * ca.fabs(n) * D_p**2 * D_p**3 * K
 
 
@@ -211,13 +212,13 @@ def wash(
     the speed that momentum theory adds, sqrt(u_P^2 + 8 K n^2 D_p^2 / pi) - |u_P|. By the same theory that share is 1/2
     at the disc and falls away from it. Without k_suction a screw astern does not reach the rudder.
     """
-    u_P = inflow(nu_r, SX(x), SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
-    K = thrust_coefficient(u_P, n, D_p, K_T, SX(J_min), SX(J_max))
+    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
+    K = thrust_coefficient(u_P, n, D_p, K_T, ca.SX(J_min), ca.SX(J_max))
     driven = 8 / ca.pi * K * (n * D_p) ** 2
     ahead = ca.sqrt(ca.fmax(u_P**2 + driven, 0) + SPEED_FLOOR**2)
     race = ca.if_else(u_P >= 0, ahead, signed_root(SPEED_FLOOR**2 - u_P**2 + ca.fmax(driven, 0)))
     if given(k_suction, 0.0):
-        K_a = thrust_coefficient(u_P, n, D_p, K_T_astern or K_T, SX(J_min), SX(J_max))
+        K_a = thrust_coefficient(u_P, n, D_p, K_T_astern or K_T, ca.SX(J_min), ca.SX(J_max))
         added = 8 / ca.pi * k_astern * ca.fmax(K_a, 0) * (n * D_p) ** 2
         astern = u_P - k_suction * (ca.sqrt(u_P**2 + added + SPEED_FLOOR**2) - ca.sqrt(u_P**2 + SPEED_FLOOR**2))
         return ca.vertcat(ca.if_else(n >= 0, u_P, astern), ca.if_else(n >= 0, race, astern), D_p)
@@ -262,9 +263,9 @@ def controllable_pitch(
     Blanke (1981), in Fossen (2021), with T_nn proportional to the pitch: a linear approximation of the K_T curves of
     the Wageningen B-series over pitch, not a fit. It overestimates the thrust at the largest pitches.
     """
-    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
+    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P)
     thrust = rho * D_p**2 * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
-    return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
+    return force_at(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
 
 
 @wraps(controllable_pitch, assigned=("__annotations__",))
@@ -296,7 +297,7 @@ def controllable_wash(
     By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream`. So the flow at a rudder
     has no step where the pitch goes through zero.
     """
-    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
+    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P)
     driven = 8 / ca.pi * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
     return ca.vertcat(u_P, slipstream(u_P, u_P * ca.fabs(u_P), driven), D_p)
 
@@ -349,7 +350,8 @@ def quadratic(
     """
     u_P = (1 - w_P0) * nu_r[0]
     thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
-    return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1)) + thrust * vector(0, Y_T, 0, -z * Y_T, 0, N_T)
+    ahead = force_at(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
+    return ahead + thrust * vector(0, Y_T, 0, -z * Y_T, 0, N_T)
 
 
 @wraps(quadratic, assigned=("__annotations__",))
@@ -384,7 +386,7 @@ def quadratic_wash(
     u_P = (1 - w_P0) * nu_r[0]
     if not any(given(number, 0.0) for number in (D_p, c_uu, c_un, c_nn)):
         return vector(u_P, u_P, D_p)
-    still, driven = SX(1, 1), c_uu * u_P * ca.fabs(u_P) + c_un * n * u_P + c_nn * n * ca.fabs(n)
+    still, driven = ca.SX(1, 1), c_uu * u_P * ca.fabs(u_P) + c_un * n * u_P + c_nn * n * ca.fabs(n)
     if given(D_p, 0.0):
         thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
         still, driven = u_P * ca.fabs(u_P), driven + 8 * thrust / (ca.pi * rho * D_p**2)
@@ -434,9 +436,9 @@ def four_quadrant(
     to 0 the screw ahead while she goes astern, -180 to -90 astern. A stopped screw, at +-90 deg, drags. Inflow u_P as
     in `inflow`.
     """
-    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
+    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P)
     thrust = rho * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T)
-    return force_at(SX(x), SX(y), SX(z), (1 - t_P) * thrust, SX(1, 1))
+    return force_at(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
 
 
 @wraps(four_quadrant, assigned=("__annotations__",))
@@ -465,7 +467,7 @@ def four_quadrant_wash(
 
     By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream`.
     """
-    u_P = inflow(nu_r, SX(x), SX(y), SX(w_P0), SX(C_1), SX(C_2_plus), SX(C_2_minus), tau, C_P)
+    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P)
     driven = 8 / ca.pi * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T) / D_p**2
     return vector(u_P, slipstream(u_P, u_P * ca.fabs(u_P), driven), D_p)
 

@@ -9,13 +9,14 @@ manoeuvring model includes their added mass and damping at zero frequency: they 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import casadi as ca
-from casadi import SX
-
+from shipid.physics import symbols as ca
 from shipid.physics.frames import heave_rate, vector
 from shipid.physics.grammar import POSITIVE
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 
 def mode_rates(velocity: SX, state: SX, sigma: Sequence[SX], omega: Sequence[SX]) -> list[SX]:
@@ -30,7 +31,7 @@ def mode_rates(velocity: SX, state: SX, sigma: Sequence[SX], omega: Sequence[SX]
 def kernel_force(state: SX, a: Sequence[SX], b: Sequence[SX]) -> SX:
     """Convolution of the kernel a cos + b sin with the velocity that drives the states (c, s) of each mode."""
     pairs = zip(a, b, strict=True)
-    return sum((a_k * state[2 * k] + b_k * state[2 * k + 1] for k, (a_k, b_k) in enumerate(pairs)), SX(1, 1))
+    return sum((a_k * state[2 * k] + b_k * state[2 * k + 1] for k, (a_k, b_k) in enumerate(pairs)), ca.SX(1, 1))
 
 
 def _names(block: Mapping[str, Any], drivers: Sequence[str]) -> tuple[str, ...]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from casadi import SX
+from typing import TYPE_CHECKING, Annotated
 
 from shipid.physics.frames import vector
 from shipid.physics.grammar import POSITIVE
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 
 def hydrostatic(

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any
-
-import casadi as ca
-from casadi import SX
+from typing import TYPE_CHECKING, Any
 
 from shipid.errors import ShipidError
+from shipid.physics import symbols as ca
 from shipid.units import listed, plural
 from shipid.users import begins_at, of_users
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 
 def returned(
@@ -33,10 +34,10 @@ def returned(
 
 def _symbols(value: Any) -> SX | None:
     """A value as symbols, also numbers of CasADi and NumPy; None for what is none."""
-    if isinstance(value, SX):
+    if isinstance(value, ca.SX):
         return value
     try:
-        return SX(value)
+        return ca.SX(value)
     except (NotImplementedError, TypeError, ValueError, RuntimeError):  # CasADi, for what it takes for no matrix
         return None
 

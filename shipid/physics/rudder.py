@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import wraps
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import casadi as ca
-from casadi import SX
-
+from shipid.physics import symbols as ca
 from shipid.physics.frames import given, vector
 from shipid.physics.grammar import (
     CROSS_FLOWS,
@@ -20,6 +18,9 @@ from shipid.physics.grammar import (
 )
 from shipid.physics.hull import SPEED_FLOOR, TIGHTEST, about_service_speed, summed
 from shipid.physics.propeller import drift, signed_root
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 
 def rudder(
@@ -170,7 +171,7 @@ def polynomial_normal_force(
     turning = nu_r[5] * L_pp / TIGHTEST
     U = ca.sqrt(ca.fmax(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, turning**2), SPEED_FLOOR**2))
     prime = {"v": nu_r[1] / U, "r": nu_r[5] * L_pp / U}
-    across = U * sum((value * cross_flow_monomial(name).value(prime) for name, value in v_R.items()), SX(1, 1))
+    across = U * sum((value * cross_flow_monomial(name).value(prime) for name, value in v_R.items()), ca.SX(1, 1))
     still = u_P * ca.fabs(u_P)
     race = u_race * ca.fabs(u_race) - SPEED_FLOOR**2  # the slipstream comes with a floor of its speed
     u_R = epsilon * signed_root(still + k_x * (race - still))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import wraps
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import casadi as ca
-from casadi import SX
-
+from shipid.physics import symbols as ca
 from shipid.physics.frames import force_at, given
 from shipid.physics.grammar import POSITIVE, THRUST, thrust_monomial
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 SHAFT_FLOOR = 1e-3  # rev/s: J = u / (n D) stays finite at n = 0
 UNLIMITED = 1e9  # default limit of a command: beyond all of them
@@ -19,7 +20,7 @@ UNLIMITED = 1e9  # default limit of a command: beyond all of them
 def polynomial(coefficients: Mapping[str, SX], J: SX, J_y: SX, width: SX) -> SX:
     """Sum of named monomials in J, y = J_y and t = tanh(|J_y| / width)."""
     symbols = {"J": J, "y": J_y, "t": ca.tanh(ca.fabs(J_y) / width)}
-    return sum((value * thrust_monomial(name).value(symbols) for name, value in coefficients.items()), SX(1, 1))
+    return sum((value * thrust_monomial(name).value(symbols) for name, value in coefficients.items()), ca.SX(1, 1))
 
 
 def azimuth(
@@ -90,7 +91,7 @@ def tunnel(
     F_3: Annotated[SX, "N s^3"],
 ) -> SX:
     """Wrench (6) of a transverse tunnel thruster at zero ship speed: Y = F_1 n + F_2 n|n| + F_3 n^3, n [rev/s]."""
-    return force_at(SX(x), SX(1, 1), SX(z), SX(1, 1), tunnel_side_force(n, F_1=F_1, F_2=F_2, F_3=F_3))
+    return force_at(ca.SX(x), ca.SX(1, 1), ca.SX(z), ca.SX(1, 1), tunnel_side_force(n, F_1=F_1, F_2=F_2, F_3=F_3))
 
 
 def tunnel_side_force(

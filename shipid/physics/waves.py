@@ -8,13 +8,14 @@ sway, roll and yaw odd, as for any ship with port/starboard symmetry.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import casadi as ca
-from casadi import SX
-
+from shipid.physics import symbols as ca
 from shipid.physics.frames import rotation
 from shipid.physics.grammar import AXES
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 EVEN = (0, 2, 4)
 FORCES = tuple(f"{axis}_{part}" for axis in AXES for part in ("real", "imag"))
@@ -29,7 +30,7 @@ def passage(block: Mapping[str, Any]) -> tuple[str, ...]:  # noqa: ARG001
 
 def passage_rates(eta: SX, nu: SX, nu_r: SX) -> SX:
     """d(state)/dt of the wave states: 1, then the current velocity north and east [m/s]."""
-    return ca.vertcat(SX(1), (rotation(eta[3], eta[4], eta[5]) @ (nu - nu_r)[:3])[:2])
+    return ca.vertcat(ca.SX(1), (rotation(eta[3], eta[4], eta[5]) @ (nu - nu_r)[:3])[:2])
 
 
 def first_order_widths(*, table: Mapping[str, Any], harmonics: int) -> dict[str, int]:  # noqa: ARG001
@@ -45,7 +46,7 @@ def drift_widths(*, table: Mapping[str, Any], harmonics: int) -> dict[str, int]:
 
 def multiples(c: SX, s: SX, count: int) -> tuple[list[SX], list[SX]]:
     """cos(m beta), sin(m beta) for m = 0 ... count from cos(beta), sin(beta), without a further trigonometric call."""
-    cosines, sines = [SX(1), c], [SX(1, 1), s]
+    cosines, sines = [ca.SX(1), c], [ca.SX(1, 1), s]
     for _ in range(2, count + 1):
         cosines.append(2 * c * cosines[-1] - cosines[-2])
         sines.append(2 * c * sines[-1] - sines[-2])
@@ -79,7 +80,7 @@ def first_order(eta: SX, state: SX, omega: SX, k: SX, c_chi: SX, s_chi: SX, epsi
 
 
 def _series(coefficients: SX, basis: list[SX]) -> SX:
-    return sum((coefficients[m] * entry for m, entry in enumerate(basis)), SX(1, 1))
+    return sum((coefficients[m] * entry for m, entry in enumerate(basis)), ca.SX(1, 1))
 
 
 def drift(eta: SX, c_chi: SX, s_chi: SX, drift: SX) -> SX:
@@ -90,4 +91,4 @@ def drift(eta: SX, c_chi: SX, s_chi: SX, drift: SX) -> SX:
     count = drift.numel() // 3
     cosines, sines = multiples(*relative_heading(eta[5], c_chi, s_chi), count - 1)
     X, Y, N = (_series(drift[i * count : (i + 1) * count], basis) for i, basis in enumerate((cosines, sines, sines)))
-    return ca.vertcat(X, Y, SX(3, 1), N)
+    return ca.vertcat(X, Y, ca.SX(3, 1), N)

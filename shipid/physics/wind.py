@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import casadi as ca
-from casadi import SX
-
+from shipid.physics import symbols as ca
 from shipid.physics.frames import vector
 from shipid.physics.grammar import POSITIVE
+
+if TYPE_CHECKING:
+    from casadi import SX
 
 CALM = 1e-6  # m/s: below this relative wind the angle of attack is taken as that of a head wind
 

@@ -16,7 +16,7 @@ from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics import ACTUATORS, GIVEN, TERMS, Term
 from shipid.physics.frames import current, heave_rate, kinematics, vector
 from shipid.physics.helm import Helmsman
-from shipid.physics.inertia import added_mass, coriolis, rigid_body
+from shipid.physics.inertia import added_mass, coriolis, matrix, rigid_body
 from shipid.physics.returned import returned
 from shipid.physics.signals import named, units
 from shipid.units import plural
@@ -153,8 +153,8 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     states_of = {path: ca.vertcat(*(state_of[name] for name in entries)) for path, entries in hidden.items()}
     available = {"eta": eta, "nu": nu, "nu_r": nu_r, "psi": eta[5], **weather, **actual}
 
-    M_RB = rigid_body(**_values(bound["inertia"], value_of))
-    M_A = added_mass(**_values(bound["added_mass"], value_of))
+    M_RB = matrix(rigid_body(**_values(bound["inertia"], value_of)))
+    M_A = matrix(added_mass(**_values(bound["added_mass"], value_of)))
     kept = CORIOLIS[vessel.document.get("added_mass", {}).get("coriolis", "full")]
     force = _added_mass_force(M_A, nu_r, kept)
     if vessel.document["inertia"].get("coriolis", "full") == "full":

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FiniteFloat
 
 from shipid import document as documents
@@ -25,7 +24,7 @@ from shipid.physics.inertia import mass
 from shipid.physics.signals import ACTUAL, row_of
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import Binding, bindings, units
-from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, contradiction, first_of, out_of_range
+from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, contradiction, everywhere, first_of, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
@@ -37,6 +36,10 @@ from shipid.vessel.schema import (
     term_blocks,
     term_model,
 )
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 MOST_RADIANS = 7.0  # more than a full turn: a larger limit of an actuator is in degrees
 LONGEST_CHAIN = 20  # documents that extend or patch one another
@@ -118,20 +121,19 @@ class Vessel:
     @property
     def mass(self) -> NDArray[np.float64]:
         """Mass plus added mass (n, n) [kg, kg m, kg m^2] in the degrees of freedom of the vessel; a copy."""
-        first: NDArray[np.float64] = self._masses[0]
-        return first.copy()
+        import numpy as np
+
+        return np.array(self._mass)
 
     @cached_property
-    def _masses(self) -> NDArray[np.float64]:
-        """`mass` of every member (members, n, n), where the numbers are those of several; else of one."""
-        blocks, numbers = [self.bound[name] for name in ("inertia", "added_mass")], []
-        for target in (target for block in blocks for target in block.values()):
-            assert isinstance(target, str | int | float)  # neither function takes a list or a table
-            numbers.append(self._parameters[target] if isinstance(target, str) else target)
-        columns = np.array(np.broadcast_arrays(*numbers))
-        M = np.asarray(mass(*(tuple(block) for block in blocks))(columns))  # (6, 6 members)
-        each: NDArray[np.float64] = M.reshape(6, -1, 6).swapaxes(0, 1)
-        return each[np.ix_(range(len(each)), self.axes, self.axes)]
+    def _mass(self) -> list[list[Any]]:
+        """Rows of `mass`; its entries are arrays (members,) where the numbers are those of several."""
+        numbers: list[dict[str, Any]] = [
+            {name: self._parameters[target] if isinstance(target, str) else target for name, target in block.items()}
+            for block in (self.bound["inertia"], self.bound["added_mass"])
+        ]
+        M = mass(*numbers)
+        return [[M[row][column] for column in self.axes] for row in self.axes]
 
     @cached_property
     def structure(self) -> str:
@@ -170,6 +172,8 @@ class Vessel:
 
         False says nothing of any member: `with_values` has to be asked for each.
         """
+        import numpy as np
+
         least, most = documents.LEAST_NUMBER, documents.MOST_NUMBER
         apart = ("particulars.", "constants.")  # other checks read them in the document, and those of tables are by row
         known = all(
@@ -267,6 +271,7 @@ def _with_tables(document: Document, file: Path) -> Document:
 
 def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dict[str, list[float]]:
     """Columns of a CSV file with a header; lines that begin with # are comments."""
+    import numpy as np
     import pandas as pd  # most vessels have no table, and it takes its time
 
     try:
@@ -388,19 +393,19 @@ def _check_sense(vessel: Vessel) -> None:
     values = vessel.parameters
     for path, group, name in _with_a_sense(tuple(values)):
         value = values[path]
-        if group == "added_mass" and not np.all(value <= 0):
+        if group == "added_mass" and not everywhere(value <= 0):
             message = f"{first_of(value <= 0, value)[0]:g}: added mass is on the force side, so {name} is negative"
             raise DocumentError(message, file=vessel.file, path=path)
         if name in ("low", "high"):
-            _check_limit(path, value, values.get(f"{group}.low", -np.inf), vessel.file)
-        if name == "x_fwd" and not np.all(ahead := value > values.get(f"{group}.x_aft", -np.inf)):
+            _check_limit(path, value, values.get(f"{group}.low", -math.inf), vessel.file)
+        if name == "x_fwd" and not everywhere(ahead := value > values.get(f"{group}.x_aft", -math.inf)):
             raise DocumentError(f"{first_of(ahead, value)[0]:g}: must be ahead of x_aft", file=vessel.file, path=path)
     sizes = vessel.document.get("particulars", {})
     rho = vessel.document.get("constants", {}).get("rho")
     if rho is not None and {"L_pp", "B", "T"} <= sizes.keys():
         shares = values["inertia.m"] / (rho * sizes["L_pp"] * sizes["B"] * sizes["T"])
         usual = (shares > LEAST_BLOCK) & (shares < MOST_BLOCK)
-        if not np.all(usual):
+        if not everywhere(usual):
             m, share = first_of(usual, values["inertia.m"], shares)
             message = f"{m:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?"
             raise DocumentError(message, file=vessel.file, path="inertia.m")
@@ -421,10 +426,10 @@ def _with_a_sense(paths: tuple[str, ...]) -> list[tuple[str, str, str]]:
 def _check_limit(path: str, value: float, low: float, file: str) -> None:
     """DocumentError for limits of an actuator that leave no range, or for an angle in degrees."""
     row = row_of(path.rsplit(".", 2)[-2])
-    if row is not None and row.angle and not np.all(within := abs(value) <= MOST_RADIANS):
+    if row is not None and row.angle and not everywhere(within := abs(value) <= MOST_RADIANS):
         message = f"{first_of(within, value)[0]:g}: is in rad, and that is more than a full turn"
         raise DocumentError(message, file=file, path=path)
-    if path.endswith(".high") and not np.all(above := value > low):
+    if path.endswith(".high") and not everywhere(above := value > low):
         high, low = first_of(above, value, low)
         raise DocumentError(f"{high:g}: must be above low, {low:g}", file=file, path=path)
 
@@ -473,6 +478,8 @@ def _check_lengths(path: str, block: Mapping[str, Any], file: str) -> None:
 
 def _check_wave_table(path: str, table: Mapping[str, list[float]], columns: tuple[str, ...], file: str) -> None:
     """DocumentError for a table that is no grid of frequencies and equally spaced headings from 0 to 180 deg."""
+    import numpy as np
+
     missing = next((name for name in columns if name not in table), None)
     if missing is not None:
         raise DocumentError(f"has no column {missing!r}: {choices(missing, table)}", file=file, path=path)
@@ -504,12 +511,24 @@ def _check_inertia(vessel: Vessel) -> None:
         if row in vessel.axes and not vessel.document["inertia"].get(name):
             message = f"missing: {len(vessel.axes)} degrees of freedom need it"
             raise DocumentError(message, file=vessel.file, path=f"inertia.{name}")
-    M = vessel._masses
-    if np.any(np.linalg.eigvalsh(M + M.swapaxes(1, 2))[:, 0] <= 0):
+    if not _is_positive(vessel._mass):
         remedy = (
             "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
         )
         raise DocumentError(f"mass plus added mass is not positive: {remedy}", file=vessel.file, path="inertia")
+
+
+def _is_positive(M: list[list[Any]]) -> bool:
+    """Whether a matrix, or that of every member, is positive definite: all pivots of its symmetric part are above 0."""
+    rows = [[M[i][j] + M[j][i] for j in range(len(M))] for i in range(len(M))]
+    while rows:
+        (pivot, *right), *below = rows
+        if not everywhere(pivot > 0):
+            return False
+        rows = [
+            [entry - first / pivot * above for entry, above in zip(rest, right, strict=True)] for first, *rest in below
+        ]
+    return True
 
 
 def _without_words(document: Document) -> Document:

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
-
 from shipid import document as documents
 from shipid.units import GRAVITY
 
@@ -105,7 +103,7 @@ def out_of_range(
         least, most = ends[number]
         value = values[path]
         usual = (least <= abs(value)) & (abs(value) <= most)
-        if not np.all(usual) and not _is_meant(path, meant):
+        if not everywhere(usual) and not _is_meant(path, meant):
             value, least, most = first_of(usual, value, least, most)
             words = f"{value:g}: expected {ranges[number].words} ({least:.3g} to {most:.3g})"
             return path, f"{words}; {_remedy(path)}"
@@ -116,8 +114,15 @@ def out_of_range(
     return None
 
 
+def everywhere(holds: Any) -> bool:
+    """Whether something holds of all members: an array (members,) of truth values, or one of them for all."""
+    return bool(holds.all() if hasattr(holds, "all") else holds)
+
+
 def first_of(holds: Any, *numbers: Any) -> list[float]:
     """Numbers of the first member of which something does not hold: each an array (members,), or one for all."""
+    import numpy as np  # a vessel alone is checked without
+
     place = int(np.argmin(holds))
     return [float(np.broadcast_to(number, np.shape(holds)).flat[place]) for number in numbers]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import GenericAlias
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, create_model, model_validator
 
@@ -15,6 +15,7 @@ from shipid.physics import ACTUATORS, GIVEN, TERMS, Term
 from shipid.physics.grammar import POSITIVE, Grammar
 from shipid.physics.inertia import added_mass, rigid_body
 from shipid.physics.signals import named
+from shipid.physics.symbols import types_of
 from shipid.vessel.ranges import UNUSUAL
 from shipid.vessel.terms import FIXED, POSITIONAL, check_term, split_keys
 
@@ -50,7 +51,7 @@ class Parameter:
 @cache
 def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
     """Parameters of a physics function, in order, from its keyword-only arguments and `**` table."""
-    hints = get_type_hints(function, include_extras=True)
+    hints = types_of(function)
     result = []
     for name, argument in inspect.signature(function).parameters.items():
         if argument.kind not in (argument.KEYWORD_ONLY, argument.VAR_KEYWORD) or name not in hints:
@@ -143,14 +144,14 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
     """Pydantic model of the block that feeds a physics function; `extra` fields go beside its parameters."""
     fields: dict[str, Any] = dict(extra)
     validators: dict[str, Any] = {}
-    config = ConfigDict(extra="forbid", strict=True)
+    config: dict[str, Any] = {}
     for parameter in declared:
         if parameter.kind == "open":
             grammar = parameter.unit
             assert isinstance(grammar, Grammar)
             names: dict[str, Any] = {"patternProperties": {_whole(grammar.names): {"type": "number"}}}
             editors = {**names, "additionalProperties": False}
-            config = ConfigDict(extra="allow", strict=True, json_schema_extra=editors)
+            config = {"extra": "allow", "json_schema_extra": editors}
             fields["__pydantic_extra__"] = (dict[str, FiniteFloat], Field(init=False))
             validators["names_are_formulas"] = model_validator(mode="after")(_name_check(grammar))
             continue
@@ -172,8 +173,7 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
             fields[parameter.name] = (Annotated[_number(parameter), note], parameter.default)
         else:
             fields[parameter.name] = (Annotated[_number(parameter), note], ...)
-    base = type("Base", (Block,), {"model_config": config, "__module__": __name__})
-    return create_model(name, __base__=base, __validators__=validators, **fields)
+    return create_model(name, __base__=Block, __cls_kwargs__=config, __validators__=validators, **fields)
 
 
 def _name_check(grammar: Grammar) -> Callable[[Any], Any]:

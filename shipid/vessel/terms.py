@@ -7,12 +7,13 @@ import re
 from collections.abc import Callable, Mapping
 from functools import cache
 from numbers import Real
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_origin
 
 from shipid.errors import ShipidError, choices
 from shipid.physics import GIVEN, MOTION, TERMS, Term
 from shipid.physics.grammar import Grammar
 from shipid.physics.signals import named
+from shipid.physics.symbols import types_of
 from shipid.units import listed, unit_fault
 from shipid.users import begins_at, place_of, placed
 
@@ -77,7 +78,7 @@ def _check_signature(where: str, term: Term, function: Any) -> None:
     """ShipidError for an argument that is neither a signal nor a parameter with its unit."""
     place = begins_at(function)
     try:
-        hints = get_type_hints(function, include_extras=True)
+        hints = types_of(function)
         arguments = inspect.signature(function).parameters
     except (TypeError, ValueError, NameError, AttributeError, SyntaxError) as error:
         raise ShipidError(f"{where}: its arguments cannot be read ({error}): write a plain function{place}") from None

@@ -23,10 +23,10 @@ from tests.cli.running import BAD, ended, output_of, shell
 from tests.study.tiny import TINY
 
 
-def test_help_and_version_are_light() -> None:
-    """Nobody waits for PyTorch to read a help page."""
+def test_help_version_and_vessels_are_light() -> None:
+    """Nobody waits for PyTorch to read a help page, or for arrays and symbols to read a vessel."""
     heavy = {"torch", "casadi", "pandas", "optuna", "numpy", "dask", "plotly", "pyarrow"}
-    asked = (["--help"], ["--version"], ["study", "run", "--help"], ["vessel"])
+    asked = (["--help"], ["--version"], ["study", "run", "--help"], ["vessel"], ["vessel", "show", "gunnerus-28.9"])
     code = (
         f"import sys\nfrom shipid.cli import main\nfor words in {asked!r}:\n    sys.argv[1:] = words\n"
         "    try:\n        main()\n    except SystemExit as end:\n"

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.inertia import added_mass, coriolis, rigid_body
+from shipid.physics.inertia import added_mass, coriolis, mass, matrix, rigid_body
 
 
 def numbers(expression: Any) -> np.ndarray:
@@ -15,7 +15,7 @@ def numbers(expression: Any) -> np.ndarray:
 
 def test_rigid_body_in_the_plane() -> None:
     """[[m, 0, 0], [0, m, m x_G], [0, m x_G, I_z]]."""
-    M = numbers(rigid_body(m=400.0, I_z=9000.0, x_G=-1.5))[np.ix_([0, 1, 5], [0, 1, 5])]
+    M = numbers(matrix(rigid_body(m=400.0, I_z=9000.0, x_G=-1.5)))[np.ix_([0, 1, 5], [0, 1, 5])]
     np.testing.assert_allclose(M, [[400, 0, 0], [0, 400, -600], [0, -600, 9000]])
 
 
@@ -27,27 +27,39 @@ def test_rigid_body_has_the_kinetic_energy_of_its_points() -> None:
     points, masses = np.vstack([half, half * [1, -1, 1]]), np.tile(rng.uniform(1, 5, 4), 2)
     x, y, z = points.T
     m = masses.sum()
-    M = rigid_body(
-        m=m,
-        x_G=masses @ x / m,
-        z_G=masses @ z / m,
-        I_x=masses @ (y**2 + z**2),
-        I_y=masses @ (x**2 + z**2),
-        I_z=masses @ (x**2 + y**2),
+    M = numbers(
+        matrix(
+            rigid_body(
+                m=m,
+                x_G=masses @ x / m,
+                z_G=masses @ z / m,
+                I_x=masses @ (y**2 + z**2),
+                I_y=masses @ (x**2 + z**2),
+                I_z=masses @ (x**2 + y**2),
+            )
+        )
     )
     products = np.zeros((6, 6))
     products[3, 5] = products[5, 3] = -(masses @ (x * z))  # the one product of inertia that the model leaves out
     nu = rng.uniform(-1, 1, 6)
     velocity = nu[:3] + np.cross(nu[3:], points)
     energy = 0.5 * masses @ (velocity**2).sum(axis=1)
-    assert 0.5 * nu @ (numbers(M) + products) @ nu == pytest.approx(energy, rel=1e-12)
+    assert 0.5 * nu @ (M + products) @ nu == pytest.approx(energy, rel=1e-12)
 
 
 def test_added_mass_turns_the_sign_of_named_derivatives() -> None:
-    M_A = numbers(added_mass(X_udot=-2.0, Y_rdot=3.0, N_vdot=4.0, K_pdot=-5.0))
+    M_A = numbers(matrix(added_mass(X_udot=-2.0, Y_rdot=3.0, N_vdot=4.0, K_pdot=-5.0)))
     expected = np.zeros((6, 6))
     expected[0, 0], expected[1, 5], expected[5, 1], expected[3, 3] = 2, -3, -4, 5
     np.testing.assert_allclose(M_A, expected)
+
+
+def test_mass_of_several_is_that_of_each() -> None:
+    inertia, added = {"m": np.array([3.0, 4.0]), "I_z": 6.0, "x_G": 0.4, "z_G": -0.2}, {"Y_rdot": np.array([1.0, 2.0])}
+    together = [[np.broadcast_to(entry, 2) for entry in row] for row in mass(inertia, added)]
+    for one, m in enumerate((3.0, 4.0)):
+        alone = matrix(rigid_body(m=m, I_z=6.0, x_G=0.4, z_G=-0.2)) + matrix(added_mass(Y_rdot=one + 1.0))
+        np.testing.assert_array_equal(np.array(together)[..., one], numbers(alone))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -74,7 +86,7 @@ def test_planar_closed_form(seed: int) -> None:
 def test_free_rigid_body_keeps_its_momentum() -> None:
     """Kirchhoff without fluid: with M nu_dot = -C nu, momentum in fixed axes does not change."""
     rng = np.random.default_rng(1)
-    M = numbers(rigid_body(m=3.0, I_x=2.0, I_y=5.0, I_z=6.0, x_G=0.4, z_G=-0.2))
+    M = numbers(matrix(rigid_body(m=3.0, I_x=2.0, I_y=5.0, I_z=6.0, x_G=0.4, z_G=-0.2)))
     nu = rng.normal(size=6)
     nu_dot = np.linalg.solve(M, -numbers(coriolis(ca.SX(ca.DM(M)), ca.SX(ca.DM(nu)))).ravel())
     linear, angular = np.split(M @ nu, 2)

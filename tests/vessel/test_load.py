@@ -12,7 +12,7 @@ import pytest
 from shipid.document import bundled, leaves, replace
 from shipid.errors import DocumentError
 from shipid.vessel.bindings import bindings
-from shipid.vessel.load import Vessel, check_vessel, load_vessel, sources
+from shipid.vessel.load import Vessel, _is_positive, check_vessel, load_vessel, sources
 
 UNIT = re.compile(
     r"-|prime|bis|deg|rad(?:/s)?|rev/s(?:\^2)?|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*"
@@ -250,6 +250,20 @@ def test_what_a_vessel_returns_is_free_to_be_changed() -> None:
         assert (ship.parameters, ship.units) == before[:2]
         np.testing.assert_array_equal(ship.mass, before[2])
     assert base.with_values({"inertia.m": 4e5}) == light
+
+
+@pytest.mark.parametrize("size", [3, 4, 6])
+def test_a_mass_is_positive_where_all_its_eigenvalues_are(size: int) -> None:
+    """One by one, and of several members together; the part that is not symmetric does no work."""
+    rng = np.random.default_rng(size)
+    turns = np.linalg.qr(rng.normal(size=(40, size, size)))[0]
+    values = 10 ** rng.uniform(-3, 3, (40, size))
+    values[::2, 0] *= -1
+    twists = rng.normal(size=(40, size, size))
+    masses = turns * values[:, None, :] @ turns.swapaxes(1, 2) + twists - twists.swapaxes(1, 2)
+    assert [_is_positive(M.tolist()) for M in masses] == [False, True] * 20
+    assert _is_positive(list(masses[1::2].transpose(1, 2, 0)))
+    assert not _is_positive(list(masses[:2].transpose(1, 2, 0)))
 
 
 @pytest.mark.parametrize("values", [None, [("inertia.m", 4e5)], {5: 1.0}, "inertia.m"])
