@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import platform
+from functools import cache
 from pathlib import Path
 
 GIB = 2**30
@@ -24,11 +25,17 @@ def processor() -> str:
 def cores() -> int:
     """Number of cores that this process may use, by its affinity and by its container."""
     count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(count, _quota(_GROUP) or count)
+
+
+@cache
+def _quota(group: Path) -> int | None:
+    """Number of cores that a container may use, None without a limit; read once, for each rollout asks for it."""
     try:
-        quota, period = map(int, (_GROUP / "cpu.max").read_text().split())
+        quota, period = map(int, (group / "cpu.max").read_text().split())
     except (OSError, ValueError):  # no such limit, or the word "max"
-        return count
-    return min(count, max(math.ceil(quota / period), 1)) if quota > 0 < period else count
+        return None
+    return max(math.ceil(quota / period), 1) if quota > 0 < period else None
 
 
 def memory() -> int:

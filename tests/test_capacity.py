@@ -38,7 +38,9 @@ def test_cores_are_those_that_this_process_may_use(
     monkeypatch.setattr(capacity, "_GROUP", tmp_path)
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(64)), raising=False)
     assert capacity.cores() == 64
-    (tmp_path / "cpu.max").write_text(f"{limit}\n")
+    monkeypatch.setattr(capacity, "_GROUP", tmp_path / "limited")  # a limit is read once
+    (tmp_path / "limited").mkdir()
+    (tmp_path / "limited" / "cpu.max").write_text(f"{limit}\n")
     assert capacity.cores() == cores
 
 
