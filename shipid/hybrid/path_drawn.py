@@ -41,7 +41,8 @@ class PathDrawn(Searched):
     motion_scale, command_scale, wind_scale : how far an input must move, in its standard deviations, to change a hidden
         unit by about one: u, v, r; the commands; the relative wind. Large = the compensation varies slowly with it.
     offset : spread of the offsets of the hidden units: large bends more.
-    ridge : weight of the squared output weights; from low to high, the best of 9 is taken for each trial and model.
+    ridge : weight of the squared output weights; of 9 from low to high, each trial takes for each model the best that
+        is found by descent from the middle.
     terms : the compensation is a polynomial of time with so many terms: what is faster is waves.
     mirror : share of the trials in which port and starboard are mirror images.
     averaged : the compensation is the mean of the networks of so many best trials; by default 8, and 4 with `choose`,

@@ -523,13 +523,15 @@ def _left_out(
 ) -> tuple[Array, Array, _Errors]:
     """Errors over judged windows, each block without itself.
 
-    `terms` is r. `wanted` (ridges, K) says which ridges are asked of which models, all by default.
+    `terms` is r. `wanted` (ridges, K) says which ridges are asked of which models. By default each model descends from
+    the middle of the ridges: those on either side are taken one by one, as long as the last one is the best so far by
+    all folds, or by all but one of them.
 
     A run left out is never predicted better than with itself in the fit. So a ridge whose fit already misses more than
     other ridges do on runs left out is passed over: it would not be chosen, neither by all folds nor by all but one.
 
     Returns sums of squares (ridges, K) [m^2] over all folds, those over all folds but one (ridges, F, K), and the
-    errors. The sums of a ridge that is passed over, or not wanted, are infinite.
+    errors. The sums of a ridge that is passed over, or not asked, are infinite.
     """
     targets, ends = parts[0].targets, np.cumsum([len(block.out) for block in blocks])
     pieces = [
@@ -551,8 +553,22 @@ def _left_out(
             by_fold[piece.folds] += squares.sum(dim=(1, 3))
         return by_fold.sum(dim=0), by_fold.sum(dim=0) - by_fold
 
-    for i in sorted(range(len(ridges)), key=ridges.__getitem__):
-        models = list(range(num_models)) if wanted is None else np.flatnonzero(wanted[i]).tolist()
+    def best_at(i: int) -> list[int]:
+        """Models for which ridge i is the best so far, by all folds or by all but one."""
+        curves = torch.cat([sums[:, None], others], dim=1) if ends[-1] > 1 else sums[:, None]
+        return (curves.argmin(dim=0) == i).any(dim=0).nonzero().flatten().tolist()
+
+    def asked() -> Iterator[tuple[int, list[int]]]:
+        """Numbers of ridges, each with the models of which it is asked."""
+        every, middle = range(len(ridges)), len(ridges) // 2
+        if wanted is not None:
+            yield from ((i, np.flatnonzero(wanted[i]).tolist()) for i in every)
+            return
+        yield middle, list(range(num_models))
+        yield from ((i, best_at(i + 1)) for i in reversed(every[:middle]))
+        yield from ((i, best_at(i - 1)) for i in every[middle + 1 :])
+
+    for i, models in asked():
         if not models:
             continue
         columns = None if len(models) == num_models else [k * terms + term for k in models for term in range(terms)]

@@ -156,8 +156,11 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(units, ridge, kind
     np.testing.assert_allclose([np.square(one).sum() for one in kept], expected, rtol=1e-5)
 
 
-def drawn_parts(seed):
-    """A few folds of a few windows, with features and noise of very different sizes: x and y, folds, windows."""
+def drawn_parts(seed, models=1):
+    """A few folds of a few windows, with features and noise of very different sizes: x and y, folds, windows.
+
+    Each model has 2 shapes.
+    """
     rng = np.random.default_rng(seed)
     count = int(rng.integers(2, 5))
     lengths = [int(rng.integers(3, 9)) for _ in range(count)]
@@ -167,7 +170,7 @@ def drawn_parts(seed):
     features = [rng.normal(size=(len(windows), units)) * rng.lognormal(0, 1.5, size=units) for _ in range(2)]
     parts = []
     for seen in features:
-        made = seen @ rng.normal(size=(units, 2)) * rng.uniform(0, 2)
+        made = seen @ rng.normal(size=(units, 2 * models)) * rng.uniform(0, 2)
         noise = rng.lognormal(0, 1) * rng.normal(size=made.shape)
         parts.append(part_of(seen, made + noise * np.repeat(rng.lognormal(0, 1, count), lengths)[:, None]))
     return parts, runs, windows
@@ -184,9 +187,8 @@ def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged, least, mos
         parts, runs, windows = drawn_parts(seed)
         folds = [(np.setdiff1d(windows, run), run[: len(run) // 2] if part_judged else run) for run in runs]
         blocks = _blocks(folds, windows, "cpu")
-        sums, others, errors = _left_out(parts, ridges, blocks, 2)
-        alone = [_left_out(parts, [ridge], blocks, 2) for ridge in ridges]
-        one_by_one, but_one = (np.concatenate([one[place] for one in alone]) for place in (0, 1))
+        sums, others, errors = _left_out(parts, ridges, blocks, 2, np.ones((9, 1), dtype=bool))
+        one_by_one, but_one = one_by_one_ridge(parts, ridges, blocks)
         passed = np.isinf(sums).any(axis=1)
         passed_over += int(passed.sum())
         np.testing.assert_array_equal(sums[~passed], one_by_one[~passed])
@@ -195,6 +197,43 @@ def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged, least, mos
         kept = errors.of(others[:, :, 0].argmin(axis=0), 0)
         assert np.isfinite(kept[:, np.concatenate([judged for _, judged in folds])].numpy()).all()
     assert least <= passed_over <= most
+
+
+def one_by_one_ridge(parts, ridges, blocks):
+    """Sums of squares over all folds, (ridges, K), and over all but one, (ridges, F, K), of each ridge alone."""
+    alone = [_left_out(parts, [ridge], blocks, 2) for ridge in ridges]
+    return tuple(np.concatenate([one[place] for one in alone]) for place in (0, 1))
+
+
+def descent(curves):
+    """Where each of some curves (C, ridges) is least among those that a descent of them all from the middle sees."""
+    low = high = curves.shape[1] // 2
+    while low > 0 and (curves[:, low : high + 1].argmin(axis=1) == 0).any():
+        low -= 1
+    while high < curves.shape[1] - 1 and (curves[:, low : high + 1].argmin(axis=1) == high - low).any():
+        high += 1
+    return low + curves[:, low : high + 1].argmin(axis=1)
+
+
+def test_each_model_takes_the_ridge_to_which_it_descends_from_the_middle():
+    """By all folds and by all but any one, whatever its company; with one minimum only, this is the best of all."""
+    ridges, asked, alike, curves_of_all = list(np.geomspace(1e-4, 1e4, 9)), 0, 0, 0
+    for seed in range(200):
+        parts, runs, windows = drawn_parts(seed, models=3)
+        blocks = _blocks([(np.setdiff1d(windows, run), run) for run in runs], windows, "cpu")
+        sums, others, _ = _left_out(parts, ridges, blocks, 2)
+        every, but_one = one_by_one_ridge(parts, ridges, blocks)
+        for model in range(3):
+            seen, known = (
+                np.concatenate([one[:, None, model], rest[..., model]], axis=1).T
+                for one, rest in ((sums, others), (every, but_one))
+            )
+            np.testing.assert_array_equal(seen.argmin(axis=1), descent(known))
+            alike += int((descent(known) == known.argmin(axis=1)).sum())
+            curves_of_all += len(known)
+        asked += int(np.isfinite(sums).sum())
+    assert asked < 0.6 * 200 * 3 * 9
+    assert 0.9 < alike / curves_of_all < 1.0
 
 
 @pytest.mark.parametrize("many_rows", [False, True])
