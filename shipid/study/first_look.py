@@ -21,6 +21,7 @@ from tomlkit.items import KeyType, SingleKey
 from shipid.data.dataset import Dataset, clock_slack, pieces
 from shipid.data.windows import Instants, PathSource, Windows, cut_windows
 from shipid.engine.engines import REPEATED
+from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DocumentError
 from shipid.hybrid.physics import Physics, check_columns
 from shipid.identification.late import Late, between_rows, late_commands
@@ -139,6 +140,7 @@ class Look:
     late : commands that come late, where the vessel errs less if they change between the rows, and its mean error [m]
         then; what else explains the error is beside them.
     current : that explains more than all changes alone; the changes are then beside it.
+    integrator : by which the vessel errs so.
     """
 
     vessel: Vessel
@@ -149,6 +151,7 @@ class Look:
     changes: tuple[Change, ...] = field(default=())
     current: Current | None = None
     late: tuple[Late, float] | None = None
+    integrator: Integrator = "rk4"
 
     @property
     def timely(self) -> float:
@@ -233,12 +236,14 @@ def first_look(
     ahead: float,
     step: float,
     path: PathSource = "position",
+    integrator: Integrator = "rk4",
 ) -> Look:
     """Compare a vessel with the runs of a log.
 
     Parameters
     ----------
     runs : names of the runs to look at. ahead, step : of the predictions [s]. path : as in `cut_windows`.
+    integrator : of the predictions; what is wrong with their paths is blamed on numbers, so its error must be small.
 
     Raises
     ------
@@ -250,7 +255,7 @@ def first_look(
     finer = 1 if late is None else max(1, math.ceil(step / late.delay - 1e-9))  # steps in which orders change in time
     windows = _some(part, max(round(ahead / step), 1) * finer, step / finer, path)
     constant = float(position_error(constant_motion(windows), windows.future).mean())
-    trial = _Trial(vessel, part, windows, constant)
+    trial = _Trial(vessel, part, windows, constant, integrator)
     alone = trial.errors([{}])[0]
     timely = None
     if late is not None:
@@ -259,7 +264,7 @@ def first_look(
         if error < (1 - WORTH) * alone:
             trial, timely = other, (late, error)
     least = alone if timely is None else timely[1]
-    share = _turning(vessel, windows, trial.instants())
+    share = _turning(trial.physics(), windows, trial.instants())
     facts = tuple(_facts(vessel, windows, share))
     mistaken = share is not None and share < 0  # a sign, which no factor mends
     done = mistaken or least < LEAST_ERROR
@@ -274,7 +279,25 @@ def first_look(
     if current is not None:
         changes = _worthwhile(inside, current.error)
     length = windows.horizon * windows.step
-    return Look(vessel, length, alone, constant, facts, tuple(changes), current, timely)
+    return Look(vessel, length, alone, constant, facts, tuple(changes), current, timely, integrator)
+
+
+def euler_apart(
+    vessel: Vessel, dataset: Dataset, runs: Iterable[str], *, ahead: float, step: float, path: PathSource = "position"
+) -> tuple[float, float]:
+    """Mean distance [m] of the paths of explicit Euler from those of RK4, and the mean error [m] of the latter.
+
+    Parameters and errors as of `first_look`. Infinite where Euler diverges and RK4 does not; 0 where RK4 always does.
+    """
+    part = dataset.select(runs)
+    windows = _some(part, max(round(ahead / step), 1), step, path)
+    trial = _Trial(vessel, part, windows, 0.0)
+    rk4, euler = (replace(trial, integrator=rule).physics().paths(trial.instants()) for rule in ("rk4", "euler"))
+    sound = np.isfinite(rk4).all(axis=(0, 2))
+    if not sound.any():
+        return 0.0, 0.0
+    apart, error = (position_error(rk4[:, sound], to[:, sound]).mean() for to in (euler, windows.future))
+    return float(np.nan_to_num(apart, nan=np.inf)), float(error)
 
 
 def _some(dataset: Dataset, horizon: int, step: float, path: PathSource) -> Windows:
@@ -293,6 +316,7 @@ class _Trial:
     dataset: Dataset
     windows: Windows
     constant: float
+    integrator: Integrator = "rk4"
     known: dict[Gear, Instants] = field(default_factory=dict)
     reached: dict[Gear, dict[str, Array] | None] = field(default_factory=dict)  # by actuators, in any current
 
@@ -304,6 +328,11 @@ class _Trial:
             self.known[gear] = self.windows.instants(known=True, hidden=self.reached[gear])
         return self.known[gear]
 
+    def physics(self, gear: Gear = ()) -> Physics:
+        """What predicts, with changed actuators: where they are depends on them."""
+        vessel = self.vessel.with_values(dict(gear))
+        return Physics(vessel, self.windows.horizon, self.windows.step, self.integrator)
+
     def errors(self, rows: Sequence[Mapping[str, float]]) -> list[float]:
         """Mean error [m] for each set of changed numbers; a window counts `PENALTY` times constant motion at most."""
         by_gear: dict[Gear, list[int]] = {}
@@ -313,13 +342,12 @@ class _Trial:
         result = [np.inf] * len(rows)
         names = list(self.vessel.parameters)
         for gear, places in by_gear.items():
-            vessel = self.vessel.with_values(dict(gear))  # where the actuators are depends on them
-            base = np.array(list(vessel.parameters.values()))
+            physics = self.physics(gear)
+            base = np.array(list(physics.ship.parameters.values()))
             parameters = np.tile(base, (len(places), 1))
             for number, place in enumerate(places):
                 for path, value in rows[place].items():
                     parameters[number, names.index(path)] = value
-            physics = Physics(vessel, self.windows.horizon, self.windows.step, "rk4")
             distances = physics.distances(self.instants(gear), self.windows.future, parameters, engine=REPEATED)
             mean = np.where(distances.diverged, np.inf, distances.total / self.windows.horizon)
             capped = np.minimum(np.nan_to_num(mean, nan=np.inf), PENALTY * max(self.constant, 1e-9))
@@ -395,8 +423,7 @@ def _currents(trial: _Trial, groups: NDArray[np.int_]) -> Array:
     def away(currents: Array) -> Array:  # (T, N, 2) [m], of all points
         north, east = currents[groups].T
         one = _in_current(trial, np.hypot(north, east), np.arctan2(east, north))
-        paths = Physics(one.vessel, one.windows.horizon, one.windows.step, "rk4").paths(one.instants())
-        return np.asarray(paths - one.windows.future)
+        return np.asarray(one.physics().paths(one.instants()) - one.windows.future)
 
     speed = float(np.median(np.hypot(trial.windows.columns["u"], trial.windows.columns["v"])))
     currents, step = np.zeros((int(groups.max()) + 1, 2)), 0.02 * speed
@@ -505,11 +532,10 @@ def _values(vessel: Vessel, groups: Mapping[Group, Sequence[str]], factors: Mapp
     }
 
 
-def _turning(vessel: Vessel, windows: Windows, instants: Instants) -> float | None:
+def _turning(physics: Physics, windows: Windows, instants: Instants) -> float | None:
     """How far the vessel turns over how far the ship of the log does, median; None where the ship hardly turns."""
     turned = windows.states["psi"][-1] - windows.columns["psi"]
-    predicted = Physics(vessel, windows.horizon, windows.step, "rk4").states(instants)["psi"][-1]
-    predicted = predicted - windows.columns["psi"]
+    predicted = physics.states(instants)["psi"][-1] - windows.columns["psi"]
     much = (np.abs(turned) > LEAST_TURN) & np.isfinite(predicted)
     return float(np.median(predicted[much] / turned[much])) if much.sum() >= TURNS else None
 

@@ -8,9 +8,8 @@ import textwrap
 import tomllib
 import unicodedata
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import product
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from tomlkit.items import Table
 from shipid import document as documents
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
 from shipid.data.windows import cut_windows
+from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DataError, Diverges, DocumentError, ShipidError
 from shipid.hybrid.physics import assumed, check_columns
 from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
@@ -30,7 +30,7 @@ from shipid.simulation.approach import Controls, service_speed
 from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import shaft_speed
 from shipid.study.declared import NO_MODEL
-from shipid.study.first_look import Look, first_look
+from shipid.study.first_look import LEAST_ERROR, Look, euler_apart, first_look
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import all_windows, obtain, over_gaps, partition, prepare
 from shipid.study.survey import Survey, helm_sense, separation, survey, typical_runs
@@ -50,7 +50,9 @@ WIND, WIND_LENGTH = 6.0, 28.9  # m/s, m: up to a moderate breeze on R/V Gunnerus
 HORIZONS = (1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 450, 600)  # s
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
 SMALLER = (2, 4, 8)  # parts of the step: a small craft is stiff in yaw
+EULER = 0.1  # of the error of a vessel, by which explicit Euler may move its paths
 STEPS, LOGGED_STEPS, LONGEST_STEP = 15, 30, 2.0  # steps ahead at least, of constant and of recorded orders; s
+DIVERGES = "explicit Euler diverges on these runs"
 LEAST_SENSE = 0.1  # correlation of an angle with the change of r
 SYSTEMATIC = 0.05  # positions and velocities differ by a factor, not by scatter
 GROWING = 1.2  # times as far apart after twice the time: less is jitter
@@ -183,8 +185,9 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     tests = typical_runs(runs)
     true_path = _path(seen, dataset, steps * step)
     others = [name for name in usable if name not in tests]
-    how: dict[str, Any] = {"ahead": steps * step, "step": step, "path": true_path.value}
-    looks = {named: first_look(vessel, dataset, others, **how) for named, vessel in vessels.items()}
+    how: dict[str, Any] = {"ahead": steps * step, "path": true_path.value}
+    rk4 = _needs_rk4([euler_apart(vessel, dataset, others, step=step, **how) for vessel in vessels.values()])
+    learned = _learned(vessels, dataset.runs)
     fixed = [
         *_question(vessels, dataset, seen, steps * step),
         Choice("data.dataset", _relative(str(data), out), _measured(vessels, dataset)),
@@ -196,9 +199,9 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
         Choice("prediction.step", step, f"s; rows of the log come every {seen.step:.3g} s"),
     ]
     rest = [Choice("prediction.interval", interval, "s between instants of prediction")]
-    families = _families(vessels, looks, _learned(vessels, dataset.runs), others)
+    plain = _families(vessels, {}, learned, others)
     some = [Choice("split.folds", 1), Choice("grid.N_D", [LEAST_RUNS]), *ahead, *rest]
-    least = _planned([*fixed, *some, method], families[:1], out, vessels)
+    least = _planned([*fixed, *some, method], plain[:1], out, vessels)
     amounts = ladder(len(partition(least, dataset)[0].spans))
     fixed += [_folds(amounts[-1])]
     tail = [*rest, *_grid(amounts), method]
@@ -206,15 +209,36 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     failing += over_gaps(dataset, all_windows(least, dataset))
     warnings = [*failing, *_wrong_velocities(seen), *_wrong_helm(first, dataset)]
     warnings += _knowing(_learned(vessels, tests))
-    warnings += [look.sentence for look in looks.values() if look.wrong]
+
+    def corrected(step: float, integrator: Integrator) -> _Content:
+        """Families and warnings by looks that predict as the study does."""
+        seen = {
+            named: first_look(vessel, dataset, others, step=step, integrator=integrator, **how)
+            for named, vessel in vessels.items()
+        }
+        wrong = [look.sentence for look in seen.values() if look.wrong]
+        return _Content(_softer(_families(vessels, seen, learned, others)), (*warnings, *wrong), seen)
+
     try:
-        draft = _first_that_runs(fixed, ahead, tail, _softer(families), out, vessels, dataset, warnings)
+        return _first_that_runs(fixed, _ways(*ahead, rk4=rk4), tail, corrected, out, vessels, dataset)
     except Diverges as error:
         if not seen.faults:
             raise
         message = f"{error.message}; but first {_failing(seen, data)}"
         raise Diverges(message, file=error.file, path=error.path) from None
-    return replace(draft, looks=looks)
+
+
+def _needs_rk4(apart: Sequence[tuple[float, float]]) -> str:
+    """Why Euler is not to be taken, nothing where it may be; apart : as of `euler_apart`, of each vessel."""
+    if any(np.isinf(moved) for moved, _ in apart):
+        return DIVERGES
+    moved, error = max(apart, key=lambda one: one[0] / max(one[1], LEAST_ERROR))
+    if moved <= EULER * max(error, LEAST_ERROR):
+        return ""
+    return (
+        f"explicit Euler (the paper's) with this step moves the paths by {moved:.2g} m (mean), and with rk4 the vessel "
+        f"errs {error:.2g} m: too much to tell which numbers are wrong"
+    )
 
 
 def _learned(vessels: Mapping[str, Vessel], runs: Sequence[str]) -> dict[str, list[str]]:
@@ -262,33 +286,51 @@ def _usable(dataset: Dataset, steps: int, step: float, data: Path) -> list[str]:
     return usable
 
 
+@dataclass(frozen=True)
+class _Content:
+    """Families of a study, then milder ones; what is wrong, one sentence each; and the looks that say so."""
+
+    families: Sequence[list[Any]]
+    warnings: tuple[str, ...] = ()
+    looks: Mapping[str, Look] = field(default_factory=dict)
+
+
+def _ways(horizon: Choice, step: Choice, *, rk4: str = "") -> Iterator[list[Choice]]:
+    """Explicit Euler, else RK4, else RK4 at smaller and smaller steps; rk4 : why Euler is not among them."""
+    if not rk4:
+        yield [
+            horizon,
+            step,
+            Choice("prediction.integrator", "euler", "the paper's; take rk4 if you take a longer step"),
+        ]
+    method = Choice("prediction.integrator", "rk4", rk4 or DIVERGES)
+    yield [horizon, step, method]
+    for parts in SMALLER:
+        yield [horizon, Choice(step.path, step.value / parts, f"{step.why}; twice as long diverges"), method]
+
+
 def _first_that_runs(
     before: Sequence[Choice],
-    ahead: Sequence[Choice],
+    ways: Iterator[list[Choice]],
     after: Sequence[Choice],
-    families: Sequence[list[Any]],
+    content: Callable[[float, Integrator], _Content],
     out: Path,
     vessels: Mapping[str, Vessel],
     dataset: Dataset | None = None,
-    warnings: Sequence[str] = (),
 ) -> Draft:
-    """Explicit Euler, else RK4, else RK4 at smaller and smaller steps; milder families in turn: the first that runs."""
-    horizon, step = ahead
-    euler = Choice("prediction.integrator", "euler", "the paper's; take rk4 if you take a longer step")
-    rk4 = Choice("prediction.integrator", "rk4", "explicit Euler diverges on these runs")
-    smaller = [
-        ([horizon, Choice(step.path, step.value / parts, f"{step.why}; twice as long diverges")], rk4)
-        for parts in SMALLER
-    ]
-    for (front, method), chosen in product(((ahead, euler), (ahead, rk4), *smaller), families):
-        choices = [*before, *front, method, *after, *_claims([family["name"] for family in chosen])]
-        plan = _planned(choices, chosen, out, vessels)
-        try:
-            _check_runs(plan, obtain(plan) if dataset is None else dataset)
-        except Diverges as error:
-            last = error
-        else:
-            return Draft(_text(choices, chosen, warnings), tuple(choices), plan, tuple(warnings))
+    """The first way to step that runs, with the first of its families that do; content : by step [s] and integrator."""
+    for way in ways:
+        held = content(way[1].value, way[2].value)
+        for chosen in held.families:
+            choices = [*before, *way, *after, *_claims([family["name"] for family in chosen])]
+            plan = _planned(choices, chosen, out, vessels)
+            try:
+                _check_runs(plan, obtain(plan) if dataset is None else dataset)
+            except Diverges as error:
+                last = error
+            else:
+                text = _text(choices, chosen, held.warnings)
+                return Draft(text, tuple(choices), plan, held.warnings, held.looks)
     raise last
 
 
@@ -563,7 +605,7 @@ def _simulated(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         Choice("grid.seeds", [0], "take [0, 1, 2, 3, 4] for verdicts: findings about scatter need five"),
         method,
     ]
-    return _first_that_runs(fixed, ahead, tail, [families], out, vessels)
+    return _first_that_runs(fixed, _ways(*ahead), tail, lambda *_: _Content([families]), out, vessels)
 
 
 def _method(length: float | None, step: float, spare: float) -> Choice:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Dataset, write_dataset
+from shipid.data.windows import cut_windows
+from shipid.hybrid.physics import Physics
 from shipid.identification.plausible import outside
+from shipid.metrics import position_error
 from shipid.simulation.approach import acceleration
 from shipid.simulation.manoeuvre import Steps, TurningCircle, Zigzag
 from shipid.simulation.perform import perform
@@ -24,10 +28,13 @@ from shipid.study.first_look import (
     _some,
     _steady_speeds,
     _Trial,
+    euler_apart,
     first_look,
     steady_speed,
 )
+from shipid.study.new import draft_study
 from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.template import Particulars, first_guess
 
 SHIP, RPM = "kvlcc2-l7", 627.0
 D_P, RUDDER = "thruster.propeller.D_p", "thruster.rudder.A_R"
@@ -316,3 +323,53 @@ def test_a_change_says_how_many_numbers_it_scales(more: int, words: str) -> None
         _shown(ship, change)
         == f"{D_P} = {0.5 * ship.parameters[D_P]:.4g} in place of {ship.parameters[D_P]:.4g}{words}"
     )
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_study_has_the_integrator_by_which_its_correction_errs_less(tmp_path: Path, seed: int) -> None:
+    """Steps of Euler erred more than the numbers: the family declared accurate was worse than the guess."""
+    rng = np.random.default_rng(seed)
+    length, file = float(rng.uniform(5, 12)), tmp_path / "small.toml"
+    given = Particulars(length, length / rng.uniform(5, 7), length / 17, rng.uniform(0.6, 0.8))
+    first = first_guess(given, "small", str(file))
+    file.write_text(first.text)
+    guess, factors = load_vessel(file), {"yaw damping": rng.uniform(1.2, 1.5), "resistance": rng.uniform(0.75, 1.3)}
+    truth = guess.with_values(
+        {
+            path: factors[group.name] * guess.parameters[path]
+            for group in GROUPS
+            if group.name in factors
+            for path in _members(guess, group)
+        }
+    )
+    how = {"n_rpm": 60 * first.n, "approach": "helmsman", "duration": 120.0, "execute_at": 10.0}
+    kinds = [Zigzag(name=f"zz {angle}", angle_deg=angle, **how) for angle in (10, 15, 20)]
+    kinds += [TurningCircle(name=f"circle {side}", angle_deg=25, side=side, **how) for side in ("port", "starboard")]
+    frame = perform(truth, kinds, step=0.1, interval=1.0)
+    kept = frame[[name for name in frame if not str(name).startswith("actual.")]]
+    dataset = Dataset(kept.astype({"run": "str"}), {"clock": "run", "flags": []})
+    draft = draft_study([str(file)], write_dataset(dataset, tmp_path / "log.parquet"), tmp_path / "study.toml")
+    (view,), prediction = draft.looks.values(), draft.plan.study.prediction
+    assert prediction.integrator == view.integrator == "rk4"
+    assert "explicit Euler (the paper's) with this step moves the paths by" in draft.text.replace("\n# ", " ")
+    assert view.changes
+    horizon = round(prediction.ahead / prediction.step)
+    windows = cut_windows(dataset, horizon=horizon, step=prediction.step, interval=5.0, path="position")
+    errors = [
+        position_error(
+            Physics(vessel, horizon, prediction.step, prediction.integrator).paths(windows.instants(known=True)),
+            windows.future,
+        ).mean()
+        for vessel in (guess, guess.with_values(view.values))
+    ]
+    assert errors[1] < 0.9 * errors[0]
+
+
+def test_a_look_errs_by_the_integrator_that_it_is_given(log: Dataset) -> None:
+    ship, how = load_vessel(SHIP), {"ahead": 16.0, "step": 1.0}
+    apart, error = euler_apart(ship, log, log.runs, **how)
+    fine = first_look(ship, log, log.runs, **how)
+    rough = first_look(ship, log, log.runs, **how, integrator="euler")
+    assert fine.alone == pytest.approx(error, rel=0.2)  # with late commands in finer steps
+    assert fine.alone < rough.alone <= fine.alone + apart
+    assert (fine.integrator, rough.integrator) == ("rk4", "euler")

@@ -51,8 +51,8 @@ SHIP = "gunnerus-33.9"
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """No search for numbers that explain a log: `test_first_look.py` has that; here it agrees with every vessel."""
 
-    def agrees(vessel: Vessel, *_: Any, ahead: float, **__: Any) -> Look:
-        return Look(vessel, ahead, 0.5, 1.0, ())
+    def agrees(vessel: Vessel, *_: Any, ahead: float, integrator: Any, **__: Any) -> Look:
+        return Look(vessel, ahead, 0.5, 1.0, (), integrator=integrator)
 
     monkeypatch.setattr(new, "first_look", agrees)
 
@@ -359,6 +359,8 @@ def test_a_vessel_that_is_stiff_in_yaw_takes_smaller_steps(tmp_path: Path) -> No
     file = tmp_path / "stiff.toml"
     file.write_text(patch, encoding="utf-8")
     draft, document = drafted(tmp_path, trial(), str(file))
+    (view,) = draft.looks.values()
+    assert (view.integrator, view.ahead) == ("rk4", document["prediction"]["ahead"])
     plain = drafted(tmp_path, trial())[1]["prediction"]["step"]
     assert document["prediction"]["step"] == plain / 4
     assert document["prediction"]["integrator"] == "rk4"
