@@ -225,6 +225,7 @@ def data_check(
     """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position, thrust of a vessel."""
     from shipid.data.checks import check_dataset
     from shipid.data.dataset import read_dataset
+    from shipid.data.held import nothing_varies
 
     check_ending(html, ".html")
     log = read_dataset(dataset)
@@ -254,6 +255,8 @@ def data_check(
             rows = ((str(r.run), str(r.check), str(r.sentence)) for r in checks[~ok].itertuples())
             answer.rows("failed", checks[~ok], table(["run", "failed", "what to look at"], rows))
         answer.say(f"{len(checks) - failed} of {len(checks)} checks passed", passed=len(checks) - failed)
+        notes = nothing_varies(log, log.runs)
+        answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
         if failed:
             raise typer.Exit(1)
 

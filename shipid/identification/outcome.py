@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict
 from shipid import document as documents
 from shipid.arguments import function_or_none, names_of, number, of_class
 from shipid.data.dataset import Dataset, apart_from
+from shipid.data.held import held_commands, nothing_varies
 from shipid.data.outputs import common_outputs, compare_outputs
 from shipid.data.windows import gaps_in_words
 from shipid.document import short_names
@@ -310,6 +311,7 @@ def run_identification(
             *filter(None, (_in_log(solution, dataset, judged),)),
             *unmeasured(vessel, dataset, fitted, settings),
             *unrecorded(dataset, fitted, settings),
+            *_not_varied(dataset, fitted, solution.paths),
             *_warnings(solution, judged, pairs, growth_in(dataset, fitted, pair[AFTER])),
             *_left(solution, curves),
             *(
@@ -678,6 +680,16 @@ def unrecorded(dataset: Dataset, runs: Sequence[str], settings: Identify) -> lis
     words = gaps_in_words(dataset.select(runs), settings.step)
     remedy = "orders are held and weather is interpolated there; set max_gap in [clock] of the mapping and import again"
     return [f"{words}: {remedy}"] if words else []
+
+
+def _not_varied(dataset: Dataset, runs: Sequence[str], paths: Sequence[str]) -> list[str]:
+    """A warning if the runs to fit vary no command, or not one of a component of which numbers are identified."""
+    said, components = nothing_varies(dataset, runs), {path.split(".")[1] for path in paths if "." in path}
+    held = [name for name in held_commands(dataset, runs) if name.rpartition(".")[0] in components]
+    if said or not held:
+        return said
+    are = plural(len(held), "is", "are")
+    return [f"{listed(held)} {are} the same in all runs to fit: what other orders do there is not learnt"]
 
 
 def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:

@@ -20,6 +20,7 @@ from tomlkit.items import Table
 
 from shipid import document as documents
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
+from shipid.data.held import nothing_varies
 from shipid.data.windows import cut_windows
 from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DataError, Diverges, DocumentError, ShipidError
@@ -207,7 +208,7 @@ def _recorded(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: 
     tail = [*rest, *_grid(amounts), method]
     failing = [_failing(seen, data)] if seen.faults else []
     failing += over_gaps(dataset, all_windows(least, dataset))
-    warnings = [*failing, *_wrong_velocities(seen), *_wrong_helm(first, dataset)]
+    warnings = [*failing, *nothing_varies(dataset, usable), *_wrong_velocities(seen), *_wrong_helm(first, dataset)]
     warnings += _knowing(_learned(vessels, tests))
 
     def corrected(step: float, integrator: Integrator) -> _Content:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from shipid.data.causal import causal_columns
 from shipid.data.checks import copies, repeated
 from shipid.data.dataset import Dataset, clock_slack, kept_rows, outside_spans, pieces, read_dataset
+from shipid.data.held import nothing_varies
 from shipid.data.windows import (
     Instants,
     PathSource,
@@ -142,7 +143,7 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
     test = windows.select(np.isin(windows.run, test_runs))
     rest = windows.select(~np.isin(windows.run, test_runs))
     coarse = coarse_in_words(dataset, windows.step)
-    notes = [*([coarse] if coarse else []), *over_gaps(dataset, windows)]
+    notes = [*([coarse] if coarse else []), *nothing_varies(dataset, windows.spans), *over_gaps(dataset, windows)]
     if windows.shared_clock:
         touching = rest.touching(test.spans.values())
         if touching.any():

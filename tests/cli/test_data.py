@@ -38,6 +38,10 @@ def test_data_check_tells_what_fails(tmp_path: Path, tiny_run: Path) -> None:
     result = CliRunner().invoke(app, ["data", "check", str(file)])
     assert result.exit_code == 1
     assert re.search(r"M001 +heading", result.output), "failures are listed by run"
+    assert "the same in all" not in result.output
+    held = dataset.frame.assign(**dict.fromkeys(dataset.commands, 0.2))
+    file = write_dataset(type(dataset)(held, dataset.metadata), tmp_path / "held.parquet")
+    assert re.search(r"note: .* the same in all \d+ runs", output_of("data", "check", file))
 
 
 def test_data_guess_segment_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

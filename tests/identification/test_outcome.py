@@ -592,3 +592,16 @@ def test_factors_on_a_scale_are_not_said_to_be_on_the_base_value() -> None:
     assert reasons["N_uv"].endswith("% of its base value")
     figure = estimates(identification_content(found, "log.parquet"))
     assert "The base has 0 for N_ur: there factors are on the scale" in figure.how
+
+
+def test_commands_that_no_run_varies_are_named(log: Dataset) -> None:
+    """One helm and one shaft speed: yaw damping and resistance were identified with other factors, without a word."""
+    names = list(log.commands)
+    one = {name: float(log.frame[name].iloc[0]) for name in names}
+    (words,) = outcome._not_varied(changed(log, **one), log.runs, FEW)
+    assert "are the same in all 5 runs" in words
+    shafts = changed(log, **{name: 2.5 for name in names if name.endswith(".n")})
+    assert outcome._not_varied(shafts, log.runs, FEW) == []
+    (words,) = outcome._not_varied(shafts, log.runs, ["thruster.port.D_p", *FEW])
+    assert words == "port.n is the same in all runs to fit: what other orders do there is not learnt"
+    assert outcome._not_varied(log, log.runs, ["thruster.port.D_p"]) == []

@@ -329,6 +329,16 @@ def test_runs_shorter_than_the_horizon_are_named(tmp_path: Path) -> None:
     assert document["grid"]["N_D"][-1] == 5
 
 
+def test_commands_that_no_run_varies_are_named_first(tmp_path: Path) -> None:
+    """Also before the study computes anything; orders that vary are no word worth."""
+    usual = trial(4)
+    held = Dataset(usual.frame.assign(**dict.fromkeys(usual.commands, 0.5)), usual.metadata)
+    draft, _ = drafted(tmp_path, held)
+    assert "are the same in all 4 runs: what they do cannot be learnt" in draft.warnings[0]
+    assert draft.warnings[0] in prepare(read_plan(tmp_path / "study.toml"), held).notes
+    assert not any("the same in all" in warning for warning in drafted(tmp_path, usual)[0].warnings)
+
+
 def test_kinds_are_counted() -> None:
     assert set(survey(trial(3)).runs["kind"]) == {"zigzag"}
 
