@@ -21,6 +21,7 @@ from shipid.data.windows import (
     true_path,
     without_rows,
 )
+from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Bands, Region, at_level
@@ -34,7 +35,7 @@ from shipid.study.apply import Band, along_run, dataset_of
 from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
 from shipid.study.store import read_predictor
-from shipid.units import length_text, level_text, percent, plural
+from shipid.units import length_text, level_text, listed, percent, plural
 
 Array = np.ndarray
 TRACK = ["run", "t", "north", "east"]
@@ -287,11 +288,18 @@ def _promise(played: Played) -> list[str]:
         ends = factors.groupby(played.instants["run"], sort=False).last()[:5]
         last = ", ".join(f"{run} {value:.2f}" for run, value in ends.items())
         lines.append(f"  times the calibrated one: {factors.min():.2f} to {factors.max():.2f}; at the end: {last}")
-    points = played.points
+    points, none = played.points, []
     for moment in _moments(points):
         here = points[points["ahead"] == moment]
-        along, across = (length_text(np.median(here[name])) for name in ("band_along", "band_across"))
-        lines.append(f"  {moment:g} s ahead: {along} m along the track, {across} m across (median)")
+        along, across = (float(np.median(here[name])) for name in ("band_along", "band_across"))
+        if max(along, across) > SPEED_LIMIT * moment:
+            none.append(f"{moment:g}")
+            continue
+        words = f"{length_text(along)} m along the track, {length_text(across)} m across (median)"
+        lines.append(f"  {moment:g} s ahead: {words}")
+    if none:
+        why = "it is wider than a ship can go in that time, as where an input that did not vary in training now does"
+        lines.append(f"  {listed(none)} s ahead: no band to speak of, {why}")
     return lines
 
 

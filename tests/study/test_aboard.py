@@ -174,6 +174,22 @@ def test_lengths_of_a_small_model_are_no_zeros_in_a_summary(banded, tmp_path):
     assert not any(" 0.00 " in line for line in said), said
 
 
+def test_a_band_wider_than_a_ship_can_go_is_none(banded, tmp_path):
+    """Wind that was never there in training gave bands of 5,653,307 m; where it was as in training, digits stay."""
+    fitted, _ = banded
+    still = replace(fitted.bands, spread=1e-9 * fitted.bands.spread)
+    file = replace(fitted, bands=still).save(tmp_path / "still.npz")
+    played = play(file, saved(log(), tmp_path), level=0.9)
+    ahead = [line for line in summary(played) if " s ahead:" in line]
+    (line,) = ahead
+    assert "no band to speak of, it is wider than a ship can go" in line
+    one = played.points.copy()
+    one.loc[one["ahead"] < one["ahead"].max(), ["band_along", "band_across"]] = 0.5
+    *some, last = [line for line in summary(replace(played, points=one)) if " s ahead:" in line]
+    assert all("0.50 m along the track, 0.50 m across (median)" in line for line in some)
+    assert last.startswith(f"  {one['ahead'].max():g} s ahead: no band")
+
+
 def test_a_summary_says_when_bands_hold_less_than_promised_by_more_than_chance(banded, tmp_path):
     """Eight runs like those of training; then of a ship that is far faster than her log says."""
     fitted, _ = banded
