@@ -16,7 +16,7 @@ Pereyra, Inverse Problems 19 (2003) R1 (variable projection), with the Jacobian 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -362,10 +362,40 @@ def _gauss_newton(J: Array, f: Array) -> tuple[Array, Array, float]:
 
 def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
     """Residuals and Jacobian at given factors (n,), with the unknowns of the runs at their optimum."""
-    at, parts = _eliminated(problem, factors, point), list[Array]()
-    threshold = problem.settings.linear_from
-    n = problem.num_factors
-    f, J, A = _robust(at, threshold)
+    at = _eliminated(problem, factors, point)
+    whole = _triangular(problem, at, problem.num_factors)
+    return _Value(factors, at, whole[:, -1], whole[:, :-1])
+
+
+def beside(problem: Problem, factors: Array, point: Point) -> Callable[[Array], tuple[Array, Array]]:
+    """Function of a change of the factors (n,) to residuals (m,) and Jacobian (m, n) there, priors included.
+
+    Their squares are the objective that one step of Gauss-Newton of the unknowns of the runs leaves, from where these
+    are to first order. One prediction each; where it diverges, they are not finite.
+    """
+    here = predict(problem, factors, point.nuisances, point.away)
+
+    def linearised(change: Array) -> tuple[Array, Array]:
+        with np.errstate(all="ignore"):
+            to = point
+            if point.nuisances.size or point.away.size:
+                moved = replace(here, r=here.r + here.by_factor @ change)
+                steps, _ = _steps(problem, moved, problem.settings.linear_from)
+                to = Point(*_moved(problem, here, steps, np.ones(len(problem.runs))))
+            there = predict(problem, factors + change, to.nuisances, to.away)
+            whole = _triangular(problem, there, problem.num_factors + 1)
+        return whole[:, -1], whole[:, :-1]
+
+    return linearised
+
+
+def _triangular(problem: Problem, at: Prediction, columns: int) -> Array:
+    """Jacobian and residuals (m, n + 1), with the priors of the factors; the triangular factor of each run.
+
+    columns : how many of the columns lose what the unknowns of the runs can do; n where these are at their optimum.
+    """
+    parts, n = list[Array](), problem.num_factors
+    f, J, A = _robust(at, problem.settings.linear_from)
     if np.isfinite(f).all() and np.isfinite(J).all():
         for run in range(len(problem.runs)):
             rows = at.rows(run)
@@ -374,16 +404,15 @@ def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
             if len(xi):
                 both = np.vstack([both, np.column_stack([np.zeros((len(xi), n)), xi])])
                 basis = np.linalg.qr(np.vstack([slopes, np.eye(len(xi))]))[0]
-                both[:, :n] -= basis @ (basis.T @ both[:, :n])
+                both[:, :columns] -= basis @ (basis.T @ both[:, :columns])
             parts.append(np.asarray(np.linalg.qr(both, mode="r")))
     else:
         parts.append(np.full((1, n + 1), np.nan))
     known = np.isfinite(problem.unknown.prior)
     prior = np.column_stack(
-        [np.diag(1 / problem.unknown.prior), (factors - problem.unknown.centre) / problem.unknown.prior]
+        [np.diag(1 / problem.unknown.prior), (at.factors - problem.unknown.centre) / problem.unknown.prior]
     )
-    whole = np.vstack([*parts, prior[known]])
-    return _Value(factors, at, whole[:, n], whole[:, :n])
+    return np.vstack([*parts, prior[known]])
 
 
 def _robust(at: Prediction, threshold: float) -> tuple[Array, Array, Array]:

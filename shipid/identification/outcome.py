@@ -26,6 +26,7 @@ from shipid.files import write_new
 from shipid.identification import design
 from shipid.identification.antenna import antenna_fit
 from shipid.identification.bands import LONG, Measure, bands, check_level, refusal
+from shipid.identification.curvature import curved
 from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs, unfelt
 from shipid.identification.late_fit import late_fit
@@ -313,6 +314,7 @@ def run_identification(
             *unrecorded(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
             *_warnings(solution, judged, pairs, growth_in(dataset, fitted, pair[AFTER])),
+            *filter(None, (curved(solution, dataset, judged, determined),)),
             *_left(solution, curves),
             *(
                 f"no profile of {path}: it is at a bound, fixed or dropped"

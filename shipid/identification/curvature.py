@@ -1,0 +1,111 @@
+"""Curvature of a fit: whether the linear 95 % interval of a factor holds, by one step of its profile on each side.
+
+The factor is moved to an end of its interval, the others with it along the linear regression on it, the column of the
+covariance. There the fit is linearised again: residuals e, Jacobian J_o of the other factors. The objective that is
+left when these are fitted anew by one step of Gauss-Newton, |e|^2 - |P e|^2 with P the projection on J_o, rises by
+h^2 / a where the problem is linear (h the half-width, a the variance of the factor for the declared deviations). Where
+it rises by q times that, the end of the interval is about 1 / sqrt(q) times as far from the estimate; rather more where
+q is below 1, for the profile goes on flattening.
+
+This costs one prediction of all runs for each end. The curvatures of Bates and Watts need second derivatives in all
+directions; what matters to an interval is the curvature along its own direction (Cook, Witmer), and a profile has it.
+
+Sources: Bates, Watts, Journal of the Royal Statistical Society B 42 (1980) 1, and Nonlinear Regression Analysis (1988),
+ch. 6 (profile t); Cook, Witmer, The American Statistician 39 (1985) 119 (parameters one by one); Donaldson, Schnabel,
+Technometrics 29 (1987) 67 (linear intervals of curved problems cover too little).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Dataset
+from shipid.document import short_names
+from shipid.identification.covariance import inverted
+from shipid.identification.fit import beside
+from shipid.identification.residuals import build
+from shipid.identification.solve import Solution
+from shipid.identification.statistics import Statistics
+from shipid.units import listed
+
+Array = NDArray[np.float64]
+Beside = Callable[[Array], tuple[Array, Array]]
+"""Change of the factors (n,) from the estimate -> residuals (m,) and Jacobian (m, n) there, priors included."""
+
+SHORT = 1.2  # times as far as the linear end, from which on an interval is too short
+NARROW = 0.1  # of the factor: half-widths below it are not looked at, for they are linear enough
+MOST = 3.0  # times: of what is farther, one step says no more
+RANK = 1e-9  # relative, of a Jacobian
+
+
+def ends(judged: Statistics, at: Beside) -> dict[str, tuple[float, float]]:
+    """Factor -> how many times as far its lower and its upper end are from the estimate as those of its interval.
+
+    Of identified factors, except those whose interval is narrow. At most `MOST`; 0 where a prediction diverges at the
+    end: a profile counts that as outside, too.
+    """
+    fit, wide = judged.fit, _wide(judged)
+    if not wide:
+        return {}
+    places = np.array([fit.paths.index(path) for path in judged.free])
+    J, precision = fit.jacobian[:, places], 0.0 if fit.prior_widths is None else 1 / fit.prior_widths[places] ** 2
+    inverse = inverted(J.T @ J + np.diag(precision * np.ones(len(places))))[0]
+    least = float(np.square(at(np.zeros(len(fit.paths)))[0]).sum())
+    result = {}
+    for j in wide:
+        half, variance = float(judged.high[places[j]] - fit.factors[places[j]]), float(inverse[j, j])
+        times = []
+        for side in (-1, 1):
+            change = np.zeros(len(fit.paths))
+            change[places] = side * half * inverse[:, j] / variance
+            e, slopes = at(change)
+            share = (_left(e, slopes[:, np.delete(places, j)]) - least) * variance / half**2
+            times.append(share**-0.5 if share > MOST**-2 else MOST)
+        result[judged.free[j]] = (times[0], times[1])
+    return result
+
+
+def _left(e: Array, J: Array) -> float:
+    """Sum of the squares of e (m,) after one step of Gauss-Newton with J (m, k); infinite where it diverges."""
+    if not (np.isfinite(e).all() and np.isfinite(J).all()):
+        return float("inf")
+    size = np.linalg.norm(J, axis=0)
+    scaled = J / np.where(size > 0, size, 1.0)
+    return float(np.square(e - scaled @ np.linalg.lstsq(scaled, e, rcond=RANK)[0]).sum())
+
+
+def sentence(judged: Statistics, seen: Mapping[str, tuple[float, float]]) -> str:
+    """The factors whose intervals end too early on a side, and by how much; none: empty. seen : of `ends`."""
+    names = dict(zip(judged.fit.paths, short_names(judged.fit.paths), strict=True))
+    short = [
+        (times, path, f"{names[path]} {side} {times:.2g}")
+        for path, both in seen.items()
+        for side, times in zip(("downwards", "upwards"), both, strict=True)
+        if times > SHORT
+    ]
+    if not short:
+        return ""
+    return (
+        "the fit is not linear, and these intervals end too early; their ends are at least so many times as far from "
+        f"the estimates: {listed([words for _, _, words in short])}; compare with --profile {max(short)[1]}, or fit "
+        "runs whose commands vary more"
+    )
+
+
+def curved(solution: Solution, dataset: Dataset, judged: Statistics, profiled: Sequence[str] = ()) -> str:
+    """The sentence on intervals that are too short; none: empty. profiled : factors that have a profile already."""
+    if not _wide(judged):
+        return ""
+    problem = build(solution.vessel, dataset, solution.runs, solution.settings)
+    seen = ends(judged, beside(problem, solution.factors, solution.point))
+    return sentence(judged, {path: times for path, times in seen.items() if path not in profiled})
+
+
+def _wide(judged: Statistics) -> list[int]:
+    """Places among the free factors of those that are identified, with intervals that are no narrow ones."""
+    places = [judged.fit.paths.index(path) for path in judged.free]
+    half, size = judged.high - judged.fit.factors, np.abs(judged.fit.factors)
+    return [j for j, place in enumerate(places) if judged.identifiable[place] and half[place] > NARROW * size[place]]

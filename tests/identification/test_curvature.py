@@ -1,0 +1,229 @@
+"""Laws of curved fits: linear ones are never named, curved ones are, on the side on which the profile is longer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.optimize import least_squares
+
+from shipid.data.dataset import Dataset
+from shipid.engine.rollout import rollout
+from shipid.identification.curvature import MOST, SHORT, Beside, curved, ends, sentence
+from shipid.identification.fit import beside, evaluate
+from shipid.identification.outcome import run_identification
+from shipid.identification.profile import profile, variance_ratio
+from shipid.identification.residuals import build
+from shipid.identification.settings import Identify
+from shipid.identification.solve import Solution, identify
+from shipid.identification.statistics import LinearFit, Statistics, statistics
+from shipid.vessel.load import Vessel, load_vessel
+from tests.identification.linear import design, fitted, labels, noise
+from tests.identification.trials import changed, trials
+
+Residuals = Callable[[np.ndarray], np.ndarray]
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("prior", [None, 0.4])
+def test_a_linear_fit_is_not_named(seed: int, prior: float | None) -> None:
+    n, (clusters, signals) = 4, labels(6, 40)
+    jacobian = design(6, 40, n, seed=seed) / 10
+    error = noise(np.random.default_rng(seed), 6, 40, 0.0)
+    widths = np.full(n, np.inf if prior is None else prior)
+    fit = fitted(jacobian, error, clusters, signals, prior_widths=widths)
+    judged = statistics(fit)
+
+    def at(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        priors = (fit.factors + change - 1) / widths
+        return (
+            np.append(fit.residuals + fit.jacobian @ change, priors),
+            np.vstack([fit.jacobian, np.diag(1 / widths)]),
+        )
+
+    seen = ends(judged, at)
+    assert seen
+    np.testing.assert_allclose(list(seen.values()), 1.0, rtol=1e-6)
+    assert sentence(judged, seen) == ""
+
+
+def test_a_single_factor_has_the_rise_of_its_formula() -> None:
+    """Residuals (exp(f - 1) - 1) / w: at the end h the squares rise by (exp(h) - 1)^2 in place of h^2."""
+    rng, m = np.random.default_rng(0), 60
+    error = rng.normal(size=m)
+    error -= error.mean()
+    w = 0.25 * m**0.5
+
+    def at(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return error + (np.exp(change[0]) - 1) / w, np.full((m, 1), np.exp(change[0]) / w)
+
+    judged = _judged(("a",), np.ones(1), at)
+    h = float(judged.high[0] - 1)
+    assert ends(judged, at)["a"] == pytest.approx((h / (1 - np.exp(-h)), h / (np.exp(h) - 1)), rel=1e-6)
+
+
+def test_growth_that_is_cut_short_is_named_and_its_profile_bears_it_out() -> None:
+    """y = a (1 - exp(-b t)), the curved example of Bates and Watts: the first part of the growth, and all of it."""
+    named, beyond = 0, list[float]()
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        a, b, error = rng.uniform(0.8, 1.2), rng.uniform(0.8, 1.2), 0.04 * rng.normal(size=40)
+        judged, at, _ = _growth(np.linspace(0.2, 6, 40), a, b, error)
+        assert sentence(judged, ends(judged, at)) == ""
+        judged, at, residuals = _growth(np.linspace(0.05, 0.9, 40), a, b, error)
+        seen = ends(judged, at)
+        named += bool(sentence(judged, seen))
+        for path, times in seen.items():
+            j, factors = judged.fit.paths.index(path), judged.fit.factors
+            true = np.abs(np.array(_profile_of(path, judged, residuals)) - factors[j]) / (judged.high[j] - factors[j])
+            beyond += [true[side] / times[side] for side in (0, 1) if times[side] > SHORT]
+    assert named >= 18
+    assert min(beyond) * SHORT > 1.1  # each of these ends is farther than the linear one
+    assert min(beyond) > 0.95  # at least as far as is said
+
+
+def test_an_end_that_diverges_is_outside_and_one_that_is_flat_is_far() -> None:
+    judged = _judged(("a",), np.ones(1), _line)
+
+    def diverging(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        e, J = _line(change)
+        return (e * np.nan, J) if change[0] > 0 else (e, J)
+
+    assert ends(judged, diverging)["a"] == pytest.approx((1.0, 0.0))
+    seen = ends(judged, lambda change: _line(np.minimum(change, 0.01)))
+    assert seen["a"] == pytest.approx((1.0, MOST))
+    assert "estimates: a upwards 3; compare with --profile a, or" in sentence(judged, seen)
+
+
+def _line(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    J = np.ones((40, 1))
+    return np.tile([1.0, -1.0], 20) + J @ change, J
+
+
+@pytest.mark.parametrize("more", [{}, {"loss": "huber"}, {"prior": {"*": 0.3}}, {"nuisance": []}])
+def test_the_fit_beside_the_estimate(more: dict[str, Any]) -> None:
+    """Its squares are the objective; changes of it are those of its Jacobian; curvature at an end as evaluated anew."""
+    vessel = load_vessel("gunnerus-28.9")
+    data = trials(vessel, 2, 40)
+    rng = np.random.default_rng(3)
+    sizes = {"u": 0.05, "v": 0.05, "r": np.radians(0.1)}
+    data = changed(data, **{name: data.frame[name] + rng.normal(0, s, len(data.frame)) for name, s in sizes.items()})
+    paths = [f"hull.derivatives.{name}" for name in ("X_u|u|", "Y_uv", "N_ur")]
+    settings = Identify(
+        **{"parameters": paths, "weights": sizes, "nuisance": ["initial_state"], "start": "base", **more}
+    )
+    solution = identify(vessel, data, data.runs, settings)
+    problem = build(solution.vessel, data, solution.runs, solution.settings)
+    at = beside(problem, solution.factors, solution.point)
+    e, J = at(np.zeros(3))
+    assert e @ e == pytest.approx(solution.objective, rel=1e-7)
+    change = 1e-5 * np.array([1.0, -2.0, 3.0])
+    assert np.square(at(change)[0]).sum() - e @ e == pytest.approx(
+        2 * e @ J @ change + np.square(J @ change).sum(), abs=1e-6
+    )
+    judged = statistics(LinearFit.of(solution))
+    assert curved(solution, data, judged) == ""
+    for times in ends(judged, at).values():
+        np.testing.assert_allclose(times, 1.0, atol=0.1)
+
+
+def test_a_ship_that_hardly_changes_her_turn_is_named() -> None:
+    """One run of 200 s about 10 deg of helm: of six factors the estimates are the smaller, the surer they seem."""
+    turning = ["N_v", "N_r"]
+    base, data, settings = _turn(0.2, 0.002)
+    outcome = run_identification(base, data, settings)
+    said = next(words for words in outcome.warnings if "not linear" in words)
+    assert all(f"{name} upwards" in said for name in turning)
+    _as_with_starts_at_their_optimum(outcome.solution, data, outcome.statistics)
+    base, data, settings = _turn(20.0, 0.2)
+    solution = identify(base, data, data.runs, settings)
+    assert solution.status == "ok"
+    assert curved(solution, data, statistics(LinearFit.of(solution))) == ""
+
+
+def _as_with_starts_at_their_optimum(solution: Solution, data: Dataset, judged: Statistics) -> None:
+    """One step for the unknowns of the runs gives the ends that all their steps give."""
+    problem = build(solution.vessel, data, solution.runs, solution.settings)
+
+    def settled(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        there = evaluate(problem, solution.factors + change, solution.point)
+        return there.f, there.J
+
+    by_one = ends(judged, beside(problem, solution.factors, solution.point))
+    for path, times in ends(judged, settled).items():
+        assert by_one[path] == pytest.approx(times, rel=0.06)
+
+
+def _turn(helm: float, share: float) -> tuple[Vessel, Dataset, Identify]:
+    """A guess, a run with orders that change so much every 20 s [deg], [1], and the settings of a fit to it."""
+    vessel, rng, n = load_vessel("kvlcc2-l7"), np.random.default_rng(0), 200
+    delta, shaft = (np.repeat(rng.uniform(-1, 1, 11), 20)[: n + 1] for _ in range(2))
+    orders = {"rudder.delta": np.radians(10 + helm * delta), "propeller.n": 10 * (1 + share * shaft)}
+    start = {"north": 0.0, "east": 0.0, "psi": 0.0, "u": 0.75, "v": -0.09, "r": 0.032}
+    path = rollout(
+        vessel,
+        {name: np.array([value]) for name, value in start.items()},
+        {name: np.repeat(values[:-1], 20)[:, None] for name, values in orders.items()},
+        {},
+        step=0.05, num_steps=20 * n, method="rk4", every=20,
+    )  # fmt: skip
+    sizes = {"u": 0.01, "v": 0.01, "r": np.radians(0.05)}
+    noises = {name: rng.normal(0, size, n + 1) for name, size in sizes.items()}
+    frame = pd.DataFrame(
+        {"run": "R", "t": np.arange(n + 1.0)}
+        | {name: path[name][:, 0, 0] + noises.get(name, 0.0) for name in start}
+        | {"flags": 0}
+        | orders
+    )
+    data = Dataset(frame, {"clock": "run"})
+    off = {"R_0": 0.9, "Y_v": 1.15, "Y_r": 1.1, "N_v": 0.87, "N_r": 1.12}
+    guess = {f"hull.mmg.{name}": factor for name, factor in off.items()} | {"thruster.rudder.f_alpha": 0.9}
+    base = vessel.with_values({name: vessel.parameters[name] * factor for name, factor in guess.items()})
+    return base, data, Identify(parameters=list(guess), weights=sizes, horizon=0.0, nuisance=["initial_state"])
+
+
+def _judged(paths: tuple[str, ...], factors: np.ndarray, at: Beside) -> Statistics:
+    e, J = at(np.zeros(len(paths)))
+    m = len(e)
+    return statistics(LinearFit(paths, factors, e, J, np.zeros(m, dtype=int), ("u",) * m))
+
+
+def _growth(t: np.ndarray, a: float, b: float, error: np.ndarray) -> tuple[Statistics, Beside, Residuals]:
+    """A fit of growth with these errors of 0.04, linearised at other factors, and its whitened residuals."""
+    y = a * (1 - np.exp(-b * t)) + error
+
+    def residuals(f: np.ndarray) -> np.ndarray:
+        return np.asarray((f[0] * (1 - np.exp(-f[1] * t)) - y) / 0.04)
+
+    def jacobian(f: np.ndarray) -> np.ndarray:
+        return np.stack([1 - np.exp(-f[1] * t), f[0] * t * np.exp(-f[1] * t)], axis=1) / 0.04
+
+    best = least_squares(residuals, [1.0, 1.0], jac=jacobian, xtol=1e-12, ftol=1e-12).x
+
+    def at(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return residuals(best + change), jacobian(best + change)
+
+    return _judged(("a", "b"), best, at), at, residuals
+
+
+def _profile_of(path: str, judged: Statistics, residuals: Residuals) -> tuple[float, float]:
+    """Ends of the 95 % interval by the profile."""
+    j = judged.fit.paths.index(path)
+
+    def refit(name: str, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:  # noqa: ARG001
+        def factors(rest: np.ndarray) -> np.ndarray:
+            return np.insert(rest, j, value)
+
+        other = least_squares(lambda rest: residuals(factors(rest)), np.delete(start, j))
+        return 2 * float(other.cost), factors(other.x)
+
+    fit = judged.fit
+    curve = profile(
+        path, fit.factors, j, float(fit.residuals @ fit.residuals), refit,
+        half_width=float(judged.high[j] - fit.factors[j]),
+        freedom=float(judged.covariances[judged.chosen].freedom[j]), ratio=variance_ratio(judged, path),
+    )  # fmt: skip
+    return curve.low, curve.high
