@@ -322,16 +322,16 @@ class Predictor:
             raise DataError(f"the header of the method {self.method!r}: {' and '.join(NAMES)} must be lists of texts")
         return header
 
-    def check_restored(self, instants: Instants, paths: Array) -> None:
+    def check_restored(self, instants: Instants, paths: Array, kind: type[Any]) -> None:
         """Raise ShipidError where the method of a user, read back from what `save` writes, predicts something else.
 
-        instants, paths : of which the first is predicted, as for `predict`.
+        instants, paths : of which the first is predicted, as for `predict`. kind : the `corrector` of the method.
         """
         home = type(self.corrector)
         if home.__module__.startswith("shipid."):  # the tests of shipid say so
             return
         header = json.loads(json.dumps(self._corrector_header(), default=str))
-        kind, arrays = METHODS[self.method].corrector, self._corrector_arrays()
+        arrays = self._corrector_arrays()
         with placed(f"{kind.__name__}.from_arrays", kind):
             corrector = kind.from_arrays(header, arrays)
         if fault := fault_of_corrector(corrector):

@@ -443,24 +443,19 @@ class Stored:
 
 def test_a_method_that_loses_what_it_learned_is_seen_before_its_results(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its errors were those of the fit, and the predictor of the same cell was 3 m beside them, without a word."""
-
-    class Mine(Shared):
-        corrector: ClassVar[type[Any]] = Stored
-
-    monkeypatch.setitem(METHODS, "mine", Mine)
     instants, paths = WINDOWS.instants(), np.zeros((HORIZON, len(WINDOWS), 2))
-    Predictor(NONE, "mine", Stored(2.0)).check_restored(instants, paths)
+    Predictor(NONE, "mine", Stored(2.0)).check_restored(instants, paths, Stored)
     with pytest.raises(
         ShipidError, match=r"the method 'mine', saved and read back, predicts places 4\.2 m away: `header`"
     ):
-        Predictor(NONE, "mine", Stored(5.0, kept=False)).check_restored(instants, paths)
+        Predictor(NONE, "mine", Stored(5.0, kept=False)).check_restored(instants, paths, Stored)
     with pytest.raises(ShipidError, match=r"^Stored\.from_arrays: ZeroDivisionError: .*, line "):
-        Predictor(NONE, "mine", Stored(0.0)).check_restored(instants, paths)
+        Predictor(NONE, "mine", Stored(0.0)).check_restored(instants, paths, Stored)
     monkeypatch.setattr(Stored, "from_arrays", classmethod(lambda *_: None))
     with pytest.raises(
         ShipidError, match=r"^`from_arrays` of Stored in .* must return a corrector: NoneType lacks `pred"
     ):
-        Predictor(NONE, "mine", Stored(2.0)).check_restored(instants, paths)
+        Predictor(NONE, "mine", Stored(2.0)).check_restored(instants, paths, Stored)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from typing import Any
 
 from shipid.users import of_users, written
 
+UNKNOWN = "unknown"  # digest of what is in no file
 INSTALLED = ("site-packages", "dist-packages")
 
 
@@ -46,7 +47,7 @@ def users_code(kinds: tuple[Callable[..., Any], ...]) -> str:
         with suppress(OSError, TypeError):  # of a notebook
             files |= _with_imported(Path(inspect.getfile(inspect.unwrap(kind))).resolve(), kind.__module__.count("."))
     texts = [file.read_bytes() for file in sorted(files)]
-    return hashlib.sha256(b"\n".join(texts)).hexdigest()[:8] if texts else "unknown"
+    return hashlib.sha256(b"\n".join(texts)).hexdigest()[:8] if texts else UNKNOWN
 
 
 def _with_imported(file: Path, depth: int) -> set[Path]:

@@ -36,11 +36,11 @@ from shipid.metrics import lengths, position_error, share_of, summary
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
 from shipid.study.claims import WAIT, Holder, TakenOver, UnitClaims, pause
-from shipid.study.code import code_digest
+from shipid.study.code import UNKNOWN, code_digest
 from shipid.study.declared import Foundation, Way
 from shipid.study.envelope import envelope
 from shipid.study.foundations import Prediction, predictions
-from shipid.study.plan import Batch, Plan, Unit
+from shipid.study.plan import USER_SCRIPT, Batch, Plan, Unit
 from shipid.study.prepare import (
     Prepared,
     apart,
@@ -55,7 +55,7 @@ from shipid.study.prepare import (
     window_memory,
 )
 from shipid.study.workers import import_for_workers, on_workers
-from shipid.units import percent
+from shipid.units import listed, percent
 from shipid.users import of_users
 from shipid.version import __version__
 
@@ -120,16 +120,53 @@ def run_study(
     device : PyTorch device of rollouts and training.
     leave : end when other processes work on all that is left; the one that ends last writes the tables.
 
-    Raises ShipidError for a plan that is none and for a number of workers below 1, before any work.
+    Raises ShipidError before any work for a plan that is none, for a number of workers below 1, and where local workers
+    lack the code that a user wrote, such as that of a notebook.
     """
     of_class("plan", plan, Plan, "as of `read_plan`")
     folder = path_of("folder", folder)
     workers = None if workers is None else whole_number("workers", workers, 1)
     check_device(device)
+    if scheduler is None:
+        import_for_workers()
+        _check_code(plan, folder)
     store.open_folder(folder, plan)
     with store.in_place(folder, plan):
         run = _run_parts if plan.parts else _run_one
         yield from run(plan, folder, workers, scheduler, device, leave)
+
+
+def _check_code(plan: Plan, folder: Path) -> None:
+    """ShipidError where a local worker has not the code that a user wrote, unless nothing is left for one to do."""
+    units = {unit.key: unit for unit in plan.units}
+    if not plan.code or (folder.is_dir() and store.finished_keys(folder, units) >= units.keys()):
+        return
+    here, there, why = _code_of(plan), dict[str, str](), ""
+    try:
+        ((_, there),) = on_workers(partial(_code_of, plan), [None], 1)
+    except ShipidError:
+        raise
+    except Exception as error:  # whatever comes of a class, or of a name in TERMS, that is not there
+        why = "" if isinstance(error, KeyError) else f" ({error})"
+    if not (other := {what: digest for what, digest in here.items() if there.get(what) != digest}):
+        return
+    named = listed([*other])
+    if there.keys() >= other.keys() and UNKNOWN not in other.values():
+        raise ShipidError(f"the file of the {named} has changed since it was imported: start this process again")
+    if file := getattr(sys.modules["__main__"], "__file__", None):
+        remedy = 'they import your script: define and name it above the line `if __name__ == "__main__":`'
+    elif "term" in named:
+        script = f"a script, as {USER_SCRIPT} in docs/extending.md"
+        remedy = f"write it, with its line TERMS[...] = ..., into {script}, and run the study by that"
+    else:
+        remedy = "write it into a file, such as my_method.py, and import it from there"
+    words = f"workers are processes, which do not see what a cell or a console defines: they lack the {named}{why}"
+    raise ShipidError(f"{words}: {remedy}", file=file)
+
+
+def _code_of(plan: Plan, _: None = None) -> dict[str, str]:
+    """What the user wrote, in words, as this process or a worker has it -> digest."""
+    return {f"{what.split()[-1]} {name!r}": digest for what, held in plan.code.items() for name, digest in held.items()}
 
 
 def _run_one(
@@ -137,8 +174,6 @@ def _run_one(
 ) -> Iterator[Event]:
     """Run a study of one part."""
     begun = time.perf_counter()
-    if scheduler is None:
-        import_for_workers()
     with UnitClaims(folder) as claims:
         for words in _mended(folder, claims):
             yield Event("note", words)
@@ -544,7 +579,7 @@ def _judged(
         sentence = share if np.isfinite(one.paths).all() else one.sentence
         return _failed(sentence, "diverged") | {"hyperparameters": words}, None
     instants = instants_of(plan, predictor.vessel, prepared.data, test, one.estimates)
-    predictor.check_restored(instants, one.test_paths)
+    predictor.check_restored(instants, one.test_paths, way.method.corrector)
     paths = predictor.predict(instants, one.test_paths)
     failed = _beyond_ships(paths, test.step)
     if failed.any():
