@@ -88,8 +88,11 @@ def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int
 def _check_guard() -> None:
     """End a worker that imports the script of its user, where the script starts workers: they would start more.
 
-    A process begins with that import. What no line `if __name__ == "__main__":` guards is done once more.
+    A process begins with that import. What no line `if __name__ == "__main__":` guards is done once more. ShipidError
+    for a script that is in no file, which they cannot import.
     """
+    if getattr(sys.modules["__main__"], "__file__", None) == "<stdin>":
+        raise ShipidError("a script from standard input cannot start workers: save it as a file, and run that")
     if getattr(current_process(), "_inheriting", False):  # where multiprocessing would raise an error of 20 lines
         os._exit(NO_GUARD)
 
