@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -49,7 +49,7 @@ from shipid.study.envelope import envelope_table
 from shipid.study.plan import Plan, build_plan
 from shipid.study.schema import Published
 from shipid.units import DEGREE
-from shipid.vessel import perturb, schema
+from shipid.vessel import perturb
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.perturb import Rule
@@ -74,7 +74,6 @@ FLAP = Signal(
     usual=(-0.3, 0.3),
     component="flap",
 )
-CACHES = (schema.vessel_model, schema.term_model, schema.actuator_model)
 T = np.arange(0.0, 60.0, 0.5)
 
 
@@ -84,15 +83,10 @@ def flap_force(nu_r: Any, flap: Any, *, x: Annotated[Any, "m"], k: Annotated[Any
 
 
 @pytest.fixture
-def flap(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def flap(monkeypatch: pytest.MonkeyPatch) -> None:
     """A signal `flap` and a term that takes it."""
     monkeypatch.setitem(signals.SIGNALS, "flap", FLAP)
     monkeypatch.setitem(TERMS, "thruster.flap", Term(flap_force))
-    for cached in CACHES:
-        cached.cache_clear()
-    yield
-    for cached in CACHES:
-        cached.cache_clear()
 
 
 def with_flap() -> Vessel:
@@ -179,18 +173,13 @@ def test_a_correction_mirrors_it() -> None:
 
 
 @pytest.fixture
-def jet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def jet(monkeypatch: pytest.MonkeyPatch) -> None:
     """The water jet of docs/extending.md: a signal and its term."""
     row = eval("{" + code("A signal")[0] + "}", {"Signal": Signal})
     monkeypatch.setitem(signals.SIGNALS, "throttle", row["throttle"])
     monkeypatch.setitem(TERMS, "thruster.jet", Term(module("A term", "jet_of_the_page", monkeypatch).jet))
     monkeypatch.setitem(test_laws.RANGES, "throttle", row["throttle"].reach)
     monkeypatch.setitem(test_laws.MIRROR, "throttle", row["throttle"].mirror)
-    for cached in CACHES:
-        cached.cache_clear()
-    yield
-    for cached in CACHES:
-        cached.cache_clear()
 
 
 @pytest.mark.usefixtures("jet")
@@ -255,14 +244,10 @@ def kite(
 
 def test_the_laws_make_up_a_vessel_for_any_numbers_of_a_term(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(TERMS, "thruster.kite", Term(kite))
-    for cached in CACHES:
-        cached.cache_clear()
     test_laws.test_mirror_port_starboard("thruster.kite", 0)
     test_laws.test_zero_at_rest("thruster.kite")
     test_laws.test_forces_follow_the_units("thruster.kite", test_laws.FROUDE)
     monkeypatch.undo()
-    for cached in CACHES:
-        cached.cache_clear()
 
 
 def shallow_drag(
@@ -279,20 +264,16 @@ ALIKE = {"kind": "turning", "n_rpm": 120.0, "alpha_deg": 5.0, "start_speed": 4.0
 
 
 @pytest.fixture
-def depth(monkeypatch: pytest.MonkeyPatch) -> Iterator[Vessel]:
+def depth(monkeypatch: pytest.MonkeyPatch) -> Vessel:
     """The depth of docs/extending.md with a term that takes it, and a ship that feels it."""
     row = eval("{" + code("A signal")[1] + "}", {"Signal": Signal})["depth"]
     monkeypatch.setitem(signals.SIGNALS, "depth", row)
     monkeypatch.setitem(TERMS, "hull.shallow", Term(shallow_drag))
     monkeypatch.setitem(test_laws.RANGES, "depth", row.reach)
     monkeypatch.setitem(test_laws.MIRROR, "depth", row.mirror)
-    for cached in CACHES:
-        cached.cache_clear()
     document = load_vessel("gunnerus-28.9").document
     block = {"c": 0.1, "T": 2.65, "L_pp": 28.9}
-    yield check_vessel({**document, "hull": {**document["hull"], "shallow": block}}, "shallow")
-    for cached in CACHES:
-        cached.cache_clear()
+    return check_vessel({**document, "hull": {**document["hull"], "shallow": block}}, "shallow")
 
 
 @pytest.mark.usefixtures("depth")

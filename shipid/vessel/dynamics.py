@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
+from shipid import document as documents
 from shipid.arguments import of_class
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics import ACTUATORS, GIVEN, TERMS, Term
@@ -20,10 +21,21 @@ from shipid.physics.inertia import added_mass, coriolis, matrix, rigid_body
 from shipid.physics.returned import returned
 from shipid.physics.signals import named, units
 from shipid.units import plural
-from shipid.users import begins_at
-from shipid.vessel.bindings import Binding
+from shipid.users import begins_at, of_users
+from shipid.vessel.bindings import Binding, bindings
+from shipid.vessel.bindings import units as units_of
 from shipid.vessel.load import Vessel
-from shipid.vessel.schema import BEHIND, actuators, behind, functions, signals, structural, term_blocks, term_parameters
+from shipid.vessel.schema import (
+    BEHIND,
+    actuators,
+    behind,
+    functions,
+    model_for,
+    signals,
+    structural,
+    term_blocks,
+    term_parameters,
+)
 from shipid.vessel.schema import parameters as declared
 from shipid.vessel.terms import called, check_term, no_signal, states_of
 
@@ -122,6 +134,10 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     terms = list(term_blocks(vessel.document))
     for _, key, _ in terms:  # a notebook may have put another into TERMS since the vessel was read
         check_term(key)
+    if any(of_users(function) for held in functions(vessel.document).values() for function in held):
+        documents.parse(model_for(vessel.document), vessel.document, vessel.file)
+        if (bindings(vessel.document), units_of(vessel.document)) != (vessel.bound, vessel.units):
+            raise ShipidError("its terms take other numbers than when it was read: load it again", file=vessel.file)
     names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)
     hidden = _hidden(terms)
     ordered = _orders_taken(terms)

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, create_model, model_validator
 
-from shipid.physics import ACTUATORS, GIVEN, TERMS, Term
+from shipid.physics import ACTUATORS, GIVEN, TERMS, Memory, Term
 from shipid.physics.grammar import POSITIVE, Grammar
 from shipid.physics.inertia import added_mass, rigid_body
 from shipid.physics.signals import named
@@ -191,10 +191,14 @@ def _dimension_model(name: str, units: Mapping[str, str]) -> type[Block]:
     return create_model(name, __base__=Block, **fields)
 
 
-@cache
 def term_model(key: str) -> type[Block]:
     """Model of one kind of term: its parameters, its structural counts, its actuators, and `off`."""
-    term = check_term(key)
+    return _term_model(key, check_term(key), tuple(ACTUATORS.items()))
+
+
+@cache
+def _term_model(key: str, term: Term, memories: tuple[tuple[str, Memory], ...]) -> type[Block]:
+    """The same, of what TERMS and ACTUATORS hold now: a notebook may put another function there."""
     group, kind = key.split(".")
     extra: dict[str, Any] = {"off": (bool, False)}
     if group not in FIXED:
@@ -203,7 +207,7 @@ def term_model(key: str) -> type[Block]:
         extra[name] = (_Table, ...) if name == TABLE else (Annotated[int, Field(ge=1, le=1000)], ...)
     commands = [signal for signal in signals(term.function) if signal in named("command")]
     if commands:
-        fields: dict[str, Any] = {command: (actuator_model() | None, None) for command in commands}
+        fields: dict[str, Any] = {command: (_actuator_model(memories) | None, None) for command in commands}
         extra["actuator"] = (create_model(f"{kind}_actuators", __base__=Block, **fields) | None, None)
     if behind(term):
         extra[BEHIND] = (Annotated[str, Field(description="the propeller in whose slipstream it is")], ...)
@@ -218,12 +222,12 @@ def actuators(block: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]
 
 
 @cache
-def actuator_model() -> Any:
+def _actuator_model(memories: tuple[tuple[str, Memory], ...]) -> Any:
     """Model of any kind of actuator."""
     return _union(
         [
             block_model(f"actuator_{kind}", parameters(memory.advance), kind=(Literal[kind], ...), off=(bool, False))
-            for kind, memory in ACTUATORS.items()
+            for kind, memory in memories
         ]
     )
 
@@ -246,31 +250,35 @@ def _of_group(group: str) -> list[str]:
     return [key for key, (of, _) in zip(TERMS, split_keys(tuple(TERMS)), strict=True) if of == group]
 
 
-def _named(group: str, of: Collection[str]) -> Any:
-    models = [term_model(key) for key in _of_group(group) if key in of]
+def _named(group: str, of: Mapping[str, type[Block]]) -> Any:
+    models = [of[key] for key in _of_group(group) if key in of]
     return _union(models) if models else Block
 
 
-def _fixed(group: str, of: Collection[str]) -> Any:
-    fields: dict[str, Any] = {
-        key.split(".")[1]: ((term_model(key) if key in of else Block) | None, None) for key in _of_group(group)
-    }
+def _fixed(group: str, of: Mapping[str, type[Block]]) -> Any:
+    fields: dict[str, Any] = {key.split(".")[1]: (of.get(key, Block) | None, None) for key in _of_group(group)}
     return create_model(group, __base__=Block, **fields)
 
 
 def model_for(document: Mapping[str, Any]) -> type[BaseModel]:
     """Pydantic model for one vessel document, with models of those terms alone that it has: others take their time."""
     named = {name for off in (False, True) for path, key, _ in term_blocks(document, off) for name in (path, key)}
-    return vessel_model(frozenset(named & TERMS.keys()))
+    return vessel_model(named & TERMS.keys())
 
 
-@cache
-def vessel_model(having: frozenset[str] | None = None) -> type[BaseModel]:
+def vessel_model(having: Collection[str] | None = None) -> type[BaseModel]:
     """Pydantic model of a whole vessel document; its JSON schema serves editors.
 
     having : kinds of term that the document may have, as keys of TERMS, which are all by default.
     """
-    of = TERMS.keys() if having is None else having
+    terms = tuple(TERMS)
+    split_keys(terms)
+    return _vessel_model(terms, tuple((key, term_model(key)) for key in terms if having is None or key in having))
+
+
+@cache
+def _vessel_model(terms: tuple[str, ...], models: tuple[tuple[str, type[Block]], ...]) -> type[BaseModel]:  # noqa: ARG001
+    of = dict(models)
     current: dict[str, Any] = {"kind": (Literal["uniform"], ...)}
     fields: dict[str, Any] = {
         "name": (str, ...),

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
+from casadi import SX
 
-from shipid.errors import ShipidError
-from shipid.physics import ACTUATORS, TERMS, Term
+from shipid.errors import DocumentError, ShipidError
+from shipid.physics import ACTUATORS, TERMS, Memory, Term
 from shipid.units import unit_fault
-from shipid.vessel import schema
 from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import load_vessel
+from shipid.vessel.load import check_vessel, load_vessel
 from shipid.vessel.schema import parameters, vessel_model
 from shipid.vessel.terms import check_term, split_keys
 from tests.cli.running import ended
@@ -57,16 +56,6 @@ SHIPS = {
     "wind": '[wind]\nkind = "{kind}"\nC = 100.0\n',
     "radiation": "[radiation.{kind}]\nC = 100.0\n",
 }
-CACHES = (schema.vessel_model, schema.term_model)
-
-
-@pytest.fixture(autouse=True)
-def _fresh() -> Iterator[None]:
-    for cached in CACHES:
-        cached.cache_clear()
-    yield
-    for cached in CACHES:
-        cached.cache_clear()
 
 
 def signature(arguments: str) -> str:
@@ -98,6 +87,7 @@ TERM = Term(drag, components=parts)
 """
 
 
+NEWTON = "Annotated[SX, 'kg m^-1']"
 WRENCH = "hull.drag must return a wrench (6), not "
 FAULTS: dict[str, tuple[str, str, str, str]] = {
     # name -> key, text of the module, the line that is named, words
@@ -333,6 +323,33 @@ def test_the_schema_for_editors_names_a_wrong_term(tmp_path: Path, monkeypatch: 
         vessel_model()
 
 
+def test_a_term_that_is_put_in_again_has_the_schema_of_now(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a notebook: the schema was of the first function, and refused the second's, or dropped numbers unsaid."""
+    registered("hull.drag", DRAG.format("return wrench(Y)"), tmp_path, monkeypatch)
+    file = ship("hull.drag", tmp_path)
+    load_vessel(file)
+    registered("hull.drag", signature(f"nu_r: SX, *, D: {NEWTON}"), tmp_path, monkeypatch)
+    with pytest.raises(DocumentError, match=r"hull\.drag\.C: unknown key: valid: D, off, source"):
+        load_vessel(file)
+    file.write_text(file.read_text().replace("C =", "D ="))
+    assert "hull.drag.D" in load_vessel(file).parameters
+    registered("hull.drag", signature(f"nu_r: SX, *, D: {NEWTON} = 5.0"), tmp_path, monkeypatch)
+    file.write_text(file.read_text().replace("D = 100.0", ""))
+    assert dynamics(load_vessel(file))
+
+
+def test_an_actuator_that_is_put_in_again_has_the_schema_of_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = load_vessel("kvlcc2-l7").document
+    kind = document["thruster"]["rudder"]["actuator"]["delta"]["kind"]
+
+    def advance(command: SX, state: SX, dt: SX, *, T_up: Annotated[SX, "s"]) -> SX:
+        return state + (command - state) * dt / T_up
+
+    monkeypatch.setitem(ACTUATORS, kind, Memory(ACTUATORS[kind].output, advance))
+    with pytest.raises(DocumentError, match=r"actuator\.delta\.T: unknown key: valid: T_up, kind, off"):
+        check_vessel(document, "kvlcc2")
+
+
 def test_a_term_that_is_put_in_later_is_checked_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a notebook, for a vessel that was read before."""
     registered("hull.drag", DRAG.format("return wrench(Y)"), tmp_path, monkeypatch)
@@ -340,6 +357,15 @@ def test_a_term_that_is_put_in_later_is_checked_too(tmp_path: Path, monkeypatch:
     registered("hull.drag", signature("nu_r: SX, C: Annotated[SX, 'kg m^-1']"), tmp_path, monkeypatch)
     with pytest.raises(ShipidError, match="must be behind a"):
         dynamics(vessel)
+    registered("hull.drag", signature(f"nu_r: SX, *, C: {NEWTON}, D: {NEWTON}"), tmp_path, monkeypatch)
+    with pytest.raises(DocumentError, match=r"ship\.toml: hull\.drag\.D: missing"):
+        dynamics(vessel)
+    for more in (f"D: {NEWTON} = 2.0", f"L_pp: {NEWTON}"):
+        registered("hull.drag", signature(f"nu_r: SX, *, C: {NEWTON}, {more}"), tmp_path, monkeypatch)
+        with pytest.raises(
+            ShipidError, match=r"ship\.toml: its terms take other numbers than when it was read: load it"
+        ):
+            dynamics(vessel)
     monkeypatch.setitem(TERMS, "hull.drag", Term(3))  # type: ignore[arg-type]
     with pytest.raises(ShipidError, match=r"^hull\.drag must be a function, not 3$"):
         dynamics(vessel)
