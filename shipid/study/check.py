@@ -67,7 +67,8 @@ def _checked(folder: Path, plan: Plan, part: str = "") -> Checked:
     done = sum(len(unit.pairs) for unit in store.finished(folder, plan.units))
     counted = f"{done} of {plan.cells} cells finished, {len(faults)} {plural(len(faults), 'fault')}"
     lines.append(f"{part}: {counted}" if part else counted)
-    if held := claims.held(folder):
+    keys = {unit.key for unit in plan.units}
+    if held := [name for name in claims.held(folder) if name in keys]:  # other claims are no work of a user's
         lines.append(f"at work, or ended without giving back: {', '.join(held)}")
     left = [place for place in folder.rglob(f"{TEMPORARY}*") if place.is_dir()]
     if left:

@@ -12,6 +12,8 @@ from shipid.files import TEMPORARY
 from shipid.hybrid.methods import METHODS
 from shipid.study import seals, store
 from shipid.study.check import check_folder
+from shipid.study.claims import UnitClaims
+from shipid.study.run import MENDED
 from tests.study.tiny import tiny_plan
 
 
@@ -45,6 +47,16 @@ def test_a_run_that_has_just_begun(tmp_path: Path) -> None:
     assert check_folder(tmp_path / "run").lines == ["0 of 8 cells finished, 0 faults"]
     with pytest.raises(ResultError, match=r"no study\.toml"):
         check_folder(tmp_path)
+
+
+def test_units_that_a_process_works_on_are_named_and_no_other_claim(tmp_path: Path) -> None:
+    """`mended`, the claim of a process that has looked at the files, stood between the units."""
+    plan = tiny_plan(tmp_path)
+    store.open_folder(tmp_path / "run", plan)
+    with UnitClaims(tmp_path / "run") as claims:
+        assert all(map(claims.take, (MENDED, plan.units[0].key)))
+        (line,) = check_folder(tmp_path / "run").lines[1:]
+    assert line == f"at work, or ended without giving back: {plan.units[0].key}"
 
 
 def test_files_of_a_study_whose_method_is_not_here_are_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
