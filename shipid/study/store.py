@@ -94,7 +94,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
     check_readable(folder)
     if provenance(folder)["digest"] != plan.digest:
-        raise ResultError(f"holds the results of another study than {plan.file}: choose another --out", file=folder)
+        raise ResultError(_other_study(folder, plan), file=folder)
     for name in FOLDERS:
         if os.path.lexists(folder / name) and not (folder / name).is_dir():
             raise ResultError("is no folder, where one belongs: move it away, and resume", file=folder / name)
@@ -102,6 +102,23 @@ def open_folder(folder: Path, plan: Plan) -> None:
     _check_journals(folder, plan)
     _mend(folder, plan)
     sweep_run(folder)
+
+
+def _other_study(folder: Path, plan: Plan) -> str:
+    """What a folder holds that is of another digest: where the documents are equal, which file was changed since."""
+    stored, record = read_json(folder / VESSELS), provenance(folder)
+    vessels = [
+        vessel.file
+        for name, vessel in plan.vessels.items()
+        if isinstance(stored, dict) and name in stored and stored[name].get("document") != vessel.document
+    ]
+    sources = [name for name, digest in plan.sources.items() if record.get("sources", {}).get(name) != digest]
+    if documents.read(folder / STUDY) != plan.document or not (vessels or sources):
+        return f"holds the results of another study than {plan.file}: choose another --out"
+    changed = listed([*vessels, *(f"the {name.rpartition('/')[2]} of {plan.file}" for name in sources)])
+    words = f"holds the results of before {changed} changed: choose another --out"
+    resume = f"{plan.program} study resume {as_argument(folder)}"
+    return words if sources else f"{words}, or go on with the vessel as it was: `{resume}`"
 
 
 def check_readable(folder: Path) -> None:

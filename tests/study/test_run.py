@@ -9,7 +9,7 @@ import re
 import shutil
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any, ClassVar
@@ -542,6 +542,29 @@ def test_folder_of_another_study_is_refused(tmp_path: Path, tiny_run: Path) -> N
     other = tiny_plan(tmp_path, {"truth.seed": 99})
     with pytest.raises(ResultError, match=r"another study than .*tiny\.toml: choose another --out"):
         next(run_study(other, tiny_run))
+
+
+def test_a_folder_of_before_a_vessel_changed_names_the_vessel(tmp_path: Path) -> None:
+    """The document is the same: it said that the study is another one than itself."""
+    vessel, folder = tmp_path / "ship.toml", tmp_path / "run"
+    vessel.write_text('extends = "gunnerus-28.9"\n')
+    changes = {"truth.vessel": "ship.toml", "family.0.base": "ship.toml"}
+    store.open_folder(folder, tiny_plan(tmp_path, changes))
+    vessel.write_text('extends = "gunnerus-28.9"\n[inertia]\nm = 5e5\n')
+    words = f"holds the results of before {vessel} changed: choose another --out, or go on with the vessel as it was: "
+    with pytest.raises(ResultError) as caught:
+        store.open_folder(folder, tiny_plan(tmp_path, changes))
+    assert str(caught.value) == f"{folder}: {words}`shipid study resume {folder}`"
+    store.open_folder(folder, store.stored_plan(folder))
+    with pytest.raises(ResultError, match="another study than"):
+        store.open_folder(folder, tiny_plan(tmp_path, {**changes, "truth.seed": 99}))
+
+
+def test_a_folder_of_before_a_log_changed_names_the_log(tmp_path: Path) -> None:
+    plan = tiny_plan(tmp_path)
+    store.open_folder(tmp_path / "run", replace(plan, sources={"mapping": "a", "log": "b"}))
+    with pytest.raises(ResultError, match=r"of before the log of .*tiny\.toml changed: choose another --out$"):
+        store.open_folder(tmp_path / "run", replace(plan, sources={"mapping": "a", "log": "c"}))
 
 
 @pytest.mark.parametrize("at", ["note", "start", "cell"])
