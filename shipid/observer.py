@@ -388,7 +388,7 @@ def begin(filters: Bank, measured: Array, commands: Array) -> Array:
     return np.stack(columns, axis=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Estimates:
     """What the observer knows at every row of a dataset, from that row and those before it alone.
 
@@ -541,7 +541,7 @@ def start(columns: Mapping[str, Array]) -> dict[str, Array]:
     return {**columns, **{name: columns[f"observer.{name}"] for name in MEASURED}}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ObservedStart:
     """What the physics starts from with an observer, for S instants and T steps.
 

@@ -54,7 +54,7 @@ class Banded(NamedTuple):
     outside: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Predictor:
     """Physics and a fitted method as one deployable thing: it predicts a trajectory from one instant.
 
@@ -72,12 +72,12 @@ class Predictor:
 
     physics: Physics
     method: str
-    corrector: Corrector
-    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    provenance: Mapping[str, Any] = field(default_factory=dict)
+    corrector: Corrector = field(repr=False)
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict, repr=False)
+    provenance: Mapping[str, Any] = field(default_factory=dict, repr=False)
     commands: Commands = "held"
     causal: tuple[str, ...] = ()
-    bands: Bands | None = None
+    bands: Bands | None = field(default=None, repr=False)
     run_up: float = 0.0
 
     def __post_init__(self) -> None:

@@ -38,9 +38,9 @@ FORGOTTEN = 1.1  # times: by so much the shortest interval of late grows with ea
 _KEY = b"shipid"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Dataset:
-    """Runs of one vessel: a table that has passed `check_schema`, and where it came from.
+    """Runs of one vessel: a table that has passed `check_schema`, and where it came from. `==` compares by identity.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ FUTURE_STATES = ("u", "v", "r", "psi")
 """True states that a window holds over its horizon, beside the path."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Instants:
     """What is known at S instants of prediction; every array is in SI units, time first.
 
@@ -58,11 +58,11 @@ class Instants:
     step : time [s] between the entries of past and planned; None: that of the predictor.
     """
 
-    columns: Mapping[str, NDArray[Any]]
-    past: Mapping[str, Array] = field(default_factory=dict)
-    planned: Mapping[str, Array] | None = None
-    hidden: Mapping[str, Array] | None = None
-    estimates: Mapping[str, Array] = field(default_factory=dict)
+    columns: Mapping[str, NDArray[Any]] = field(repr=False)
+    past: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    planned: Mapping[str, Array] | None = field(default=None, repr=False)
+    hidden: Mapping[str, Array] | None = field(default=None, repr=False)
+    estimates: Mapping[str, Array] = field(default_factory=dict, repr=False)
     step: float | None = None
 
     def __len__(self) -> int:
@@ -85,7 +85,7 @@ class Instants:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Windows:
     """S windows with a horizon of T steps; every array is in SI units, time first.
 
@@ -102,16 +102,16 @@ class Windows:
     states : true u, v, r [m/s, rad/s] and psi [rad] after 1..T steps, name -> (T, S).
     """
 
-    run: NDArray[np.str_]
-    t: Array
-    columns: dict[str, NDArray[Any]]
-    future: Array
-    planned: dict[str, Array]
+    run: NDArray[np.str_] = field(repr=False)
+    t: Array = field(repr=False)
+    columns: dict[str, NDArray[Any]] = field(repr=False)
+    future: Array = field(repr=False)
+    planned: dict[str, Array] = field(repr=False)
     horizon: int
     step: float
     shared_clock: bool = True
-    past: dict[str, Array] = field(default_factory=dict)
-    states: dict[str, Array] = field(default_factory=dict)
+    past: dict[str, Array] = field(default_factory=dict, repr=False)
+    states: dict[str, Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return len(self.t)

@@ -28,7 +28,7 @@ SPEED_LIMIT = 100.0  # m/s: beyond any ship; a faster sample has diverged
 PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time where an engine cannot measure on its way
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectories:
     """Result of a rollout.
 

@@ -30,7 +30,7 @@ TRAITS = ("length", "turn", "change", "slip", "distance")
 """What the growth of a band depends on, see `traits`."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Region:
     """Regions around predicted paths, in the frame (11) of the instants.
 
@@ -70,7 +70,7 @@ class Region:
         return Region(self.ahead, self.along * factor, self.across * factor)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bands:
     """Calibrated bands of a predictor.
 

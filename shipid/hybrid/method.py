@@ -55,7 +55,7 @@ class Corrector(Protocol):
         """Rebuild what `header` and `arrays` gave."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
     """One foundation of a task.
 
@@ -87,7 +87,7 @@ class Journal(Protocol):
         """Write how many trials some searches have."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Task:
     """What a method is fitted to: foundations on the same windows. Its arrays cannot be written to: others use them.
 
@@ -136,7 +136,7 @@ class Task:
         return {name: self.windows.future - case.paths for name, case in self.cases.items()}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fitted:
     """Result of a method for one foundation.
 

@@ -45,7 +45,7 @@ UNPLANNED = "later orders were not known as they were in calibration"
 STANDARD = (0.5, 0.8, 0.9, 0.95)  # levels that the summary judges beside the one that was asked for
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Played:
     """What would have been seen at sea.
 

@@ -38,7 +38,7 @@ GRID = {"N_D": "grid.N_D", "seed": "grid.seeds"}  # what two runs must share: ke
 MEASURED = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """Several runs beside the first of them.
 

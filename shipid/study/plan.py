@@ -114,16 +114,16 @@ class Plan:
 
     name: str
     file: str
-    document: Document
-    study: Study
-    foundations: tuple[Foundation, ...]
-    methods: tuple[Way, ...]
-    batches: tuple[Batch, ...]
+    document: Document = field(repr=False)
+    study: Study = field(repr=False)
+    foundations: tuple[Foundation, ...] = field(repr=False)
+    methods: tuple[Way, ...] = field(repr=False)
+    batches: tuple[Batch, ...] = field(repr=False)
     truth: Vessel | None = None
-    vessels: Mapping[str, Vessel] = field(default_factory=dict)
+    vessels: Mapping[str, Vessel] = field(default_factory=dict, repr=False)
     sources: Mapping[str, str] = field(default_factory=dict)
     changes: Mapping[str, Any] = field(default_factory=dict)
-    parts: Mapping[str, Part] = field(default_factory=dict)
+    parts: Mapping[str, Part] = field(default_factory=dict, repr=False)
 
     @property
     def used_vessels(self) -> list[Vessel]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -54,7 +54,7 @@ class Vessel:
     file : where it was read from.
     """
 
-    document: Document
+    document: Document = field(repr=False)
     file: str
 
     def __post_init__(self) -> None:
