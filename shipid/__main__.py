@@ -3,6 +3,7 @@
 import gc
 import io
 import os
+import signal
 import sys
 
 FEW_LOOKS = 100_000  # objects made between two looks for garbage: imports make many objects, and no garbage
@@ -34,6 +35,7 @@ def run() -> None:
         sys.stderr.write("interrupted\n")
         sys.exit(130)
     finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C pressed twice: the exit status is that of the first
         gc.freeze()  # the end of the process looks for garbage once more: it frees all in any case
 
 

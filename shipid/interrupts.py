@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+DOUBLE = 1.0  # s after Ctrl-C in which another one is of the same mind: the first one's end is not disturbed
 _holding: list[list[int]] = []  # the outermost call that holds interrupts back, if any
 
 
@@ -16,12 +18,14 @@ def uninterrupted() -> Iterator[list[int]]:
 
     Gives the list of signals held back so far, so that a long call can look and stop. In nested blocks the outermost
     one holds. Raises KeyboardInterrupt at the end of the block if Ctrl-C was pressed, also where the block failed.
+    Where Ctrl-C is ignored, as in workers, it stays so.
     """
-    if _holding or threading.current_thread() is not threading.main_thread():
+    before = signal.getsignal(signal.SIGINT)
+    if _holding or before is signal.SIG_IGN or threading.current_thread() is not threading.main_thread():
         yield _holding[0] if _holding else []
         return
     held: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _frame: held.append(number))
+    signal.signal(signal.SIGINT, lambda number, _frame: held.append(number))
     _holding.append(held)
     try:
         yield held
@@ -29,6 +33,8 @@ def uninterrupted() -> Iterator[list[int]]:
         _holding.clear()
         signal.signal(signal.SIGINT, before)
         if held:
+            if callable(before):
+                before(held[0], None)  # which notes when
             raise KeyboardInterrupt
 
 
@@ -36,16 +42,19 @@ def uninterrupted() -> Iterator[list[int]]:
 def recognised() -> Iterator[None]:
     """Raise KeyboardInterrupt for any error of the block after Ctrl-C was pressed: compiled code makes others of it.
 
+    A second press within a second is passed over: it would break off how the block ends, with a traceback.
     Nothing is changed in a thread, or where something else answers Ctrl-C.
     """
     before = signal.getsignal(signal.SIGINT)
     if before is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
         yield
         return
-    pressed: list[int] = []
+    pressed: list[float] = []
 
-    def press(number: int, _frame: object) -> None:
-        pressed.append(number)
+    def press(_number: int, _frame: object) -> None:
+        if pressed and time.monotonic() - pressed[-1] < DOUBLE:
+            return
+        pressed.append(time.monotonic())
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGINT, press)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 
 import pytest
 
+from shipid import interrupts
 from shipid.interrupts import recognised, uninterrupted
 
 
@@ -112,3 +113,39 @@ def test_an_error_behind_ctrl_c_is_ctrl_c() -> None:
         work(press)
     with pytest.raises(SystemError):
         work(int)
+
+
+def test_where_it_is_ignored_it_stays_so() -> None:
+    """A worker, which ignores Ctrl-C, printed a traceback where it was pressed during a call into compiled code."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with uninterrupted() as held:
+            press()
+        assert held == []
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_double_press_breaks_off_no_end(inside: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second one arose while workers were stopped, with a traceback; a later one is answered again."""
+    now = [10.0]
+    monkeypatch.setattr(interrupts.time, "monotonic", lambda: now[0])
+    steps: list[str] = []
+
+    def work() -> None:
+        with recognised():
+            try:
+                with uninterrupted() if inside else nullcontext():
+                    press()
+            finally:
+                press()
+                steps.append("ended")
+                now[0] += interrupts.DOUBLE
+                with pytest.raises(KeyboardInterrupt):
+                    press()
+                steps.append("later")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert steps == ["ended", "later"]
