@@ -47,6 +47,7 @@ class Dataset:
     frame : columns `run`, `t`, `north`, `east`, `psi`, `u`, `v`, `r`, `flags`, one per command
         (`port.n` [rev/s], `port.alpha` [rad], `rudder.delta` [rad]) and, where measured, `V_w`, `beta_w`, outputs
         (`propeller.thrust` [N]) and the rest of `optional()`. SI units, radians; time increases within a run; no NaN.
+        u and v are horizontal, along and across the heading, and r = d(psi)/dt, also where the ship heels.
     metadata : plain data (JSON). `flags` names the bits of the column `flags`; `clock` is `"run"` where every run
         has a separate clock (simulation) and `"shared"` where all runs are parts of one recording (the default).
     """

@@ -32,6 +32,9 @@ PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time wher
 class Trajectories:
     """Result of a rollout.
 
+    u, v and r are along the axes of the ship; those of a log are horizontal, which differs where she heels or trims:
+    `shipid.simulation.log.horizontal` converts them.
+
     states : (num_records, num_variants, num_samples, num_channels), SI; channels named by `names`.
     diverged : (num_variants, num_samples): an input or a record is not finite, or a speed is above 100 m/s. Others are
         unharmed.
