@@ -156,7 +156,7 @@ class PathDrawn(Searched):
             yield point | {name: value_at(self, name, share) for share, name in zip(shares[1:], ranges, strict=True)}
 
     def path(self) -> list[float]:
-        """Return the ridges that every trial is solved with, evenly spread by their logarithm."""
+        """Return the ridges of which each trial takes one for each model, rising, evenly spread by their logarithm."""
         return ridges_of(self.ridge, RIDGES)
 
     def fit(self, task: Task) -> dict[str, Fitted]:

@@ -314,7 +314,7 @@ class _Tuning:
     def _judged(
         self, group: _Group, number: int, judges: _Judges, wanted: Mapping[str, Index] | None = None
     ) -> dict[str, _Verdict]:
-        """One trial for some foundations; `wanted` are the numbers of the ridges of each, by default all."""
+        """One trial for some foundations; `wanted` are the numbers of the ridges of each, else it descends."""
         if not group.names:
             return {}
         point, terms, ridges = self.points[number], self.terms, self.method.path()
@@ -492,7 +492,7 @@ def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
 
 
 class _Errors:
-    """Errors of a trial over judged windows, each fold without itself, for every ridge; in single precision."""
+    """Errors of a trial over judged windows, each fold without itself, by ridge; in single precision."""
 
     def __init__(self, num_windows: int, terms: int, num_ridges: int) -> None:
         self.num_windows, self.terms = num_windows, terms
@@ -523,9 +523,9 @@ def _left_out(
 ) -> tuple[Array, Array, _Errors]:
     """Errors over judged windows, each block without itself.
 
-    `terms` is r. `wanted` (ridges, K) says which ridges are asked of which models. By default each model descends from
-    the middle of the ridges: those on either side are taken one by one, as long as the last one is the best so far by
-    all folds, or by all but one of them.
+    `ridges` rise; `terms` is r. `wanted` (ridges, K) says which ridges are asked of which models. By default each model
+    descends from the middle of the ridges: those on either side are taken one by one, as long as the last one is the
+    best so far by all folds, or by all but one of them.
 
     A run left out is never predicted better than with itself in the fit. So a ridge whose fit already misses more than
     other ridges do on runs left out is passed over: it would not be chosen, neither by all folds nor by all but one.

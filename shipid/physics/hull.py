@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from shipid.physics import symbols as ca
 from shipid.physics.frames import given, vector
@@ -25,7 +25,6 @@ from shipid.physics.grammar import (
 )
 
 if TYPE_CHECKING:
-    import numpy as np
     from casadi import SX
 
 SPEED_FLOOR = 0.01  # m/s: keeps 1/U finite at rest
@@ -164,7 +163,7 @@ def abkowitz(
     return about_service_speed(nu_r, 0.0, values, L_pp, U_0, rho)
 
 
-def strips(*, strips: int) -> dict[str, np.ndarray]:
+def strips(*, strips: int) -> dict[str, Any]:
     """Midpoints of equal strips as a fraction of the length, and the fraction that each strip covers."""
     import numpy as np
 

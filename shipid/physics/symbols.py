@@ -6,8 +6,6 @@ from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any, get_type_hints
 
-from shipid.users import of_users
-
 if TYPE_CHECKING:
     from casadi import *  # noqa: F403
 else:
@@ -22,13 +20,14 @@ else:
 
 
 class Symbol:
-    """Stands for `SX` in the signatures of shipid's own functions, so that they are read without CasADi."""
+    """Stands for `SX` in signatures, so that they are read without CasADi."""
 
 
 @cache
 def types_of(function: Callable[..., Any]) -> dict[str, Any]:
     """Types of the arguments and of the result of a function of symbols, with their units, by name.
 
-    Raises whatever `typing.get_type_hints` raises, such as NameError for a type that a user's file does not import.
+    `SX` need not be a name in the function's file. Raises whatever `typing.get_type_hints` raises, such as NameError
+    for another type that is none.
     """
-    return get_type_hints(function, localns=None if of_users(function) else {"SX": Symbol}, include_extras=True)
+    return get_type_hints(function, localns={"SX": Symbol}, include_extras=True)

@@ -299,7 +299,7 @@ def _promise(played: Played) -> list[str]:
         lines.append(f"  {moment:g} s ahead: {words}")
     if none:
         why = "it is wider than a ship can go in that time, as where an input that did not vary in training now does"
-        lines.append(f"  {listed(none)} s ahead: no band to speak of, {why}")
+        lines.append(f"  {listed(none)} s ahead: no useful band: {why}")
     return lines
 
 

@@ -182,12 +182,12 @@ def test_a_band_wider_than_a_ship_can_go_is_none(banded, tmp_path):
     played = play(file, saved(log(), tmp_path), level=0.9)
     ahead = [line for line in summary(played) if " s ahead:" in line]
     (line,) = ahead
-    assert "no band to speak of, it is wider than a ship can go" in line
+    assert "no useful band: it is wider than a ship can go" in line
     one = played.points.copy()
     one.loc[one["ahead"] < one["ahead"].max(), ["band_along", "band_across"]] = 0.5
     *some, last = [line for line in summary(replace(played, points=one)) if " s ahead:" in line]
     assert all("0.50 m along the track, 0.50 m across (median)" in line for line in some)
-    assert last.startswith(f"  {one['ahead'].max():g} s ahead: no band")
+    assert last.startswith(f"  {one['ahead'].max():g} s ahead: no useful band")
 
 
 def test_a_summary_says_when_bands_hold_less_than_promised_by_more_than_chance(banded, tmp_path):
