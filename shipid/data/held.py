@@ -6,25 +6,43 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Array, Dataset
 from shipid.physics.signals import row_of
 from shipid.units import DEGREE, listed, plural
 
-NOISE = {True: 0.5 * DEGREE, False: 0.01}  # standard deviation that still counts as none: of angles, and of the mean
+NOISE = {True: 0.5 * DEGREE, False: 0.01}
+"""Standard deviation that counts as none, of angles [rad] and as a share of others: assumed for measured feedback."""
+KICK = 4.0  # times this noise: a departure that is an order, where it lasts
+SPIKE, SPIKES = 3.0, 1e-3  # s between the rows around a departure, and share of rows: below, faulty rows and no order
 
 
 def held_commands(dataset: Dataset, runs: Iterable[str]) -> tuple[str, ...]:
-    """Commands that are the same, to measuring noise, in every row of some runs. One that varies in one run varies."""
+    """Commands that are the same in every row of some runs, but for measuring noise and a faulty row in a thousand.
+
+    One that varies in one run varies, also where that is for a few seconds of a long run.
+    """
     frame = dataset.frame[dataset.frame["run"].isin(list(runs))]
     by_run, held = frame.groupby("run", sort=False), []
     for name in dataset.commands:
-        means, scatter = by_run[name].mean(), by_run[name].std(ddof=0)
+        usual = by_run[name].median()
         row = row_of(name)
         angle = row is not None and row.angle
-        noise = NOISE[angle] * (1.0 if angle else float(means.abs().max()))
-        if len(means) and np.ptp(means) <= noise and float(scatter.max()) <= noise:
+        noise = NOISE[angle] * (1.0 if angle else float(usual.abs().max()))
+        if (
+            len(usual)
+            and np.ptp(usual) <= noise
+            and all(_same(run["t"].to_numpy(float), run[name].to_numpy(float), noise) for _, run in by_run)
+        ):
             held.append(name)
     return tuple(held)
+
+
+def _same(t: Array, values: Array, noise: float) -> bool:
+    """Whether a command is the same in every row of a run; t, values : its rows; noise : standard deviation."""
+    far = np.abs(values - np.median(values)) > KICK * noise
+    first, behind = np.flatnonzero(np.diff(far, prepend=False, append=False)).reshape(-1, 2).T
+    lasting = t[np.minimum(behind, len(t) - 1)] - t[np.maximum(first - 1, 0)]
+    return bool(far.mean() <= SPIKES and (lasting < SPIKE).all() and values[~far].std() <= noise)
 
 
 def nothing_varies(dataset: Dataset, runs: Iterable[str]) -> list[str]:

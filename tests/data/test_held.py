@@ -44,3 +44,61 @@ def test_a_command_that_varies_anywhere_varies(where: str) -> None:
     assert held_commands(dataset, dataset.runs) == ("propeller.n",)
     assert nothing_varies(dataset, dataset.runs) == []
     assert nothing_varies(dataset, ["run 0", "run 1"]) != []
+
+
+def one_run(rows: int, step: float = 1.0, **commands: np.ndarray) -> Dataset:
+    """A run of so many rows; names of commands with _ for the point."""
+    columns = {name.replace("_", "."): x for name, x in commands.items()}
+    motion = dict.fromkeys(("north", "east", "psi", "u", "v", "r"), 0.0)
+    frame = pd.DataFrame({"run": "long", "t": step * np.arange(rows), **motion, **columns, "flags": 0})
+    return Dataset(frame.astype({"run": "str"}), {"clock": "run", "flags": []})
+
+
+@pytest.mark.parametrize(
+    ("hours", "step", "lasts", "size", "held"),
+    [
+        (1, 1.0, 20.0, 5.0, False),
+        (1 / 6, 1.0, 5.0, 5.0, False),
+        (10, 1.0, 5.0, 5.0, False),
+        (10, 0.1, 5.0, 5.0, False),
+        (10, 10.0, 10.0, 5.0, False),
+        (1, 1.0, 20.0, 3.0, False),
+        (1, 1.0, 20.0, 1.5, True),
+        (1, 1.0, 1.0, 35.0, True),
+        (1, 0.1, 1.0, 35.0, True),
+        (1 / 6, 1.0, 1.0, 35.0, False),
+    ],
+)
+def test_a_short_kick_in_a_long_run_varies(hours: float, step: float, lasts: float, size: float, held: bool) -> None:
+    """The scatter of a whole run shrinks with its length; what is one faulty row in a thousand is no kick."""
+    rows = round(3600 * hours / step)
+    helm = np.zeros(rows)
+    for begin in (0, rows // 2, rows - round(lasts / step)):
+        moved = helm.copy()
+        moved[begin : begin + round(lasts / step)] = np.radians(size)
+        log = one_run(rows, step, rudder_delta=moved, propeller_n=np.full(rows, 2.0))
+        assert ("rudder.delta" in held_commands(log, log.runs)) == held
+        assert bool(nothing_varies(log, log.runs)) == held
+
+
+def test_a_short_zigzag_of_small_angles_in_a_log_of_a_day_varies() -> None:
+    helm = np.zeros(36000)
+    helm[7000:7240] = np.radians(5.0) * np.sign(np.sin(np.arange(240) / 20 + 0.01))
+    log = one_run(len(helm), rudder_delta=helm, propeller_n=np.full(len(helm), 2.0))
+    assert held_commands(log, log.runs) == ("propeller.n",)
+
+
+@pytest.mark.parametrize(("angle", "share", "held"), [(0.4, 0.008, True), (0.65, 0.013, False)])
+def test_noise_of_feedback_is_no_order(angle: float, share: float, held: bool) -> None:
+    """Standard deviations of 0.5 deg and of 1 % count as none, in a run of any length."""
+    rng = np.random.default_rng(2)
+    for rows in (100, 100_000):
+        helm = 0.1 + np.radians(angle) * rng.standard_normal(rows)
+        log = one_run(rows, rudder_delta=helm, propeller_n=2.0 * (1 + share * rng.standard_normal(rows)))
+        assert held_commands(log, log.runs) == (("rudder.delta", "propeller.n") if held else ())
+
+
+def test_a_run_of_one_row_is_held() -> None:
+    log = one_run(1, rudder_delta=np.array([0.1]), propeller_n=np.array([2.0]))
+    assert held_commands(log, log.runs) == ("rudder.delta", "propeller.n")
+    assert held_commands(log, []) == ()
