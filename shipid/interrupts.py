@@ -8,7 +8,11 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-DOUBLE = 1.0  # s after Ctrl-C in which another one is of the same mind: the first one's end is not disturbed
+DOUBLE = 1.0
+"""Seconds after Ctrl-C in which another one counts as the same press, so that it does not break off how the first ends.
+
+Longer than a double press, shorter than a second thought: who sees that nothing ends and presses again is answered.
+"""
 _holding: list[list[int]] = []  # the outermost call that holds interrupts back, if any
 
 
@@ -17,8 +21,9 @@ def uninterrupted() -> Iterator[list[int]]:
     """Hold back Ctrl-C until the block ends: inside CasADi it would become an error about arguments.
 
     Gives the list of signals held back so far, so that a long call can look and stop. In nested blocks the outermost
-    one holds. Raises KeyboardInterrupt at the end of the block if Ctrl-C was pressed, also where the block failed.
-    Where Ctrl-C is ignored, as in workers, it stays so.
+    one holds. At the end of the block, also where it failed, a Ctrl-C that was held back is answered as it would have
+    been without the block: with KeyboardInterrupt, unless a handler of Python passes it over. Where Ctrl-C is ignored,
+    as in workers, it stays so.
     """
     before = signal.getsignal(signal.SIGINT)
     if _holding or before is signal.SIG_IGN or threading.current_thread() is not threading.main_thread():
@@ -34,8 +39,9 @@ def uninterrupted() -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, before)
         if held:
             if callable(before):
-                before(held[0], None)  # which notes when
-            raise KeyboardInterrupt
+                before(held[0], None)  # which may pass it over
+            else:
+                raise KeyboardInterrupt
 
 
 @contextmanager

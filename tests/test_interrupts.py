@@ -149,3 +149,31 @@ def test_a_double_press_breaks_off_no_end(inside: bool, monkeypatch: pytest.Monk
     with pytest.raises(KeyboardInterrupt):
         work()
     assert steps == ["ended", "later"]
+
+
+def test_a_double_press_breaks_off_no_end_that_is_held_back() -> None:
+    """The second one was passed over, and raised all the same where the block of the end was left."""
+    steps: list[str] = []
+
+    def work() -> None:
+        with recognised():
+            try:
+                press()
+            finally:
+                with uninterrupted():
+                    press()
+                    steps.append("end of the block")
+                steps.append("behind the block")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert steps == ["end of the block", "behind the block"]
+
+
+def test_without_a_handler_in_python_it_is_raised() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        with pytest.raises(KeyboardInterrupt), uninterrupted():
+            press()
+    finally:
+        signal.signal(signal.SIGINT, before)
