@@ -297,7 +297,7 @@ def euler_apart(
     if not sound.any():
         return 0.0, 0.0
     apart, error = (position_error(rk4[:, sound], to[:, sound]).mean() for to in (euler, windows.future))
-    return float(np.nan_to_num(apart, nan=np.inf)), float(error)
+    return float(apart) if np.isfinite(apart) else math.inf, float(error)
 
 
 def _some(dataset: Dataset, horizon: int, step: float, path: PathSource) -> Windows:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -373,3 +376,22 @@ def test_a_look_errs_by_the_integrator_that_it_is_given(log: Dataset) -> None:
     assert fine.alone == pytest.approx(error, rel=0.2)  # with late commands in finer steps
     assert fine.alone < rough.alone <= fine.alone + apart
     assert (fine.integrator, rough.integrator) == ("rk4", "euler")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_where_euler_diverges_its_paths_are_infinitely_far(
+    value: float, log: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Infinite paths were 1.8e308 m apart, a number."""
+    physics = _Trial.physics
+
+    def diverging(trial: _Trial) -> Any:
+        sound = physics(trial)
+        if trial.integrator != "euler":
+            return sound
+        return SimpleNamespace(paths=lambda instants: np.full_like(sound.paths(instants), value))
+
+    monkeypatch.setattr(_Trial, "physics", diverging)
+    apart, error = euler_apart(load_vessel(SHIP), log, log.runs, ahead=16.0, step=1.0)
+    assert math.isinf(apart)
+    assert math.isfinite(error)
