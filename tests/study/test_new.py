@@ -23,10 +23,12 @@ from shipid.simulation.approach import Controls
 from shipid.study import new
 from shipid.study.first_look import GROUPS, Change, Look
 from shipid.study.new import (
+    DIVERGES,
     LEAST_RUNS,
     SHARE_OF_RUN,
     _ahead,
     _degraded,
+    _needs_rk4,
     _of_kind,
     _turning,
     draft_study,
@@ -337,6 +339,31 @@ def test_commands_that_no_run_varies_are_named_first(tmp_path: Path) -> None:
     assert "are the same in all 4 runs: what they do cannot be learnt" in draft.warnings[0]
     assert draft.warnings[0] in prepare(read_plan(tmp_path / "study.toml"), held).notes
     assert not any("the same in all" in warning for warning in drafted(tmp_path, usual)[0].warnings)
+
+
+@pytest.mark.parametrize(
+    ("apart", "words"),
+    [
+        ({"A": (0.9, 10.0)}, []),
+        ({"A": (1.1, 10.0)}, ["moves the paths by 1.1 m", "the vessel errs 10 m"]),
+        ({"A": (0.9e-4, 0.0)}, []),
+        ({"A": (1.1e-4, 0.0)}, ["moves the paths by 0.00011 m"]),
+        ({"A": (float("inf"), 10.0)}, [DIVERGES]),
+        ({"A": (0.9, 10.0), "B": (0.9, 10.0)}, []),
+        ({"A": (2.0, 10.0), "B": (0.9, 1.0)}, ["moves the paths of B by 0.9 m", "B errs 1 m"]),
+        ({"A": (0.9, 1.0), "B": (2.0, 10.0)}, ["moves the paths of A by 0.9 m", "A errs 1 m"]),
+        ({"A": (2.0, 1.0), "B": (float("inf"), 10.0)}, [DIVERGES, "with B"]),
+    ],
+)
+def test_euler_is_taken_where_it_moves_the_paths_of_every_vessel_little(
+    apart: dict[str, tuple[float, float]], words: list[str]
+) -> None:
+    """By a tenth of the error of each vessel, which counts as 1 mm at least; the worst vessel decides."""
+    why = _needs_rk4(apart)
+    assert bool(why) == bool(words)
+    assert all(word in why for word in words)
+    if len(apart) == 1:
+        assert not re.search(r"\bA\b", why)
 
 
 def test_kinds_are_counted() -> None:
