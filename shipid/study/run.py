@@ -33,6 +33,7 @@ from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Case, Corrector, Fitted, Task, fit_all
 from shipid.hybrid.physics import Physics
 from shipid.metrics import lengths, position_error, share_of, summary
+from shipid.physics import TERMS
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study import seals, store
 from shipid.study.claims import WAIT, Holder, TakenOver, UnitClaims, pause
@@ -73,6 +74,7 @@ PACKAGES = (
     "plotly",
 )
 
+MAIN = "__main__"  # module of a script, a cell or a console
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
 SESSIONS = "sessions"  # name of the claim on the record of what a run is computed with
 MENDING, MENDED = "mending", "mended"  # claims: on the look at all files, and of the process that has looked
@@ -141,19 +143,26 @@ def _check_code(plan: Plan, folder: Path) -> None:
     units = {unit.key: unit for unit in plan.units}
     if not plan.code or (folder.is_dir() and store.finished_keys(folder, units) >= units.keys()):
         return
-    here, there, why = _code_of(plan), dict[str, str](), ""
+    here, there, failed, why = _code_of(plan), dict[str, str](), "", ""
     try:
         ((_, there),) = on_workers(partial(_code_of, plan), [None], 1)
     except ShipidError:
         raise
-    except Exception as error:  # whatever comes of a class, or of a name in TERMS, that is not there
-        why = "" if isinstance(error, KeyError) else f" ({error})"
+    except Exception as error:  # of a module as it is imported, of a class or of a name in TERMS that is not there
+        why = "" if isinstance(error, KeyError) and any(key in error.args for key in TERMS) else f" ({error})"
+        in_script = isinstance(error, AttributeError) and any(
+            type(way.method).__module__ == MAIN for way in plan.methods
+        )
+        failed = "" if in_script or not why else legible(f"{type(error).__name__}: {error}".removesuffix(": "))
     if not (other := {what: digest for what, digest in here.items() if there.get(what) != digest}):
         return
     named = listed([*other])
+    if failed and UNKNOWN not in other.values():
+        raise ShipidError(f"a worker cannot import the {named}: {failed}")
     if there.keys() >= other.keys() and UNKNOWN not in other.values():
-        raise ShipidError(f"the file of the {named} has changed since it was imported: start this process again")
-    if file := getattr(sys.modules["__main__"], "__file__", None):
+        words = f"the file of the {named}, or one that it imports, has changed since it was imported"
+        raise ShipidError(f"{words}: start this process again")
+    if file := getattr(sys.modules[MAIN], "__file__", None):
         remedy = 'they import your script: define and name it above the line `if __name__ == "__main__":`'
     elif "term" in named:
         script = f"a script, as {USER_SCRIPT} in docs/extending.md"

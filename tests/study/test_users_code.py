@@ -86,7 +86,58 @@ def test_a_file_that_changed_after_its_import_is_named(tmp_path: Path) -> None:
     known = "from mine import Linear\nimport shipid\nfrom shipid.study.code import users_code\n"
     later = "users_code((Linear, Linear.corrector))\nopen('mine.py', 'a').write('# edited')\n"
     line = ended(tmp_path, "-c", known + later + LISTED + RUN)
-    assert "the file of the method 'own' has changed since it was imported" in line
+    assert "the file of the method 'own', or one that it imports, has changed since it was imported" in line
+
+
+def test_a_file_that_a_changed_file_is_imported_by_is_not_said_to_have_changed(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(METHOD + "import helper\n")
+    (tmp_path / "helper.py").write_text("SHARE = 0.5\n")
+    known = "from mine import Linear\nimport shipid\nfrom shipid.study.code import users_code\n"
+    later = "users_code((Linear, Linear.corrector))\nopen('helper.py', 'a').write('SHARE = 0.6')\n"
+    line = ended(tmp_path, "-c", known + later + LISTED + RUN)
+    assert line.endswith(", or one that it imports, has changed since it was imported: start this process again"), line
+
+
+@pytest.mark.parametrize(
+    ("in_a_worker", "error"),
+    [
+        ("raise OSError('no camera\\nis there')", "OSError: no camera is there"),
+        ("{}['SHIPS']", "KeyError: 'SHIPS'"),
+        ("raise AttributeError", "AttributeError"),
+    ],
+)
+def test_a_file_that_a_worker_cannot_import_is_named_with_its_error(
+    in_a_worker: str, error: str, tmp_path: Path
+) -> None:
+    """The class is in a file already: it said that workers do not see what a cell defines."""
+    failing = f"import multiprocessing\nif multiprocessing.parent_process():\n    {in_a_worker}\n"
+    (tmp_path / "mine.py").write_text(METHOD + failing)
+    line = ended(tmp_path, "-c", "from mine import Linear" + LISTED + RUN)
+    assert line == f"shipid.errors.ShipidError: a worker cannot import the method 'own': {error}"
+
+
+def test_a_module_that_was_loaded_by_its_path_cannot_be_imported_by_a_worker(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "mine.py").write_text(METHOD)
+    loaded = """
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+spec = spec_from_file_location("by_path", "elsewhere/mine.py")
+sys.modules["by_path"] = module = module_from_spec(spec)
+spec.loader.exec_module(module)
+Linear = module.Linear
+"""
+    line = ended(tmp_path, "-c", loaded + LISTED + RUN)
+    error = "ModuleNotFoundError: No module named 'by_path'"
+    assert line == f"shipid.errors.ShipidError: a worker cannot import the method 'own': {error}"
+
+
+def test_a_term_of_a_file_whose_line_is_in_a_cell_needs_a_script(tmp_path: Path) -> None:
+    (tmp_path / "ship.toml").write_text(SHIP)
+    (tmp_path / "skegs.py").write_text(code("A term")[1])
+    listed = "from shipid.physics import TERMS, Term\nTERMS['hull.skeg'] = Term(skeg)\n"
+    line = ended(tmp_path, "-c", "from skegs import skeg\n" + listed + RUN_TERM)
+    assert "they lack the term 'hull.skeg': write it, with its line TERMS[...] = ..., into a script, as my.py" in line
 
 
 @pytest.mark.slow
