@@ -97,6 +97,16 @@ def with_flap() -> Vessel:
     return check_vessel({**document, "thruster": {**document["thruster"], "tail": block}}, "with a flap")
 
 
+@pytest.mark.usefixtures("flap")
+def test_a_row_that_is_corrected_to_a_command_has_an_actuator_in_the_schema(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a notebook: the schema of the term was that of the row before."""
+    monkeypatch.setitem(signals.SIGNALS, "flap", replace(FLAP, role="environment"))
+    with pytest.raises(DocumentError, match="actuator: unknown key"):
+        with_flap()
+    monkeypatch.setitem(signals.SIGNALS, "flap", FLAP)
+    assert with_flap().parameters["thruster.tail.actuator.flap.T"] == 0.5
+
+
 def flap_log(folder: Path, largest: float = 0.2) -> Dataset:
     """A log with a flap in degrees, imported."""
     log = as_log(turning(T), folder / "log.csv")

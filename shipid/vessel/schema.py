@@ -193,19 +193,23 @@ def _dimension_model(name: str, units: Mapping[str, str]) -> type[Block]:
 
 def term_model(key: str) -> type[Block]:
     """Model of one kind of term: its parameters, its structural counts, its actuators, and `off`."""
-    return _term_model(key, check_term(key), tuple(ACTUATORS.items()))
+    term = check_term(key)
+    known = named("command")
+    commands = tuple(signal for signal in signals(term.function) if signal in known)
+    return _term_model(key, term, commands, tuple(ACTUATORS.items()))
 
 
 @cache
-def _term_model(key: str, term: Term, memories: tuple[tuple[str, Memory], ...]) -> type[Block]:
-    """The same, of what TERMS and ACTUATORS hold now: a notebook may put another function there."""
+def _term_model(
+    key: str, term: Term, commands: tuple[str, ...], memories: tuple[tuple[str, Memory], ...]
+) -> type[Block]:
+    """The same, of what TERMS, SIGNALS and ACTUATORS hold now: a notebook may put another entry there."""
     group, kind = key.split(".")
     extra: dict[str, Any] = {"off": (bool, False)}
     if group not in FIXED:
         extra["kind"] = (Literal[kind], ...)
     for name in structural(term):
         extra[name] = (_Table, ...) if name == TABLE else (Annotated[int, Field(ge=1, le=1000)], ...)
-    commands = [signal for signal in signals(term.function) if signal in named("command")]
     if commands:
         fields: dict[str, Any] = {command: (_actuator_model(memories) | None, None) for command in commands}
         extra["actuator"] = (create_model(f"{kind}_actuators", __base__=Block, **fields) | None, None)
@@ -273,12 +277,13 @@ def vessel_model(having: Collection[str] | None = None) -> type[BaseModel]:
     """
     terms = tuple(TERMS)
     split_keys(terms)
-    return _vessel_model(terms, tuple((key, term_model(key)) for key in terms if having is None or key in having))
+    return _vessel_model(tuple((key, term_model(key) if having is None or key in having else None) for key in terms))
 
 
 @cache
-def _vessel_model(terms: tuple[str, ...], models: tuple[tuple[str, type[Block]], ...]) -> type[BaseModel]:  # noqa: ARG001
-    of = dict(models)
+def _vessel_model(models: tuple[tuple[str, type[Block] | None], ...]) -> type[BaseModel]:
+    """The same; models : of all keys of TERMS, in their order; None for a kind that the document may not have."""
+    of = {key: model for key, model in models if model is not None}
     current: dict[str, Any] = {"kind": (Literal["uniform"], ...)}
     fields: dict[str, Any] = {
         "name": (str, ...),
