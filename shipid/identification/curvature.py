@@ -36,18 +36,22 @@ Beside = Callable[[Array], tuple[Array, Array]]
 """Change of the factors (n,) from the estimate -> residuals (m,) and Jacobian (m, n) there, priors included."""
 
 SHORT = 1.2  # times as far as the linear end, from which on an interval is too short
-NARROW = 0.1  # of the factor: half-widths below it are not looked at, for they are linear enough
-MOST = 3.0  # times: of what is farther, one step says no more
+NARROW = 0.1
+"""Of the factor: intervals of a smaller half-width are not looked at, which saves two predictions each. The end of a
+fit as curved as exp(factor) belongs 1.05 times as far there; for SHORT it has to be four times as curved."""
+MOST = 3.0
+"""Times as far, at most. Beyond it the squares rise by less than a ninth of h^2 / a: the profile is so flat there that
+it may as well be open, and the rise, the difference of two sums of squares, may be 0 or below by rounding."""
 RANK = 1e-9  # relative, of a Jacobian
 
 
-def ends(judged: Statistics, at: Beside) -> dict[str, tuple[float, float]]:
+def ends(judged: Statistics, at: Beside, profiled: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
     """Factor -> how many times as far its lower and its upper end are from the estimate as those of its interval.
 
-    Of identified factors, except those whose interval is narrow. At most `MOST`; 0 where a prediction diverges at the
-    end: a profile counts that as outside, too.
+    Of identified factors, except those whose interval is narrow and those `profiled`. At most `MOST`; 0 where a
+    prediction diverges at the end: a profile counts that as outside, too.
     """
-    fit, wide = judged.fit, _wide(judged)
+    fit, wide = judged.fit, _wide(judged, profiled)
     if not wide:
         return {}
     places = np.array([fit.paths.index(path) for path in judged.free])
@@ -95,17 +99,32 @@ def sentence(judged: Statistics, seen: Mapping[str, tuple[float, float]]) -> str
     )
 
 
-def curved(solution: Solution, dataset: Dataset, judged: Statistics, profiled: Sequence[str] = ()) -> str:
-    """The sentence on intervals that are too short; none: empty. profiled : factors that have a profile already."""
-    if not _wide(judged):
+def curved(
+    solution: Solution,
+    dataset: Dataset,
+    judged: Statistics,
+    profiled: Sequence[str] = (),
+    go_on: Callable[[], None] = lambda: None,
+) -> str:
+    """The sentence on intervals that are too short; none: empty.
+
+    profiled : factors that have a profile already. go_on : called before each prediction; what it raises ends the look.
+    """
+    if not _wide(judged, profiled):
         return ""
     problem = build(solution.vessel, dataset, solution.runs, solution.settings)
-    seen = ends(judged, beside(problem, solution.factors, solution.point))
-    return sentence(judged, {path: times for path, times in seen.items() if path not in profiled})
+    at = beside(problem, solution.factors, solution.point)
+
+    def next_at(change: Array) -> tuple[Array, Array]:
+        go_on()
+        return at(change)
+
+    return sentence(judged, ends(judged, next_at, profiled))
 
 
-def _wide(judged: Statistics) -> list[int]:
-    """Places among the free factors of those that are identified, with intervals that are no narrow ones."""
+def _wide(judged: Statistics, profiled: Sequence[str]) -> list[int]:
+    """Places among the free factors of those that are identified, not profiled, with intervals that are not narrow."""
     places = [judged.fit.paths.index(path) for path in judged.free]
     half, size = judged.high - judged.fit.factors, np.abs(judged.fit.factors)
-    return [j for j, place in enumerate(places) if judged.identifiable[place] and half[place] > NARROW * size[place]]
+    wide = judged.identifiable & (half > NARROW * size)
+    return [j for j, place in enumerate(places) if wide[place] and judged.free[j] not in profiled]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -314,7 +315,7 @@ def run_identification(
             *unrecorded(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
             *_warnings(solution, judged, pairs, growth_in(dataset, fitted, pair[AFTER])),
-            *filter(None, (curved(solution, dataset, judged, determined),)),
+            *filter(None, (curved(solution, dataset, judged, determined, partial(_go_on, held)),)),
             *_left(solution, curves),
             *(
                 f"no profile of {path}: it is at a bound, fixed or dropped"

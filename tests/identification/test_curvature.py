@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +13,7 @@ from scipy.optimize import least_squares
 
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
+from shipid.identification import curvature
 from shipid.identification.curvature import MOST, SHORT, Beside, curved, ends, sentence
 from shipid.identification.fit import beside, evaluate
 from shipid.identification.outcome import run_identification
@@ -101,6 +103,51 @@ def test_an_end_that_diverges_is_outside_and_one_that_is_flat_is_far() -> None:
 def _line(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     J = np.ones((40, 1))
     return np.tile([1.0, -1.0], 20) + J @ change, J
+
+
+def test_a_factor_that_has_a_profile_costs_no_prediction() -> None:
+    rng, asked = np.random.default_rng(4), list[np.ndarray]()
+    error = 0.04 * rng.normal(size=40)
+    judged, at, _ = _growth(np.linspace(0.05, 0.9, 40), 1.0, 1.0, error)
+
+    def counted(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        asked.append(change)
+        return at(change)
+
+    both = ends(judged, at)
+    assert both.keys() == {"a", "b"}
+    assert ends(judged, counted, ["a"]) == {"b": both["b"]}
+    assert len(asked) == 3  # the estimate and two ends
+    asked.clear()
+    assert ends(judged, counted, ["a", "b"]) == {}
+    assert not asked
+
+
+def test_ctrl_c_ends_the_look_at_the_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is held back during a fit, and was looked at after the last end only."""
+    asked = 0
+
+    def pressed(*arguments: Any) -> Beside:
+        at = beside(*arguments)
+
+        def counted(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            nonlocal asked
+            asked += 1
+            signal.raise_signal(signal.SIGINT)
+            return at(change)
+
+        return counted
+
+    monkeypatch.setattr(curvature, "beside", pressed)
+    monkeypatch.setattr(curvature, "NARROW", 0.0)
+    vessel = load_vessel("gunnerus-28.9")
+    data = trials(vessel, 2, 40)
+    rng = np.random.default_rng(3)
+    data = changed(data, **{name: data.frame[name] + rng.normal(0, 0.01, len(data.frame)) for name in ("u", "v", "r")})
+    paths = [f"hull.derivatives.{name}" for name in ("X_u|u|", "Y_uv", "N_ur")]
+    with pytest.raises(KeyboardInterrupt):
+        run_identification(vessel, data, Identify(parameters=paths, start="base"))
+    assert asked == 1
 
 
 @pytest.mark.parametrize("more", [{}, {"loss": "huber"}, {"prior": {"*": 0.3}}, {"nuisance": []}])
