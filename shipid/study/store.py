@@ -37,6 +37,7 @@ from shipid.hybrid.methods import METHODS
 from shipid.physics import TERMS
 from shipid.predictor import Predictor
 from shipid.study import seals
+from shipid.study.code import code_digest
 from shipid.study.declared import Foundation
 from shipid.study.plan import METHOD_CODE, TERM_CODE, USER_SCRIPT, WITH, Plan, Unit, build_plan
 from shipid.units import listed, plural
@@ -105,20 +106,36 @@ def open_folder(folder: Path, plan: Plan) -> None:
 
 
 def _other_study(folder: Path, plan: Plan) -> str:
-    """What a folder holds that is of another digest: where the documents are equal, which file was changed since."""
-    stored, record = read_json(folder / VESSELS), provenance(folder)
-    vessels = [
-        vessel.file
-        for name, vessel in plan.vessels.items()
-        if isinstance(stored, dict) and name in stored and stored[name].get("document") != vessel.document
-    ]
-    sources = [name for name, digest in plan.sources.items() if record.get("sources", {}).get(name) != digest]
-    if documents.read(folder / STUDY) != plan.document or not (vessels or sources):
+    """What a folder holds that is of another digest: where the documents are equal, what was changed since."""
+    if documents.read(folder / STUDY) != plan.document:
         return f"holds the results of another study than {plan.file}: choose another --out"
-    changed = listed([*vessels, *(f"the {name.rpartition('/')[2]} of {plan.file}" for name in sources)])
-    words = f"holds the results of before {changed} changed: choose another --out"
+    stored, record = read_json(folder / VESSELS), provenance(folder)
+    try:
+        vessels = [one.file for name, one in plan.vessels.items() if stored[name]["document"] != one.document]
+    except (TypeError, KeyError):
+        raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
+    before = record.get("sources", plan.sources)  # an early version noted none
+    sources = [name for name, digest in plan.sources.items() if before.get(name) != digest]
+    changed = [*vessels, *(f"the {name.rpartition('/')[2]} of {plan.file}" for name in sources)]
+    if not changed:
+        then, now = record.get(METHOD_CODE, {}), plan.code.get(METHOD_CODE, {})
+        changed = [f"the method {name!r}" for name, digest in then.items() if now.get(name) != digest]
+    if not changed:
+        return _otherwise_made(record)
+    words = f"holds results from before {listed(changed)} changed: choose another --out"
     resume = f"{plan.program} study resume {as_argument(folder)}"
-    return words if sources else f"{words}, or go on with the vessel as it was: `{resume}`"
+    return f"{words}, or go on with the vessel as it was: `{resume}`" if changed == vessels else words
+
+
+def _otherwise_made(record: Mapping[str, Any]) -> str:
+    """What a folder of the same documents and data is whose digest is another one."""
+    made = next((str(session["shipid"]) for session in record.get("sessions", [])[-1:] if "shipid" in session), "")
+    here = f"{__version__}, code {code_digest()}"
+    if made == here:
+        why = "it was changed by hand, or a method has other defaults"
+        return f"says that it is of another study, and holds this one: {why}: choose another --out"
+    versions = f"{made}; this is {here}" if made else f"this is {here}"
+    return f"was made by another version of shipid ({versions}), whose defaults are others: choose another --out"
 
 
 def check_readable(folder: Path) -> None:

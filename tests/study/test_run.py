@@ -33,8 +33,9 @@ from shipid.predictor import Predictor
 from shipid.study import run, seals, store
 from shipid.study.check import check_folder
 from shipid.study.claims import UnitClaims
+from shipid.study.code import code_digest
 from shipid.study.contents import write_pages
-from shipid.study.plan import Plan, read_plan
+from shipid.study.plan import METHOD_CODE, Plan, read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.results import provenance_words, read_results
 from shipid.study.rotate import kept_folder
@@ -551,7 +552,7 @@ def test_a_folder_of_before_a_vessel_changed_names_the_vessel(tmp_path: Path) ->
     changes = {"truth.vessel": "ship.toml", "family.0.base": "ship.toml"}
     store.open_folder(folder, tiny_plan(tmp_path, changes))
     vessel.write_text('extends = "gunnerus-28.9"\n[inertia]\nm = 5e5\n')
-    words = f"holds the results of before {vessel} changed: choose another --out, or go on with the vessel as it was: "
+    words = f"holds results from before {vessel} changed: choose another --out, or go on with the vessel as it was: "
     with pytest.raises(ResultError) as caught:
         store.open_folder(folder, tiny_plan(tmp_path, changes))
     assert str(caught.value) == f"{folder}: {words}`shipid study resume {folder}`"
@@ -563,8 +564,48 @@ def test_a_folder_of_before_a_vessel_changed_names_the_vessel(tmp_path: Path) ->
 def test_a_folder_of_before_a_log_changed_names_the_log(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path)
     store.open_folder(tmp_path / "run", replace(plan, sources={"mapping": "a", "log": "b"}))
-    with pytest.raises(ResultError, match=r"of before the log of .*tiny\.toml changed: choose another --out$"):
+    with pytest.raises(
+        ResultError, match=r"results from before the log of .*tiny\.toml changed: choose another --out$"
+    ):
         store.open_folder(tmp_path / "run", replace(plan, sources={"mapping": "a", "log": "c"}))
+
+
+def refused(folder: Path, plan: Plan, stored: object = None, **record: object) -> str:
+    """What is said of a folder of the same document whose digest is another one, without the folder."""
+    store.open_folder(folder, plan)
+    entries = {**read_json(folder / store.PROVENANCE), "digest": "0" * 64, **record}
+    write_json(folder / store.PROVENANCE, {name: entry for name, entry in entries.items() if entry is not None})
+    if stored is not None:
+        write_json(folder / store.VESSELS, stored)
+    with pytest.raises(ResultError) as caught:
+        store.open_folder(folder, plan)
+    return str(caught.value).removeprefix(f"{folder}: ")
+
+
+@pytest.mark.parametrize("stored", [{"gunnerus-28.9": 3}, {"gunnerus-28.9": {}}, {}, 3])
+def test_a_folder_of_another_digest_with_damaged_vessels_says_so(tmp_path: Path, stored: object) -> None:
+    """It ended with an AttributeError, or said that the study is another one than itself."""
+    words = refused(tmp_path / "run", tiny_plan(tmp_path), stored)
+    assert words == f"{tmp_path / 'run' / 'vessels.json'}: damaged: run the study again into a new folder"
+
+
+def test_a_folder_of_another_version_says_so(tmp_path: Path) -> None:
+    """As where a method has another default since: it said that the study is another one than itself."""
+    plan = replace(tiny_plan(tmp_path), sources={"mapping": "a", "log": "b"})
+    here = f"{__version__}, code {code_digest()}"
+    made = "was made by another version of shipid"
+    words = refused(tmp_path / "a", plan, sessions=[{"shipid": "0.0.1, code 01234567"}])
+    assert words == f"{made} (0.0.1, code 01234567; this is {here}), whose defaults are others: choose another --out"
+    unknown = f"{made} (this is {here}), whose defaults are others: choose another --out"
+    assert refused(tmp_path / "b", plan) == unknown
+    assert refused(tmp_path / "c", plan, sources=None) == unknown  # says nothing of mapping and log
+    words = refused(tmp_path / "d", plan, sessions=[{"shipid": here}])
+    assert words.startswith("says that it is of another study, and holds this one: it was changed by hand, or a method")
+
+
+def test_a_folder_of_before_a_method_of_a_user_changed_names_the_method(tmp_path: Path) -> None:
+    words = refused(tmp_path / "run", tiny_plan(tmp_path), **{METHOD_CODE: {"own": "01234567"}})
+    assert words == "holds results from before the method 'own' changed: choose another --out"
 
 
 @pytest.mark.parametrize("at", ["note", "start", "cell"])
