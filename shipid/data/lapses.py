@@ -27,9 +27,7 @@ HELD = 3  # times as long as a zero an order is held before and after it
 SELDOM, OFTEN = 0.05, 0.02  # share of the rows that are zeros, and spikes, at most
 WIDE, GEAR = np.radians(47.0), np.radians(40.0)  # rad, no rudder is there; rad/s, no gear is faster
 STILL, TIMES, REST = 50, 10.0, 0.5  # rows; times nearly all other repetitions; share of rows in shorter ones, at least
-BOTH = np.radians(
-    20.0
-)  # by which the ship turns meanwhile, to each side: to one she turns as well by a helm that is held
+BOTH = np.radians(20.0)  # by which the ship turns meanwhile, to each side: to one she turns by a held helm, too
 TURNING = np.radians(5.0)  # by which she turns in `STILL` rows of another turn
 
 

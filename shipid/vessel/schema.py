@@ -203,7 +203,7 @@ def term_model(key: str) -> type[Block]:
 def _term_model(
     key: str, term: Term, commands: tuple[str, ...], memories: tuple[tuple[str, Memory], ...]
 ) -> type[Block]:
-    """The same, of what TERMS, SIGNALS and ACTUATORS hold now: a notebook may put another entry there."""
+    """Model of a term with these commands and kinds of actuator; kept by them, for a notebook may put in others."""
     group, kind = key.split(".")
     extra: dict[str, Any] = {"off": (bool, False)}
     if group not in FIXED:
@@ -276,13 +276,13 @@ def vessel_model(having: Collection[str] | None = None) -> type[BaseModel]:
     having : kinds of term that the document may have, as keys of TERMS, which are all by default.
     """
     terms = tuple(TERMS)
-    split_keys(terms)
+    split_keys(terms)  # refuses a key that is none
     return _vessel_model(tuple((key, term_model(key) if having is None or key in having else None) for key in terms))
 
 
 @cache
 def _vessel_model(models: tuple[tuple[str, type[Block] | None], ...]) -> type[BaseModel]:
-    """The same; models : of all keys of TERMS, in their order; None for a kind that the document may not have."""
+    """Model of a vessel document from models of terms, by key of TERMS; None for a kind that it may not have."""
     of = {key: model for key, model in models if model is not None}
     current: dict[str, Any] = {"kind": (Literal["uniform"], ...)}
     fields: dict[str, Any] = {
