@@ -46,10 +46,9 @@ def test_its_first_guess_is_judged_by_its_log(ship: Stranger) -> None:
     guess = first_guess(given, "guess", "guess.toml").vessel
     pace = sizes[0] / float(known["speed"])
     view = first_look(guess, ship.dataset, ship.dataset.runs, ahead=2.5 * pace, step=pace / 4)
-    assert np.isfinite([view.alone, view.constant]).all()
-    assert view.wrong == (bool(view.changes) or view.alone >= view.constant)
-    assert view.corrected <= view.alone
-    assert f"{view.constant:.3g} m" in view.sentence
+    assert np.isfinite([view.vessel_error, view.constant_error]).all()
+    assert view.wrong == (view.vessel_error >= view.constant_error or view.turning < 0)
+    assert f"{view.constant_error:.3g} m" in view.sentence
 
 
 @pytest.mark.parametrize("way", [1, -1], ids=["as it is", "mirrored"])

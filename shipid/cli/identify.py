@@ -259,7 +259,7 @@ def _with_interval(row: Any) -> str:
 
 
 def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
-    """Say what is off between vessel and log before anything is fitted, and draft the correction."""
+    """Say before anything is fitted whether the vessel predicts the log better than constant u, v, r."""
     from shipid.errors import DataError
     from shipid.identification.outcome import pick_runs, without_shared
     from shipid.study.first_look import first_look
@@ -267,7 +267,7 @@ def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], 
 
     log, fitted, _ = without_shared(log, *pick_runs(log, runs, test))
     try:
-        with steps("comparing the vessel as she is with the runs, before the fit"):
+        with steps("comparing the vessel as it is with the runs, before the fit"):
             ahead, step = proposed_horizon(ship, log)
             look = first_look(ship, log, fitted, ahead=ahead, step=step)
     except DataError:
@@ -277,10 +277,6 @@ def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], 
     else:
         answer.say(look.sentence)
     answer.say(first_look=look.sentence)
-    if look.changes:
-        answer.say("draft of a correction:")
-        patch = look.patch(str(ship.file))
-        answer.say(patch, correction=patch)
 
 
 def _widths(given: list[str]) -> list[str] | dict[str, Any]:

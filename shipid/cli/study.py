@@ -59,7 +59,7 @@ def study_new(
     """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
     from shipid.files import as_argument, check_new, write_new
     from shipid.schemas import with_schema
-    from shipid.study.new import draft_study, family_names
+    from shipid.study.new import draft_study
 
     file = out or Path(f"{stem(data or vessel[0])}-study.toml")
     check_new(file, "study")
@@ -75,14 +75,9 @@ def study_new(
             show_reasons(choices)
         for warning in draft.warnings:
             typer.echo(f"warning: {warning}", err=True)
-        names = family_names({named: look.vessel for named, look in draft.looks.items()})
-        for named, look in draft.looks.items():
+        for look in draft.looks.values():
             if not look.wrong:
                 answer.say(look.sentence)
-            elif look.changes:
-                answer.say(f"draft of a correction; in the study it is {names[named][1]}; as a patch:")
-                patch = look.patch(named)
-                answer.say(patch, correction=patch)
         models = [model.name for model in draft.plan.foundations]
         sentence = f"{draft.plan.cells} cells of {len(models)} foundations ({', '.join(models)}) -> {file}"
         answer.say(sentence, file=file, cells=draft.plan.cells, foundations=models, warnings=draft.warnings)

@@ -40,7 +40,6 @@ from tests.study.tiny import run_here
 FIRST, SHIPS = 20261122, 12
 GOAL, NEAR = 0.25, 1.3  # of constant u, v, r; of the true vessel, where that is above the goal
 FEWER = 3  # times as long between instants of prediction as in the study
-OFF = 2.0  # times the error of the corrected vessel: a guess that is wrong
 STAGES = ("vessel", "draft", "import", "check", "study", "report")
 WHOLE = "the study as written"  # a further stage, if asked for
 HORIZONS = {"1x": 1, "2x": 2}
@@ -114,7 +113,7 @@ def words_of(outcome: dict[str, Any]) -> dict[str, str]:
         if far in outcome:
             numbers = outcome[far]
             words[far] = (
-                f"{numbers['ahead']:g} s: alone {numbers['alone']:.2f}, corrected {numbers['corrected']:.2f}, "
+                f"{numbers['ahead']:g} s: alone {numbers['alone']:.2f}, "
                 f"compensated {numbers['compensated']:.2f}, without physics {numbers['none']:.2f}, true vessel "
                 f"{numbers['true']:.2f} of {numbers['constant']:.3g} m{'' if numbers['passed'] else ' MISSED'}"
             )
@@ -165,7 +164,7 @@ def _to_the_study(ship: RawStranger, desk: Desk) -> list[str]:
 
 def _judged(warnings: Sequence[str], numbers: dict[str, Any], said: list[str], silent: list[str]) -> None:
     """Whether the guess of the vessel is wrong, and whether `study new` says so."""
-    if numbers["alone"] > min(1.0, OFF * numbers["corrected"]):
+    if numbers["alone"] > 1.0:
         words = f"vessel: alone {numbers['alone']:.2f} of constant u, v, r"
         (said if any("constant u, v, r" in warning for warning in warnings) else silent).append(words)
 
@@ -201,7 +200,6 @@ def figures_of(ship: RawStranger, plan: Plan, folder: Path) -> dict[str, Any]:
     _, test, _ = partition(plan, imported)
     constant = float(position_error(constant_motion(test), test.future).mean())
     with_physics = cells[cells["family"] != "none"]
-    first, corrected = with_physics.iloc[0], with_physics[with_physics["family"].str.endswith("-corrected")]
     losses = [
         min((t["value"] for t in trials if t["value"] is not None), default=np.inf) for trials in with_physics["trials"]
     ]
@@ -212,8 +210,7 @@ def figures_of(ship: RawStranger, plan: Plan, folder: Path) -> dict[str, Any]:
     paths = physics.paths(seen.instants(known=True, hidden=window_memory(ship.truth, known, seen)))
     true = float(position_error(paths, seen.future).mean())
     numbers = {
-        "ahead": test.horizon * test.step, "constant": constant, "alone": first["A"] / constant,
-        "corrected": (corrected.iloc[0] if len(corrected) else first)["A"] / constant,
+        "ahead": test.horizon * test.step, "constant": constant, "alone": with_physics.iloc[0]["A"] / constant,
         "compensated": best["H"] / constant, "family": str(best["family"]), "true": true / constant,
         "none": float(cells[cells["family"] == "none"]["H"].min()) / constant,
     }  # fmt: skip

@@ -97,4 +97,4 @@ def test_the_look_before_the_fit_says_what_it_does_when_it_takes_long(
     monkeypatch.setattr(first_look, "first_look", slow)
     dataset = trials(load_vessel("gunnerus-28.9"), runs=2, steps=30)
     identify._look(load_vessel("gunnerus-28.9"), dataset, (), (), Answer(False))
-    assert "comparing the vessel as she is with the runs, before the fit" in capsys.readouterr().err
+    assert "comparing the vessel as it is with the runs, before the fit" in capsys.readouterr().err

@@ -11,7 +11,6 @@ import pytest
 from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
 from shipid.study.kinds import STOPPED, kinds_of, seen_kind
 from shipid.study.prepare import obtain
-from shipid.study.survey import typical_runs
 from tests.study.tiny import logged, tiny_plan
 
 T = np.arange(0.0, 200.0)
@@ -68,16 +67,6 @@ def test_a_simulated_run_is_of_the_kind_that_was_drawn(tmp_path: Path) -> None:
     for block, kind in zip(blocks, ["zigzag", "turning", "turning", RANDOM, RANDOM], strict=True):
         plan = tiny_plan(tmp_path, {"truth.manoeuvre": [block], "truth.manoeuvres": 10})
         assert set(kinds_of(obtain(plan)).values()) == {kind}
-
-
-def test_every_kind_reaches_the_test() -> None:
-    kinds = ["zigzag"] * 4 + [RANDOM] * 4 + [COASTING] * 3 + ["stop"]
-    frame = pd.DataFrame(
-        {"kind": kinds, "duration": np.arange(12.0) + 100, "speed": 4.0, "rate": 0.02, "helm": 0.2}
-        | {"whole": True, "sound": True},
-        index=[f"run {number}" for number in range(12)],
-    )
-    assert set(frame.loc[typical_runs(frame), "kind"]) == {"zigzag", RANDOM, COASTING}
 
 
 def test_the_motion_of_the_test_says_nothing_of_other_runs() -> None:
