@@ -1,4 +1,4 @@
-"""A vessel against its log, before any study: does it predict better than constant u, v, r?
+"""A vessel against its log, before any study: whether it predicts better than constant u, v, r.
 
 The vessel starts from recorded instants with the recorded commands. Its mean position error over the horizon stands
 beside that of constant u, v, r, and how far it turns and how fast it gets beside the motion of the ship.
@@ -53,9 +53,7 @@ class Look:
                   (self.turning, "it turns {:.2g} times as far"))  # fmt: skip
         seen = "; ".join([errors, *(words.format(share) for share, words in shares if np.isfinite(share))])
         if self.turning < 0:
-            return (
-                f"{name} turns the other way than the ship of the log: check the signs of angles and yaw rate; {seen}"
-            )
+            return f"{name} turns the other way than the ship of the log: check the signs of angles and yaw; {seen}"
         how = "is no better than" if self.wrong else "is better than"
         return f"{name} {how} constant u, v, r: {seen}"
 

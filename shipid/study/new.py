@@ -48,6 +48,7 @@ WIND, WIND_LENGTH = 6.0, 28.9  # m/s, m: up to a moderate breeze on R/V Gunnerus
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
 STEP_PARTS = (1, 2, 4, 8)  # of the step: a small craft is stiff in yaw
 STEPS, LOGGED_STEPS, LONGEST_STEP = 15, 30, 2.0  # steps ahead at least, of constant and of recorded orders; s
+SCATTER = 0.01  # of the way: less does not show beside errors of prediction, some hundredths of it
 GROWING = 2**0.75  # times as far apart after twice the time: jitter 1, scatter that adds up sqrt(2), a wrong speed 2
 FEW_RUNS, FOLDS = 6, 3
 MANOEUVRES, TESTS, INSTANTS = 60, 10, 50  # method, section 4, with a fifth of its instants
@@ -175,7 +176,7 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     seen = Survey(seen.runs.loc[usable], seen.step, seen.failed)
     tests = typical_runs(seen)
     others = [name for name in usable if name not in tests]
-    true_path = _true_path(dataset, ahead)
+    true_path = _true_path(dataset, ahead, seen.speed)
     interval = max(step, seen.step, _round_down(2.5 * float(seen.runs["duration"].sum()) / MOST_WINDOWS))
     why += f"; too short for it: {', '.join(short)}" if short else ""
     fixed = [
@@ -213,8 +214,8 @@ def _already_seen(families: Sequence[Mapping[str, Any]], tests: Sequence[str]) -
     for family in families:
         runs = [run for run in family.get("seen", []) if run in tests]
         if runs and family["name"] != INACCURATE:
-            words = f"{family['name']} was identified from {', '.join(runs)}"
-            yield f"{words}, which now {plural(len(runs), 'tests', 'test')} it: choose other test runs, or let the study identify ([family.identify])"
+            words = f"{family['name']} was identified from {', '.join(runs)}, which now tests it"
+            yield f"{words}: choose other test runs, or let the study identify ([family.identify])"
 
 
 def _failed_checks(seen: Survey, data: Path) -> list[str]:
@@ -282,7 +283,7 @@ def _log_in_words(seen: Survey, dataset: Dataset) -> str:
     """How many runs of which kinds, how long and how fast."""
     runs = seen.runs
     kinds = ", ".join(f"{kind} {count}" for kind, count in Counter(runs["kind"]).most_common())
-    times, speeds = (f"{runs[name].min():.2g} to {runs[name].max():.2g}" for name in ("duration", "speed"))
+    times, speeds = (f"{runs[name].min():.3g} to {runs[name].max():.3g}" for name in ("duration", "speed"))
     return f"{len(runs)} runs ({kinds}) of {times} s at {speeds} m/s, {len(dataset.frame)} rows"
 
 
@@ -297,12 +298,12 @@ def _inputs_in_words(vessels: Mapping[str, Vessel], dataset: Dataset) -> str:
     return "; ".join([*parts, f"{estimated} are estimated from positions and heading"] if estimated else parts)
 
 
-def _true_path(dataset: Dataset, ahead: float) -> Choice:
+def _true_path(dataset: Dataset, ahead: float, speed: float) -> Choice:
     """The true path: positions, unless they scatter where the integral of the velocities does not."""
     half, whole = (separation(dataset, lag) for lag in (ahead / 2, ahead))
     apart = f"positions and the integral of u, v, psi part by {half:.2g} m in {ahead / 2:g} s"
     apart += f", {whole:.2g} m in {ahead:g} s"
-    if whole < GROWING * half:
+    if whole < GROWING * half and whole > SCATTER * speed * ahead:
         return Choice("data.path", "velocity", f"{apart} (RMS): it grows as positions that scatter do")
     return Choice("data.path", "position", f"{apart} (RMS): positions do not scatter")
 
