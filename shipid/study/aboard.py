@@ -5,44 +5,31 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from shipid.data.causal import causal_columns
-from shipid.data.dataset import Dataset, clock_slack, pieces, sample
-from shipid.data.windows import (
-    Instants,
-    coarse_in_words,
-    from_frame,
-    gaps_in_words,
-    past_of,
-    true_path,
-    without_rows,
-)
+from shipid.data.dataset import Dataset, clock_slack, pieces
+from shipid.data.windows import coarse_in_words, gaps_in_words
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError
 from shipid.files import check_table, write_table
-from shipid.hybrid.bands import Bands, Region, at_level
+from shipid.hybrid.bands import Region
 from shipid.hybrid.physics import assumed, check_columns
 from shipid.logs.dates import span_of
 from shipid.metrics import share_of
-from shipid.observer import observe
 from shipid.predictor import Predictor
 from shipid.report.content import Line
-from shipid.study.apply import Band, along_run, dataset_of
+from shipid.study.apply import Band, Forecast, dataset_of, instants_along, predict_instants, tables_along
 from shipid.study.bands import share_interval
-from shipid.study.prepare import states_along
 from shipid.study.store import read_predictor
 from shipid.units import length_text, level_text, listed, percent, plural
 
 Array = np.ndarray
 TRACK = ["run", "t", "north", "east"]
 AHEAD = 5  # moments of the horizon that the summary shows
-CHANGED = "the ship, her loading or the weather is not that of the training, and bands do not hold"
+CHANGED = "the ship, its loading or the weather is not that of the training, and bands do not hold"
 UNPLANNED = "later orders were not known as they were in calibration"
-STANDARD = (0.5, 0.8, 0.9, 0.95)  # levels that the summary judges beside the one that was asked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +44,7 @@ class Played:
     assumed : what the vessel feels and the log does not hold; it is 0.
     skipped : instants at which a prediction was due before there was a past.
     plan : whether orders were taken as held where the predictor knows a plan.
-    band : what was asked of the band; None: none was asked. bands : of the predictor, where it has some.
+    band : what was asked of the band; None: none was asked.
     track : run, t [s], north, east [m] as measured, for a page. gaps : times without rows, in words. coarse : that rows
         are farther apart than the step, in words.
     """
@@ -70,7 +57,6 @@ class Played:
     assumed: tuple[str, ...]
     plan: bool
     band: Band | None = None
-    bands: Bands | None = None
     track: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=TRACK))
     gaps: str = ""
     coarse: str = ""
@@ -107,13 +93,16 @@ def play(
         check_columns(vessel, names, str(log))
     if every is not None and not every > 0:
         raise DataError(f"{every:g}: must be above 0", path="--every")
-    rows, paths, skipped = [], [], 0
+    instants, points, skipped = [], [], 0
     for run, piece in pieces(dataset):
-        instants = _along(predictor, dataset, run, piece.reset_index(drop=True), every or step, band)
-        rows += instants[0]
-        paths += instants[1]
-        skipped += instants[2]
-    if not rows:
+        rows, early = _due_rows(piece["t"].to_numpy(), every or step, predictor.past * step)
+        skipped += early
+        if len(rows):
+            forecast, latency = _forecast_row_by_row(predictor, dataset, piece, rows, band)
+            path, seen = tables_along(predictor, run, piece, forecast, band)
+            points.append(path)
+            instants.append(seen.assign(latency=latency))
+    if not instants:
         past = predictor.past * step
         if every is not None and any(np.ptp(piece["t"]) >= past for _, piece in pieces(dataset)):
             message = f"{every:g}: no instant so many s apart has the past of {past:g} s that the predictor needs"
@@ -121,112 +110,44 @@ def play(
         raise DataError(f"no run is as long as the past of {past:g} s that the predictor needs", file=log)
     missing = () if vessel is None else tuple(assumed(vessel, names))
     return Played(
-        pd.DataFrame(rows), pd.concat(paths, ignore_index=True), step, predictor.physics.horizon, skipped, missing,
-        predictor.commands == "known", band, predictor.bands, dataset.frame[TRACK], gaps_in_words(dataset, step),
+        *(pd.concat(tables, ignore_index=True) for tables in (instants, points)), step, predictor.physics.horizon,
+        skipped, missing,
+        predictor.commands == "known", band, dataset.frame[TRACK], gaps_in_words(dataset, step),
         coarse_in_words(dataset, step),
     )  # fmt: skip
 
 
-def _along(
-    predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, every: float, band: Band | None
-) -> tuple[list[dict[str, object]], list[pd.DataFrame], int]:
-    """Predictions along one unbroken stretch; at how many instants that were due there was no past yet."""
-    t = rows["t"].to_numpy()
-    slack = clock_slack(t)
-    entries: list[dict[str, Any]] = []
-    paths, skipped, due = [], 0, t[0]
-    for i in range(len(t)):
-        if t[i] < due - slack:
-            continue
-        due = max(due + every, t[i] + slack)
-        if t[i] - t[0] < predictor.past * predictor.physics.step - slack:
-            skipped += 1
-            continue
+def _due_rows(t: Array, every: float, past: float) -> tuple[list[int], int]:
+    """Rows at which a prediction is due and has its past [s], and how many due ones have none."""
+    slack, due, rows = clock_slack(t), t[0], []
+    for i, now in enumerate(t):
+        if now >= due - slack:
+            rows.append(i)
+            due = max(due + every, now + slack)
+    ready = [i for i in rows if t[i] - t[0] >= past - slack]
+    return ready, len(rows) - len(ready)
+
+
+def _forecast_row_by_row(
+    predictor: Predictor, dataset: Dataset, piece: pd.DataFrame, rows: list[int], band: Band | None
+) -> tuple[Forecast, list[float]]:
+    """Predictions at some rows of one unbroken stretch, each from the rows up to it, and the latency [s] of each."""
+    forecasts, latency = [], []
+    for i in rows:
         begin = time.perf_counter()
-        instants = known_at(predictor, dataset, rows.iloc[: i + 1])
-        predicted = predictor.predict(instants)[:, 0]
-        alone = predictor.alone(instants)[:, 0] if predictor.vessel is not None else np.full_like(predicted, np.nan)
-        region = None if band is None else predictor.band(predicted[:, None], instants, band.level, kind=band.kind)
-        latency = time.perf_counter() - begin
-        outside = bool(predictor.outside({**instants.columns, **instants.estimates})[0])
-        points, error, reach = _judged(predictor, rows, i, predicted, alone, region)
-        points.insert(0, "run", run)
-        points.insert(1, "t", t[i])
-        paths.append(points)
-        entries.append({"run": run, "t": float(t[i]), "outside": outside, "latency": latency, "error": error})
-        if band is not None:
-            entries[-1]["reach"] = reach
-    if band is not None and entries:
-        _adapt(predictor, entries, paths, band)
-    return entries, paths, skipped
-
-
-def _adapt(predictor: Predictor, instants: list[dict[str, Any]], paths: list[pd.DataFrame], band: Band) -> None:
-    """Give each instant the factor of its band, and scale the bands of the paths with it."""
-    assert predictor.bands is not None
-    factors = np.ones(len(instants))
-    if band.rate is not None:
-        now = np.array([instant["t"] for instant in instants])
-        reach = np.array([instant["reach"] for instant in instants])
-        ends = now + predictor.physics.horizon * predictor.physics.step
-        factors = along_run(reach, ends, now, band, predictor.bands.table(band.kind))
-    for instant, points, factor in zip(instants, paths, factors, strict=True):
-        instant["factor"] = float(factor)
-        points[["band_along", "band_across"]] *= factor
-
-
-def known_at(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame) -> Instants:
-    """What is known at the last of some rows of one stretch, from them alone.
-
-    Fixes that were interpolated, the past, the actuators and the observer are all taken from these rows.
-    """
-    physics = predictor.physics
-    seen = Dataset(rows.reset_index(drop=True), dataset.metadata)
-    if predictor.causal:
-        seen = causal_columns(seen, predictor.causal)
-    last = seen.frame["t"].to_numpy()[-1:]
-    columns = sample(seen.frame, last) | {"t": last}
-    hidden = estimates = None
-    if predictor.vessel is not None:
-        along = states_along(predictor.vessel, dataset.commands, seen.frame)
-        hidden = along and {name: values[-1:] for name, values in along.items()}
-        if physics.observer is not None:
-            observed = observe(predictor.vessel, seen, physics.observer).columns
-            estimates = {name: values[-1:] for name, values in observed.items()}
-    planned = None
-    if predictor.commands == "known":
-        planned = {name: np.tile(columns[name], (physics.horizon, 1)) for name in dataset.commands}
-    past = past_of(seen.frame, last, predictor.past, physics.step, physics.path)
-    return Instants(columns, past, planned, hidden, estimates or {})
-
-
-def _judged(
-    predictor: Predictor, rows: pd.DataFrame, i: int, predicted: Array, alone: Array, region: Region | None
-) -> tuple[pd.DataFrame, float, float]:
-    """Points of a path in north-east with errors and band, the error at the end, and the greatest over the band.
-
-    What the log does not hold is not a number.
-    """
-    physics, t = predictor.physics, rows["t"].to_numpy()
-    ahead = physics.step * np.arange(1, physics.horizon + 1)
-    origin = tuple(float(rows[name].iloc[i]) for name in ("north", "east", "psi"))
-    table: dict[str, Array] = {"ahead": ahead}
-    for prefix, path in (("", predicted), ("physics_", alone)):
-        table[f"{prefix}north"], table[f"{prefix}east"] = from_frame(path[:, 0], path[:, 1], *origin)
-    later = t[i] + ahead
-    there = (later <= t[-1] + clock_slack(t)) & ~without_rows(t, later, physics.step)
-    missed = np.full((physics.horizon, 2), np.nan)
-    if there.any():
-        shown = np.append(t[i], later[there])
-        true = true_path(rows, shown, sample(rows, shown), physics.path, longest=physics.step)[1:]
-        missed[there] = true - predicted[there]
-    error, reach = np.hypot(*missed.T), np.nan
-    if region is not None:
-        course = np.arctan2(region.ahead[:, 0, 1], region.ahead[:, 0, 0]) + origin[2]
-        table |= {"band_along": region.along[:, 0], "band_across": region.across[:, 0]}
-        table["band_course"] = np.mod(course, 2 * np.pi)
-        reach = float(region.reach(missed[:, None]).max())
-    return pd.DataFrame({**table, "error": error}), float(error[-1]), reach
+        known = instants_along(predictor, dataset, piece.iloc[: i + 1], slice(i, i + 1), plan=False)
+        forecasts.append(predict_instants(predictor, known, band))
+        latency.append(time.perf_counter() - begin)
+    regions = [one.region for one in forecasts if one.region is not None]
+    names = ("ahead", "along", "across")
+    parts = [np.concatenate([getattr(region, name) for region in regions], axis=1) for name in names] if regions else []
+    return Forecast(
+        np.concatenate([one.predicted for one in forecasts], axis=1),
+        np.concatenate([one.alone for one in forecasts], axis=1),
+        Region(*parts) if regions else None,
+        np.concatenate([one.outside for one in forecasts]),
+        {name: np.concatenate([one.columns[name] for one in forecasts]) for name in forecasts[0].columns},
+    ), latency
 
 
 def write(played: Played, file: Path) -> None:
@@ -234,11 +155,6 @@ def write(played: Played, file: Path) -> None:
     check_table(file)
     kept = played.instants.drop(columns=["error", "reach"], errors="ignore").rename(columns={"factor": "band_factor"})
     write_table(file, played.points.merge(kept, on=["run", "t"], how="left"))
-
-
-def summary(played: Played) -> list[str]:
-    """Summary of a replay, as lines of text."""
-    return [line.text for line in summed_up(played)]
 
 
 def summed_up(played: Played) -> list[Line]:
@@ -280,9 +196,9 @@ def summed_up(played: Played) -> list[Line]:
 
 def _promise(played: Played) -> list[str]:
     """How often the band held whole paths, then by how much it adapted and its size ahead; none without a band."""
-    if played.band is None or played.bands is None:
+    if played.band is None:
         return []
-    lines = _held(played.instants, played.band, played.bands, f"{UNPLANNED}, or {CHANGED}" if played.plan else CHANGED)
+    lines = _held(played.instants, played.band, f"{UNPLANNED}, or {CHANGED}" if played.plan else CHANGED)
     if played.band.rate is not None:
         factors = played.instants["factor"]
         ends = factors.groupby(played.instants["run"], sort=False).last()[:5]
@@ -303,7 +219,7 @@ def _promise(played: Played) -> list[str]:
     return lines
 
 
-def _held(instants: pd.DataFrame, band: Band, bands: Bands, why: str) -> list[str]:
+def _held(instants: pd.DataFrame, band: Band, why: str) -> list[str]:
     """How often the band held the whole paths that can be judged, and why if that is fewer than was promised."""
     reach, outside = instants["reach"].to_numpy(), instants["outside"].to_numpy(dtype=bool)
     judged = np.isfinite(reach)
@@ -328,22 +244,7 @@ def _held(instants: pd.DataFrame, band: Band, bands: Bands, why: str) -> list[st
             same = share == percent(held[promised].mean())
             what = "that is" if same else f"in the mean over runs {share}, which is"
             lines[0] += f"; {what} fewer than {level_text(band.level)} by more than chance: {why}"
-        lines += _by_level(reach[promised], band, bands)
     return lines
-
-
-def _by_level(reach: Array, band: Band, bands: Bands) -> list[str]:
-    """How often bands of other levels held the paths of a reach, without alarm; none of a band that adapts."""
-    table = bands.table(band.kind)
-    usual = at_level(table, band.level)
-    if band.rate is not None or not usual > 0:
-        return []
-    levels = sorted(level for level in {*STANDARD, band.level} if bands.promises(level, band.kind))
-    shares = (
-        f"{level_text(level)} held {percent((reach <= float(at_level(table, level) / usual)).mean())}"
-        for level in levels
-    )
-    return [f"  by level, without alarm: {', '.join(shares)}"] if levels else []
 
 
 def _moments(points: pd.DataFrame) -> Array:

@@ -1,4 +1,4 @@
-"""Use a finished cell: its predictor along a log."""
+"""Roll a predictor along a log: each instant with what is known there, and each path beside how the log goes on."""
 
 from __future__ import annotations
 
@@ -14,15 +14,40 @@ from shipid.data.windows import Instants, coarse_in_words, from_frame, future_of
 from shipid.errors import DataError, ResultError, choices
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region, adapted, adaptive, factor
-from shipid.hybrid.physics import Physics, check_columns
+from shipid.hybrid.physics import check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
-from shipid.observer import Estimates, observe
+from shipid.observer import observe
 from shipid.predictor import Predictor
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file, read_predictor
 
 Array = np.ndarray
+PREDICTED = ("cooperative_north", "cooperative_east")
+
+
+@dataclass(frozen=True)
+class Band:
+    """Settings of a band along a log: its level, the kind of manoeuvre, and the rate at which it adapts, if any."""
+
+    level: float
+    kind: str | None = None
+    rate: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Predictions from S instants of one stretch, in the frame (11).
+
+    predicted, alone : paths (T, S, 2) [m], compensated and of the physics alone, NaN without physics.
+    region : of the band, where one was asked for. outside : the alarm (S,). columns : of the log at the instants.
+    """
+
+    predicted: Array
+    alone: Array
+    region: Region | None
+    outside: Array
+    columns: dict[str, Array]
 
 
 def predict_log(
@@ -59,20 +84,31 @@ def predict_log(
     dataset = dataset_of(log, mapping)
     if predictor.vessel is not None:
         check_columns(predictor.vessel, dataset.frame.columns, str(log))
-    if predictor.causal:
-        dataset = causal_columns(dataset, predictor.causal)
-    estimates = None
-    if predictor.vessel is not None and predictor.physics.observer is not None:
-        estimates = observe(predictor.vessel, dataset, predictor.physics.observer)
     band = None if level is None else Band(level, kind, rate)
-    parts = [_along(predictor, dataset, run, rows, estimates, band) for run, rows in pieces(dataset)]
-    frame = pd.concat(parts, ignore_index=True)
-    if frame.empty:
+    tables = [table_of_stretch(predictor, dataset, run, rows, band) for run, rows in pieces(dataset)]
+    parts = [table for table in tables if len(table)]
+    if not parts:
         raise DataError(_too_short(predictor), file=log)
+    frame = pd.concat(parts, ignore_index=True)
     write_table(out, frame)
     step = predictor.physics.step
     frame.attrs |= {"gaps": gaps_in_words(dataset, step), "coarse": coarse_in_words(dataset, step)}
     return frame, float(frame["outside"].mean())
+
+
+def table_of_stretch(
+    predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, band: Band | None = None
+) -> pd.DataFrame:
+    """The table of `predict_log` for one unbroken stretch; empty where no row has the past and the plan it needs."""
+    some = _usable_rows(predictor, rows["t"].to_numpy())
+    if some.start >= some.stop:
+        return pd.DataFrame()
+    forecast = predict_instants(predictor, instants_along(predictor, dataset, rows, some, plan=True), band)
+    points, instants = tables_along(predictor, run, rows, forecast, band)
+    points = points.drop(columns="error").rename(columns=dict(zip(("north", "east"), PREDICTED, strict=True)))
+    if band is not None and band.rate is not None:
+        points["band_factor"] = np.repeat(instants["factor"].to_numpy(), predictor.physics.horizon)
+    return points.assign(outside=np.repeat(forecast.outside, predictor.physics.horizon))
 
 
 def dataset_of(log: Path, mapping: str | None) -> Dataset:
@@ -80,15 +116,6 @@ def dataset_of(log: Path, mapping: str | None) -> Dataset:
     if mapping is None:
         return read_dataset(log, remedy=", or give the log itself with --mapping")
     return import_log(read_mapping(mapping), log)
-
-
-@dataclass(frozen=True)
-class Band:
-    """Settings of a band along a log: its level, the kind of manoeuvre, and the rate at which it adapts, if any."""
-
-    level: float
-    kind: str | None = None
-    rate: float | None = None
 
 
 def _too_short(predictor: Predictor) -> str:
@@ -110,76 +137,96 @@ def _known_cell(folder: Path, cell: str) -> Path:
     return cell_file(folder, cell)
 
 
-def _along(
-    predictor: Predictor,
-    dataset: Dataset,
-    run: str,
-    rows: pd.DataFrame,
-    estimates: Estimates | None,
-    band: Band | None = None,
-) -> pd.DataFrame:
-    """Predictions from every instant of one unbroken stretch that has the past and the plan that they need."""
-    physics, t = predictor.physics, rows["t"].to_numpy()
-    slack = clock_slack(t)
-    first = int((t < t[0] + predictor.past * physics.step - slack).sum())  # earlier instants have no whole past
-    last = len(t)
-    ahead = physics.step * np.arange(physics.horizon)
-    if predictor.commands == "known":
-        last = int((t + ahead[-1] <= t[-1] + slack).sum())  # later instants have no whole plan
-    count = last - first
-    if count <= 0:
-        return pd.DataFrame()
+def _usable_rows(predictor: Predictor, t: Array) -> slice:
+    """Rows of one unbroken stretch at t (N,) [s] that have the past and the plan that the predictor needs."""
+    physics, slack = predictor.physics, clock_slack(t)
+    first = int((t < t[0] + predictor.past * physics.step - slack).sum())
+    plan = (physics.horizon - 1) * physics.step if predictor.commands == "known" else 0.0
+    return slice(first, int((t + plan <= t[-1] + slack).sum()))
+
+
+def instants_along(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame, some: slice, *, plan: bool) -> Instants:
+    """What is known at some rows of one stretch, from its rows alone; `rows` ends where knowledge ends.
+
+    Fixes that were interpolated, the past, the actuators and the observer are all taken from these rows.
+    plan : whether a predictor with known commands gets those that the rows hold later, or the present orders.
+    """
+    physics = predictor.physics
+    seen = Dataset(rows.reset_index(drop=True), dataset.metadata)
+    if predictor.causal:
+        seen = causal_columns(seen, predictor.causal)
+    t = seen.frame["t"].to_numpy()[some]
+    columns = sample(seen.frame, t) | {"t": t}
     planned = None
-    if predictor.commands == "known":
-        planned = in_force(rows, t[first:last] + physics.step * np.arange(physics.horizon + 1)[:, None])
-    hidden = None if predictor.vessel is None else states_along(predictor.vessel, dataset.commands, rows)
-    hidden = hidden and {name: values[first:last] for name, values in hidden.items()}
-    columns = {**sample(rows, t[first:last]), "t": t[first:last]}
-    past = past_of(rows, t[first:last], predictor.past, physics.step, physics.path)
-    known = {}
-    if estimates is not None:
-        places = rows.index.to_numpy()[first:last]
-        known = {name: values[places] for name, values in estimates.columns.items()}
-    instants = Instants(columns, past, planned, hidden, known)
-    origin, steps = (columns["north"], columns["east"], columns["psi"]), physics.horizon
-    result = {
+    if predictor.commands == "known" and plan:
+        planned = in_force(seen.frame, t + physics.step * np.arange(physics.horizon + 1)[:, None])
+    elif predictor.commands == "known":
+        planned = {name: np.tile(columns[name], (physics.horizon, 1)) for name in dataset.commands}
+    hidden, estimates = None, {}
+    if predictor.vessel is not None:
+        along = states_along(predictor.vessel, dataset.commands, seen.frame)
+        hidden = along and {name: values[some] for name, values in along.items()}
+        if physics.observer is not None:
+            observed = observe(predictor.vessel, seen, physics.observer).columns
+            estimates = {name: values[some] for name, values in observed.items()}
+    past = past_of(seen.frame, t, predictor.past, physics.step, physics.path)
+    return Instants(columns, past, planned, hidden, estimates)
+
+
+def predict_instants(predictor: Predictor, instants: Instants, band: Band | None) -> Forecast:
+    """Paths, band and alarm at some instants."""
+    alone = predictor.alone(instants)
+    predicted = predictor.predict(instants, alone)
+    region = None if band is None else predictor.band(predicted, instants, band.level, kind=band.kind)
+    outside = np.asarray(predictor.outside({**instants.columns, **instants.estimates}))
+    columns = {name: instants.columns[name] for name in ("t", "north", "east", "psi")}
+    return Forecast(predicted, alone if predictor.vessel else np.full_like(alone, np.nan), region, outside, columns)
+
+
+def tables_along(
+    predictor: Predictor, run: str, rows: pd.DataFrame, forecast: Forecast, band: Band | None
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Points and instants of a forecast along one unbroken stretch, all of whose rows are `rows`.
+
+    Points have run, t, ahead, physics_north, physics_east, north, east, error [m] where the log goes on; with a band
+    band_along, band_across, band_course. Instants have run, t, outside, and the error at the end of the horizon; with
+    a band reach, the greatest error of the whole path over the band as calibrated, and factor, by which it adapted.
+    """
+    physics, columns = predictor.physics, forecast.columns
+    steps, count = physics.horizon, len(columns["t"])
+    missed = _missed(predictor, rows, forecast)
+    error = np.hypot(missed[..., 0], missed[..., 1])
+    points = {
         "run": np.full(steps * count, run),
         "t": np.repeat(columns["t"], steps),
         "ahead": np.tile(physics.step * np.arange(1, steps + 1), count),
     }
-    alone = predictor.alone(instants)
-    predicted = predictor.predict(instants, alone)
-    if predictor.vessel is None:
-        alone = np.full_like(alone, np.nan)
-    for name, path in (("physics", alone), ("cooperative", predicted)):
-        north, east = from_frame(path[..., 0], path[..., 1], *origin)
-        result[f"{name}_north"], result[f"{name}_east"] = north.T.ravel(), east.T.ravel()
-    if band is not None:
-        region = predictor.band(predicted, instants, band.level, kind=band.kind)
+    for prefix, path in (("physics_", forecast.alone), ("", forecast.predicted)):
+        places = from_frame(path[..., 0], path[..., 1], columns["north"], columns["east"], columns["psi"])
+        points |= {f"{prefix}{name}": place.T.ravel() for name, place in zip(("north", "east"), places, strict=True)}
+    instants = {"run": run, "t": columns["t"], "outside": forecast.outside, "error": error[-1]}
+    if band is not None and forecast.region is not None:
+        region, reach, factors = forecast.region, forecast.region.reach(missed).max(axis=0), np.ones(count)
         if band.rate is not None:
             assert predictor.bands is not None
-            judged = _later(rows, t[first:last], predicted, region, physics)
-            table = predictor.bands.table(band.kind)
-            factors = along_run(judged, columns["t"] + physics.horizon * physics.step, columns["t"], band, table)
-            region, result["band_factor"] = region.scaled(factors), np.repeat(factors, steps)
+            ends, table = columns["t"] + steps * physics.step, predictor.bands.table(band.kind)
+            factors = along_run(reach, ends, columns["t"], band, table)
+        instants |= {"reach": reach, "factor": factors}
         course = np.arctan2(region.ahead[..., 1], region.ahead[..., 0]) + columns["psi"]
-        result["band_along"], result["band_across"] = region.along.T.ravel(), region.across.T.ravel()
-        result["band_course"] = np.mod(course, 2 * np.pi).T.ravel()
-    result["outside"] = np.repeat(predictor.outside({**columns, **known}), steps)
-    return pd.DataFrame(result)
+        points["band_along"], points["band_across"] = (
+            (axis * factors).T.ravel() for axis in (region.along, region.across)
+        )
+        points["band_course"] = np.mod(course, 2 * np.pi).T.ravel()
+    return pd.DataFrame(points | {"error": error.T.ravel()}), pd.DataFrame(instants)
 
 
-def _later(rows: pd.DataFrame, instants: Array, predicted: Array, region: Region, physics: Physics) -> Array:
-    """Greatest reach (S,) over the horizon of the paths that the log holds later; not a number where it ends before."""
-    t, horizon = rows["t"].to_numpy(), physics.horizon * physics.step
-    grid = instants + physics.step * np.arange(physics.horizon + 1)[:, None]
-    whole = (instants + horizon <= t[-1] + clock_slack(t)) & ~without_rows(t, grid, physics.step).any(axis=0)
-    reach = np.full(len(instants), np.nan)
-    if whole.any():
-        future = future_of(rows, instants[whole], physics.horizon, physics.step, physics.path)
-        some = Region(region.ahead[:, whole], region.along[:, whole], region.across[:, whole])
-        reach[whole] = some.reach(future - predicted[:, whole]).max(axis=0)
-    return reach
+def _missed(predictor: Predictor, rows: pd.DataFrame, forecast: Forecast) -> Array:
+    """How far paths are from how the log goes on (T, S, 2) [m]; not a number where it holds no rows."""
+    physics, t, now = predictor.physics, rows["t"].to_numpy(), forecast.columns["t"]
+    later = now + physics.step * np.arange(1, physics.horizon + 1)[:, None]
+    there = (later <= t[-1] + clock_slack(t)) & ~without_rows(t, later, physics.step)
+    future = future_of(rows, now, physics.horizon, physics.step, physics.path)
+    return np.where(there[..., None], future - forecast.predicted, np.nan)
 
 
 def along_run(reach: Array, known_at: Array, now: Array, band: Band, table: Array) -> Array:
