@@ -202,7 +202,7 @@ def _compare(
 
 
 def _show_structures(compared: Compared, answer: Answer) -> None:
-    """Print errors on runs held out, standard manoeuvres, errors by side, and what to run next."""
+    """Print errors on runs held out, standard manoeuvres, and errors by side."""
     from math import degrees
 
     from shipid.identification.sides import HEADS, shown
@@ -241,7 +241,6 @@ def _show_structures(compared: Compared, answer: Answer) -> None:
         answer.rows("groups", compared.groups, table(list(HEADS), shown(compared.groups)))
     answer.say("\n".join(compared.sentences), sentences=list(compared.sentences))
     answer.rows("spread", compared.spread, None)
-    answer.rows("to_run_next", compared.programme, None)
     notes = compared.manoeuvres[(compared.manoeuvres["note"].fillna("") != "") & (compared.manoeuvres["measure"] == "")]
     warnings = [
         *compared.shared,

@@ -14,7 +14,7 @@ from shipid.report.content import PageContent, Sentence
 from shipid.report.page import page, write
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Table, decimals, figure, text
-from shipid.report.wording import counted, fixed, listed
+from shipid.report.wording import fixed, listed
 from shipid.units import decimals_for
 
 Row = Mapping[Any, Any]
@@ -30,7 +30,6 @@ class StructuresContent(PageContent):
     manoeuvres: pd.DataFrame
     spread: pd.DataFrame
     groups: pd.DataFrame
-    programme: pd.DataFrame
     chosen: str
     cautions: Mapping[str, str]
     ahead: float
@@ -167,18 +166,6 @@ def group_table(frame: pd.DataFrame, takeaway: str) -> Table | None:
     return Table("sides", "Errors by side, helm and speed", takeaway + more, head, [False, False, *[True] * 6], rows)
 
 
-def programme(content: StructuresContent) -> Table:
-    """Manoeuvres to run next."""
-    rows = [
-        [text(row["manoeuvre"]), figure(row["hours"], 2), figure(row["apart"], 1)]
-        for row in content.programme.to_dict("records")
-    ]
-    best = content.programme.iloc[0]
-    takeaway = f"The structures are farthest apart in: {best['manoeuvre']}."
-    head = ["manoeuvre", "time [h]", "apart [standard deviations]"]
-    return Table("programme", counted(len(rows), "candidate"), takeaway, head, [False, True, True], rows)
-
-
 SECTIONS: dict[str, Section] = {
     "structures": Section(
         "Which structure",
@@ -193,8 +180,5 @@ SECTIONS: dict[str, Section] = {
         anchors=("manoeuvres",),
     ),
     "sides": Section("Where it is wrong", lambda content: (groups(content),), needs=("groups",), anchors=("sides",)),
-    "next": Section(
-        "What to run next", lambda content: (programme(content),), needs=("programme",), anchors=("programme",)
-    ),
 }
 """Sections of the page in order."""

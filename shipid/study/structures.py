@@ -24,13 +24,11 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
 from shipid.files import write_new
 from shipid.identification.bands import Measure, bands, check_level, refusal
-from shipid.identification.design import Candidate, candidates, performed, recorded, steps_between
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
 from shipid.identification.outcome import (
     ERRORS_OF,
     TRIED,
     pick_runs,
-    residual_level,
     residual_spacing,
     unmeasured,
     unrecorded,
@@ -57,7 +55,6 @@ FOLDS = 3
 SIDES = ("starboard", "port")
 SHOWN = {"zigzag": ("overshoot 1", "overshoot 2"), "turning": ("advance", "tactical diameter")}
 """Kind of a standard manoeuvre -> measures shown, few of `COMPARED` of `identify`: each has a row a structure."""
-FIRST = 8  # manoeuvres to run next
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +85,6 @@ class Compared:
     beyond : sentences on manoeuvres that go farther than the data.
     groups : errors by side, helm and speed of the chosen structure on runs that the fit has not seen.
     uneven : sentences on sides.
-    programme : `manoeuvre`, `hours`, `apart`: manoeuvres to run next, by how far apart the structures are in them, in
-        standard deviations of the residuals; empty where only one structure was fitted.
     """
 
     vessel: Vessel
@@ -108,7 +103,6 @@ class Compared:
     beyond: tuple[str, ...]
     groups: pd.DataFrame
     uneven: tuple[str, ...]
-    programme: pd.DataFrame
 
     @property
     def sentences(self) -> list[str]:
@@ -136,12 +130,6 @@ class Compared:
                 f"{worst['manoeuvre']}: {worst['least']:.3g} to {worst['greatest']:.3g} {worst['unit']}"
             )
         notes += [*self.beyond, *self.uneven]
-        if len(self.programme):
-            first = self.programme.iloc[0]
-            notes.append(
-                f"to run next: {first['manoeuvre']}, in which the structures are {first['apart']:.2g} standard "
-                "deviations of the residuals apart"
-            )
         return notes
 
     def document(self) -> str:
@@ -231,7 +219,6 @@ def compare_structures(
     reach = reach_of(vessel, dataset, fitted)
     manoeuvres, far = _manoeuvres(fits, chosen, reach, equal, level)
     groups = by_group(series[chosen], chosen, fits[chosen].vessel, dataset)
-    report("manoeuvres to run next")
     return Compared(
         vessel=vessel,
         runs=fitted,
@@ -249,7 +236,6 @@ def compare_structures(
         beyond=far,
         groups=groups,
         uneven=uneven(groups),
-        programme=_programme(dataset, fitted, fits, chosen, table),
     )
 
 
@@ -346,32 +332,28 @@ def _table(
     known = sorted(counts, key=lambda name: float(means["folds", name]["position"]))
     best = known[0]
     sound = [name for name in known if np.isfinite(list(position[name].values())).all()]
-    intervals: dict[str, tuple[float, float]] = {}
-    worse: set[str] = set()
+    between, worse = dict.fromkeys(known, (np.nan, np.nan)), set[str]()
     if best in sound and len(sound) > 1:
         apart = np.array([[position[name][run] - position[best][run] for run in fitted] for name in sound[1:]])
         differences = contrasts(apart, np.ones(len(fitted)))
-        intervals = dict(
-            zip(sound[1:], zip(differences.low.tolist(), differences.high.tolist(), strict=True), strict=True)
-        )
+        between |= dict(zip(sound[1:], np.stack([differences.low, differences.high], axis=1).tolist(), strict=True))
         worse = {name for name, behind in zip(sound[1:], shown(differences.above), strict=True) if behind}
-    rows: list[dict[str, Any]] = []
-    for name in known:
-        low, high = intervals.get(name, (np.nan, np.nan))
-        here = means["folds", name]
-        rows.append(
-            {
-                "structure": name,
-                "numbers": counts[name],
-                **{signal: float(here[signal]) for signal in ERRORS_OF},
-                "test": float(means["test", name]["position"]) if ("test", name) in means else np.nan,
-                "more": float(here["position"] - means["folds", best]["position"]) if name in sound else np.inf,
-                "low": low,
-                "high": high,
-                "equal": name == best or (name in sound and name not in worse),
-                "note": "" if name in sound else "diverges on a run that was held out",
-            }
-        )
+    rows: list[dict[str, Any]] = [
+        {
+            "structure": name,
+            "numbers": counts[name],
+            **{signal: float(means["folds", name][signal]) for signal in ERRORS_OF},
+            "test": float(means["test", name]["position"]) if ("test", name) in means else np.nan,
+            "more": float(means["folds", name]["position"] - means["folds", best]["position"])
+            if name in sound
+            else np.inf,
+            "low": between[name][0],
+            "high": between[name][1],
+            "equal": name == best or (name in sound and name not in worse),
+            "note": "" if name in sound else "diverges on a run that was held out",
+        }
+        for name in known
+    ]
     nothing = dict.fromkeys((*ERRORS_OF, "test", "more", "low", "high"), np.nan)
     rows += [
         {"structure": name, "numbers": 0, **nothing, "equal": False, "note": notes[name]}
@@ -393,24 +375,20 @@ def with_gear(vessel: Vessel) -> Vessel:
 
 
 TRIALS = [(kind, angles, side) for kind, angles in TRIED for side in SIDES]
-
-
-def _title(kind: str, angles: Sequence[float], side: str) -> str:
-    return f"{kind} {'/'.join(f'{angle:g}' for angle in angles)} to {side}"
+TITLES = [f"{kind} {'/'.join(f'{angle:g}' for angle in angles)} to {side}" for kind, angles, side in TRIALS]
 
 
 def _measured(vessel: Vessel) -> dict[str, Measured]:
-    """Title -> every standard manoeuvre."""
-    ship, titles = with_gear(vessel), [_title(*trial) for trial in TRIALS]
+    """Title -> every standard manoeuvre that the vessel can perform."""
+    ship, done = with_gear(vessel), dict[str, Measured]()
     try:
-        return dict(zip(titles, measure_all(ship, TRIALS, engine="repeated"), strict=True))
-    except ShipidError:  # one of them: the others may be performed
-        done: dict[str, Measured] = {}
-        for trial, title in zip(TRIALS, titles, strict=True):
+        return dict(zip(TITLES, measure_all(ship, TRIALS, engine="repeated"), strict=True))
+    except ShipidError as error:  # one of them: the others may be performed
+        for trial, title in zip(TRIALS, TITLES, strict=True):
             with suppress(ShipidError):
                 done[title] = measure_all(ship, [trial], engine="repeated")[0]
         if not done:
-            raise
+            raise error
         return done
 
 
@@ -438,8 +416,8 @@ def _manoeuvres(
             known = {fit.vessel.digest: done}
             measures = [(title, _measure(title, known)) for title in done]
             frames = bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level).to_dict("records")
-        missing = [_title(*trial) for trial in TRIALS if _title(*trial) not in done]
-        rows += [{"manoeuvre": title, "measure": "", "structure": name, "note": "diverges"} for title in missing]
+        missing = {"measure": "", "structure": name, "note": "diverges"}
+        rows += [{"manoeuvre": title, **missing} for title in TITLES if title not in done]
         rows += [{"note": "", **row, "structure": name, "unit": units.get(row["measure"], "")} for row in frames]
     columns = ["manoeuvre", "measure", "unit", "structure", "value", "low", "high", "note"]
     return pd.DataFrame(rows, columns=columns), tuple(filter(None, far))
@@ -466,75 +444,13 @@ def _measure(title: str, known: dict[str, dict[str, Measured]]) -> Measure:
 
 def _spread(manoeuvres: pd.DataFrame, equal: Sequence[str]) -> pd.DataFrame:
     """Range of every measure over the structures that are equally good, and the greatest interval within one."""
-    rows = []
-    good = [row for row in manoeuvres.to_dict("records") if row["structure"] in equal and row["measure"]]
-    for manoeuvre, measure in dict.fromkeys((row["manoeuvre"], row["measure"]) for row in good):
-        of = [row for row in good if (row["manoeuvre"], row["measure"]) == (manoeuvre, measure)]
-        values = np.array([row["value"] for row in of], dtype=float)
-        wide = np.array([row["high"] - row["low"] for row in of], dtype=float)
-        least, greatest = (float(f(values)) if np.isfinite(values).any() else np.nan for f in (np.nanmin, np.nanmax))
-        rows.append(
-            {
-                "manoeuvre": manoeuvre,
-                "measure": measure,
-                "unit": of[0]["unit"],
-                "least": least,
-                "greatest": greatest,
-                "spread": greatest - least,
-                "width": float(np.nanmax(wide)) if np.isfinite(wide).any() else np.nan,
-            }
-        )
-    return pd.DataFrame(rows, columns=["manoeuvre", "measure", "unit", "least", "greatest", "spread", "width"])
-
-
-def _programme(
-    dataset: Dataset, runs: Sequence[str], fits: Mapping[str, Fitted], chosen: str, table: pd.DataFrame
-) -> pd.DataFrame:
-    """Manoeuvres in which the good structures are farthest apart; of one good structure and the next best."""
-    columns = ["manoeuvre", "hours", "apart"]
-    good = [str(name) for name in table.loc[table["equal"], "structure"]]
-    if len(good) < len((chosen, "another")):
-        good = [str(name) for name in table["structure"] if name in fits][:2]
-    if len(good) < 2:
-        return pd.DataFrame(columns=columns)
-    ship = with_gear(fits[chosen].vessel)
-    speed, limits = recorded(ship, dataset, runs)
-    settings, judged = fits[chosen].solution.settings, fits[chosen].statistics
-    deviations = {
-        name: settings.weights[name] * residual_level(judged, name) for name in "uvr" if name in settings.weights
-    }
-    try:
-        choice = candidates(ship, (speed / 2, speed), limits)
-        interval = settings.step
-        step = interval / steps_between(ship, interval)
-        logs = {name: _logs(with_gear(fits[name].vessel), choice, step, interval) for name in good}
-    except ShipidError:  # no shaft speed gives these speeds, or the ship has no length
-        return pd.DataFrame(columns=columns)
-    if not deviations:
-        return pd.DataFrame(columns=columns)
-    pairs = [(a, b) for i, a in enumerate(good) for b in good[i + 1 :]]
-    result = []
-    for number, one in enumerate(choice):
-        if not all(logs[name][number] for name in good):
-            continue
-        squares = [
-            np.mean([((logs[a][number][s] - logs[b][number][s]) / sd) ** 2 for s, sd in deviations.items()])
-            for a, b in pairs
-        ]
-        result.append((one.title, one.hours, float(np.sqrt(np.max(squares)))))
-    ranked = pd.DataFrame(result, columns=columns).sort_values("apart", ascending=False, ignore_index=True)
-    return ranked.head(FIRST)
-
-
-def _logs(vessel: Vessel, choice: Sequence[Candidate], step: float, interval: float) -> list[dict[str, Array]]:
-    """Motion of each candidate: u, v, r -> (N,); nothing for one that the vessel cannot perform."""
-    try:
-        log = performed(vessel, choice, step=step, interval=interval)
-    except ShipidError:
-        if len(choice) == 1:
-            return [{}]
-        return [_logs(vessel, [one], step, interval)[0] for one in choice]
-    return [{name: rows[name].to_numpy() for name in "uvr"} for _, rows in log.groupby("run", sort=False)]
+    good = manoeuvres[manoeuvres["structure"].isin(equal) & (manoeuvres["measure"] != "")]
+    good = good.assign(width=(good["high"] - good["low"]).astype(float), value=good["value"].astype(float))
+    spread = good.groupby(["manoeuvre", "measure"], sort=False, as_index=False).agg(
+        unit=("unit", "first"), least=("value", "min"), greatest=("value", "max"), width=("width", "max")
+    )
+    spread.insert(5, "spread", spread["greatest"] - spread["least"])
+    return spread
 
 
 def structures_content(compared: Compared, dataset: str | Path, command: str = "") -> StructuresContent:
@@ -548,7 +464,6 @@ def structures_content(compared: Compared, dataset: str | Path, command: str = "
         manoeuvres=compared.manoeuvres,
         spread=compared.spread,
         groups=compared.groups,
-        programme=compared.programme,
         chosen=compared.chosen,
         cautions={name: fit.caution for name, fit in compared.fits.items()},
         ahead=compared.ahead,

@@ -61,14 +61,13 @@ def test_the_answer_of_a_comparison_for_programs_has_all_that_is_shown(capsys: p
     compared = SimpleNamespace(
         vessel=load_vessel("gunnerus-28.9"), runs=("a", "b"), ahead=20.0, table=table, groups=[], sentences=["best"],
         manoeuvres=pd.DataFrame([diverges]), spread=pd.DataFrame([spread]), shared=("shared",), chosen="mmg",
-        programme=pd.DataFrame([{"apart": 3.0}]), fits={"mmg": SimpleNamespace(caution="wide")},
+        fits={"mmg": SimpleNamespace(caution="wide")},
     )  # fmt: skip
     answer = Answer(True)
     _show_structures(compared, answer)  # type: ignore[arg-type]
     said = ["shared", "intervals of mmg: wide", "mmg, turning 35 to port: diverges"]
     assert answer.contents["warnings"] == said
     assert answer.contents["spread"] == [spread]
-    assert answer.contents["to_run_next"] == [{"apart": 3.0}]
     assert capsys.readouterr().err.splitlines() == [f"warning: {one}" for one in said]
 
 

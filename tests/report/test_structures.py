@@ -12,9 +12,6 @@ from shipid.report.structures import SECTIONS, StructuresContent, group_table, w
 ROW = {"numbers": 18, "u": 0.01, "v": 0.01, "r": 0.001, "position": 0.1, "test": float("nan"), "note": ""}
 
 
-NEXT = [{"manoeuvre": "stop", "hours": 1.0, "apart": 3.0}]
-
-
 def content() -> StructuresContent:
     table = pd.DataFrame(
         [
@@ -31,14 +28,14 @@ def content() -> StructuresContent:
     spread = pd.DataFrame([{**same, "least": 20.0, "greatest": 20.0, "spread": 0.0, "width": 2.0}])
     return StructuresContent(
         title="a ship", name="ship", sentences=["a is best"], table=table, errors=errors, manoeuvres=manoeuvres,
-        spread=spread, groups=pd.DataFrame(), programme=pd.DataFrame(NEXT),
+        spread=spread, groups=pd.DataFrame(),
         chosen="a <b>", cautions={"b": "short horizon"}, ahead=30.0, level=0.95,
     )  # fmt: skip
 
 
 def test_the_page_shows_all_and_escapes_names(tmp_path: Path) -> None:
     text = write_structures(content(), tmp_path / "page.html").read_text()
-    for word in ("A is best.", "a &lt;b&gt;", "20.00 (19.00 … 21.00)", "short horizon", "0.050 … 0.200", "stop"):
+    for word in ("A is best.", "a &lt;b&gt;", "20.00 (19.00 … 21.00)", "short horizon", "0.050 … 0.200"):
         assert word in text
     assert "a <b>" not in text.replace("a <b>ship", "")
 
