@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,12 +29,8 @@ Plane = np.ndarray[Any, np.dtype[np.complex128]]
 GAP = 3.0  # usual steps: a longer one is a time without rows
 JITTER, FROZEN, OVERLAP = 0.05, 0.02, 0.5
 ROUGHER = 1.2  # times, on an uneven clock or on an even one: this one is wrong, by more than the noise hides
-CORRELATION, SCALE_ERROR, HEADING_ERROR, PATH_ERROR = 0.8, 0.1, 0.25, 0.05
+SCALE_ERROR, HEADING_ERROR, PATH_ERROR = 0.1, 0.25, 0.05
 TURNING = np.radians(0.2)  # rms of r under which a run is too straight to compare headings
-TURNS, NO_DRIFT = 0.3, 0.005  # of the largest r, from which on the ship turns; of u: no ship has so little sway there
-FEW_ROWS, FAR, BRIEF, CALM = 30, np.radians(240.0), 600.0, 1.0  # rows; turn of the ship; s; m/s
-WITH_HER, GUSTY = 0.45, 0.55  # of her speed, of the wind speed: less is distortion of the flow, and gusts
-STEADIER, UNSTEADY = 0.5, 0.25  # where it is so much steadier if taken for an apparent wind; of the wind speed
 STRETCH, WINDOW = 30.0, 10.0  # s
 SURE = 4.0  # standard errors beyond which a difference is no chance: one clean run in some ten thousand
 EXACT = 1e-4  # of a change: a smaller misfit is none
@@ -57,20 +53,16 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     Raises DataError for what is no dataset.
     """
     of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
-    by_run, shared = pieces_by_run(dataset), shares_clock(dataset)
-    whole = {run: _motion(pd.concat(stretches)) for run, stretches in by_run.items()}
-    headings = {run: [*_heading(stretches)] for run, stretches in by_run.items()}
-    contrary = any(not row["ok"] for heading in headings.values() for row in heading)
-    if contrary and _is_course(dataset.frame):
-        headings = {run: [*_of_course(headings[run], stretches)] for run, stretches in by_run.items()}
-    lapsed = _lapsed(dataset)
+    by_run = pieces_by_run(dataset)
+    motions = {run: _motion(stretches) for run, stretches in by_run.items()}
+    faulty = _faulty_commands(dataset)
     table = []
     for run, stretches in by_run.items():
-        heading = headings[run]
-        proved = {"r"} if _proves_rate(heading) else set()  # a small craft turns faster than any ship
-        results = [*_clock(stretches), *_ranges(stretches, proved), *heading, *_path(stretches), *_wind(stretches)]
-        results += [*_repetition(run, stretches, whole, shared), *lapsed.get(run, [])]
-        table += [{"run": run, **row} for row in results]
+        heading = [*_heading(stretches)]
+        rate_is_right = any(row["check"] == "heading scale" and row["ok"] and row["value"] for row in heading)
+        results = [*_clock(stretches), *_ranges(stretches, {"r"} if rate_is_right else set()), *heading]
+        results += [*_path(stretches), _frozen(stretches), _overlap(run, motions, shares_clock(dataset))]
+        table += [{"run": run, **row} for row in [*results, *faulty.get(run, [])]]
     return pd.DataFrame(table)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
 
 
@@ -142,7 +134,7 @@ def _ranges(stretches: list[pd.DataFrame], proved: set[str]) -> Iterator[dict[st
             yield _row(f"range {name}", largest, unit, row.plausible, sentence, ok=name in proved or None)
 
 
-def _lapsed(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
+def _faulty_commands(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
     """Run -> a failure for each command that lapses in it; what is usual for a command say all runs together."""
     parts = [*pieces(dataset)]
     psi = np.concatenate([np.unwrap(rows["psi"]) for _, rows in parts])
@@ -169,45 +161,6 @@ def _lapsed(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
             sentence = f"{name} {' and '.join(said)}: {where}. If it was not so, mend it in the mapping by {by}"
             found.setdefault(run, []).append(_row(f"lapses {name}", float(count), "1", 0.0, sentence, ok=ordered))
     return found
-
-
-def _wind(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
-    """Whether the true wind turns with the ship: of a steady wind W, logged as W + b e^(i psi), b is 0.
-
-    An apparent wind taken for a true one changes by more than gusts do. A wrong unit, or from and towards taken for
-    each other, leave a part of the ship's speed in b. Judged are parts of `BRIEF` in which the ship turns far, with a
-    wind that may drift; the worst one is reported.
-    """
-    found = []
-    for rows in stretches:
-        if "V_w" in rows:
-            part = ((rows["t"] - rows["t"].iloc[0]) // BRIEF).to_numpy()
-            found += [_turning_wind(rows[part == number]) for number in np.unique(part)]
-    yield from sorted((row for row in found if row is not None), key=lambda row: float(row["value"]))[-1:]
-
-
-def _turning_wind(rows: pd.DataFrame) -> dict[str, Any] | None:
-    psi = np.unwrap(rows["psi"].to_numpy())
-    if len(rows) < FEW_ROWS or np.ptp(psi) < FAR:
-        return None
-    t = rows["t"].to_numpy() - rows["t"].mean()
-    still, ship = np.stack([np.ones_like(t), t], axis=1), (rows["u"] + 1j * rows["v"]).to_numpy()
-    wind = rows["V_w"].to_numpy() * np.exp(1j * rows["beta_w"].to_numpy())
-
-    def left(values: Plane) -> float:
-        return float(np.std(values - still @ np.linalg.lstsq(still, values, rcond=None)[0]))
-
-    with_her = np.linalg.lstsq(np.column_stack([still, np.exp(1j * psi)]), wind, rcond=None)[0][2]
-    speed, mean = max(float(np.abs(ship).mean()), CALM), max(float(np.abs(wind).mean()), CALM)
-    apparent = min(left((sign * wind + moving) * np.exp(1j * psi)) for sign in (1, -1) for moving in (ship, 0 * ship))
-    moved = left(wind)
-    sentence = (
-        f"while the ship turns by {np.degrees(np.ptp(psi)):.0f} deg, the true wind changes by "
-        f"{100 * moved / mean:.0f} % (RMS), and {abs(with_her):.2g} m/s of it turn with her: relative, from or "
-        "towards, or unit wrong?"
-    )
-    most = UNSTEADY if apparent < STEADIER * moved else GUSTY
-    return _row("wind", max(abs(with_her) / speed / WITH_HER, moved / mean / most), "1", 1.0, sentence)
 
 
 def noise_of(values: Array) -> float:
@@ -253,7 +206,7 @@ def _turning(stretches: list[pd.DataFrame]) -> _Turning:
 
 
 def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
-    """Changes of psi over windows against the integral of r: correlation, scale, and the difference beyond the noise.
+    """Changes of psi over windows against the integral of r: scale, and the difference beyond the noise.
 
     A difference is reported where it is large and not made by noise: neither a noisy log in good order nor a small
     error of an exact one fails.
@@ -262,55 +215,24 @@ def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     if len(windows.seen) < 2:
         return
     size = rms(np.concatenate([rows["r"].to_numpy() for rows in stretches]))
-    change, ran = rms(windows.seen), rms(windows.integrated)
+    change = rms(windows.seen)
     if max(size, change / WINDOW) < TURNING:
-        yield _row("heading rate", 0.0, "1", 0.0, "too straight to compare heading and rate", ok=True)
+        yield _row("heading scale", 0.0, "1", 0.0, "too straight to compare heading and rate", ok=True)
         return
-    error = windows.seen - windows.integrated
-    noise = rms(windows.error)
-    count = len(error)
-    chance = noise * np.sqrt(1 + SURE * np.sqrt(2 / count))  # of a mean square of so many
-    noisy = rms(error) <= chance
-    correlation = float(np.mean(windows.seen * windows.integrated)) / (
-        change * ran or 1.0
-    )  # not centred: a steady turn counts
-    power = float(np.sum(windows.integrated**2))
-    scale = float(np.sum(windows.seen * windows.integrated)) / (power or 1.0)
-    spread = rms(windows.seen - scale * windows.integrated) / np.sqrt(power or 1.0)
-    words = "; wrong sign of r or psi?" if correlation < 0 else ""
-    sentence = f"changes of psi and integrals of r correlate by {correlation:.3f}{words}"
-    yield _row("heading rate", correlation, "1", CORRELATION, sentence, ok=noisy or correlation >= CORRELATION)
-    sentence = f"changes of psi are {scale:.3f} +- {spread:.2g} times the integral of r; degrees or another unit?"
+    error, noise = windows.seen - windows.integrated, rms(windows.error)
+    chance = noise * np.sqrt(1 + SURE * np.sqrt(2 / len(error)))  # of a mean square of so many
+    power = float(np.sum(windows.integrated**2)) or 1.0
+    scale = float(np.sum(windows.seen * windows.integrated)) / power
+    spread = rms(windows.seen - scale * windows.integrated) / np.sqrt(power)
+    words = "; wrong sign of r or psi?" if scale < 0 else "; degrees or another unit?"
+    sentence = f"changes of psi are {scale:.3f} +- {spread:.2g} times the integral of r{words}"
     limit = SCALE_ERROR + SURE * spread
-    yield _row("heading scale", scale, "1", limit, sentence, ok=noisy or abs(scale - 1) <= limit)
+    yield _row("heading scale", scale, "1", limit, sentence, ok=rms(error) <= chance or abs(scale - 1) <= limit)
     off, by_noise = np.degrees(rms(error)), np.degrees(noise)
     sentence = f"changes of psi leave the integral of r by {off:.2g} deg (RMS), {by_noise:.2g} by noise"
     yield _row("heading error", rms(error), "rad", HEADING_ERROR * change + chance, sentence)
     seen = [np.unwrap(rows["psi"]).astype(complex) for rows in stretches]
     yield from _latency("heading latency", "heading", "yaw rate", stretches, seen, [_turned(one) for one in stretches])
-
-
-def _is_course(frame: pd.DataFrame) -> bool:
-    """Whether the ship never drifts where she turns: psi looks like a course over ground."""
-    r, u, v = (frame[name].to_numpy() for name in ("r", "u", "v"))
-    turns = np.abs(r) > max(TURNING, TURNS * float(np.abs(r).max(initial=0.0)))
-    return bool(turns.sum() >= FEW_ROWS and rms(u[turns]) > 0 and rms(v[turns]) < NO_DRIFT * rms(u[turns]))
-
-
-def _of_course(heading: list[dict[str, Any]], stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
-    """The checks of a heading that looks like a course: that is said, and not that it is late, as a course is."""
-    yield from (row for row in heading if row["check"] != "heading latency")
-    u, v = (np.concatenate([rows[name].to_numpy() for rows in stretches]) for name in ("u", "v"))
-    share = rms(v) / max(rms(u), 1e-12)
-    sentence = f"v is {100 * share:.2g} % of u (RMS) although the ship turns: is psi the course over ground?"
-    yield _row("sway", share, "1", NO_DRIFT, sentence, ok=False)
-
-
-def _proves_rate(heading: list[dict[str, Any]]) -> bool:
-    """Whether the heading changes as the yaw rate says, so that the unit is right."""
-    value = {row["check"]: row["value"] for row in heading}
-    rate, scale = value.get("heading rate", 0.0), value.get("heading scale", 0.0)
-    return bool(rate >= CORRELATION and abs(scale - 1) <= SCALE_ERROR)
 
 
 def _turned(rows: pd.DataFrame) -> Plane:
@@ -460,51 +382,53 @@ class _Motion:
     lively: bool
 
 
-def _motion(rows: pd.DataFrame) -> _Motion:
+def _motion(stretches: list[pd.DataFrame]) -> _Motion:
+    rows = pd.concat(stretches)
     values = rows[["psi", "u", "v", "r"]].round(9)
     lively = (values.diff() != 0).all(axis=1).to_numpy()  # a ship at rest, or held steady, is the same everywhere
     keys = pd.util.hash_pandas_object(values, index=False).to_numpy()
     return _Motion(rows["t"].to_numpy(), keys, bool(lively.sum() >= 0.5 * len(rows)))
 
 
-def _repetition(
-    run: str, stretches: list[pd.DataFrame], whole: dict[str, _Motion], shared: bool
-) -> Iterator[dict[str, Any]]:
+def _frozen(stretches: list[pd.DataFrame]) -> dict[str, Any]:
+    """Share of the rows whose motion is that of the row before."""
     states = ["north", "east", "psi", "u", "v", "r"]
     same = np.concatenate([(rows[states].diff().iloc[1:] == 0).all(axis=1).to_numpy() for rows in stretches])
     frozen = float(same.mean()) if len(same) else 0.0
-    yield _row("frozen", frozen, "1", FROZEN, f"{100 * frozen:.3g} % of the rows repeat the row before")
-    others = ((_within(whole[run], rows, shared), name) for name, rows in whole.items() if name != run)
+    return _row("frozen", frozen, "1", FROZEN, f"{100 * frozen:.3g} % of the rows repeat the row before")
+
+
+def _overlap(run: str, motions: Mapping[str, _Motion], shared: bool) -> dict[str, Any]:
+    """Share of the rows of a run that another run has, too."""
+    others = ((_within(motions[run], one, shared), name) for name, one in motions.items() if name != run)
     double, other = max(others, default=(0.0, ""))
     where = f", most in {other!r}" if double > 0 else ""
-    yield _row("overlap", double, "1", OVERLAP, f"{100 * double:.3g} % of the rows belong to another run, too{where}")
+    sentence = f"{100 * double:.3g} % of the rows belong to another run, too{where}"
+    return _row("overlap", double, "1", OVERLAP, sentence)
 
 
 def copies(dataset: Dataset, runs: Iterable[str], others: Collection[str]) -> dict[str, str]:
     """Runs, and the one of some others with their motion in most rows: recorded twice, or cut from one log twice."""
-    whole = {run: _motion(pd.concat(parts)) for run, parts in pieces_by_run(dataset).items()}
-    every = np.concatenate([whole[other].keys for other in others] or [np.empty(0, np.uint64)])
-    found: dict[str, str] = {}
-    for run in runs:
-        if np.isin(whole[run].keys, every).mean() >= OVERLAP:  # of few runs: the others need no comparison one by one
-            share, other = max((_alike(whole[run], whole[other]), other) for other in others)
-            found |= {run: other} if share >= OVERLAP else {}
-    return found
+    return _copies_among(dataset, runs, list(others), grow=False)
 
 
 def repeated(dataset: Dataset, runs: Iterable[str]) -> dict[str, str]:
     """Runs, and the one of those before them with their motion in most rows, as in `copies`."""
-    whole = {run: _motion(pd.concat(parts)) for run, parts in pieces_by_run(dataset).items()}
-    names = list(runs)
-    sizes = [len(whole[name].keys) for name in names]
-    owner = np.repeat(np.arange(len(names)), sizes)
-    keys = np.concatenate([whole[name].keys for name in names] or [np.empty(0, np.uint64)])
-    _, first, place = np.unique(keys, return_index=True, return_inverse=True)
-    before = np.bincount(owner, owner[first][place] < owner, len(names)) / np.maximum(sizes, 1)
+    return _copies_among(dataset, runs, [], grow=True)
+
+
+def _copies_among(dataset: Dataset, runs: Iterable[str], earlier: list[str], *, grow: bool) -> dict[str, str]:
+    motions = {run: _motion(parts) for run, parts in pieces_by_run(dataset).items()}
+    known = {key for run in earlier for key in motions[run].keys.tolist()}
     found: dict[str, str] = {}
-    for k in np.flatnonzero(before >= OVERLAP):  # of few runs: the others need no comparison one by one
-        share, other = max((_alike(whole[names[k]], whole[name]), name) for name in names[:k])
-        found |= {names[k]: other} if share >= OVERLAP else {}
+    for run in runs:
+        keys = motions[run].keys.tolist()
+        if sum(key in known for key in keys) >= OVERLAP * len(keys) and earlier:  # of few runs: only then one by one
+            share, other = max((_alike(motions[run], motions[name]), name) for name in earlier)
+            found |= {run: other} if share >= OVERLAP else {}
+        if grow:
+            earlier.append(run)
+            known.update(keys)
     return found
 
 

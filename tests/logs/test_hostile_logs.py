@@ -174,7 +174,7 @@ WRONG_UNITS: dict[str, tuple[Write, str]] = {
     "speed in knots": (frame(lambda f: f.assign(u=f["u"].astype(float) / 0.514444)), "path"),
     "heading in radians": (frame(lambda f: f.assign(heading=np.radians(f["heading"].astype(float)))), "heading"),
     "rate in deg/s": (frame(lambda f: f.assign(rot=f["rot"].astype(float) / 60)), "heading scale"),
-    "rate to port": (frame(lambda f: f.assign(rot=-f["rot"].astype(float))), "heading rate"),
+    "rate to port": (frame(lambda f: f.assign(rot=-f["rot"].astype(float))), "heading scale"),
     "shaft in 1/s": (frame(lambda f: f.assign(rpm=1e4)), "range propeller.n"),
     "position in km": (frame(lambda f: f.assign(N=f["N"].astype(float) / 1e3, E=f["E"].astype(float) / 1e3)), "path"),
     "frozen": (frame(lambda f: f.iloc[np.arange(120) // 4 * 4].assign(time=T)), "frozen"),
