@@ -85,15 +85,13 @@ def check_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
         raise DataError(
             f"{vessel.name} predicts {predicted}; the data have {measured}: nothing to compare", path="--vessel"
         )
-    table = []
-    for row in compare_outputs(vessel, dataset).to_dict("records"):
-        scatter = row["error"] / max(row["predicted"], 1e-300)
-        off = f"(difference {100 * scatter:.2g} %)"
-        sentence = f"{row['output']} is {row['scale']:.3g} times what {vessel.name} predicts {off}"
-        words = "; wrong sign?" if row["scale"] < 0 else "; right unit, right size of the component?"
-        ok = scatter <= OFF
-        table.append({
-            "check": f"output {row['output']}", "run": row["run"], "value": scatter, "unit": "1", "limit": OFF,
-            "ok": ok, "sentence": sentence + ("" if ok else words),
-        })  # fmt: skip
-    return pd.DataFrame(table, columns=["check", "run", "value", "unit", "limit", "ok", "sentence"])
+    table = compare_outputs(vessel, dataset)
+    scatter = table["error"] / table["predicted"].clip(lower=1e-300)
+    ok = scatter <= OFF
+    words = np.where(table["scale"] < 0, "; wrong sign?", "; right unit, right size of the component?")
+    said = [
+        f"{row.output} is {row.scale:.3g} times what {vessel.name} predicts (difference {100 * off:.2g} %)"
+        for row, off in zip(table.itertuples(), scatter, strict=True)
+    ]
+    rows = {"check": "output " + table["output"], "run": table["run"], "value": scatter, "unit": "1", "limit": OFF}
+    return pd.DataFrame({**rows, "ok": ok, "sentence": np.array(said, dtype=object) + np.where(ok, "", words)})
