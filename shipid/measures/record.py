@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -97,25 +96,13 @@ class Measure:
     why: str = ""
 
 
-class Measures(Mapping[str, Measure]):
+class Measures(dict[str, Measure]):
     """Measures by name, in the order in which they were added."""
 
-    def __init__(self) -> None:
-        self._by_name: dict[str, Measure] = {}
-
-    def add(self, name: str, value: float, unit: str, why: str) -> None:
-        """Add a measure; `why` is kept only if the value is not finite."""
-        missing = not np.isfinite(value)
-        self._by_name[name] = Measure(NAN if missing else float(value), unit, why if missing else "")
-
-    def __getitem__(self, name: str) -> Measure:
-        return self._by_name[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._by_name)
-
-    def __len__(self) -> int:
-        return len(self._by_name)
+    def add(self, why: str, **values: tuple[float, str]) -> None:
+        """Add measures, each a value and its unit; `why` is the reason of those that are not finite."""
+        for name, (value, unit) in values.items():
+            self[name] = Measure(float(value), unit) if np.isfinite(value) else Measure(NAN, unit, why)
 
 
 def value_at(t: Array, values: Array, when: float) -> float:

@@ -81,17 +81,15 @@ def spiral(record: Record) -> Measures:
     flat = [_at_zero(helm, rate) for helm, rate in ways] if len(ways) == 2 else [NAN, NAN]
     apart = [_around_zero(rate, helm) for helm, rate in ways] if len(ways) == 2 else [NAN, NAN]
     why = "the rate does not change sign on the way there and on the way back, on levels that are steady"
-    measures.add("neutral_helm", (zero[0] + zero[1]) / 2, "rad", why)
     width, height, resolved = abs(zero[1] - zero[0]), abs(flat[1] - flat[0]), max(apart)
     if width < UNSETTLED * resolved:
         width = height = 0.0
-    measures.add("loop_width", width, "rad", why)
+    measures.add(why, neutral_helm=((zero[0] + zero[1]) / 2, "rad"), loop_width=(width, "rad"))
     branch = bool(np.isnan(zero).all() and flat[0] * flat[1] > 0)  # both ways may lie on one branch of a loop
     unknown = ONE_SIDE if branch else "the helm does not pass 0 on both ways"
-    measures.add("loop_height", NAN if branch else height, "rad/s", unknown)
-    measures.add("levels_apart", resolved if np.isfinite(apart).all() else NAN, "rad", why)
-    measures.add("levels", len(points.helm), "-", "")
-    measures.add("levels_not_steady", points.skipped, "-", "")
+    measures.add(unknown, loop_height=(NAN if branch else height, "rad/s"))
+    measures.add(why, levels_apart=(resolved if np.isfinite(apart).all() else NAN, "rad"))
+    measures.add("", levels=(len(points.helm), "-"), levels_not_steady=(points.skipped, "-"))
     return measures
 
 
@@ -142,9 +140,10 @@ def reverse_spiral(record: Record) -> Measures:
     helm, rate = points.helm[order], points.rate[order]
     both = len(rate) >= 3 and rate[0] < 0 < rate[-1]
     why = "there are no three steady rates to both sides"
-    measures.add("neutral_helm", float(np.interp(0.0, rate, helm)) if both else NAN, "rad", why)
-    width = float((np.maximum.accumulate(helm) - helm).max()) if both else NAN
-    measures.add("loop_width", width, "rad", why)
-    measures.add("levels_apart", float(np.diff(rate).max()) if both else NAN, "rad/s", why)
-    measures.add("levels", len(rate), "-", "")
+    neutral = width = apart = NAN
+    if both:
+        neutral, apart = float(np.interp(0.0, rate, helm)), float(np.diff(rate).max())
+        width = float((np.maximum.accumulate(helm) - helm).max())
+    measures.add(why, neutral_helm=(neutral, "rad"), loop_width=(width, "rad"), levels_apart=(apart, "rad/s"))
+    measures.add("", levels=(len(rate), "-"))
     return measures

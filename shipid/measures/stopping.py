@@ -16,22 +16,22 @@ def stop(record: Record) -> Measures:
         path, `head_reach` along the heading at the order, `lateral_deviation` to starboard of it [m]; `heading_change`
         [rad], > 0 to starboard.
     """
-    t, measures, why = record.t, Measures(), "the shaft is not ordered to stop or astern"
+    t, measures, never = record.t, Measures(), "the shaft is not ordered to stop or astern"
     astern = np.flatnonzero(record.shaft <= 0) if record.shaft is not None else np.empty(0, dtype=int)
     start = NAN
     if record.shaft is not None and len(astern):
         start = departure(t, record.shaft, int(astern[0])) if astern[0] else float(t[0])
     ahead, aside = record.along(start)
     end = crossing(t, record.u, 0.0, start, rising=False)
-    measures.add("execute", start, "s", why)
-    if np.isfinite(start):
-        measures.add("approach_speed", float(np.interp(start, t, record.speed)), "m/s", why)
-        why = "the ship still moves ahead when the log ends"
-    else:
-        measures.add("approach_speed", NAN, "m/s", why)
-    measures.add("stopping_time", end - start, "s", why)
-    measures.add("track_reach", integral(t, record.speed, start, end), "m", why)
-    measures.add("head_reach", value_at(t, ahead, end), "m", why)
-    measures.add("lateral_deviation", value_at(t, aside, end), "m", why)
-    measures.add("heading_change", value_at(t, record.psi, end) - value_at(t, record.psi, start), "rad", why)
+    ordered = bool(np.isfinite(start))
+    before = float(np.interp(start, t, record.speed)) if ordered else NAN
+    measures.add(never, execute=(start, "s"), approach_speed=(before, "m/s"))
+    measures.add(
+        "the ship still moves ahead when the log ends" if ordered else never,
+        stopping_time=(end - start, "s"),
+        track_reach=(integral(t, record.speed, start, end), "m"),
+        head_reach=(value_at(t, ahead, end), "m"),
+        lateral_deviation=(value_at(t, aside, end), "m"),
+        heading_change=(value_at(t, record.psi, end) - value_at(t, record.psi, start), "rad"),
+    )
     return measures

@@ -51,27 +51,22 @@ def turning(record: Record) -> Measures:
     passed = {angle: crossing(t, turned, angle * DEGREE, start) for angle in (90, 180, 270, 360)}
     against = turned.min(initial=0.0) <= -90 * DEGREE
     why = {
-        angle: "the ship turns against her helm" if against else f"the heading changes by less than {angle} deg"
+        angle: "the ship turns against its helm" if against else f"the heading changes by less than {angle} deg"
         for angle in passed
     }
-    measures.add("execute", start, "s", STILL)
-    measures.add("helm", helm if helm else NAN, "rad", STILL)
-    measures.add("approach_speed", before, "m/s", STILL)
-    measures.add("advance", value_at(t, ahead, passed[90]), "m", why[90])
-    measures.add("transfer", side * value_at(t, aside, passed[90]), "m", why[90])
-    measures.add("tactical_diameter", side * value_at(t, aside, passed[180]), "m", why[180])
+    measures.add(STILL, execute=(start, "s"), helm=(helm or NAN, "rad"), approach_speed=(before, "m/s"))
+    advance, transfer = value_at(t, ahead, passed[90]), side * value_at(t, aside, passed[90])
+    measures.add(why[90], advance=(advance, "m"), transfer=(transfer, "m"))
+    measures.add(why[180], tactical_diameter=(side * value_at(t, aside, passed[180]), "m"))
     for name, way, values, angle in (("advance", "ahead", ahead, 180), ("transfer", "aside", side * aside, 270)):
         still = f"the ship still goes {way} where the heading has changed by {angle} deg"
         missing = still if np.isfinite(passed[angle]) else why[angle]
-        measures.add(f"greatest_{name}", _greatest(t, values, start, passed[angle]), "m", missing)
+        greatest = extreme(t, values, start, passed[angle])[1] if np.isfinite(passed[angle]) else NAN
+        measures.add(missing, **{f"greatest_{name}": (greatest, "m")})
     for angle in (90, 180, 360):
-        measures.add(f"time_to_{angle}", passed[angle] - start, "s", why[angle])
+        measures.add(why[angle], **{f"time_to_{angle}": (passed[angle] - start, "s")})
     _steady(record, side, turned, passed[180], before, measures, why[360])
     return measures
-
-
-def _greatest(t: Array, values: Array, start: float, end: float) -> float:
-    return extreme(t, values, start, end)[1] if np.isfinite(end) else NAN
 
 
 def _steady(
@@ -92,14 +87,19 @@ def _steady(
         steady = abs(quarters[1] / quarters[0] - 1) <= STEADY
         rate = np.pi / (end - first) if steady else NAN
         why = "the turn is not steady: the last two quarter turns differ by more than 5 % in time"
-    drift = np.arctan2(-side * record.v, record.u)
-    speed = mean(t, record.speed, first, end) if np.isfinite(rate) else NAN
-    measures.add("steady_diameter", 2 * speed / rate, "m", why)
-    measures.add("steady_speed", speed, "m/s", why)
-    measures.add("steady_rate", rate, "rad/s", why)
-    measures.add("steady_drift", mean(t, drift, first, end) if np.isfinite(rate) else NAN, "rad", why)
-    measures.add("speed_loss", 1 - speed / before if before else NAN, "-", why if before else AT_REST)
-    measures.add("current_speed", _carried(record, first, end) if np.isfinite(rate) else NAN, "m/s", why)
+    speed = drift = carried = NAN
+    if np.isfinite(rate):
+        speed, carried = mean(t, record.speed, first, end), _carried(record, first, end)
+        drift = mean(t, np.arctan2(-side * record.v, record.u), first, end)
+    measures.add(
+        why,
+        steady_diameter=(2 * speed / rate, "m"),
+        steady_speed=(speed, "m/s"),
+        steady_rate=(rate, "rad/s"),
+        steady_drift=(drift, "rad"),
+    )
+    measures.add(why if before else AT_REST, speed_loss=(1 - speed / before if before else NAN, "-"))
+    measures.add(why, current_speed=(carried, "m/s"))
 
 
 def _carried(record: Record, first: float, end: float) -> float:
@@ -131,11 +131,10 @@ def pull_out(record: Record) -> Measures:
     t, end = record.t, float(record.t[-1])
     rate = over.side * float(np.interp(release, t, record.r)) if put else NAN
     why = "the helm is not put amidships after the turn"
-    measures.add("execute", over.start, "s", STILL)
-    measures.add("helm", over.angle if over.angle else NAN, "rad", STILL)
-    measures.add("turning_rate", rate, "rad/s", why)
+    measures.add(STILL, execute=(over.start, "s"), helm=(over.angle or NAN, "rad"))
+    measures.add(why, turning_rate=(rate, "rad/s"))
     residual = over.side * settled(t, record.r, release, end, rate) if put else NAN
     late = "the rate still changes over the last half of the log: let it run longer"
-    measures.add("residual_rate", residual, "rad/s", late if put else why)
-    measures.add("heading_change", over.side * integral(t, record.r, release, end), "rad", why)
+    measures.add(late if put else why, residual_rate=(residual, "rad/s"))
+    measures.add(why, heading_change=(over.side * integral(t, record.r, release, end), "rad"))
     return measures

@@ -58,28 +58,27 @@ def zigzag(record: Record, execute_heading: float | None = None, course: float |
     angle = _seen(record, off, over) if execute_heading is None else abs(execute_heading)
     executes, why_no_more = _executes(t, off, angle, start)
     before = float(np.interp(start, t, record.speed)) if np.isfinite(start) else NAN
-    measures.add("execute", start, "s", STILL)
-    measures.add("helm", helm if helm else NAN, "rad", STILL)
-    measures.add("execute_heading", angle, "rad", "the helm is never reversed")
-    measures.add("approach_speed", before, "m/s", STILL)
+    measures.add(STILL, execute=(start, "s"), helm=(helm or NAN, "rad"))
+    measures.add("the helm is never reversed", execute_heading=(angle, "rad"))
+    measures.add(STILL, approach_speed=(before, "m/s"))
     second, third, fourth = (*executes, *[NAN] * 3)[:3]
     missing = why_no_more.format
-    measures.add("initial_turning", integral(t, record.speed, start, second), "m", missing("second"))
-    measures.add("initial_turning_time", second - start, "s", missing("second"))
+    track = integral(t, record.speed, start, second)
+    measures.add(missing("second"), initial_turning=(track, "m"), initial_turning_time=(second - start, "s"))
     for number, (moment, until) in enumerate(_legs(executes, float(t[-1])), start=1):
         sense = 1.0 if number % 2 else -1.0
         turned, peak = extreme(t, sense * off, moment, until)
         why = "the log ends before the heading turns back" if np.isfinite(moment) else missing("next")
-        measures.add(f"overshoot_{number}", peak - angle, "rad", why)
-        measures.add(f"time_to_check_{number}", turned - moment, "s", why)
+        peaks = {f"overshoot_{number}": (peak - angle, "rad"), f"time_to_check_{number}": (turned - moment, "s")}
+        measures.add(why, **peaks)
     back = crossing(t, off, 0.0, second, rising=False) if np.isfinite(second) else NAN
-    measures.add("reach", back - start, "s", "the log ends before the ship is back on its course")
-    measures.add("period", fourth - second, "s", missing("fourth"))
+    measures.add("the log ends before the ship is back on its course", reach=(back - start, "s"))
+    measures.add(missing("fourth"), period=(fourth - second, "s"))
     slowest = NAN
     if np.isfinite(third):
         slowest = min(float(np.interp(third, t, record.speed)), *record.speed[(t >= start) & (t <= third)])
     lost = 1 - slowest / before if before else NAN
-    measures.add("speed_loss", lost, "-", missing("third") if before else AT_REST)
+    measures.add(missing("third") if before else AT_REST, speed_loss=(lost, "-"))
     return measures
 
 

@@ -108,13 +108,19 @@ def play(
             message = f"{every:g}: no instant so many s apart has the past of {past:g} s that the predictor needs"
             raise DataError(f"{message}: give less, such as {past:g}", path="--every")
         raise DataError(f"no run is as long as the past of {past:g} s that the predictor needs", file=log)
-    missing = () if vessel is None else tuple(assumed(vessel, names))
     return Played(
-        *(pd.concat(tables, ignore_index=True) for tables in (instants, points)), step, predictor.physics.horizon,
-        skipped, missing,
-        predictor.commands == "known", band, dataset.frame[TRACK], gaps_in_words(dataset, step),
+        pd.concat(instants, ignore_index=True),
+        pd.concat(points, ignore_index=True),
+        step,
+        predictor.physics.horizon,
+        skipped,
+        () if vessel is None else tuple(assumed(vessel, names)),
+        predictor.commands == "known",
+        band,
+        dataset.frame[TRACK],
+        gaps_in_words(dataset, step),
         coarse_in_words(dataset, step),
-    )  # fmt: skip
+    )
 
 
 def _due_rows(t: Array, every: float, past: float) -> tuple[list[int], int]:

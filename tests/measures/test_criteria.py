@@ -27,7 +27,7 @@ def judged(kind: str, length: float | None, **values: float) -> dict[str, tuple[
     measures = MEASURES[kind](every(RECORDS[kind](), 0.5))
     changed = Measures()
     for name, one in measures.items():
-        changed.add(name, values.get(name, one.value), one.unit, one.why or "is missing")
+        changed.add(one.why or "is missing", **{name: (values.get(name, one.value), one.unit)})
     judgements = criteria(kind, changed, length)
     return {one.name.rpartition("(")[2].rstrip(")"): (one.value, one.limit, one.met, one.note) for one in judgements}
 
@@ -130,6 +130,6 @@ def test_the_advance_is_at_most_4_5_lengths() -> None:
     for value, met in ((899.999, True), (900.001, False)):
         changed = Measures()
         for name, one in MEASURES["turning"](every(RECORDS["turning"](), 0.5)).items():
-            changed.add(name, value if name == "advance" else one.value, one.unit, one.why)
+            changed.add(one.why, **{name: (value if name == "advance" else one.value, one.unit)})
         (advance, _) = criteria("turning", changed, 200.0)
         assert advance.met is met

@@ -13,9 +13,9 @@ from shipid.measures.rows import criterion_rows, measure_rows
 
 def test_angles_are_in_degrees_and_distances_also_in_ship_lengths() -> None:
     measures = Measures()
-    measures.add("overshoot_1", math.radians(12.0), "rad", "")
-    measures.add("advance", 150.0, "m", "")
-    measures.add("period", float("nan"), "s", "the log ends before the fourth execute")
+    measures.add("", overshoot_1=(math.radians(12.0), "rad"))
+    measures.add("", advance=(150.0, "m"))
+    measures.add("the log ends before the fourth execute", period=(float("nan"), "s"))
     angle, distance, period = measure_rows(measures, 50.0)
     assert (angle["measure"], angle["unit"]) == ("overshoot 1", "deg")
     assert angle["value"] == pytest.approx(12.0)
@@ -26,7 +26,7 @@ def test_angles_are_in_degrees_and_distances_also_in_ship_lengths() -> None:
 
 def test_without_a_ship_length_there_are_no_lengths() -> None:
     measures = Measures()
-    measures.add("advance", 150.0, "m", "")
+    measures.add("", advance=(150.0, "m"))
     assert math.isnan(measure_rows(measures, None)[0]["lengths"])
 
 

@@ -99,7 +99,7 @@ def test_a_ship_that_turns_against_her_helm_is_not_judged() -> None:
     turned = measure_standard(Vessel({**document, "thruster": units}, "tug.toml"), "turning", 35.0, speed=5.0)
     assert turned.frame["psi"].iloc[-1] < -np.pi
     assert {row["verdict"] for row in turned.criteria} == {"not judged"}
-    assert all("against her helm" in row["note"] for row in turned.criteria)
+    assert all("against its helm" in row["note"] for row in turned.criteria)
 
 
 @pytest.mark.parametrize(("name", "angles"), [("turning", (35,)), ("zigzag", (10,)), ("stop", ())])
