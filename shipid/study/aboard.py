@@ -17,7 +17,6 @@ from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region
 from shipid.hybrid.physics import assumed, check_columns
 from shipid.logs.dates import span_of
-from shipid.metrics import share_of
 from shipid.predictor import Predictor
 from shipid.report.content import Line
 from shipid.study.apply import Band, Forecast, dataset_of, instants_along, predict_instants, tables_along
@@ -170,16 +169,13 @@ def summed_up(played: Played) -> list[Line]:
     early = f"{played.skipped} {plural(played.skipped, 'instant')} before there was a past"
     many = f"{len(instants)} {plural(len(instants), 'prediction')} in {runs} {plural(runs, 'run')}"
     lines = [Line("predictions", f"{many}, {played.horizon * played.step:g} s ahead; {early}")]
-    if played.assumed:
-        lines.append(Line("limit", f"not in the log, taken as 0: {', '.join(played.assumed)}"))
-    if played.coarse:
-        lines.append(Line("limit", played.coarse))
-    if played.gaps:
-        words = f"{played.gaps}: no errors there, and a past over one of them is interpolated"
-        lines.append(Line("limit", words))
-    if played.plan:
-        words = "the plan was: orders stay as they are, since at sea later orders are not known"
-        lines.append(Line("limit", words))
+    limits = (
+        f"not in the log, taken as 0: {', '.join(played.assumed)}" if played.assumed else "",
+        played.coarse,
+        f"{played.gaps}: no errors there, and a past over one of them is interpolated" if played.gaps else "",
+        "the plan was: orders stay as they are, since at sea later orders are not known" if played.plan else "",
+    )
+    lines += [Line("limit", text) for text in limits if text]
     latency = 1e3 * instants["latency"].to_numpy()
     words = f"latency: median {np.median(latency):.1f} ms, 99 % below {np.quantile(latency, 0.99):.1f} ms"
     lines.append(Line("detail", words))
@@ -204,7 +200,8 @@ def _promise(played: Played) -> list[str]:
     """How often the band held whole paths, then by how much it adapted and its size ahead; none without a band."""
     if played.band is None:
         return []
-    lines = _held(played.instants, played.band, f"{UNPLANNED}, or {CHANGED}" if played.plan else CHANGED)
+    why = f"{UNPLANNED}, or {CHANGED}" if played.plan else CHANGED
+    lines = [_band_in_words(played.instants, played.band, why)]
     if played.band.rate is not None:
         factors = played.instants["factor"]
         ends = factors.groupby(played.instants["run"], sort=False).last()[:5]
@@ -225,32 +222,26 @@ def _promise(played: Played) -> list[str]:
     return lines
 
 
-def _held(instants: pd.DataFrame, band: Band, why: str) -> list[str]:
+def _band_in_words(instants: pd.DataFrame, band: Band, why: str) -> str:
     """How often the band held the whole paths that can be judged, and why if that is fewer than was promised."""
     reach, outside = instants["reach"].to_numpy(), instants["outside"].to_numpy(dtype=bool)
     judged = np.isfinite(reach)
     promised = judged & ~outside
     if not judged.any():
-        return [f"band of {level_text(band.level)}: no whole path can be judged, the log ends before"]
+        return f"band of {level_text(band.level)}: no whole path can be judged, the log ends before"
     held = reach <= instants["factor"].to_numpy()
     of = "" if band.kind is None else f" of the kind {band.kind!r}"
     adapts = "" if band.rate is None else f", adapting at {band.rate:g}"
     inside = "all in alarm, where nothing is promised"
     if promised.any():
         inside = f"{percent(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
-    lines = [
+    line = (
         f"band of {level_text(band.level)}{of}{adapts}: it held {percent(held[judged].mean())} of the {judged.sum()} "
         f"whole paths that can be judged, {inside}"
-    ]
-    if promised.any():
-        run = instants["run"].to_numpy()[promised]
-        _, most = share_interval(held[promised], run)
-        if most < band.level:
-            share = percent(share_of(held[promised], run))
-            same = share == percent(held[promised].mean())
-            what = "that is" if same else f"in the mean over runs {share}, which is"
-            lines[0] += f"; {what} fewer than {level_text(band.level)} by more than chance: {why}"
-    return lines
+    )
+    if promised.any() and share_interval(held[promised], instants["run"].to_numpy()[promised])[1] < band.level:
+        line += f"; that is fewer than {level_text(band.level)} by more than chance: {why}"
+    return line
 
 
 def _moments(points: pd.DataFrame) -> Array:
