@@ -69,14 +69,6 @@ def test_fixes_between_rows_reach_no_row_before_them(seed: int, even: bool) -> N
         np.testing.assert_array_equal(causal_columns(data, ["u"]).frame["u"][before], one[before])
 
 
-def test_on_an_uneven_clock_a_line_between_two_fixes_has_no_bend() -> None:
-    """Fixes in every fifth row: a fix is seen with the row after it, and the row before the fix is then known."""
-    rng = np.random.default_rng(0)
-    t, rows = np.cumsum(rng.uniform(0.2, 3.0, 51)), np.arange(6, 51)
-    known = last_known(t, np.interp(t, t[::5], rng.normal(size=11)))
-    np.testing.assert_array_equal(known[rows], (rows - 1) // 5 * 5 - 1)
-
-
 def test_what_holds_still_is_known_and_other_columns_stay() -> None:
     data = as_dataset(turning(np.arange(30.0)).assign(u=4.0))
     held = causal_columns(data, ["u"])

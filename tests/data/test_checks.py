@@ -179,18 +179,6 @@ def test_a_delay_is_measured_whatever_the_scale_and_beside_spikes(delay: float, 
     assert measured.said("position", "velocity")[0] == late_one
 
 
-@pytest.mark.parametrize("delay", [0.0, 2.0])
-def test_a_rounded_heading_is_late_only_where_it_is(delay: float) -> None:
-    """Of a ship that turns for a third of the time: the rest, where whole degrees do not change, fits at any delay."""
-    t = np.arange(0.0, 600.0, 0.5)
-    r = np.radians(5.0) * np.sin(2 * np.pi * t / 45.0) * (np.floor(t / 45.0) % 3 == 0)
-    total = np.append(0.0, np.cumsum((r[1:] + r[:-1]) / 2 * 0.5))
-    psi = np.radians(np.round(np.degrees(np.interp(t - delay, t, total))))
-    measured = checks.delay_of([(t, psi.astype(complex), total.astype(complex))])
-    assert measured is not None
-    assert measured.seconds == pytest.approx(delay, abs=0.26)
-
-
 def test_noise_is_no_delay_and_few_windows_say_nothing() -> None:
     t = np.arange(0.0, 300.0, 1.0)
     for seed in range(20):
@@ -261,18 +249,3 @@ def test_noise_of_positions_widens_the_limit_of_the_path() -> None:
     log[["north", "east"]] += random.normal(0, 2.0, (len(t), 2))
     row = check_dataset(as_dataset(log)).set_index("check").loc["path"]
     assert row["limit"] == pytest.approx(0.05 * 30.0 * np.hypot(4.0, 0.5) + 2 * (2 * 2 * 2.0**2) ** 0.5, rel=0.1)
-
-
-@pytest.mark.parametrize("step", [0.1, 0.5, 2.0])
-@pytest.mark.parametrize("noisy", ["velocities", "heading"])
-def test_noise_that_is_integrated_widens_the_limit_of_the_path(step: float, noisy: str) -> None:
-    """Its path goes as the root of the time: 1 / sqrt(2) of what it is after 30 s, RMS over them."""
-    t, random = np.arange(0.0, 3000.0, step), np.random.default_rng(3)
-    log = turning(t)
-    if noisy == "velocities":
-        log[["u", "v"]] += random.normal(0, 0.4, (len(t), 2))
-    else:
-        log["psi"] += random.normal(0, 0.1, len(t))
-    row = check_dataset(as_dataset(log)).set_index("check").loc["path"]
-    by_noise = float(re.findall(r"([\d.]+) m by noise", str(row["sentence"]))[0])
-    assert by_noise == pytest.approx(2**0.5 * row["value"], rel=0.35)

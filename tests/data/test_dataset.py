@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -140,10 +139,6 @@ def test_units_that_contradict_the_schema_are_refused() -> None:
         as_dataset(turning(T), units={"psi": "deg"})
 
 
-def test_two_runs_may_share_a_clock_and_rows() -> None:
-    assert as_dataset(turning(T), turning(T)).runs == ["a", "b"]
-
-
 @pytest.mark.parametrize(
     ("content", "remedy"),
     [(b"time,N,E\n", "not a Parquet file"), (None, "cannot be read"), ("foreign", "not a dataset of")],
@@ -195,12 +190,6 @@ def test_a_table_that_changes_later_does_not_change_the_dataset() -> None:
     assert dataset.metadata == {"flags": ["break"]}
 
 
-def test_a_table_is_a_frame() -> None:
-    columns: Any = as_dataset(turning(T)).frame.to_dict("list")
-    with pytest.raises(DataError, match="the table must be a pandas DataFrame, not dict"):
-        Dataset(columns, {"flags": ["break"]})
-
-
 def test_pieces_start_at_breaks() -> None:
     frame = turning(T).assign(flags=np.where(np.isin(T, [0.0, 5.0, 12.0]), 1, 0))
     starts = [(run, rows["t"].iloc[0], len(rows)) for run, rows in pieces(as_dataset(frame, turning(T)))]
@@ -233,11 +222,6 @@ def test_sample_finds_the_row_that_rounding_moved() -> None:
     np.testing.assert_array_equal(sample(rows, 1.7e9 + 0.3 + 0.1 * k[:900])["port.n"], k[3:903])
     alone = sample(rows.iloc[:1], np.array([1.7e9, 1.7e9 + 5.0]))
     np.testing.assert_array_equal(alone["port.n"], [0.0, 0.0])
-
-
-def test_sample_unwraps_angles() -> None:
-    rows = turning(np.array([0.0, 1.0])).assign(psi=np.radians([359.0, 1.0]))
-    assert np.degrees(sample(rows, np.array([0.5]))["psi"]) == pytest.approx(360.0)
 
 
 @pytest.mark.parametrize(
@@ -292,21 +276,6 @@ def test_commands_in_force_have_the_integral_of_those_that_hold(seed: int) -> No
     same = (held == held[0]).all(axis=0)
     assert 0.2 < same.mean() < 1
     np.testing.assert_array_equal(found["port.n"][same], held[0][same])
-
-
-def test_rows_are_numbered_anew() -> None:
-    """Runs that pandas joined have the numbers of each; what looks rows up by them finds one."""
-    joined = as_dataset(turning(T), turning(T, r=-0.02))
-    again = Dataset(joined.frame.set_index(np.tile(np.arange(len(T)), 2)), joined.metadata)
-    assert again.frame.index.tolist() == list(range(2 * len(T)))
-    assert again.digest == joined.digest
-
-
-def test_the_digest_changes_with_the_flags_and_the_clock() -> None:
-    """They decide where runs are broken and which moments two runs share."""
-    frame = as_dataset(turning(T)).frame
-    kinds = [{"flags": ["break"]}, {"flags": ["despike"]}, {"flags": ["break"], "clock": "run"}]
-    assert len({Dataset(frame, metadata).digest for metadata in kinds}) == 3
 
 
 def test_only_angles_are_unwrapped() -> None:

@@ -81,13 +81,6 @@ def test_a_short_kick_in_a_long_run_varies(hours: float, step: float, lasts: flo
         assert bool(nothing_varies(log, log.runs)) == held
 
 
-def test_a_short_zigzag_of_small_angles_in_a_log_of_a_day_varies() -> None:
-    helm = np.zeros(36000)
-    helm[7000:7240] = np.radians(5.0) * np.sign(np.sin(np.arange(240) / 20 + 0.01))
-    log = one_run(len(helm), rudder_delta=helm, propeller_n=np.full(len(helm), 2.0))
-    assert held_commands(log, log.runs) == ("propeller.n",)
-
-
 @pytest.mark.parametrize(("angle", "share", "held"), [(0.4, 0.008, True), (0.65, 0.013, False)])
 def test_noise_of_feedback_is_no_order(angle: float, share: float, held: bool) -> None:
     """Standard deviations of 0.5 deg and of 1 % count as none, in a run of any length."""
@@ -96,9 +89,3 @@ def test_noise_of_feedback_is_no_order(angle: float, share: float, held: bool) -
         helm = 0.1 + np.radians(angle) * rng.standard_normal(rows)
         log = one_run(rows, rudder_delta=helm, propeller_n=2.0 * (1 + share * rng.standard_normal(rows)))
         assert held_commands(log, log.runs) == (("rudder.delta", "propeller.n") if held else ())
-
-
-def test_a_run_of_one_row_is_held() -> None:
-    log = one_run(1, rudder_delta=np.array([0.1]), propeller_n=np.array([2.0]))
-    assert held_commands(log, log.runs) == ("rudder.delta", "propeller.n")
-    assert held_commands(log, []) == ()

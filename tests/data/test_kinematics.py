@@ -132,37 +132,6 @@ def by_least_squares(
 UNEVEN = np.append(0.0, np.cumsum(np.tile([0.5, 2.0, 1.0], 6)))
 
 
-def test_places_give_the_velocities_of_least_squares() -> None:
-    """The heading is known, so all is linear; noise ahead and across is turned into north and east, on uneven rows."""
-    psi, random = 0.7, np.random.default_rng(2)
-    given = Noise({"north": 0.5, "east": 0.5, "psi": 1e-8}, 0.08, 1e-9)
-    logged = {"north": 3.0 * UNEVEN, "east": 1.5 * UNEVEN}
-    logged = {name: way + 0.5 * random.standard_normal(len(way)) for name, way in logged.items()}
-    known = smooth(UNEVEN, logged | {"psi": np.full_like(UNEVEN, psi)}, given)
-    chosen = [STATES.index(name) for name in ("north", "east", "u", "v")]
-    first, spread = _start(UNEVEN, logged | {"psi": np.full_like(UNEVEN, psi)}, given)
-    turn = np.array([[np.cos(psi), -np.sin(psi)], [np.sin(psi), np.cos(psi)]])
-    samples = np.stack([logged["north"], logged["east"]], axis=1)
-    prior = first[chosen], spread[np.ix_(chosen, chosen)]
-    states, covariances = by_least_squares(UNEVEN, prior, turn, 0.08**2 * np.eye(2), samples, 0.5)
-    np.testing.assert_allclose(known.states[:, chosen], states, atol=1e-6)
-    np.testing.assert_allclose(known.covariances[:, chosen][:, :, chosen], covariances, atol=1e-6)
-
-
-def test_headings_give_the_yaw_rate_of_least_squares() -> None:
-    """Places that are worth nothing leave heading and yaw rate, which are linear."""
-    random = np.random.default_rng(3)
-    given = Noise({"north": 1e7, "east": 1e7, "psi": 0.01}, 1e-3, 2e-3)
-    psi = 0.02 * UNEVEN + 0.01 * random.standard_normal(len(UNEVEN))
-    logged = {"north": np.zeros_like(psi), "east": np.zeros_like(psi), "psi": psi}
-    known, (first, spread) = smooth(UNEVEN, logged, given), _start(UNEVEN, logged, given)
-    chosen = [STATES.index(name) for name in ("psi", "r")]
-    prior = first[chosen], spread[np.ix_(chosen, chosen)]
-    states, covariances = by_least_squares(UNEVEN, prior, np.eye(1), np.full((1, 1), 2e-3**2), psi[:, None], 0.01)
-    np.testing.assert_allclose(known.states[:, chosen], states, atol=1e-7)
-    np.testing.assert_allclose(known.covariances[:, chosen][:, :, chosen], covariances, rtol=1e-5, atol=1e-12)
-
-
 def test_wrong_noise_is_reported() -> None:
     """Samples that err three times more than declared give innovations above one."""
     random = np.random.default_rng(4)
@@ -170,14 +139,6 @@ def test_wrong_noise_is_reported() -> None:
     noisy = {name: motion[name].to_numpy() + 3.0 * random.standard_normal(len(T)) for name in ("north", "east")}
     noisy["psi"] = motion["psi"].to_numpy()
     assert smooth(T, noisy, noise(1.0, 0.01, 0.02, 1e-3)).consistency > 2.0
-
-
-def test_what_is_logged_makes_the_rest_surer() -> None:
-    motion = turning(T)
-    given = noise(1.0, 0.01, 0.05, 1e-3)
-    position = {name: motion[name].to_numpy() for name in ("north", "east", "psi")}
-    alone, with_u = smooth(T, position, given), smooth(T, position | {"u": motion["u"].to_numpy()}, given)
-    assert np.all(with_u.deviation("u")[1:] < alone.deviation("u")[1:])
 
 
 def test_a_straight_way_begins_with_its_velocities() -> None:

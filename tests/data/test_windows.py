@@ -103,7 +103,7 @@ def test_velocity_path_is_the_position_path_on_a_consistent_log() -> None:
     np.testing.assert_array_equal(windows[0].columns["north"], windows[1].columns["north"])
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize(("apart", "share"), [(2.0, 0.05), (5.0, 0.15)])
 def test_between_coarse_rows_the_path_turns_with_the_ship(seed: int, apart: float, share: float) -> None:
     """Chords were the truth before: a predictor was judged by them and learned them. A current changes no digit."""
@@ -146,13 +146,6 @@ def test_rows_farther_apart_than_the_step_are_said() -> None:
     assert coarse_in_words(as_dataset(jittered), 1.0) == coarse_in_words(as_dataset(coarse), 5.0) == ""
     assert coarse_in_words(as_dataset(coarse), 1.0) == words
     assert coarse_in_words(as_dataset(jittered, coarse), 1.0) == words
-
-
-def test_velocity_path_does_not_see_positions() -> None:
-    frame = turning(T)
-    jitter = frame.assign(north=frame["north"] + np.random.default_rng(1).normal(0, 3, len(T)))
-    first, second = (cut_windows(as_dataset(f), horizon=15, path="velocity") for f in (frame, jitter))
-    np.testing.assert_array_equal(first.future, second.future)
 
 
 @pytest.mark.parametrize("path", ["position", "velocity"])
@@ -237,12 +230,6 @@ def test_touching_is_closed_and_counts_the_future() -> None:
     windows = runs_at((0, 60))
     assert windows.t[windows.touching([(20.0, 25.0)])].tolist() == list(range(10, 26))
     assert windows.touching([]).sum() == 0
-
-
-@pytest.mark.parametrize("options", [{"horizon": 200}, {"horizon": 0}, {"horizon": 5, "step": 0.0}])
-def test_impossible_windows(options: dict[str, float]) -> None:
-    with pytest.raises(DataError, match=r"horizon|step must be"):
-        cut_windows(as_dataset(turning(T)), **options)  # type: ignore[arg-type]
 
 
 spans = st.tuples(st.integers(0, 150), st.integers(20, 60)).map(lambda pair: (float(pair[0]), float(sum(pair))))
@@ -353,10 +340,6 @@ def test_few_runs_validate_and_all_others_train(validation: str, num_folds: int,
     assert sorted(map(len, judges)) == expected
     if len(judges) > 1:
         assert sorted(name for names in judges for name in names) == sorted(windows.spans)
-
-
-def test_splits_depend_on_the_seed() -> None:
-    assert len({nested_runs(NAMES, [5], seed)[5] for seed in range(20)}) == 20
 
 
 def test_draws_for_different_purposes_differ() -> None:
@@ -520,16 +503,6 @@ def test_folds_of_windows_with_a_past_share_no_moment() -> None:
     assert set(one.run) == {"a", "c"}
 
 
-def test_numbers_that_are_not_finite_are_refused() -> None:
-    dataset = as_dataset(turning(np.arange(0.0, 60.0, 0.5)))
-    for name in ("step", "interval"):
-        for value in (np.nan, np.inf, 0.0, -1.0):
-            with pytest.raises(DataError, match=f"{name} must be a number above 0 and finite, not {value}"):
-                cut_windows(dataset, **{"horizon": 5, "step": 1.0, "interval": 2.0, name: value})
-    with pytest.raises(DataError, match="horizon must be a whole number, 1 or more, not inf"):
-        cut_windows(dataset, horizon=np.inf, step=1.0, interval=2.0)
-
-
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
@@ -539,22 +512,16 @@ def test_numbers_that_are_not_finite_are_refused() -> None:
         ({"past": -3}, "past must be a whole number, 0 or more, not -3"),
         ({"path": "speed"}, "path 'speed' is not known: valid: position, velocity"),
         ({"step": "1"}, "step must be a number above 0"),
+        ({"step": np.nan}, "step must be a number above 0 and finite, not nan"),
+        ({"interval": 0.0}, "interval must be a number above 0 and finite, not 0"),
+        ({"horizon": 200}, "no run is as long as the horizon of 200 s"),
+        ({"step": 1e300}, "no run is as long as the horizon of"),
     ],
 )
 def test_windows_of_a_wrong_argument_are_refused(wrong: dict[str, Any], message: str) -> None:
     """Before, half a step of the past was cut off at the begin of a run, and an unknown path was the position."""
     with pytest.raises(DataError, match=message):
         cut_windows(as_dataset(turning(T)), **{"horizon": 5, **wrong})
-
-
-def test_numbers_of_other_types_cut_the_same_windows() -> None:
-    dataset = as_dataset(turning(T))
-    windows = cut_windows(dataset, horizon=5, step=0.5, interval=2.0, past=3)
-    other: Any = {"horizon": 5.0, "step": np.float32(0.5), "interval": np.int64(2), "past": np.uint8(3)}
-    again = cut_windows(dataset, **other)
-    assert (type(again.horizon), type(again.step)) == (int, float)
-    np.testing.assert_array_equal(again.future, windows.future)
-    np.testing.assert_array_equal(again.past["u"], windows.past["u"])
 
 
 def test_windows_are_chosen_by_masks_indices_and_slices() -> None:
@@ -586,13 +553,6 @@ def test_what_chooses_no_windows_is_refused(chosen: Any, message: str) -> None:
     for part in (windows, windows.instants()):
         with pytest.raises(DataError, match=message):
             part.select(chosen)
-
-
-@pytest.mark.parametrize("step", [1e4, 1e24, 1e300])
-def test_a_step_far_above_the_runs_is_refused(step: float) -> None:
-    dataset = as_dataset(turning(np.arange(0.0, 60.0, 0.5)))
-    with pytest.raises(DataError, match="no run is as long as the horizon of"):
-        cut_windows(dataset, horizon=5, step=step, interval=2.0)
 
 
 def test_an_interval_far_below_the_rows_gives_every_row() -> None:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from shipid.errors import DataError
-from shipid.measures import stop, turning, zigzag
+from shipid.measures import stop, zigzag
 from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.record import Record
 from shipid.units import DEGREE
-from tests.measures.made_records import GAIN, RECORDS, START, clock, every, made_record, nomoto
+from tests.measures.made_records import RECORDS, START, clock, every, made_record, nomoto
 
 
 def columns(record: Record) -> dict[str, np.ndarray]:
@@ -67,17 +67,6 @@ def test_a_stop_begins_with_the_first_of_two_shafts(later: float) -> None:
     assert stop(seen)["execute"].value == START + min(later, 0.0)
 
 
-@pytest.mark.parametrize("name", ["starboard.n", "bow.n"])
-def test_a_shaft_astern_in_a_turn_makes_no_stop(name: str) -> None:
-    """One of two screws that helps to turn, or a tunnel thruster to the other side: the ship goes on ahead."""
-    record = every(RECORDS["turning"](), 0.5)
-    astern = np.where(record.t < START, 1.0, -1.0)
-    given = columns(record) | {"rudder.delta": record.helm, "port.n": np.full(len(record.t), 2.0), name: astern}
-    seen = record_of(given)
-    assert kinds_of(seen)[0] == ("turning",)
-    np.testing.assert_array_equal(seen.shaft, (2.0 + astern) / 2)
-
-
 @pytest.mark.parametrize("counted", ["to 180 deg", "to 360 deg"])
 @pytest.mark.parametrize("takes", [0.0, 15.0])
 def test_azimuth_units_turned_astern_stop_a_ship(counted: str, takes: float) -> None:
@@ -91,16 +80,6 @@ def test_azimuth_units_turned_astern_stop_a_ship(counted: str, takes: float) -> 
     seen = record_of(given)
     assert kinds_of(seen) == (("stop",), "")
     assert stop(seen)["execute"].value == pytest.approx(START, abs=0.6)
-
-
-@pytest.mark.parametrize("angle", [35.0, 90.0, 110.0])
-def test_azimuth_units_that_turn_a_ship_do_not_stop_her(angle: float) -> None:
-    record = every(RECORDS["turning"](), 0.5)
-    alpha = -angle * DEGREE * record.helm / record.helm.max()
-    given = columns(record) | {"port.n": np.full(len(record.t), 2.0), "port.alpha": alpha}
-    seen = record_of(given)
-    assert kinds_of(seen)[0] == ("turning",)
-    np.testing.assert_array_equal(seen.shaft, 2.0)
 
 
 @pytest.mark.parametrize("turning", [True, False])
@@ -124,18 +103,6 @@ def run(legs: list[tuple[float, float]], end: float) -> Record:
     t = clock(end)
     psi, r, helm = nomoto(t, [(begin, angle * DEGREE) for begin, angle in legs])
     return every(made_record(t, psi, r, helm, np.full_like(t, 5.0), 0 * t), 0.1)
-
-
-def test_a_turn_ends_where_the_helm_is_let_go() -> None:
-    """As in a trial: small corrections before, a kick of opposite helm after; the turn alone is measured."""
-    plain = run([(40.0, 20)], 340.0)
-    trial = run([(5.0, 2), (8.0, -2), (11.0, 0), (40.0, 20), (340.0, -30), (343.0, 0), (346.0, 5)], 420.0)
-    assert kinds_of(trial) == (("turning",), "")
-    measures, expected = turning(trial), turning(plain)
-    assert measures["helm"].value == pytest.approx(20 * DEGREE)
-    assert measures["execute"].value == pytest.approx(40.0)
-    assert measures["steady_rate"].value == pytest.approx(GAIN * 20 * DEGREE, rel=1e-3)
-    assert measures["tactical_diameter"].value == pytest.approx(expected["tactical_diameter"].value, rel=0.01)
 
 
 def test_a_helm_left_over_from_before_is_no_execute() -> None:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.measures import reverse_spiral, spiral
-from shipid.measures.record import Record
-from shipid.measures.spiral import _at_zero, levels, rate_levels
+from shipid.measures.spiral import _at_zero, levels
 from shipid.units import DEGREE
 from tests.measures.made_records import GAIN, HOLD, LEVELS, RATES, START, every, reverse, stable_spiral, unstable_helm
 
@@ -101,26 +100,6 @@ def test_the_helm_for_the_next_rate_has_no_part_in_a_level() -> None:
     measures = reverse_spiral(every(replace(record, helm=led), 0.5))
     assert measures["loop_width"].value == pytest.approx(4 * DEGREE, abs=1e-3 * DEGREE)
     assert measures["neutral_helm"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
-
-
-def test_how_finely_the_loop_is_seen() -> None:
-    """Levels of 2, 0 and -2 deg are where the rate changes its sign; without that of 0 they are 4 deg apart."""
-    record = every(stable_spiral(), 0.5)
-    assert spiral(record)["levels_apart"].value == pytest.approx(2 * DEGREE, abs=1e-9)
-    unsteady = np.where(np.abs(record.helm) < 1 * DEGREE, 5e-5 * ((record.t - START) % HOLD - HOLD / 2), 0.0)
-    coarse = spiral(replace(record, r=record.r + np.where(record.t > START, unsteady, 0.0)))
-    assert coarse["levels_not_steady"].value == 2
-    assert coarse["levels_apart"].value == pytest.approx(4 * DEGREE, abs=1e-9)
-
-
-def test_the_helm_of_a_rate_is_that_of_its_last_quarter() -> None:
-    t = np.arange(0.0, 300.0)
-    r, since = (np.floor(t / 100) - 1) * DEGREE, t % 100
-    helm = np.where(since < 74, 9 * DEGREE, 2 * DEGREE)
-    still = np.zeros_like(t)
-    points = rate_levels(Record(t, still, still, np.cumsum(r), still + 5, still, r, helm))
-    np.testing.assert_allclose(points.rate, np.array([-1, 0, 1]) * DEGREE, atol=1e-12)
-    np.testing.assert_allclose(points.helm, 2 * DEGREE)
 
 
 @pytest.mark.parametrize(

@@ -114,33 +114,3 @@ def test_a_helm_that_is_let_go_gradually_is_left_amidships_until_it_moves_again(
         rate, left = GAIN * 20 * DEGREE, np.exp(-(end - 110.0) / TIME)
         assert measures["heading_change"].value == pytest.approx(rate * TIME * (1 - left), rel=2e-3)
         assert measures["residual_rate"].value == pytest.approx(0.0, abs=1e-4)
-
-
-@pytest.mark.parametrize("stream", [1.0, 3.0, 6.0])
-@pytest.mark.parametrize(("towards", "name", "words"), [(0.0, "advance", "ahead"), (90.0, "transfer", "aside")])
-def test_a_current_moves_the_greatest_distances(stream: float, towards: float, name: str, words: str) -> None:
-    """It is within the half turn, or the three quarters, whatever comes in the next circles.
-
-    Where the current is faster than the ship there is none, and a heading that changes too little is not the reason.
-    """
-    calm = perfect_circle()
-    north, east = stream * np.cos(towards * DEGREE), stream * np.sin(towards * DEGREE)
-    c, s = np.cos(calm.psi), np.sin(calm.psi)
-    carried = replace(
-        calm,
-        north=calm.north + north * calm.t,
-        east=calm.east + east * calm.t,
-        u=calm.u + north * c + east * s,
-        v=calm.v + east * c - north * s,
-    )
-    measures, angle = turning(every(carried, 0.5)), 180 if name == "advance" else 270
-    greatest = measures[f"greatest_{name}"]
-    within = (calm.t >= START) & (calm.t <= START + angle * DEGREE / RATE)
-    way = carried.along(START)[0 if name == "advance" else 1][within]
-    assert np.isfinite(measures["time_to_360"].value)
-    if stream < SPEED:
-        assert greatest.value == pytest.approx(way.max(), rel=1e-3)
-    else:
-        assert way.argmax() == len(way) - 1
-        assert np.isnan(greatest.value)
-        assert greatest.why == f"the ship still goes {words} where the heading has changed by {angle} deg"

@@ -164,19 +164,6 @@ def test_a_summary_says_that_nothing_is_promised_in_alarm(banded, tmp_path):
     assert line.endswith("whole paths that can be judged, all in alarm, where nothing is promised")
 
 
-def test_lengths_of_a_small_model_are_no_zeros_in_a_summary(banded, tmp_path):
-    _, file = banded
-    played = play(file, saved(log(), tmp_path), level=0.9)
-    small = played.points.copy()
-    small[["error", "band_along", "band_across"]] /= 3e3
-    lines = summary(replace(played, points=small))
-    heads = [line.startswith("error where the log goes on") for line in lines]
-    table = lines[heads.index(True) + 1 :]
-    assert table
-    said = [*table, *(line for line in lines if "across (median)" in line)]
-    assert not any(" 0.00 " in line for line in said), said
-
-
 def test_a_band_wider_than_a_ship_can_go_is_none(banded, tmp_path):
     """Wind that was never there in training gave bands of 5,653,307 m; where it was as in training, digits stay."""
     fitted, _ = banded
@@ -245,19 +232,6 @@ def test_a_band_that_cannot_be_promised_is_refused(banded, predictor, tmp_path):
     assert any("no whole path can be judged" in line for line in summary(short))
 
 
-def test_a_log_that_is_no_dataset_is_said_to_need_a_mapping_only_where_one_can_be_given(predictor, tmp_path):
-    (tmp_path / "log.csv").write_text("t,u\n0,1\n")
-    with pytest.raises(DataError, match=r"`shipid data import`, or give the log itself with --mapping$"):
-        play(predictor, tmp_path / "log.csv")
-    with pytest.raises(DataError, match=r"make one from a log with `shipid data import`$"):
-        read_dataset(tmp_path / "log.csv")
-
-
-def test_a_wrong_interval_is_refused(predictor, tmp_path):
-    with pytest.raises(DataError, match="--every"):
-        play(predictor, saved(log(), tmp_path), every=0.0)
-
-
 def test_instants_too_far_apart_are_not_said_to_be_runs_too_short(tmp_path):
     """Before, the runs were blamed, which are as long as the past and longer."""
     file = drawn("path-drawn", 2, vessel="mariner").predictor.save(tmp_path / "cell.npz")  # a past of 3 s
@@ -267,14 +241,6 @@ def test_instants_too_far_apart_are_not_said_to_be_runs_too_short(tmp_path):
     assert len(play(file, target, every=3.0).instants)
     with pytest.raises(DataError, match="no run is as long as the past of 3 s"):
         play(file, saved(log().iloc[:1].assign(V_w=0.0, beta_w=0.0), tmp_path), every=1e4)
-
-
-def test_instants_without_a_past_are_counted_and_not_rows(tmp_path):
-    """Rows of 0.5 s, and a past of 3 s: six rows have none, but only at 0 and 2 s was a prediction due."""
-    file = drawn("path-drawn", 2, vessel="mariner").predictor.save(tmp_path / "cell.npz")
-    frame = log().assign(V_w=0.0, beta_w=0.0, t=0.5 * np.arange(60))
-    lines = summary(play(file, saved(frame, tmp_path), every=2.0))
-    assert "2 instants before there was a past" in lines[0]
 
 
 def test_alarms_are_at_the_times_that_the_log_has():

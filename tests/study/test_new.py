@@ -102,10 +102,6 @@ def test_step_is_no_finer_than_the_log_and_leaves_two_if_it_can(horizon: float, 
     assert log_step <= step <= max(log_step, horizon / 2)
 
 
-def test_recorded_orders_need_finer_steps_than_constant_ones() -> None:
-    assert (step_of(30.0, 0.2), step_of(30.0, 0.0), step_of(300.0, 0.2)) == (1.0, 2.0, 2.0)
-
-
 def test_a_study_parses_prepares_and_says_why(tmp_path: Path) -> None:
     """Read from its file it is the very plan that was checked, and each value has a reason from the data."""
     draft, document = drafted(tmp_path, trial())
@@ -250,14 +246,6 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
     assert truth is not None
     assert truth.duration >= plan.study.prediction.horizon * plan.study.prediction.step
     assert max(plan.study.grid.N_D) == truth.manoeuvres - plan.study.split.test  # type: ignore[operator]
-
-
-@pytest.mark.parametrize(("name", "said"), [("gunnerus-28.9-6dof", True), ("gunnerus-28.9", False)])
-def test_a_vessel_that_feels_waves_is_said_to_be_in_calm_water(tmp_path: Path, name: str, said: bool) -> None:
-    """Her study draws no sea, and its question spoke of the ship in waves."""
-    text = draft_study([name], None, tmp_path / "study.toml").text
-    assert ("# in calm water: a table [truth.waves] with H_s and T_p draws a sea" in text) == said
-    assert "H_s =" not in text
 
 
 @pytest.mark.parametrize("name", ["otter", "kvlcc2-l7", "gunnerus-33.9"])
