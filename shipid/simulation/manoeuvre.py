@@ -16,9 +16,11 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 
 from shipid.checked import Checked
 from shipid.errors import DocumentError, choices
-from shipid.measures import pull_out, reverse_spiral, spiral, stop, turning, zigzag
 from shipid.measures.record import Measures, Record
-from shipid.measures.spiral import Levels, levels, rate_levels
+from shipid.measures.spiral import Levels, levels, rate_levels, reverse_spiral, spiral
+from shipid.measures.stopping import stop
+from shipid.measures.turning import pull_out, turning
+from shipid.measures.zigzag import zigzag
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman
 from shipid.physics.signals import SIGNALS, signal_of

@@ -19,9 +19,10 @@ from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
-from shipid.measures import turning, zigzag
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Measures
+from shipid.measures.turning import turning
+from shipid.measures.zigzag import zigzag
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman, Named
 from shipid.units import DEGREE

@@ -9,7 +9,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.logs.measuring import NO_HELM, measure_dataset
-from shipid.measures import zigzag
+from shipid.measures.zigzag import zigzag
 from tests.measures.made_records import RECORDS, every
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.measures import zigzag
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of, record_of
+from shipid.measures.zigzag import zigzag
 from shipid.units import DEGREE
 
 # README beside the files; the tank repeats them to 0.2 to 0.5 deg

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from shipid.errors import DataError
-from shipid.measures import stop, zigzag
 from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.record import Record
+from shipid.measures.stopping import stop
+from shipid.measures.zigzag import zigzag
 from shipid.units import DEGREE
 from tests.measures.made_records import RECORDS, START, clock, every, made_record, nomoto
 

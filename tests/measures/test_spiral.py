@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures import reverse_spiral, spiral
-from shipid.measures.spiral import _at_zero, levels
+from shipid.measures.spiral import _at_zero, levels, reverse_spiral, spiral
 from shipid.units import DEGREE
 from tests.measures.made_records import GAIN, HOLD, LEVELS, RATES, START, every, reverse, stable_spiral, unstable_helm
 

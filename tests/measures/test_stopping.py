@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures import stop
+from shipid.measures.stopping import stop
 from tests.measures.made_records import DECELERATION, SPEED, START, VEER, every, stopped
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures import pull_out, turning
 from shipid.measures.criteria import criteria
+from shipid.measures.turning import pull_out, turning
 from shipid.units import DEGREE
 from tests.measures.made_records import (
     DRIFT,

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures import zigzag
 from shipid.measures.recognise import kinds_of
 from shipid.measures.record import HelmOver, Record
-from shipid.measures.zigzag import last_over
+from shipid.measures.zigzag import last_over, zigzag
 from shipid.units import DEGREE
 from tests.measures.made_records import (
     FINE,
