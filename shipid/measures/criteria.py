@@ -47,16 +47,11 @@ def criteria(kind: str, measures: Measures, length: float | None, *, calm: bool 
         return list(_turning(measures, length, calm=calm))
     if kind == "zigzag":
         return list(_zigzag(measures, length))
-    if kind == "stop":
-        track = _lengths(measures, "track_reach", length)
-        criterion = _judged(
-            "stopping ability: track reach (5.3.4)", track, 15.0, "L", measures["track_reach"].why, length
-        )
-        if criterion.met is False:
-            more = "up to 20 L where a large displacement makes 15 L impracticable"
-            criterion = replace(criterion, note="; ".join(filter(None, [criterion.note, more])))
-        return [criterion]
-    return []
+    if kind != "stop":
+        return []
+    one = _judged(measures, "track_reach", "stopping ability: track reach (5.3.4)", 15.0, "L", length)
+    more = "up to 20 L where a large displacement makes 15 L impracticable"
+    return [replace(one, note="; ".join(filter(None, [one.note, more]))) if one.met is False else one]
 
 
 def _turning(measures: Measures, length: float | None, *, calm: bool) -> Iterator[Criterion]:
@@ -70,31 +65,24 @@ def _turning(measures: Measures, length: float | None, *, calm: bool) -> Iterato
         note = "; ".join(filter(None, [note, carried]))
     for name, limit in (("advance", 4.5), ("tactical_diameter", 5.0)):
         label = f"turning ability: {name.replace('_', ' ')} (5.3.1)"
-        missing = measures[name].why
-        yield _judged(label, _lengths(measures, name, length), limit, "L", missing, length, note, remark)
+        yield _judged(measures, name, label, limit, "L", length, note=note, remark=remark)
 
 
 def _zigzag(measures: Measures, length: float | None) -> Iterator[Criterion]:
-    small = _wrong(measures, {"helm": 10.0, "execute_heading": 10.0})
-    large = _wrong(measures, {"helm": 20.0, "execute_heading": 20.0})
-    if not large:
-        overshoot = measures["overshoot_1"]
-        yield _judged(
-            "yaw checking: 20/20 first overshoot (5.3.3.3)", overshoot.value, 25 * DEGREE, "rad", overshoot.why, length
-        )
-    if small:
+    tested = {angle: not _wrong(measures, dict.fromkeys(("helm", "execute_heading"), angle)) for angle in (10.0, 20.0)}
+    if tested[20.0]:
+        label = "yaw checking: 20/20 first overshoot (5.3.3.3)"
+        yield _judged(measures, "overshoot_1", label, 25 * DEGREE, "rad", length)
+    if not tested[10.0]:
         return
-    travelled = _lengths(measures, "initial_turning", length)
     label = "initial turning ability: track to 10 deg (5.3.2)"
-    yield _judged(label, travelled, 2.5, "L", measures["initial_turning"].why, length)
+    yield _judged(measures, "initial_turning", label, 2.5, "L", length)
     speed = measures["approach_speed"].value
-    ratio = length / speed if length and speed > 0 else NAN
-    for number, paragraph, limit in ((1, "5.3.3.1", first_limit(ratio)), (2, "5.3.3.2", second_limit(ratio))):
-        overshoot = measures[f"overshoot_{number}"]
-        ordinal = "first" if number == 1 else "second"
-        label = f"yaw checking: 10/10 {ordinal} overshoot ({paragraph})"
-        missing = overshoot.why or (AT_REST if speed == 0 else "")
-        yield _judged(label, overshoot.value, limit, "rad", missing, length)
+    ratio, missing = length / speed if length and speed > 0 else NAN, AT_REST if speed == 0 else ""
+    label = "yaw checking: 10/10 first overshoot (5.3.3.1)"
+    yield _judged(measures, "overshoot_1", label, first_limit(ratio), "rad", length, missing=missing)
+    label = "yaw checking: 10/10 second overshoot (5.3.3.2)"
+    yield _judged(measures, "overshoot_2", label, second_limit(ratio), "rad", length, missing=missing)
 
 
 def first_limit(ratio: float) -> float:
@@ -105,10 +93,6 @@ def first_limit(ratio: float) -> float:
 def second_limit(ratio: float) -> float:
     """Largest second overshoot [rad] allowed in a 10/10 zigzag, for `ratio` L/V [s]."""
     return float(np.clip(17.5 + 0.75 * ratio, 25, 40)) * DEGREE
-
-
-def _lengths(measures: Measures, name: str, length: float | None) -> float:
-    return measures[name].value / length if length else NAN
 
 
 def _wrong(measures: Measures, asked: dict[str, float]) -> str:
@@ -122,20 +106,23 @@ def _wrong(measures: Measures, asked: dict[str, float]) -> str:
 
 
 def _judged(
+    measures: Measures,
     name: str,
-    value: float,
+    label: str,
     limit: float,
     unit: str,
-    missing: str,
     length: float | None,
+    *,
     note: str = "",
     remark: str = "",
+    missing: str = "",
 ) -> Criterion:
-    """One criterion; with a `note` it is not judged, a `remark` changes nothing."""
+    """One criterion; with a `note` it is not judged, a `remark` changes nothing. missing : why there is no limit."""
+    measure = measures[name]
+    value = measure.value if unit != "L" else measure.value / length if length else NAN
     if not np.isfinite(value) or not np.isfinite(limit):
-        why = missing or "the length of the ship is not known"
-        return Criterion(name, value, limit, unit, None, why)
+        why = measure.why or missing or "the length of the ship is not known"
+        return Criterion(label, value, limit, unit, None, why)
     short = f"the standards are for ships of {SHORTEST:g} m and more" if length and length < SHORTEST else ""
-    return Criterion(
-        name, value, limit, unit, None if note else value <= limit, "; ".join(filter(None, [note, remark, short]))
-    )
+    met = None if note else value <= limit
+    return Criterion(label, value, limit, unit, met, "; ".join(filter(None, [note, remark, short])))

@@ -19,7 +19,7 @@ from shipid.metrics import position_error
 from shipid.study.prepare import constant_motion, window_memory
 from shipid.vessel.load import Vessel
 
-LEAST_TURN = np.radians(5.0)  # a smaller turn is noise of the heading of usual compasses
+LEAST_TURN = np.radians(5.0)  # the share of a smaller turn is mostly noise of the heading
 LEAST_ERROR = 1e-3  # m: no log has positions so near to the truth
 
 
