@@ -310,19 +310,21 @@ def check_metadata(metadata: Any) -> None:
     if not isinstance(metadata, dict):
         raise DataError(f"damaged metadata: {type(metadata).__name__}, must be a table")
     kinds = {"flags": list, "units": dict, "clock": str, "repairs": list}
-    for key, kind in kinds.items():
-        if key in metadata and not isinstance(metadata[key], kind):
-            raise DataError(f"damaged metadata: must be a {kind.__name__}", path=key)
-    for name in metadata.get("flags", []):
-        if not isinstance(name, str):
-            raise DataError(f"damaged metadata: {name!r} is no name of a flag", path="flags")
-    if len(metadata.get("flags", [])) > MOST_FLAGS:
-        raise DataError(f"damaged metadata: more than {MOST_FLAGS} flags", path="flags")
-    for row in metadata.get("repairs", []):
-        if not isinstance(row, dict):
-            raise DataError(f"damaged metadata: {row!r} is no repair", path="repairs")
-    if metadata.get("clock", "shared") not in ("run", "shared"):
-        raise DataError(f"damaged metadata: clock is {metadata['clock']!r}, must be 'run' or 'shared'", path="clock")
+    wrong = [
+        (key, f"must be a {kind.__name__}")
+        for key, kind in kinds.items()
+        if not isinstance(metadata.get(key, kind()), kind)
+    ]
+    if not wrong:
+        flags, clock = metadata.get("flags", []), metadata.get("clock", "shared")
+        wrong += [("flags", f"{name!r} is no name of a flag") for name in flags if not isinstance(name, str)]
+        wrong += [("flags", f"more than {MOST_FLAGS} flags")] * (len(flags) > MOST_FLAGS)
+        wrong += [
+            ("repairs", f"{row!r} is no repair") for row in metadata.get("repairs", []) if not isinstance(row, dict)
+        ]
+        wrong += [("clock", f"clock is {clock!r}, must be 'run' or 'shared'")] * (clock not in ("run", "shared"))
+    for key, what in wrong:
+        raise DataError(f"damaged metadata: {what}", path=key)
 
 
 def _check_column(name: str, column: pd.Series[Any]) -> None:

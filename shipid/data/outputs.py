@@ -59,19 +59,16 @@ def compare_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     Returns `output`, `run`, `unit`, `measured` and `predicted` (root mean squares), `scale` (measured over predicted,
     by least squares) and `error` (root mean square of the difference); empty without a common output.
     """
+    predicted = predicted_outputs(vessel, dataset)
+    measured = pd.concat([rows for _, rows in pieces(dataset)], ignore_index=True)
     table: list[dict[str, Any]] = []
-    predictions = predicted_outputs(vessel, dataset)
-    runs = dataset.frame["run"].to_numpy()
-    ordered = pd.concat([rows for _, rows in pieces(dataset)], ignore_index=True)
-    for name in predictions.columns[2:]:
-        for run in dict.fromkeys(runs):
-            here = (predictions["run"] == run).to_numpy()
-            y, f = ordered[name].to_numpy()[here], predictions[name].to_numpy()[here]
-            power = float(f @ f)
+    for name in predicted.columns[2:]:
+        for run, rows in predicted.groupby("run", sort=False):
+            y, f = measured[name].to_numpy()[rows.index], rows[name].to_numpy()
+            scale = float(f @ y) / float(f @ f) if f.any() else np.inf
             row = {"output": name, "run": str(run), "unit": unit_of(name), "measured": rms(y), "predicted": rms(f)}
-            table.append(row | {"scale": float(f @ y) / power if power else np.inf, "error": rms(y - f)})
-    names = ["output", "run", "unit", "measured", "predicted", "scale", "error"]
-    return pd.DataFrame(table, columns=names)
+            table.append({**row, "scale": scale, "error": rms(y - f)})
+    return pd.DataFrame(table, columns=["output", "run", "unit", "measured", "predicted", "scale", "error"])
 
 
 def check_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
