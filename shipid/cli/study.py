@@ -21,7 +21,7 @@ from shipid.units import decimals_for, decimals_of, length_text, level_text, per
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from shipid.study.matched import Comparison
+    from shipid.answer.matched import Comparison
     from shipid.study.plan import Plan
     from shipid.study.results import Results
 
@@ -227,8 +227,8 @@ def study_rotate(
     as_json: Json = False,
 ) -> None:
     """Test on every run in turn and train on all others; the same command goes on after an interruption."""
+    from shipid.answer import rotate
     from shipid.files import write_table
-    from shipid.study import rotate
     from shipid.study.prepare import obtain
 
     plan, file = _before_work(study, changes, device, out, "rotate")
@@ -311,7 +311,7 @@ def study_resume(
 @app.command("report")
 def study_report(folder: Folder) -> None:
     """Write report.html, summary.md and results.parquet from what is stored."""
-    from shipid.study.contents import write_pages
+    from shipid.answer.pages import write_pages
 
     with steps() as say:
         report = write_pages(folder, say)
@@ -348,14 +348,14 @@ def study_compare(
     Finished runs of one study in several worlds (another --set seed= each) are repetitions: then it shows findings and
     errors over the worlds.
     """
+    from shipid.answer import matched, worlds
     from shipid.files import check_table, write_table
-    from shipid.study import compare, matched
 
     if out is not None:
         check_table(out)
     with answering(as_json) as answer:
-        if pair is None and compare.are_worlds(folders):
-            errors = _show_worlds(compare.read_worlds(folders), answer)
+        if pair is None and worlds.are_worlds(folders):
+            errors = _show_worlds(worlds.read_worlds(folders), answer)
         else:
             pairs = dict(_counterpart(one) for one in pair or ())
             errors = _show_matched(matched.compare(folders, pairs), answer)
@@ -441,7 +441,7 @@ def _to_three_digits(mean: float, low: float, high: float) -> str:
 
 def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     """Show findings, errors and bands of one study over several worlds; returns the errors."""
-    from shipid.study.compare import compare_bands, compare_errors, compare_findings
+    from shipid.answer.worlds import compare_bands, compare_errors, compare_findings
 
     findings, errors, bands = compare_findings(worlds), compare_errors(worlds), compare_bands(worlds)
     words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
@@ -495,9 +495,9 @@ def _before_work(
 
 
 def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool) -> None:
+    from shipid.answer.pages import ANSWER, share_pages
     from shipid.files import as_argument
     from shipid.study import run, store
-    from shipid.study.contents import ANSWER, share_pages
     from shipid.study.progress import Watch
 
     resume = f"{plan.program} study resume {as_argument(folder)}"

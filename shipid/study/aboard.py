@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid.answer.bands import share_interval
 from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, clock_slack, pieces, sample
 from shipid.data.windows import (
@@ -32,7 +33,6 @@ from shipid.observer import observe
 from shipid.predictor import Predictor
 from shipid.report.content import Line
 from shipid.study.apply import Band, along_run, dataset_of
-from shipid.study.bands import share_interval
 from shipid.study.prepare import states_along
 from shipid.study.store import read_predictor
 from shipid.units import length_text, level_text, listed, percent, plural

@@ -19,9 +19,9 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError, choices
+from shipid.evidence import SIGNIFICANT, holm
 from shipid.hybrid.physics import check_columns
 from shipid.metrics import BINS, rank_correlation, tally_quantile
-from shipid.study.evidence import SIGNIFICANT, holm
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel

@@ -20,8 +20,10 @@ import tomlkit
 from numpy.typing import NDArray
 
 from shipid import document as documents
+from shipid.answer.verdict import shown
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
+from shipid.evidence import FEWEST_RUNS, contrasts
 from shipid.files import write_new
 from shipid.identification.bands import Measure, bands, check_level, refusal
 from shipid.identification.design import Candidate, candidates, performed, recorded, steps_between
@@ -44,9 +46,7 @@ from shipid.identification.statistics import LEVEL, LinearFit, Statistics, stati
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange
 from shipid.report.structures import StructuresContent
 from shipid.simulation.measured import Measured, measure_all
-from shipid.study.evidence import FEWEST_RUNS, contrasts
 from shipid.study.new import proposed_horizon
-from shipid.study.verdict import shown
 from shipid.version import __version__
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.ranges import UNUSUAL, contradictions

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from shipid.study.verdict import Verdict
+from shipid.answer.verdict import Verdict
+from tests.answer.made_up import CASES, FULL_SCALE, Size, grids, rivals, roughness, rule
 from tests.benchmarks import by_seeds
-from tests.study.made_up import CASES, FULL_SCALE, Size, grids, rivals, roughness, rule
 
 SIZES = {"20 manoeuvres, 1 seed": Size(), "20 manoeuvres, 5 seeds": Size(seeds=5), "7 manoeuvres, 3 seeds": Size(7, 3)}
 NEW = ("B1",)  # not before version 0.2

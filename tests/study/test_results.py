@@ -14,15 +14,15 @@ import pandas as pd
 import pytest
 
 from shipid import figures
+from shipid.answer.pages import report_content
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.errors import ShipidError
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import results as frames
 from shipid.study import store
-from shipid.study.contents import report_content
 from shipid.study.plan import build_plan, read_plan
 from shipid.study.results import Results, read_cells, read_results
-from tests.study.byhand import grid
+from tests.answer.byhand import grid
 
 
 @pytest.fixture(scope="module")
