@@ -35,50 +35,35 @@ def document_differences(
 ) -> pd.DataFrame:
     """One row per value that is not the same in all plans: `path`, then a column of text for each plan, from 0 on.
 
-    Compared are the studies with their defaults, the vessels that go by one name, and the digests of recorded data.
+    Compared are the studies with their defaults, the vessels that all have by one name, and the digests of data.
 
     Parameters
     ----------
     sessions : for each plan, what its run was computed with; compared, too.
     called : for each plan, method or family -> the name that it is compared under.
     """
+    shared = set.intersection(*({*plan.vessels} for plan in plans))
     whole = [
         {
             **whole_document(plan, names),
             "digest of": dict(plan.sources),
-            "vessel": {name: {"digest": vessel.digest, **vessel.document} for name, vessel in plan.vessels.items()},
+            "vessel": {name: {"digest": plan.vessels[name].digest, **plan.vessels[name].document} for name in shared},
             "computed with": dict(session),
         }
         for plan, session, names in zip(plans, sessions or [{}] * len(plans), called or [{}] * len(plans), strict=True)
     ]
-    for name in {name for one in whole for name in one["vessel"]}:
-        if not all(name in one["vessel"] for one in whole):  # another ship: its families say so
-            for one in whole:
-                one["vessel"].pop(name, None)
-    rows = [[path, *map(_text, values)] for path, values in _different(whole, "")]
-    return pd.DataFrame(rows, columns=["path", *map(str, range(len(plans)))])
+    flat = [dict(_leaves(document, "")) for document in whole]
+    paths = dict.fromkeys(path for one in flat for path in one)
+    rows = [[path, *(one.get(path, ABSENT) for one in flat)] for path in paths]
+    return pd.DataFrame([row for row in rows if len(set(row[1:])) > 1], columns=["path", *map(str, range(len(plans)))])
 
 
-def _different(values: Sequence[Any], path: str) -> Iterator[tuple[str, Sequence[Any]]]:
-    """Dotted path and values where they are not all equal, as deep as all of them have tables."""
-    tables = [_table(value) for value in values]
-    if not all(table is not None for table in tables):
-        if any(value != values[0] for value in values):
-            yield path, values
-        return
-    for key in dict.fromkeys(key for table in tables for key in table or {}):
-        inside = f"{path}.{key}" if path else key
-        yield from _different([(table or {}).get(key) for table in tables], inside)
-
-
-def _table(value: Any) -> Mapping[str, Any] | None:
-    """The value as a table, if it is one or a list of tables."""
+def _leaves(value: Any, path: str) -> Iterator[tuple[str, str]]:
+    """Dotted path and text of every value that is no table and no list of tables."""
     if isinstance(value, list) and value and all(isinstance(entry, Mapping) for entry in value):
-        return {str(place): entry for place, entry in enumerate(value)}
-    return value if isinstance(value, Mapping) else None
-
-
-def _text(value: Any) -> str:
-    if value is None:
-        return ABSENT
-    return value if isinstance(value, str) else json.dumps(value)
+        value = {str(place): entry for place, entry in enumerate(value)}
+    if isinstance(value, Mapping):
+        for key, inside in value.items():
+            yield from _leaves(inside, f"{path}.{key}" if path else str(key))
+    elif value is not None:
+        yield path, value if isinstance(value, str) else json.dumps(value)

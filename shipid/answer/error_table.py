@@ -11,15 +11,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.evidence import Contrasts, contrasts, mean_errors, training_noise
+from shipid.evidence import Differences, paired_difference, training_noise
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
-from shipid.study.results import Results, judged_cells
+from shipid.study.results import Results
 
 Array = NDArray[np.float64]
 Metric = Literal["H", "H_90"]
-PLAIN = "none, plain"
-"""Prediction with no physics and without the mirror symmetry of the hull, where the study has it."""
 ALONE = -1  # place of the physics alone in a term
 EXACT = 1e-9  # m: errors below count as this one, which has a logarithm and can be divided by
 Term = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or ALONE
@@ -59,12 +57,10 @@ class ErrorTable:
     @cached_property
     def noise(self) -> Array:
         """(amounts,) relative standard error [1] that H of one cell has from training, as a mean over seeds."""
-        by_seed = {model: values @ self.weights for model, values in self.H.items()}
-        seeds = max((values.shape[1] for values in by_seed.values()), default=1)
-        every = range(len(self.amounts))
-        noise = np.array([training_noise([values[k] for values in by_seed.values()]) for k in every], dtype=float)
-        relative: Array = noise / seeds**0.5
-        return relative
+        by_seed = [values @ self.weights for values in self.H.values()]
+        seeds = max((values.shape[1] for values in by_seed), default=1)
+        noise = [training_noise([values[k] for values in by_seed]) for k in range(len(self.amounts))]
+        return np.array(noise, dtype=float) / seeds**0.5
 
     def by_run(self, model: str, place: int) -> Array:
         """(R,) error of a model at an amount, mean over seeds, or of its physics alone."""
@@ -76,12 +72,10 @@ class ErrorTable:
 
     def interval(self, model: str, place: int) -> tuple[float, float]:
         """95 % interval [m] of the error of a model at an amount, mean over seeds and windows."""
-        judged = mean_errors(
-            self.by_run(model, place)[None], self.counts, self.mean(model, place) * float(self.noise[place])
-        )
-        return float(judged.low[0]), float(judged.high[0])
+        errors = self.compare([[(1.0, model, place)]])
+        return max(float(errors.low[0]), 0.0), float(errors.high[0])
 
-    def compare(self, differences: Sequence[Sequence[Term]]) -> Contrasts:
+    def compare(self, differences: Sequence[Sequence[Term]]) -> Differences:
         """Judge sums of errors, each with its factor: `[(1, "none", 0), (-1, "good", 0)]` is what physics saves."""
         values, training = np.zeros((len(differences), self.runs)), np.zeros(len(differences))
         for row, terms in enumerate(differences):
@@ -89,9 +83,9 @@ class ErrorTable:
                 values[row] += factor * self.by_run(model, place)
                 if place != ALONE:
                     training[row] += (factor * self.mean(model, place) * self.noise[place]) ** 2
-        return contrasts(values, self.counts, np.sqrt(training))
+        return paired_difference(values, self.counts, np.sqrt(training))
 
-    def against(self, rival: str, models: Sequence[str], place: int) -> Contrasts:
+    def lead(self, rival: str, models: Sequence[str], place: int) -> Differences:
         """How much lower [m] than a rival's the errors of models are at an amount of data."""
         return self.compare([[(1.0, rival, place), (-1.0, model, place)] for model in models])
 
@@ -99,33 +93,36 @@ class ErrorTable:
 def error_table(
     results: Results, models: Sequence[str], metric: Metric = "H", amounts: Sequence[int] | None = None
 ) -> ErrorTable:
-    """Errors of models, `none` and plain `none` that have a result in every cell; H_90 is taken in each manoeuvre.
+    """Errors of models and `none` that have a result in every cell; H_90 is taken in each manoeuvre.
 
     amounts : values of N_D that count, rising; all by default.
     """
-    _, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
-
-    def by_run(path: Array) -> Array:
-        return _by_run(path, results.test.future, place, metric)
-
-    cells = judged_cells(results)
+    cells = results.judged_cells
     amounts = sorted(set(cells["N_D"])) if amounts is None else amounts
     seeds = sorted(set(cells["seed"]))
-    wanted = {name: cells[cells["foundation"] == name] for name in (*models, NO_MODEL)}
-    if plain := results.plan.plain:
-        every = results.cells
-        wanted[PLAIN] = every[(every["foundation"] == NO_MODEL) & (every["method"] == plain)]
+    keys = zip(cells["foundation"], cells["N_D"], cells["seed"], strict=True)
+    known = dict(zip(keys, cells["cell"], strict=True))
     H = {}
-    for name, mine in wanted.items():
-        known = {(row.N_D, row.seed): str(row.cell) for row in mine.itertuples()}
-        if all(known.get((N, seed)) in results.paths for N in amounts for seed in seeds):
-            H[name] = np.array([[by_run(results.paths[known[N, seed]]) for seed in seeds] for N in amounts])
+    for name in (*models, NO_MODEL):
+        mine = [[known.get((name, N, seed)) for seed in seeds] for N in amounts]
+        if all(cell in results.paths for row in mine for cell in row):
+            H[name] = np.array([[_by_run(results, str(cell), metric) for cell in row] for row in mine])
     alone = {
-        name: by_run(path)
+        name: results.path_errors(path) if metric == "H" else _upper_errors(results, path)
         for name, path in results.physics.items()
         if name in models and name != NO_MODEL and np.isfinite(path).all()
     }
-    return ErrorTable(tuple(int(N) for N in amounts), counts.astype(float), alone, H)
+    return ErrorTable(tuple(int(N) for N in amounts), results.windows, alone, H)
+
+
+def _by_run(results: Results, cell: str, metric: Metric) -> Array:
+    return results.errors[cell] if metric == "H" else _upper_errors(results, results.paths[cell])
+
+
+def _upper_errors(results: Results, path: Array) -> Array:
+    """(R,) 90th percentile [m] of the errors of a path (T, S, 2) [m] in each test manoeuvre."""
+    error, run = position_error(path, results.test.future), results.test.run
+    return np.array([np.quantile(error[:, run == name], 0.9) for name in np.unique(run)])
 
 
 def intervals_frame(results: Results) -> pd.DataFrame:
@@ -134,33 +131,15 @@ def intervals_frame(results: Results) -> pd.DataFrame:
     Columns: model, N_D, low, high [m]; not numbers with fewer than five test manoeuvres. H is the mean over seeds; what
     another training would give is in the interval of every model that learns.
     """
-    _, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
-    cells = results.cells[results.cells["cell"].map(results.paths.__contains__)]
-    parts, weights, true = [], counts / counts.sum(), results.test.future
-    for N_D, mine in cells.groupby("N_D", sort=True):
-        errors = {
-            str(model): np.stack(
-                [_by_run(results.paths[str(cell)], true, place) for cell in same["cell"]]
-            )  # (seeds, R)
-            for model, same in mine.groupby("model", sort=False)
-        }
-        means = np.stack([each.mean(axis=0) for each in errors.values()])
-        of_model = {row.model: results.plan.learns(str(row.family), str(row.method)) for row in mine.itertuples()}
-        trained = np.array([of_model[model] for model in errors])
-        noise = training_noise([each @ weights for each, moved in zip(errors.values(), trained, strict=True) if moved])
-        seeds = np.array([len(each) for each in errors.values()])
-        judged = mean_errors(means, counts.astype(float), trained * noise * (means @ weights) / np.sqrt(seeds))
-        parts.append(pd.DataFrame({"model": list(errors), "N_D": N_D, "low": judged.low, "high": judged.high}))
+    parts, weights = [], results.windows / results.windows.sum()
+    for N_D, mine in results.cells[results.cells["cell"].isin(list(results.errors))].groupby("N_D", sort=True):
+        by_model = {str(name): same for name, same in mine.groupby("model", sort=False)}
+        errors = [np.stack([results.errors[str(cell)] for cell in same["cell"]]) for same in by_model.values()]
+        trained = np.array([results.plan.learns(*same.iloc[0][["family", "method"]]) for same in by_model.values()])
+        noise = training_noise([each @ weights for each, moved in zip(errors, trained, strict=True) if moved])
+        means = np.stack([each.mean(axis=0) for each in errors])
+        training = trained * noise * (means @ weights) / np.sqrt([len(each) for each in errors])
+        one = paired_difference(means, results.windows, training)
+        low = np.maximum(one.low, 0.0)
+        parts.append(pd.DataFrame({"model": list(by_model), "N_D": N_D, "low": low, "high": one.high}))
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["model", "N_D", "low", "high"])
-
-
-def _by_run(path: Array, true: Array, place: NDArray[np.int64], metric: Metric = "H") -> Array:
-    """(R,) mean error, or 90th percentile, [m] of a path in each test manoeuvre; place : (S,) that of each window."""
-    error = position_error(path, true)
-    if metric == "H":
-        return np.bincount(place, error.mean(axis=0)) / np.bincount(place)
-    sizes = np.bincount(place)
-    if (sizes == sizes[0]).all():  # all at once: a call of each takes ten times as long
-        order = np.argsort(place, kind="stable")
-        return np.asarray(np.quantile(error[:, order].reshape(len(error), len(sizes), -1), 0.9, axis=(0, 2)))
-    return np.array([np.quantile(error[:, place == k], 0.9) for k in range(len(sizes))])

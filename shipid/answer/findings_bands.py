@@ -18,37 +18,35 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.answer.bands import of_methods, regions, share_interval
+from shipid.answer.bands import cell_regions, of_methods
 from shipid.answer.error_table import ALONE, ErrorTable, error_table
+from shipid.answer.findings_simulation import trend_over_accuracy, trend_verdict
 from shipid.answer.verdict import (
-    SAME_A,
-    WHICH,
+    EQUAL_A,
     Finding,
-    every,
-    finding,
-    manoeuvres,
-    measured,
-    metres,
-    some,
-    span,
-    too_few,
-    undecided,
-    verdict,
+    Judgement,
+    Rule,
+    Undecided,
+    count_manoeuvres,
+    difference_with_interval,
+    judge_claims,
+    least_to_greatest,
+    leave_undecided,
+    length_in_metres,
+    too_few_manoeuvres,
+    verdict_of,
 )
-from shipid.evidence import FEWEST_MODELS, by_chance, doubling
+from shipid.evidence import all_significant, any_significant, share_interval
 from shipid.metrics import rank_correlation, share_of
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
-from shipid.study.results import Results, judged_cells
+from shipid.study.results import Results
 from shipid.units import level_text, percent
 
 Array = NDArray[np.float64]
-CLAIMS = {
-    "B1": "more accurate physics gives a narrower band",
-    "B2": "bands hold the share of whole paths that they promise",
-}
 SHORT = 0.05  # B2: a share that lies so far below its level is a broken promise
 
 
@@ -64,117 +62,141 @@ class Widths:
     rivals: bool = False
 
 
+@dataclass(frozen=True)
+class Promise:
+    """What B2 judges: the share (S,) of models whose band of a level holds the path of a window, and its run (S,).
+
+    kinds : (S,) kind of manoeuvre of each window. calibrated : kinds that calibrated every band; None if unknown.
+    """
+
+    held: Array
+    run: NDArray[np.str_]
+    level: float
+    kinds: NDArray[np.str_] | None = None
+    calibrated: frozenset[str] | None = None
+
+
+@dataclass(frozen=True)
+class BandEvidence:
+    """What B1 and B2 judge, and the shares of paths that the bands of B1 hold."""
+
+    widths: Widths
+    promise: Promise
+    shares: Sequence[float] = ()
+
+
 def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[Finding]:
     """Verdicts on B1 and B2 for models with physics (none of them sees the test); undecided where none has a band.
 
     rivals : as in `Widths`.
     """
     if not results.complete:
-        return undecided(CLAIMS, results.missing)
-    level, run = results.plan.level, results.test.run
-    of = of_methods(results, [results.plan.judged])
-    bands = {
-        str(row["cell"]): (by_level[level].radius.mean(axis=0), by_level[level].holds(errors))
-        for row, by_level, errors in regions(results, [level])
-    }
-    table = _width_table(results, physics, {cell: width for cell, (width, _) in bands.items()})
+        return leave_undecided(BAND_RULES, results.missing)
+    level, run, of = results.plan.study.bands.level, results.test.run, of_methods(results, [results.plan.judged])
+    widths, held = {}, {}
+    for row, by_level, errors in cell_regions(results, [level]):
+        region, cell = by_level[level], str(row["cell"])
+        widths[cell], held[cell] = results.by_run(region.radius.mean(axis=0)), region.holds(errors)
+    errors, cells = error_table(results, physics), results.judged_cells
+    cells = cells[cells["foundation"].isin(errors.H)]  # a model with a failed cell may have no band
+    table = _width_table(errors, cells[~cells["N_D"].isin(cells["N_D"][~cells["cell"].isin(widths)])], widths)
     sound = tuple(name for name in physics if name in table.H and name in table.A)
     if not table.amounts or len(sound) < 2:
-        return undecided(CLAIMS, f"no two models with physics{of} have a band of {level_text(level)}")
-    cells = judged_cells(results)
-    judged = [name for name in (*sound, NO_MODEL) if name in table.H]  # a model with a failed cell may have no band
-    cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin(judged)]
-    held = {name: [bands[cell][1] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
-    shares = [share_of(np.mean(held[name], axis=0), run) for name in sound]
-    first = narrower(Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals))
-    first["evidence"] += f"; these bands hold {span(percent(min(shares)), percent(max(shares)))} of whole paths"
-    whole = np.mean([one for ones in held.values() for one in ones], axis=0)
-    second = _of_known_kinds(whole, run, level, results.kinds, [results.bands[cell].kinds for cell in cells["cell"]])
-    notes = "".join(f"; {note}" for note in (f"bands{of}" if of else "", too_few(table.runs)) if note)
-    return [Finding(**{**one, "evidence": one["evidence"] + notes}) for one in (first, second)]
+        return leave_undecided(BAND_RULES, f"no two models with physics{of} have a band of {level_text(level)}")
+    cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin([*sound, NO_MODEL])]
+    of_model = {str(name): [held[cell] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
+    kinds = np.array([results.kinds[str(name)] for name in run])
+    known = [frozenset(results.bands[cell].kinds) for cell in cells["cell"] if results.bands[cell].kinds]
+    case = BandEvidence(
+        Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals),
+        Promise(
+            np.mean([one for ones in of_model.values() for one in ones], axis=0),
+            run,
+            level,
+            kinds,
+            frozenset.intersection(*known) if known else None,
+        ),
+        [share_of(np.mean(of_model[name], axis=0), run) for name in sound],
+    )
+    notes = (f"bands{of}" if of else "", too_few_manoeuvres(table.runs))
+    return judge_claims(BAND_RULES, case, "; ".join(note for note in notes if note))
 
 
-def _of_known_kinds(
-    held: Array, run: NDArray[np.str_], level: float, kinds: Mapping[str, str], calibrated: Sequence[Mapping[str, int]]
-) -> Finding:
-    """Verdict on B2 without test runs of a kind that no run of calibration has: bands promise nothing for them.
-
-    held, run : as for `kept_promise`. kinds : test run -> kind of manoeuvre. calibrated : kinds of each band, if known.
-    """
-    new = {str(name) for name in run if any(known and kinds[str(name)] not in known for known in calibrated)}
-    if not new:
-        return kept_promise(held, run, level)
-    these = listed(sorted({kinds[name] for name in new}))
-    left_out = f"no run of the kind {these} calibrated them, so they promise nothing for {manoeuvres(len(new))}"
-    like = ~np.isin(run, list(new))
-    if not like.any():
-        return finding(CLAIMS, "B2", "undecided", left_out)
-    kept = kept_promise(held[like], run[like], level)
-    return Finding(**{**kept, "evidence": f"{kept['evidence']}; {left_out}"})
+def _width_table(errors: ErrorTable, cells: pd.DataFrame, widths: Mapping[str, Array]) -> ErrorTable:
+    """Widths [m] of cells by test manoeuvre in place of H."""
+    amounts = tuple(N for N in errors.amounts if N in set(cells["N_D"]))
+    H = {
+        str(name): np.array([[widths[cell] for cell in mine["cell"][mine["N_D"] == N]] for N in amounts])
+        for name, mine in cells.sort_values("seed", kind="stable").groupby("foundation")
+    }
+    return replace(errors, amounts=amounts, H=H)
 
 
-def narrower(widths: Widths) -> Finding:
+def _judge_widths(bands: BandEvidence) -> Judgement:
+    decided, evidence, numbers = judge_width_trend(bands.widths)
+    if not numbers:
+        return decided, evidence, numbers
+    hold = least_to_greatest(percent(min(bands.shares)), percent(max(bands.shares)))
+    return decided, f"{evidence}; these bands hold {hold} of whole paths", numbers
+
+
+def judge_width_trend(widths: Widths) -> Judgement:
     """Verdict on B1, without the shares that the bands hold."""
-    table, models = widths.table, widths.physics
-    last = len(table.amounts) - 1
+    table, models, last = widths.table, widths.physics, len(widths.table.amounts) - 1
     if widths.rivals:
         good, bad = sorted(models, key=lambda model: table.mean(model, ALONE))  # the roles say nothing of the test
         wider = table.compare([[(1.0, bad, last), (-1.0, good, last)]])
-        apart = every(table.compare([[(1.0, bad, ALONE), (-1.0, good, ALONE)]]).above)
+        apart = all_significant(table.compare([[(1.0, bad, ALONE), (-1.0, good, ALONE)]]).above)
         evidence = (
-            f"at N_D = {table.amounts[last]} the mean radius of the band is {metres(table.mean(bad, last))} for {bad}, "
-            f"{metres(table.mean(good, last))} for {good}: {measured(wider, 0)} more"
+            f"at N_D = {table.amounts[last]} the mean radius of the band is {length_in_metres(table.mean(bad, last))} "
+            f"for {bad}, {length_in_metres(table.mean(good, last))} for {good}: {difference_with_interval(wider)} more"
+            f"{'' if apart else f'; {EQUAL_A}'}"
         )
-        evidence += "" if apart else f"; {WHICH}"
-        ratio = table.mean(bad, last) / table.mean(good, last)
-        decided = verdict(apart and every(wider.above), apart and some(wider.below))
-        return finding(CLAIMS, "B1", decided, evidence, **{"ratio of widths": ratio})
-    if len(models) < FEWEST_MODELS:
-        return finding(CLAIMS, "B1", "undecided", f"{len(models)} models with physics, a trend needs {FEWEST_MODELS}")
-    A = np.array([table.mean(model, ALONE) for model in models])
-    if np.isclose(A.min(), A.max()):
-        return finding(CLAIMS, "B1", "undecided", SAME_A)
-    weights, places = doubling(np.log(A)), range(len(table.amounts))
-    slopes = table.compare([[(float(w), m, k) for w, m in zip(weights, models, strict=True)] for k in places])
-    order = np.array([[table.mean(model, k) for model in models] for k in places])
+        decided = verdict_of(apart and all_significant(wider.above), apart and any_significant(wider.below))
+        return decided, evidence, {"ratio of widths": table.mean(bad, last) / table.mean(good, last)}
+    A, each = trend_over_accuracy(table, models)
+    slopes = table.compare(each)
+    order = np.array([[table.mean(model, k) for model in models] for k in range(len(each))])
     rises = [rank_correlation(A, values) for values in order]
-    shown = (np.maximum(side, by_chance(A, sign * order)) for side, sign in ((slopes.above, 1), (slopes.below, -1)))
-    risen, fallen = shown
-    ends = [f"{measured(slopes, k)} at N_D = {table.amounts[k]}" for k in sorted({0, last})]
+    ends = [f"{difference_with_interval(slopes, k)} at N_D = {table.amounts[k]}" for k in sorted({0, last})]
     evidence = (
         f"for twice the A the mean radius rises by {' and by '.join(ends)}; rank correlation of width and A "
-        f"{span(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D ({len(A)} models)"
+        f"{least_to_greatest(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D ({len(A)} models)"
     )
     numbers = {"least rank correlation of width and A": min(rises)}
     numbers |= {f"rise for twice the A at N_D = {table.amounts[last]} [m]": float(slopes.mean[last])}
-    return finding(CLAIMS, "B1", verdict(every(risen), some(fallen)), evidence, **numbers)
+    return trend_verdict(slopes, A, order), evidence, numbers
 
 
-def kept_promise(held: Array, run: NDArray[np.str_], level: float) -> Finding:
-    """Verdict on B2 from held (S,), the share of models whose band holds the path of a window, and its run (S,)."""
-    low, high = share_interval(held, run)
-    share, sizes = share_of(held, run), np.unique(run, return_counts=True)[1]
-    count = len(sizes)
-    interval = "" if too_few(count) else f" [{percent(low)}, {percent(high)}]"
+def _judge_promise(bands: BandEvidence) -> Judgement:
+    """Judge test runs of the kinds that runs of calibration have: bands promise nothing for others."""
+    promise, left_out = bands.promise, ""
+    if promise.kinds is not None and promise.calibrated is not None:
+        like = np.isin(promise.kinds, list(promise.calibrated))
+        these, count = sorted(set(promise.kinds[~like])), len(set(promise.run[~like]))
+        if count:
+            left_out = f"no run of the kind {listed(these)} calibrated them, so they promise nothing for "
+            left_out += count_manoeuvres(count)
+        if not like.any():
+            raise Undecided(left_out)
+        promise = replace(promise, held=promise.held[like], run=promise.run[like])
+    decided, evidence, numbers = judge_held_share(promise)
+    return decided, f"{evidence}; {left_out}" if left_out else evidence, numbers
+
+
+def judge_held_share(promise: Promise) -> Judgement:
+    """Verdict on B2 over all of these test runs."""
+    low, high = share_interval(promise.held, promise.run)
+    share, sizes = share_of(promise.held, promise.run), np.unique(promise.run, return_counts=True)[1]
+    few, level = too_few_manoeuvres(len(sizes)), promise.level
+    interval = "" if few else f" [{percent(low)}, {percent(high)}]"
     each = "" if (sizes == sizes[0]).all() else ", each counts the same"
     hold = f"bands of {level_text(level)} hold {percent(share)}{interval} of whole paths"
-    evidence = f"{hold} ({manoeuvres(count)}{each})"
-    decided = verdict(low >= level - SHORT, high < level)
-    numbers = {f"share at {level_text(level)}": share}
-    return finding(CLAIMS, "B2", decided if not too_few(count) else "undecided", evidence, **numbers)
+    decided = "undecided" if few else verdict_of(low >= level - SHORT, high < level)
+    return decided, f"{hold} ({count_manoeuvres(len(sizes))}{each})", {f"share at {level_text(level)}": share}
 
 
-def _width_table(results: Results, physics: Sequence[str], widths: Mapping[str, Array]) -> ErrorTable:
-    """Widths of cells (S,) [m] in place of H, by test manoeuvre, at the amounts at which every judged cell has one."""
-    cells, errors = judged_cells(results), error_table(results, physics)
-    mine = cells[cells["foundation"].isin(errors.H)]
-    without = set(mine["N_D"][~mine["cell"].isin(widths)])
-    amounts = tuple(N for N in errors.amounts if N not in without)
-    run = results.test.run
-    known = {
-        (row.foundation, row.N_D, row.seed): [widths[str(row.cell)][run == one].mean() for one in np.unique(run)]
-        for row in mine[~mine["N_D"].isin(without)].itertuples()
-    }
-    seeds, names = sorted(set(cells["seed"])), sorted(set(mine["foundation"]))
-    H = {name: np.array([[known[name, N, seed] for seed in seeds] for N in amounts]) for name in names}
-    return replace(errors, amounts=amounts, H=H)
+BAND_RULES: dict[str, Rule[BandEvidence]] = {
+    "B1": Rule("more accurate physics gives a narrower band", _judge_widths),
+    "B2": Rule("bands hold the share of whole paths that they promise", _judge_promise),
+}

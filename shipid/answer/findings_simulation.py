@@ -26,60 +26,53 @@ The thresholds are free: the paper gives none. Error rates of every rule: docs/f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr
+from scipy.stats import ttest_1samp
 
-from shipid.answer.error_table import ALONE, PLAIN, ErrorTable, Metric, error_table
+from shipid.answer.error_table import ALONE, ErrorTable, Metric, Term, error_table
 from shipid.answer.verdict import (
     SAME_A,
     Finding,
+    Judgement,
+    Rule,
+    Undecided,
     Verdict,
-    every,
-    finding,
-    manoeuvres,
-    measured,
-    metres,
-    named,
-    shown,
-    some,
-    span,
-    too_few,
-    undecided,
-    verdict,
-    weakest,
-    words,
+    count_manoeuvres,
+    difference_with_interval,
+    judge_claims,
+    least_to_greatest,
+    leave_undecided,
+    length_in_metres,
+    model_list,
+    quoted_model,
+    too_few_manoeuvres,
+    verdict_of,
+    weakest_verdict,
 )
 from shipid.evidence import (
     FEWEST_MODELS,
     FEWEST_RUNS,
     SIGNIFICANT,
-    Contrasts,
-    at_least,
-    by_chance,
-    contrasts,
-    doubling,
+    Differences,
+    all_significant,
+    any_significant,
+    doubling_weights,
+    order_chance,
+    paired_difference,
+    partial_conjunction,
+    which_significant,
 )
-from shipid.hybrid.method import Method
 from shipid.metrics import rank_correlation, roughness
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
-from shipid.study.results import Results, judged_cells
+from shipid.study.results import Results
 from shipid.units import percent, plural
 
 Array = NDArray[np.float64]
-CLAIMS = {
-    "S1": "every moderate cooperative model beats no physics at the smallest N_D, and most keep the lead",
-    "S2": "H falls with N_D for every model",
-    "S3": "H rises with A at fixed N_D, most steeply at small N_D",
-    "S4": "some high models beat no physics; the worst stay worse even at the largest N_D, and fluctuate",
-    "S5": "H_90 leads to the same findings as H",
-    "S6": "moderate models with small N_D beat no physics with a larger one, and more accurate physics alone",
-    "S7": "paths without physics are rough at small N_D, those of cooperative models are not",
-}
 FEWEST_ORDERS = 5  # S4: nested orders of runs that a fluctuation needs
 ALIKE, UNLIKE = 0.95, 0.8  # S5
 ROUGH = 1.5  # S7: times the roughness of the true paths
@@ -88,12 +81,17 @@ MOST_PAIRS = 2  # S6: of each kind, in words
 
 @dataclass(frozen=True)
 class Grid:
-    """The errors that S1-S6 judge, and which members belong to the moderate and the high family."""
+    """The errors that S1-S6 judge, and which members belong to the moderate and the high family.
+
+    by_90 : the same of H_90, for S5. results : what S7 takes the roughness of paths from.
+    """
 
     table: ErrorTable
     moderate: tuple[str, ...]
     high: tuple[str, ...]
     left_out: tuple[str, ...] = ()
+    by_90: ErrorTable | None = None
+    results: Results | None = None
 
     @property
     def physics(self) -> tuple[str, ...]:
@@ -105,193 +103,170 @@ class Grid:
         """N_D, rising."""
         return self.table.amounts
 
-    def value(self, model: str, place: int) -> str:
-        """H of a model, in words."""
-        return metres(self.table.mean(model, place))
+    def members(self, family: str) -> tuple[str, ...]:
+        """Members of a family with a result in every cell, of both for `physics`; Undecided without one."""
+        names: tuple[str, ...] = getattr(self, family)
+        if not names:
+            raise Undecided(f"no {family} model has a result in every cell")
+        return names
+
+    def metres(self, model: str, place: int) -> str:
+        """H of a model, or A where its physics is alone, in words."""
+        return length_in_metres(self.table.mean(model, place))
 
 
 def simulation_findings(results: Results) -> list[Finding]:
     """Verdicts on S1-S7; all undecided, with the reason, where the study is no evidence."""
-    H, H_90 = read_grid(results, "H"), read_grid(results, "H_90")
-    if isinstance(H, str) or isinstance(H_90, str):
-        return undecided(CLAIMS, str(H))
-    verdicts = [*judged(H, H_90), _S7(results, H)]
-    few, left_out = too_few(H.table.runs), named(H.left_out)
-    notes = [*([few] if few else []), *([f"left out for want of results: {left_out}"] if left_out else [])]
-    return [Finding(**{**one, "evidence": "; ".join([one["evidence"], *notes])}) for one in verdicts]
+    try:
+        grid = read_grid(results)
+    except Undecided as reason:
+        return leave_undecided(SIMULATION_RULES, str(reason))
+    left_out = f"left out for want of results: {model_list(grid.left_out)}" if grid.left_out else ""
+    notes = [note for note in (too_few_manoeuvres(grid.table.runs), left_out) if note]
+    return judge_claims(SIMULATION_RULES, grid, "; ".join(notes))
 
 
-def judged(H: Grid, H_90: Grid) -> list[Finding]:
-    """Verdicts on S1-S6 from tables of both metrics."""
-    by_H, by_H_90 = ([RULES[key](grid) for key in ("S1", "S2", "S3", "S4")] for grid in (H, H_90))
-    return [*by_H, _S5(H, H_90, by_H, by_H_90), RULES["S6"](H)]
-
-
-def read_grid(results: Results, metric: Metric) -> Grid | str:
-    """H or H_90 of a finished study as a grid, or the reason why there is none."""
-    claims, cells = results.plan.claims, judged_cells(results)
+def read_grid(results: Results) -> Grid:
+    """The errors of a finished study; Undecided, with the reason, where there are none."""
+    claims, cells = results.plan.study.claims, results.judged_cells
     assert claims is not None
     if not results.complete:
-        return results.missing
+        raise Undecided(results.missing)
     if NO_MODEL not in set(cells["model"]):
-        return f"the method {results.plan.judged!r} is not run without physics"
-    failed = set(cells["model"][cells["status"] != "ok"])
-    if NO_MODEL in failed:
-        return f"{words(NO_MODEL)} has no result in every cell"
+        raise Undecided(f"the method {results.plan.judged!r} is not run without physics")
+    if NO_MODEL in set(cells["model"][cells["status"] != "ok"]):
+        raise Undecided(f"{quoted_model(NO_MODEL)} has no result in every cell")
     if cells["N_D"].nunique() < 2:
-        return "the findings are about a growing N_D, and the study has one"
-    members = {
-        family: [one.name for one in results.plan.foundations if one.family == family]
-        for family in (claims.moderate, claims.high)
-    }
-    table = error_table(results, [name for names in members.values() for name in names], metric)
-    sound = {
-        family: tuple(name for name in names if name in table.H and name in table.A)
-        for family, names in members.items()
-    }
-    left_out = tuple(name for names in members.values() for name in names if name not in table.H or name not in table.A)
-    kept = (*sound[claims.moderate], *sound[claims.high])
-    table = replace(table, A={name: table.A[name] for name in kept})
-    return Grid(table, sound[claims.moderate], sound[claims.high], left_out)
+        raise Undecided("the findings are about a growing N_D, and the study has one")
+    families = (claims.moderate, claims.high)
+    names = {f: tuple(one.name for one in results.plan.foundations if one.family == f) for f in families}
+    every = [name for family in families for name in names[family]]
+
+    def table(metric: Metric) -> ErrorTable:
+        known = error_table(results, every, metric)
+        return replace(known, A={name: A for name, A in known.A.items() if name in known.H})
+
+    by_mean = table("H")
+    moderate, high = (tuple(name for name in names[family] if name in by_mean.A) for family in families)
+    left_out = tuple(name for name in every if name not in by_mean.A)
+    return Grid(by_mean, moderate, high, left_out, table("H_90"), results)
 
 
-def _without(key: str, what: str) -> Finding:
-    return finding(CLAIMS, key, "undecided", f"no {what} model has a result in every cell")
-
-
-def _range(differences: Contrasts) -> str:
+def _range_of(differences: Differences) -> str:
     """The least and the greatest of some differences, with their intervals."""
-    least, most = int(differences.mean.argmin()), int(differences.mean.argmax())
-    return measured(differences, least) + (f" to {measured(differences, most)}" if least != most else "")
+    ends = dict.fromkeys((int(differences.mean.argmin()), int(differences.mean.argmax())))
+    return " to ".join(difference_with_interval(differences, index) for index in ends)
 
 
-def _S1(grid: Grid) -> Finding:
-    if not grid.moderate:
-        return _without("S1", "moderate")
-    count, amounts, table = len(grid.moderate), grid.amounts, grid.table
-    leads = [table.against(NO_MODEL, grid.moderate, place) for place in range(len(amounts))]
-    begins = verdict(every(leads[0].above), some(leads[0].below))
-    most = count // 2 + 1
-    ahead, behind = (np.array([at_least(side, most) for side in sides]) for sides in _sides(leads))
-    keeps = verdict(every(ahead), some(behind))
-    won = [int(shown(lead.above).sum()) for lead in leads]
-    plain = ""
-    if PLAIN in table.H:
-        over_plain = shown(table.against(PLAIN, grid.moderate, 0).above).sum()
-        plain = f" ({over_plain} of {count} beat networks without mirror symmetry, {metres(table.mean(PLAIN, 0))})"
+def _judge_lead(grid: Grid) -> Judgement:
+    moderate, amounts, table = grid.members("moderate"), grid.amounts, grid.table
+    count, most = len(moderate), len(moderate) // 2 + 1
+    leads = [table.lead(NO_MODEL, moderate, place) for place in range(len(amounts))]
+    begins = verdict_of(all_significant(leads[0].above), any_significant(leads[0].below))
+    ahead = np.array([partial_conjunction(lead.above, most) for lead in leads])
+    behind = np.array([partial_conjunction(lead.below, most) for lead in leads])
+    keeps = verdict_of(all_significant(ahead), any_significant(behind))
+    won = [int(which_significant(lead.above).sum()) for lead in leads]
+    later = ", ".join(f"{number} at {N}" for number, N in zip(won[1:], amounts[1:], strict=True))
     evidence = (
         f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural(won[0], 'is', 'are')} shown to "
-        f"beat no physics ({grid.value(NO_MODEL, 0)}), whose H less theirs is {_range(leads[0])}{plain}; "
-        f"that most keep the lead is {keeps}: "
-        f"{', '.join(f'{number} at {N}' for number, N in zip(won[1:], amounts[1:], strict=True))}"
+        f"beat no physics ({grid.metres(NO_MODEL, 0)}), which has an error larger by {_range_of(leads[0])}; "
+        f"that most keep the lead is {keeps}: {later}"
     )
-    numbers = {
-        f"share shown to lead at N_D = {N}": number / count
-        for number, N in ((won[0], amounts[0]), (won[-1], amounts[-1]))
-    }
-    return finding(CLAIMS, "S1", weakest((begins, keeps)), evidence, **numbers)
+    numbers = {f"share shown to lead at N_D = {amounts[k]}": won[k] / count for k in (0, -1)}
+    return weakest_verdict((begins, keeps)), evidence, numbers
 
 
-def _sides(differences: Sequence[Contrasts]) -> tuple[list[Array], list[Array]]:
-    return [one.above for one in differences], [one.below for one in differences]
-
-
-def _S2(grid: Grid) -> Finding:
-    weights = -doubling(np.log(np.array(grid.amounts, dtype=float)))
-    models = [*grid.physics, NO_MODEL]
-    places = range(len(grid.amounts))
-    falls = grid.table.compare([[(float(weights[k]), model, k) for k in places] for model in models])
-    fallen = shown(falls.above)
-    left = float(np.median([grid.table.mean(model, places[-1]) / grid.table.mean(model, 0) for model in models]))
-    shown_for = f"{fallen.sum()} of {len(models)}" if fallen.any() else f"none of {len(models)}"
+def _judge_fall(grid: Grid) -> Judgement:
+    weights = -doubling_weights(np.log(np.array(grid.amounts, dtype=float)))
+    models, (first, *_, last) = [*grid.physics, NO_MODEL], grid.amounts
+    falls = grid.table.compare([[(float(w), model, k) for k, w in enumerate(weights)] for model in models])
+    fallen = which_significant(falls.above)
+    end = len(weights) - 1
+    left = float(np.median([grid.table.mean(model, end) / grid.table.mean(model, 0) for model in models]))
     evidence = (
-        f"H is shown to fall for {shown_for} models; twice the runs lower it by {_range(falls)}; "
-        f"N_D = {grid.amounts[-1]} leaves {percent(left)} of the error at {grid.amounts[0]} in the median"
+        f"H is shown to fall for {fallen.sum() or 'none'} of {len(models)} models; twice the runs lower it by "
+        f"{_range_of(falls)}; N_D = {last} leaves {percent(left)} of the error at {first} in the median"
     )
     if not fallen.all():
-        evidence += f"; not shown for: {named(m for m, good in zip(models, fallen, strict=True) if not good)}"
-    return finding(
-        CLAIMS,
-        "S2",
-        verdict(every(falls.above), some(falls.below)),
-        evidence,
-        **{
-            "share of models shown to fall": float(fallen.mean()),
-            f"H at N_D = {grid.amounts[-1]:g} / at {grid.amounts[0]:g}, median": left,
-        },
-    )
+        evidence += f"; not shown for: {model_list(m for m, good in zip(models, fallen, strict=True) if not good)}"
+    numbers = {"share of models shown to fall": float(fallen.mean()), f"H at N_D = {last} / at {first}, median": left}
+    return verdict_of(all_significant(falls.above), any_significant(falls.below)), evidence, numbers
 
 
-def _S3(grid: Grid) -> Finding:
-    models, table = grid.physics, grid.table
+def trend_over_accuracy(table: ErrorTable, models: Sequence[str]) -> tuple[Array, list[list[Term]]]:
+    """A of models [m], and at each amount of data the terms of the rise of H for twice the A; Undecided without."""
     if len(models) < FEWEST_MODELS:
-        return finding(CLAIMS, "S3", "undecided", f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
+        raise Undecided(f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, ALONE) for model in models])
     if np.isclose(A.min(), A.max()):
-        return finding(CLAIMS, "S3", "undecided", SAME_A)
-    weights = doubling(np.log(A))
-    each = [[(float(w), m, k) for w, m in zip(weights, models, strict=True)] for k in range(len(grid.amounts))]
-    last = len(grid.amounts) - 1
-    flatter = [*each[0], *((-factor, model, last) for factor, model, _ in each[last])]
-    slopes = table.compare([*each, flatter])
-    H = np.array([[table.mean(model, k) for model in models] for k in range(len(grid.amounts))])
-    order = np.vstack([H, H[0] - H[last]])
+        raise Undecided(SAME_A)
+    weights, places = doubling_weights(np.log(A)), range(len(table.amounts))
+    return A, [[(float(w), model, k) for w, model in zip(weights, models, strict=True)] for k in places]
+
+
+def trend_verdict(slopes: Differences, A: Array, order: Array) -> Verdict:
+    """Whether values rise over A, and would hardly do so in another order of the models; order : (J, models) values."""
+    risen = np.maximum(slopes.above, order_chance(A, order))
+    fallen = np.maximum(slopes.below, order_chance(A, -order))
+    return verdict_of(all_significant(risen), any_significant(fallen))
+
+
+def _judge_rise(grid: Grid) -> Judgement:
+    table, models = grid.table, grid.physics
+    A, each = trend_over_accuracy(table, models)
+    last, (first_N, *_, last_N) = len(each) - 1, grid.amounts
+    slopes = table.compare([*each, [*each[0], *((-factor, model, last) for factor, model, _ in each[last])]])
+    H = np.array([[table.mean(model, k) for model in models] for k in range(len(each))])
     rises = [rank_correlation(A, values) for values in H]
+    at_first, at_last, less = (difference_with_interval(slopes, k) for k in (0, last, len(each)))
     evidence = (
-        f"for twice the A, H rises by {measured(slopes, 0)} at N_D = {grid.amounts[0]} and by {measured(slopes, last)} "
-        f"at {grid.amounts[last]}, {measured(slopes, len(each))} less; rank correlation of H and A "
-        f"{span(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D ({len(A)} models)"
+        f"for twice the A, H rises by {at_first} at N_D = {first_N} and by {at_last} at {last_N}, {less} less; rank "
+        f"correlation of H and A {least_to_greatest(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D "
+        f"({len(A)} models)"
+    )
+    numbers = {"least rank correlation of H and A": min(rises)}
+    numbers |= {f"rise for twice the A at N_D = {grid.amounts[k]} [m]": float(slopes.mean[k]) for k in (0, last)}
+    return trend_verdict(slopes, A, np.vstack([H, H[0] - H[last]])), evidence, numbers
+
+
+def _judge_harm(grid: Grid) -> Judgement:
+    high, table, place = grid.members("high"), grid.table, len(grid.amounts) - 1
+    lead = table.lead(NO_MODEL, high, place)
+    better, worse = which_significant(lead.above), which_significant(lead.below)
+    worst = [model for model, behind in zip(high, worse, strict=True) if behind]
+    names = f" ({listed([f'{model} {grid.metres(model, place)}' for model in worst])})" if worst else ""
+    evidence = (
+        f"at N_D = {grid.amounts[-1]}, {better.sum()} of {len(better)} high models "
+        f"{plural(better.sum(), 'is', 'are')} shown to beat no physics ({grid.metres(NO_MODEL, place)}), {len(worst)} "
+        f"{plural(len(worst), 'is', 'are')} shown to be worse{names}"
     )
     numbers = {
-        "least rank correlation of H and A": min(rises),
-        f"rise for twice the A at N_D = {grid.amounts[0]} [m]": float(slopes.mean[0]),
-        f"rise for twice the A at N_D = {grid.amounts[last]} [m]": float(slopes.mean[last]),
+        f"share of high models shown to lead at N_D = {grid.amounts[-1]}": float(better.mean()),
+        f"share of high models shown to be worse at N_D = {grid.amounts[-1]}": float(worse.mean()),
     }
-    risen = np.maximum(slopes.above, by_chance(A, order))
-    fallen = np.maximum(slopes.below, by_chance(A, -order))
-    return finding(CLAIMS, "S3", verdict(every(risen), some(fallen)), evidence, **numbers)
-
-
-def _S4(grid: Grid) -> Finding:
-    if not grid.high:
-        return _without("S4", "high")
-    table, last = grid.table, grid.amounts[-1]
-    place = len(grid.amounts) - 1
-    lead = table.against(NO_MODEL, grid.high, place)
-    better, worse = shown(lead.above), shown(lead.below)
-    worst = [model for model, behind in zip(grid.high, worse, strict=True) if behind]
     orders = table.H[NO_MODEL].shape[1]
-    names = listed([f"{model} {grid.value(model, place)}" for model in worst]) if worst else ""
-    are = plural(len(worst), "is", "are")
-    evidence = (
-        f"at N_D = {last}, {better.sum()} of {len(better)} high models {plural(better.sum(), 'is', 'are')} shown to "
-        f"beat no physics ({grid.value(NO_MODEL, place)}), {len(worst)} {are} shown to be worse"
-        f"{f' ({names})' if names else ''}"
-    )
-    numbers = {
-        f"share of high models shown to lead at N_D = {last}": float(better.mean()),
-        f"share of high models shown to be worse at N_D = {last}": float(worse.mean()),
-    }
-    if orders < FEWEST_ORDERS:
-        seeds = f"{orders} {plural(orders, 'seed')}"
-        evidence += f"; fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has {seeds}"
-        return finding(CLAIMS, "S4", "undecided", evidence, **numbers)
-    if not grid.moderate:
-        evidence += "; no moderate model to compare their fluctuation with"
-        return finding(CLAIMS, "S4", "undecided", evidence, **numbers)
-    one_sided = every(lead.above) or every(lead.below)
+    if orders < FEWEST_ORDERS or not grid.moderate:
+        lacks = (
+            f"fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has {orders} "
+            f"{plural(orders, 'seed')}"
+            if orders < FEWEST_ORDERS
+            else "no moderate model to compare their fluctuation with"
+        )
+        return "undecided", f"{evidence}; {lacks}", numbers
     moves: Verdict = "undecided"
     if worst:
-        worst_moves, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
-        chance = _student(worst_moves - calm)
-        moves = verdict(chance <= SIGNIFICANT, 1 - chance <= SIGNIFICANT)
+        of_worst, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
+        more = float(ttest_1samp(of_worst - calm, 0.0, alternative="greater").pvalue)
+        moves = verdict_of(more <= SIGNIFICANT, 1 - more <= SIGNIFICANT)
         evidence += (
-            f"; over {orders} nested orders H of these varies by {percent(worst_moves.mean())}, of moderate models by "
+            f"; over {orders} nested orders H of these varies by {percent(of_worst.mean())}, of moderate models by "
             f"{percent(calm.mean())}"
         )
-        numbers |= {"variation of the worst": worst_moves.mean(), "variation of moderate models": calm.mean()}
-    split = verdict(bool(better.any() and worse.any()), one_sided)
-    return finding(CLAIMS, "S4", weakest((split, moves)), evidence, **numbers)
+        numbers |= {"variation of the worst": of_worst.mean(), "variation of moderate models": calm.mean()}
+    one_sided = all_significant(lead.above) or all_significant(lead.below)
+    split = verdict_of(bool(better.any() and worse.any()), one_sided)
+    return weakest_verdict((split, moves)), evidence, numbers
 
 
 def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
@@ -301,152 +276,150 @@ def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
     return moved
 
 
-def _student(values: Array) -> float:
-    """Chance of a mean as far above 0 if there were none (Student's t, one-sided)."""
-    spread = values.std(ddof=1) / len(values) ** 0.5
-    return float(stdtr(len(values) - 1, -values.mean() / spread)) if spread > 0 else float(values.mean() <= 0)
-
-
-def _S5(H: Grid, H_90: Grid, by_H: list[Finding], by_H_90: list[Finding]) -> Finding:
-    both = [np.concatenate([grid.table.H[m] @ grid.table.weights for m in grid.table.H]).ravel() for grid in (H, H_90)]
-    alike = rank_correlation(*both)
-    changed = [
-        (one["id"], one["verdict"], other["verdict"])
-        for one, other in zip(by_H, by_H_90, strict=True)
-        if one["verdict"] != other["verdict"]
-    ]
-    opposite = any({"confirmed", "refuted"} <= set(change) for change in changed)
-    evidence = f"rank correlation of H and H_90 over {both[0].size} cells {alike:.3f}; by H_90 "
-    said = [f"{key} is {other} instead of {one}" for key, one, other in changed]
-    evidence += listed(said) if said else "S1-S4 are the same"
-    decided = verdict(alike >= ALIKE and not opposite, opposite or alike < UNLIKE)
+def _judge_metric(grid: Grid) -> Judgement:
+    assert grid.by_90 is not None
+    tables, other = (grid.table, grid.by_90), replace(grid, table=grid.by_90)
+    both = [np.concatenate([table.H[m] @ table.weights for m in grid.table.H]).ravel() for table in tables]
+    alike, verdicts = (
+        rank_correlation(*both),
+        {k: [SIMULATION_RULES[k].decide(g)[0] for g in (grid, other)] for k in FIRST_FOUR},
+    )
+    changed = {key: pair for key, pair in verdicts.items() if pair[0] != pair[1]}
+    opposite = any({"confirmed", "refuted"} <= set(pair) for pair in changed.values())
+    words = [f"{key} is {by_90} instead of {by_mean}" for key, (by_mean, by_90) in changed.items()]
+    evidence = (
+        f"rank correlation of H and H_90 over {both[0].size} cells {alike:.3f}; by H_90 "
+        f"{listed(words) if words else 'S1-S4 are the same'}"
+    )
+    enough = grid.table.runs >= FEWEST_RUNS
+    decided = verdict_of(enough and alike >= ALIKE and not opposite, enough and (opposite or alike < UNLIKE))
     numbers = {"rank correlation of H and H_90": alike, "verdicts of S1-S4 that differ": float(len(changed))}
-    return finding(CLAIMS, "S5", decided if H.table.runs >= FEWEST_RUNS else "undecided", evidence, **numbers)
+    return decided, evidence, numbers
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A moderate model against something dearer: its difference, how much is saved, and the words."""
+    """A moderate model against something dearer: what it saves, and the words.
 
-    terms: tuple[tuple[float, str, int], ...]
+    terms : the difference that must be shown. also : a second one that must be shown, too.
+    """
+
+    terms: tuple[Term, ...]
     saved: float
     text: str
-    also: tuple[tuple[float, str, int], ...] = ()  # a second difference that must be shown, too
+    also: tuple[Term, ...] | None = None
 
 
-def _S6(grid: Grid) -> Finding:
-    if not grid.moderate:
-        return _without("S6", "moderate")
+def _judge_savings(grid: Grid) -> Judgement:
+    grid.members("moderate")
     if len(grid.physics) < 2:
-        return finding(CLAIMS, "S6", "undecided", "one physics model: there is no other to compare it with")
+        raise Undecided("one physics model: there is no other to compare it with")
     small = [k for k, amount in enumerate(grid.amounts) if amount <= grid.amounts[-1] / 2]
     if not small:
-        return finding(CLAIMS, "S6", "undecided", f"no N_D is at most half of the largest, {grid.amounts[-1]}")
-    kinds: list[tuple[str, Callable[[Grid, Sequence[int]], list[Pair]]]] = [
-        ("no physics with more runs", _more_data),
-        ("more accurate physics alone", _better_physics),
-    ]
+        raise Undecided(f"no N_D is at most half of the largest, {grid.amounts[-1]}")
+    kinds = {
+        "no physics with more runs": _pairs_with_more_data(grid, small),
+        "more accurate physics alone": _pairs_with_better_physics(grid, small[-1]),
+    }
+    if not all(kinds.values()):
+        raise Undecided("no physics model is more accurate than a moderate one")
     parts, examples, numbers = [], [], {}
-    for what, pairs_of in kinds:
-        pairs = pairs_of(grid, small)
-        if not pairs:
-            return finding(CLAIMS, "S6", "undecided", "no physics model is more accurate than a moderate one")
-        first = grid.table.compare([pair.terms for pair in pairs])
-        above, below = first.above, first.below
-        if pairs[0].also:
-            second = grid.table.compare([pair.also for pair in pairs])
-            above = np.maximum(above, second.above)
-        sure = [pair for pair, good in zip(pairs, shown(above), strict=True) if good]
+    for what, pairs in kinds.items():
+        first, second = (
+            grid.table.compare(of) for of in ([p.terms for p in pairs], [p.also or p.terms for p in pairs])
+        )
+        better = which_significant(np.maximum(first.above, second.above))
+        sure = [pair for pair, good in zip(pairs, better, strict=True) if good]
         best = sorted(sure, key=lambda pair: -pair.saved)[:MOST_PAIRS]
-        parts.append(verdict(bool(sure), every(below)))
-        examples.append(f"{len(sure)} of {len(pairs)} comparisons show a moderate model better than {what}")
-        examples[-1] += f": {', '.join(pair.text for pair in best)}" if best else ""
+        parts.append(verdict_of(bool(sure), all_significant(first.below)))
+        text = f"{len(sure)} of {len(pairs)} comparisons show a moderate model better than {what}"
+        examples.append(text + (f": {', '.join(pair.text for pair in best)}" if best else ""))
         numbers[f"share shown to beat {what}"] = len(sure) / len(pairs)
-    return finding(CLAIMS, "S6", weakest(parts), "; ".join(examples), **numbers)
+    return weakest_verdict(parts), "; ".join(examples), numbers
 
 
-def _more_data(grid: Grid, small: Sequence[int]) -> list[Pair]:
+def _pairs_with_more_data(grid: Grid, small: Sequence[int]) -> list[Pair]:
     """Every moderate model with a small amount against no physics with the next larger one."""
+    mean, amounts = grid.table.mean, grid.amounts
     return [
         Pair(
             ((1.0, NO_MODEL, k + 1), (-1.0, model, k)),
-            grid.amounts[k + 1] / grid.amounts[k] - grid.table.mean(model, k) / grid.table.mean(NO_MODEL, k + 1),
-            f"{model} with {grid.amounts[k]} runs {grid.value(model, k)} against {grid.amounts[k + 1]} runs without "
-            f"physics, {grid.value(NO_MODEL, k + 1)}",
+            amounts[k + 1] / amounts[k] - mean(model, k) / mean(NO_MODEL, k + 1),
+            f"{model} with {amounts[k]} runs {grid.metres(model, k)} against {amounts[k + 1]} runs without "
+            f"physics, {grid.metres(NO_MODEL, k + 1)}",
         )
         for model in grid.moderate
         for k in small
     ]
 
 
-def _better_physics(grid: Grid, small: Sequence[int]) -> list[Pair]:
+def _pairs_with_better_physics(grid: Grid, k: int) -> list[Pair]:
     """Every moderate model with the largest small amount against every more accurate physics alone."""
-    table, k = grid.table, small[-1]
+    mean = grid.table.mean
     return [
         Pair(
             ((1.0, other, ALONE), (-1.0, model, k)),
-            table.mean(model, ALONE) / table.mean(other, ALONE),
-            f"{model} ({metres(table.mean(model, ALONE))} alone) with {grid.amounts[k]} runs {grid.value(model, k)} "
-            f"against {other} alone, {metres(table.mean(other, ALONE))}",
+            mean(model, ALONE) / mean(other, ALONE),
+            f"{model} ({grid.metres(model, ALONE)} alone) with {grid.amounts[k]} runs {grid.metres(model, k)} "
+            f"against {other} alone, {grid.metres(other, ALONE)}",
             ((1.0, model, ALONE), (-1.0, other, ALONE)),
         )
         for model in grid.moderate
         for other in grid.physics
-        if table.mean(other, ALONE) < table.mean(model, ALONE)
+        if mean(other, ALONE) < mean(model, ALONE)
     ]
 
 
-RULES: Mapping[str, Callable[[Grid], Finding]] = {"S1": _S1, "S2": _S2, "S3": _S3, "S4": _S4, "S6": _S6}
-"""The rules that judge one table."""
-
-
-def smooth_by_construction(method: Method, steps: int) -> bool:
-    """Whether the compensation of a method is a polynomial of time with fewer terms than steps."""
-    terms = method.traits.terms
-    return terms is not None and terms < steps
-
-
-def _S7(results: Results, grid: Grid) -> Finding:
-    if not grid.physics:
-        return _without("S7", "physics")
+def _judge_roughness(grid: Grid) -> Judgement:
+    physics, results = grid.members("physics"), grid.results
+    assert results is not None
     if results.test.horizon < 3:
-        return finding(CLAIMS, "S7", "undecided", "a second difference needs three steps ahead")
-    judged = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
-    if smooth_by_construction(judged, results.plan.horizon):
-        evidence = (
-            "the compensation is a polynomial of time, which is smooth whatever it learned; 'path-trained' is not"
-        )
-        return finding(CLAIMS, "S7", "not testable", evidence)
-    first = grid.amounts[0]
-    cells = judged_cells(results)
-    cells = cells[cells["N_D"] == first]
-    runs, place, counts = np.unique(results.test.run, return_inverse=True, return_counts=True)
+        raise Undecided("a second difference needs three steps ahead")
+    terms = next(way.method.traits.terms for way in results.plan.methods if way.name == results.plan.judged)
+    if terms is not None and terms < results.plan.study.prediction.horizon:
+        evidence = "the compensation is a polynomial of time, which is smooth whatever it learned"
+        return "not testable", f"{evidence}; 'path-trained' is not", {}
+    cells, names = results.judged_cells, np.unique(results.test.run)
+    cells = cells[cells["N_D"] == grid.amounts[0]]
 
     def by_run(path: Array) -> Array:
-        return np.array([roughness(path[:, place == k]) for k in range(len(runs))])
+        return np.array([roughness(path[:, results.test.run == name]) for name in names])
 
-    paths: Mapping[str, list[Array]] = {
-        model: [by_run(results.paths[cell]) for cell in cells["cell"][cells["model"] == model]]
-        for model in (NO_MODEL, *grid.physics)
-    }
-    true, pure = by_run(results.test.future), np.mean(paths[NO_MODEL], axis=0)
-    together = np.mean([values for model in grid.physics for values in paths[model]], axis=0)
-    decided, numbers = rough(true, pure, together, counts.astype(float))
-    evidence = (
-        f"at N_D = {first}: {words(NO_MODEL)} {metres(numbers['roughness of no physics [m]'])}, cooperative "
-        f"{metres(numbers['roughness of cooperative models [m]'])} in the mean, true paths "
-        f"{metres(numbers['roughness of true paths [m]'])} ({manoeuvres(len(runs))})"
+    pure, together = (
+        np.mean([by_run(results.paths[cell]) for m in models for cell in cells["cell"][cells["model"] == m]], axis=0)
+        for models in ([NO_MODEL], physics)
     )
-    return finding(CLAIMS, "S7", decided, evidence, **numbers)
+    decided, numbers = compare_roughness(by_run(results.test.future), pure, together, results.windows)
+    rough, cooperative, true = (length_in_metres(value) for value in numbers.values())
+    evidence = (
+        f"at N_D = {grid.amounts[0]}: {quoted_model(NO_MODEL)} {rough}, cooperative {cooperative} in the mean, true "
+        f"paths {true} ({count_manoeuvres(len(names))})"
+    )
+    return decided, evidence, numbers
 
 
-def rough(true: Array, pure: Array, together: Array, counts: Array) -> tuple[Verdict, dict[str, float]]:
+def compare_roughness(true: Array, pure: Array, together: Array, counts: Array) -> tuple[Verdict, dict[str, float]]:
     """Verdict on S7 from the roughness (R,) [m] of true paths, those without physics and cooperative ones, by run."""
-    differences = contrasts(np.stack([pure - ROUGH * true, ROUGH * true - together]), counts)
-    share = counts / counts.sum()
-    numbers = {
-        "roughness of no physics [m]": float(pure @ share),
-        "roughness of cooperative models [m]": float(together @ share),
-        "roughness of true paths [m]": float(true @ share),
-    }
-    return verdict(every(differences.above), some(differences.below)), numbers
+    differences = paired_difference(np.stack([pure - ROUGH * true, ROUGH * true - together]), counts)
+    of = {"no physics": pure, "cooperative models": together, "true paths": true}
+    numbers = {f"roughness of {what} [m]": float(values @ counts / counts.sum()) for what, values in of.items()}
+    return verdict_of(all_significant(differences.above), any_significant(differences.below)), numbers
+
+
+FIRST_FOUR = ("S1", "S2", "S3", "S4")
+SIMULATION_RULES: dict[str, Rule[Grid]] = {
+    "S1": Rule(
+        "every moderate cooperative model beats no physics at the smallest N_D, and most keep the lead", _judge_lead
+    ),
+    "S2": Rule("H falls with N_D for every model", _judge_fall),
+    "S3": Rule("H rises with A at fixed N_D, most steeply at small N_D", _judge_rise),
+    "S4": Rule(
+        "some high models beat no physics; the worst stay worse even at the largest N_D, and fluctuate", _judge_harm
+    ),
+    "S5": Rule("H_90 leads to the same findings as H", _judge_metric),
+    "S6": Rule(
+        "moderate models with small N_D beat no physics with a larger one, and more accurate physics alone",
+        _judge_savings,
+    ),
+    "S7": Rule("paths without physics are rough at small N_D, those of cooperative models are not", _judge_roughness),
+}

@@ -1,8 +1,7 @@
 """Two or more runs compared cell by cell: the same family, member, method, N_D and seed.
 
 Each run is set against the first one. Where both predict the same test windows, the difference is taken in every test
-manoeuvre and judged over manoeuvres (paired and clustered, `shipid.evidence`); else the manoeuvres of
-each run are resampled separately.
+manoeuvre and judged over manoeuvres; where they do not, there is a difference of means, and no interval.
 """
 
 from __future__ import annotations
@@ -11,30 +10,26 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.answer.comparison import CellErrors, compare_cells
 from shipid.answer.differences import document_differences
-from shipid.answer.verdict import manoeuvres, shown, too_few
+from shipid.answer.verdict import count_manoeuvres, too_few_manoeuvres
 from shipid.arguments import path_of
-from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError, ShipidError, choices
-from shipid.evidence import Contrasts, contrasts, contrasts_apart, training_error
+from shipid.evidence import which_significant
 from shipid.metrics import over_time, position_error
 from shipid.study.declared import NO_METHOD, NO_MODEL
-from shipid.study.plan import Plan
 from shipid.study.results import Results, read_results
 from shipid.study.schema import WORLDS
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 IDENTICAL = "identical"
 """Verdict on cells that err alike to the digit."""
 KEYS = ["family", "member", "method", "N_D", "seed"]
-GROUP = ["family", "method", "N_D"]
-GRID = {"N_D": "grid.N_D", "seed": "grid.seeds"}  # what two runs must share: key -> where the study says it
 MEASURED = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
 
 
@@ -64,39 +59,34 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
     Parameters
     ----------
     folders : two or more folders of runs.
-    pairs : family or method of the first run -> its counterpart in the others. Equal names match without; where one
-        family, or one method, is left over in both runs, they match too.
+    pairs : family or method of the first run -> its counterpart in the others. Equal names match without.
 
     Raises ResultError for a folder without a result, ShipidError where no cell matches.
     """
     if isinstance(folders, str | os.PathLike) or not isinstance(folders, Sequence) or len(folders) < 2:
         raise ShipidError("name two folders or more")
     places = [path_of("folder", folder) for folder in folders]
-    real = [os.path.realpath(place) for place in places]
-    twice = next((place for place, one in zip(places, real, strict=True) if real.count(one) > 1), None)
-    if twice is not None:
-        raise ShipidError("is named twice: name each folder once", file=twice)
+    if len({os.path.realpath(place) for place in places}) < len(places):
+        raise ShipidError("a folder is named twice: name each folder once")
     return compare_results([read_results(place) for place in places], pairs)
 
 
 def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = None) -> Comparison:
     """Set the cells of runs that have been read beside those of the first: `compare` without its folders."""
-    names = _names([results.folder for results in runs])
-    _check_pairs(runs, pairs or {})
-    notes = []
+    names, pairs, notes, frames = _short_names([results.folder for results in runs]), pairs or {}, [], []
+    _check_pairs(runs, pairs)
     for name, results in zip(names, runs, strict=True):
         good = int((results.cells["status"] == "ok").sum())
         if not good:
             raise ResultError("has no cell with a result", file=results.folder)
         if good < results.plan.cells:
             notes.append(f"{name}: {good} of {results.plan.cells} cells have a result")
-    frames, called = [], [dict[str, str]()]
     for name, results in zip(names[1:], runs[1:], strict=True):
-        frame, matched, sentences = _beside(runs[0], results, pairs or {})
+        frame, words = _compare_with_first(runs[0], results, pairs)
         frames.append(frame.assign(folder=name))
-        called.append(matched)
-        notes += [f"{name}: {words}" for words in sentences]
+        notes += [f"{name}: {note}" for note in words]
     sessions = [(results.provenance.get("sessions") or [{}])[-1] for results in runs]
+    called = [{}, *({other: first for first, other in pairs.items()} for _ in runs[1:])]
     documents = document_differences([results.plan for results in runs], sessions, called)
     documents.columns = pd.Index(["path", *names])
     errors = pd.concat(frames, ignore_index=True)
@@ -113,113 +103,67 @@ def _check_pairs(runs: Sequence[Results], pairs: Mapping[str, str]) -> None:
             raise DocumentError(f"{wrong!r} is no family or method of {words}: {choices(wrong, known)}", path="--pair")
 
 
-def _names(folders: Sequence[Path]) -> tuple[str, ...]:
+def _short_names(folders: Sequence[Path]) -> tuple[str, ...]:
     """The shortest last parts of folders that make their names different."""
     parts = [folder.resolve().parts for folder in folders]
-    for count in range(1, max(map(len, parts)) + 1):
-        short = ["/".join(part[-count:]) for part in parts]
-        if len(set(short)) == len(short):
-            return tuple(short)
-    return tuple(map(str, folders))
+    names = (tuple("/".join(part[-count:]) for part in parts) for count in range(1, max(map(len, parts)) + 1))
+    return next((short for short in names if len(set(short)) == len(short)), tuple(map(str, folders)))
 
 
-def _beside(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[pd.DataFrame, dict[str, str], list[str]]:
-    """Rows of `Comparison.errors` for one run, without its name; name there -> name in the first; notes."""
-    mine, theirs = _cells(first), _cells(other)
-    notes: list[str] = []
-    called: dict[str, str] = {}
+def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[pd.DataFrame, list[str]]:
+    """Rows of `Comparison.errors` for one run, without its name, and notes."""
+    mine, others, notes = _matching_cells(first), _matching_cells(other), []
+    called = {other: first for first, other in pairs.items()}
     for key in ("family", "method"):
-        matched, words = _counterparts(mine[key], theirs[key], pairs)
-        called |= matched
-        notes += words
-        names = theirs[key].map(matched).astype(mine[key].dtype)  # of none: pandas would make them numbers
-        theirs = theirs[theirs[key].isin(matched)].assign(**{key: names, f"{key} there": theirs[key]})
-    both = mine.merge(theirs, on=KEYS, suffixes=("_first", "_other")).sort_values("N_D", kind="stable")
+        names = others[key].map(lambda name: called.get(name, name if name not in pairs else None))
+        others = others.assign(**{key: names, f"{key} there": others[key]})
+        for who, one, rest in (("the first", mine, others), ("this", others, mine)):
+            if lonely := [name for name in dict.fromkeys(one[key].dropna()) if name not in set(rest[key])]:
+                notes.append(f"only {who} has {key} {', '.join(lonely)} (--pair FIRST=OTHER names counterparts)")
+    both = mine.merge(others, on=KEYS, suffixes=("_first", "_other")).sort_values("N_D", kind="stable")
     if not (both["N_D"] > 0).any():
-        remedy = _remedy(first, other, bool((theirs["N_D"] > 0).any()))
         raise ShipidError(
-            f"no cell of {other.folder} matches one of {first.folder}: {_spans(first)}; there: {_spans(other)}; "
-            f"{remedy}"
+            f"no cell of {other.folder} matches one of {first.folder}: {_keys_in_words(first)}; there: "
+            f"{_keys_in_words(other)}; name counterparts by --pair FIRST=OTHER, or run the other study with the same "
+            "grid by --set grid.N_D=... --set grid.seeds=..."
         )
-    here, there, paired, words = _windows(first, other)
-    notes += words
-    groups = [part for _, part in both.groupby(GROUP, sort=False)]
-    one = _side(first, groups, "first", here)
-    two = _side(other, groups, "other", there)
-    alike = [paired & (a == b).all(axis=1) for a, b in zip(one.cells, two.cells, strict=True)]
-    training = np.hypot(*(_training(groups, side, alike) for side in ("first", "other")))
-    rows = (
-        contrasts(two.errors - one.errors, one.counts, training)
-        if paired
-        else contrasts_apart(two.errors, two.counts, one.errors, one.counts, training)
-    )
-    if same := sum(one.all() for one in alike):
-        notes.append(f"{same} of {len(alike)} rows are identical to the digit: no training sets them apart")
-    few = too_few(min(len(one.counts), len(two.counts)))
-    if few:
-        notes.append(few)
-    frame = pd.DataFrame(
-        {
-            **{key: [_label(part, key) for part in groups] for key in ("family", "method")},
-            "N_D": [int(part["N_D"].iloc[0]) for part in groups],
-            "cells": [len(part) for part in groups],
-            "first": one.errors @ (one.counts / one.counts.sum()),
-            "other": two.errors @ (two.counts / two.counts.sum()),
-            **{"difference": rows.mean, "low": rows.low, "high": rows.high},
-            "verdict": np.where([same.all() for same in alike], IDENTICAL, _verdicts(rows)),
-            "paired": paired,
-            **{f"coverage_{side}": [part[f"coverage_{side}"].mean() for part in groups] for side in ("first", "other")},
-        }
-    )
-    return frame, called, notes
+    here, away = _common_windows(first, other)
+    paired, rows = len(here) > 0, []
+    for _, part in both.groupby(["family", "method", "N_D"], sort=False):
+        one, two = _cell_errors(first, part, "first", here), _cell_errors(other, part, "other", away)
+        means = [float(np.mean([cell.mean for cell in cells])) for cells in (one, two)]
+        row: dict[str, Any] = {key: _label(part, key) for key in ("family", "method")}
+        row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part), "first": means[0], "other": means[1]}
+        row |= {"difference": means[1] - means[0], "low": np.nan, "high": np.nan, "above": np.nan, "below": np.nan}
+        row["same"] = paired and all(np.array_equal(a.errors, b.errors) for a, b in zip(one, two, strict=True))
+        if paired:
+            found = compare_cells(two, one)
+            row |= {"difference": found.mean} | {end: getattr(found, end) for end in ("low", "high", "above", "below")}
+        rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in ("first", "other")})
+    frame = pd.DataFrame(rows)
+    notes += _notes_on_windows(first, other, here, int(frame["same"].sum()), len(frame))
+    sides = (which_significant(frame[side].to_numpy()) for side in ("below", "above"))
+    lower, higher = sides if frame["below"].notna().all() else (np.zeros(len(frame), dtype=bool),) * 2
+    words = np.select([frame["same"].astype(bool), lower, higher], [IDENTICAL, "lower", "higher"], "")
+    columns = ["family", "method", "N_D", "cells", "first", "other", "difference", "low", "high"]
+    frame = frame[columns].assign(verdict=words, paired=paired, **frame[["coverage_first", "coverage_other"]])
+    return frame, notes
 
 
-def _cells(results: Results) -> pd.DataFrame:
+def _matching_cells(results: Results) -> pd.DataFrame:
     """Keys, predictor and band of every cell with a result; one more row per foundation for A, where it is known."""
-    good = results.cells[results.cells["status"] == "ok"].reindex(
-        columns=["cell", "foundation", *KEYS, "H", "coverage"]
-    )
-    trained = list(map(results.plan.learns, good["family"], good["method"]))
-    good = good.assign(seed=good["seed"] - WORLDS * results.plan.seed, trained=trained)
-    every = results.cells.drop_duplicates("foundation")
-    known = every["foundation"].isin([name for name, path in results.physics.items() if np.isfinite(path).all()])
-    alone = every[known & (every["family"] != NO_MODEL)].reindex(columns=good.columns)
-    alone = alone.assign(cell="", method=NO_METHOD, N_D=0, seed=0, H=every["A"], coverage=np.nan, trained=False)
-    alone = alone[~alone["family"].isin(results.plan.fitted)]
-    return pd.concat([alone, good], ignore_index=True).astype({"coverage": float, "H": float, "trained": bool})
+    columns = ["cell", "foundation", *KEYS, "coverage"]
+    good = results.cells[results.cells["status"] == "ok"].reindex(columns=columns)
+    good = good.assign(seed=good["seed"] - WORLDS * results.plan.study.seed)
+    known = [name for name, path in results.physics.items() if name != NO_MODEL and np.isfinite(path).all()]
+    alone = results.cells.drop_duplicates("foundation").reindex(columns=columns)
+    alone = alone[alone["foundation"].isin(known) & ~alone["family"].isin(results.plan.fitted)]
+    alone = alone.assign(cell="", method=NO_METHOD, N_D=0, seed=0, coverage=np.nan)
+    return pd.concat([alone, good], ignore_index=True).astype({"coverage": float})
 
 
-def _counterparts(here: pd.Series, there: pd.Series, pairs: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
-    """Name there -> name here, of families or methods; a note for names that match without being equal."""
-    mine, theirs = list(dict.fromkeys(here)), list(dict.fromkeys(there))
-    matched = {pairs[name]: name for name in mine if pairs.get(name) in theirs}
-    matched |= {name: name for name in mine if name in theirs and name not in pairs and name not in matched}
-    left = [name for name in mine if name not in matched.values()]
-    over = [name for name in theirs if name not in matched]
-    if len(left) == len(over) == 1 and left[0] not in pairs:
-        matched[over[0]] = left[0]
-        return matched, [f"{over[0]} is set beside {left[0]}, the only one left (--pair says it otherwise)"]
-    lonely = [f"{what} {', '.join(names)}" for what, names in (("only the first has", left), ("only this has", over))
-              if names]  # fmt: skip
-    return matched, ["; ".join(lonely)] if lonely else []
-
-
-def _remedy(first: Results, other: Results, named: bool) -> str:
-    """What would make cells of two runs match; `named`: whether families and methods have their counterparts."""
-    pair = "name counterparts by --pair FIRST=OTHER"
-    remedies = [] if named else [pair]
-    for key, path in GRID.items():
-        cells = [_cells(results) for results in (first, other)]
-        wanted, there = (set(map(int, each.loc[each["N_D"] > 0, key])) for each in cells)
-        if not wanted & there:
-            values = ",".join(map(str, sorted(wanted)))
-            remedies.append(f"they have no {key} in common, run the other study with --set {path}=[{values}]")
-    return "; ".join(remedies) or pair
-
-
-def _spans(results: Results) -> str:
-    cells = results.cells
-    names = {key: ", ".join(map(str, dict.fromkeys(cells[key]))) for key in ("family", "method", "N_D", "seed")}
+def _keys_in_words(results: Results) -> str:
+    names = {key: ", ".join(map(str, dict.fromkeys(results.cells[key]))) for key in ("family", "method", "N_D", "seed")}
     return "; ".join(f"{key} {words}" for key, words in names.items())
 
 
@@ -228,86 +172,41 @@ def _label(part: pd.DataFrame, key: str) -> str:
     return str(here) if here == there else f"{here} ~ {there}"
 
 
-def _windows(first: Results, other: Results) -> tuple[Index, Index, bool, list[str]]:
-    """Places of the windows that are judged in each run, whether they are pairs, and a note on it."""
-    place = {key: k for k, key in enumerate(_moments(other.test))}
-    here = np.array([k for k, key in enumerate(_moments(first.test)) if key in place], dtype=np.int64)
-    there = np.array([place[key] for key in _moments(first.test) if key in place], dtype=np.int64)
-    if len(here) and (_same_recording(first.test, other.test, here, there) or _same_draws(first.plan, other.plan)):
-        common = manoeuvres(len(set(first.test.run[here])))
-        all_of = len(here) == len(first.test) == len(other.test)
-        text = f"paired over {common}" + ("" if all_of else f", on the {len(here)} windows that both have")
-        return here, there, True, [text]
-    counts = [len(set(results.test.run)) for results in (first, other)]
-    text = f"other test manoeuvres ({counts[1]}, the first has {counts[0]}): not paired, so the intervals are wide"
-    return np.arange(len(first.test)), np.arange(len(other.test)), False, [text]
+def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Places of the windows that both runs have; none where windows of one name are other recordings."""
+    one, two = (
+        {(str(run), round(float(t), 4)): place for place, (run, t) in enumerate(zip(of.run, of.t, strict=True))}
+        for of in (first.test, other.test)
+    )
+    here, there = (np.array([of[key] for key in one if key in two], dtype=np.int64) for of in (one, two))
+    columns = [(first.test.columns[name][here], other.test.columns[name][there]) for name in MEASURED]
+    same = all(np.allclose(a, b, rtol=1e-6, atol=1e-9) for a, b in columns)
+    draws = first.plan.draws is not None and first.plan.draws == other.plan.draws  # the same orders, whatever the ship
+    return (here, there) if same or draws else (here[:0], there[:0])
 
 
-def _moments(test: Windows) -> list[tuple[str, float]]:
-    return [(str(run), round(float(t), 4)) for run, t in zip(test.run, test.t, strict=True)]
+def _notes_on_windows(first: Results, other: Results, here: NDArray[np.int64], identical: int, rows: int) -> list[str]:
+    """What the intervals rest on."""
+    if not len(here):
+        counts = [len(set(results.test.run)) for results in (other, first)]
+        return [f"other test manoeuvres ({counts[0]}, the first has {counts[1]}): not paired, so there is no interval"]
+    runs, whole = len(set(first.test.run[here])), len(here) == len(first.test) == len(other.test)
+    notes = [f"paired over {count_manoeuvres(runs)}"]
+    notes[0] += "" if whole else f", on the {len(here)} windows that both have"
+    if identical:
+        notes.append(f"{identical} of {rows} rows are identical to the digit: no training sets them apart")
+    return [*notes, *([few] if (few := too_few_manoeuvres(runs)) else [])]
 
 
-def _same_recording(one: Windows, two: Windows, here: Index, there: Index) -> bool:
-    """Whether windows of the same name and moment hold the same measured motion."""
-    names = [name for name in MEASURED if name in one.columns and name in two.columns]
-    return all(
-        np.allclose(one.columns[name][here], two.columns[name][there], rtol=1e-6, atol=1e-9) for name in names
-    ) and bool(names)
-
-
-def _same_draws(one: Plan, two: Plan) -> bool:
-    """Whether two simulated truths draw the same manoeuvres: then runs of one name are pairs, whatever the ship."""
-    return one.draws is not None and one.draws == two.draws
-
-
-@dataclass(frozen=True)
-class _Side:
-    """One run's part: errors (cells, R) [m] of each group by cell and manoeuvre, and windows (R,)."""
-
-    cells: list[Array]
-    counts: Array
-
-    @property
-    def errors(self) -> Array:
-        """(J, R) mean error of each group in each manoeuvre [m]."""
-        return np.stack([errors.mean(axis=0) for errors in self.cells])
-
-
-def _side(results: Results, groups: Sequence[pd.DataFrame], side: str, windows: Index) -> _Side:
-    """Errors of each group of cells in every test manoeuvre, on some windows."""
-    test = results.test
-    order, place, counts = np.unique(test.run[windows], return_inverse=True, return_counts=True)
-    future = test.future[:, windows]
-
-    def by_run(path: Array) -> Array:
-        error = over_time(position_error(path[:, windows], future))
-        return np.bincount(place, weights=error, minlength=len(order)) / counts
-
-    errors = []
-    for part in groups:
-        cells = zip(part["N_D"], part[f"cell_{side}"], part[f"foundation_{side}"], strict=True)
-        paths = (results.physics[str(name)] if N_D == 0 else results.paths[str(cell)] for N_D, cell, name in cells)
-        errors.append(np.stack([by_run(path) for path in paths]))
-    return _Side(errors, counts.astype(float))
-
-
-def _training(groups: Sequence[pd.DataFrame], side: str, alike: Sequence[NDArray[np.bool_]]) -> Array:
-    """(J,) standard error [m] that training alone gives a difference; cells that are alike in both runs add nothing."""
-    training = np.zeros(len(groups))
-    for row, (part, same) in enumerate(zip(groups, alike, strict=True)):
-        if not part[f"trained_{side}"].all():
-            continue
-        cells = part.assign(H=part[f"H_{side}"].astype(float), differs=~same)
-        models = [one for _, one in cells.groupby(f"foundation_{side}", sort=False)]
-        training[row] = training_error(
-            [one["H"].to_numpy() for one in models], [one["differs"].to_numpy() for one in models]
-        )
-    return training
-
-
-def _verdicts(compared: Contrasts) -> list[str]:
-    """Verdict on each difference, corrected for their number in each direction."""
-    if not np.isfinite(compared.below).all():
-        return [""] * len(compared)
-    lower, higher = shown(compared.below), shown(compared.above)
-    return ["lower" if low else "higher" if high else "" for low, high in zip(lower, higher, strict=True)]
+def _cell_errors(results: Results, part: pd.DataFrame, side: str, windows: NDArray[np.int64]) -> list[CellErrors]:
+    """Errors by test manoeuvre of the cells of a group, on some windows, or on all where these are none."""
+    test, places = results.test, windows if len(windows) else np.arange(len(results.test))
+    _, place, counts = np.unique(test.run[places], return_inverse=True, return_counts=True)
+    cells = []
+    for cell, foundation in zip(part[f"cell_{side}"], part[f"foundation_{side}"], strict=True):
+        path = results.paths[str(cell)] if cell else results.physics[str(foundation)]
+        error = over_time(position_error(path[:, places], test.future[:, places]))
+        row = results.cells[results.cells["cell"] == cell]
+        learns = bool(cell) and results.plan.learns(*row.iloc[0][["family", "method"]])
+        cells.append(CellErrors(str(foundation), np.bincount(place, error) / counts, counts.astype(float), learns))
+    return cells

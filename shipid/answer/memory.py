@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 
-from shipid.evidence import contrasts, training_error
+from shipid.answer.comparison import CellErrors, compare_cells
+from shipid.answer.frames import insert_gaps, shown_runs
 from shipid.metrics import over_time, position_error
 from shipid.observer import bank, observe
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.declared import Foundation, Way
 from shipid.study.prepare import known_by_then
-from shipid.study.results import Results, shown_runs, with_gaps
+from shipid.study.results import Results
 
 Array = np.ndarray
 Added = Literal["memory", "observer", "both"]
+Named = tuple[str, str]  # foundation and method
 PHYSICS_ALONE = "physics alone"
 ORDER = 0.05  # share of a command's range in a run that counts as a new order
 NOT_COMPARED = ("memory", "choose", "history_scale", "error_scale", "observer_scale")  # settings of memory itself
@@ -28,10 +29,11 @@ ALONG = [
     *("u", "v", "r", "observer.u", "observer.v", "observer.r", "observer.X", "observer.Y", "observer.N"),
     *("observer.current_north", "observer.current_east", "observer.test"),
 ]
+WORDS: dict[Added, str] = {"memory": "memory", "observer": "observer", "both": "observer and memory"}
 
 
 @dataclass(frozen=True)
-class Pair:
+class MemoryPair:
     """Two ways to predict that differ in what they take from the past.
 
     added : what the second takes beside the first. comparison : the same in words, for all models alike.
@@ -41,33 +43,27 @@ class Pair:
 
     added: Added
     comparison: str
-    without: tuple[str, str]
-    remembering: tuple[str, str]
+    without: Named
+    remembering: Named
     differs: tuple[str, ...] = ()
 
 
-def pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list[Pair]:
+def memory_pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list[MemoryPair]:
     """Every pair of a study: the same foundation with and without memory, and every observed one with its original.
 
     Methods are compared with others of their kind alone: between kinds, memory is not all that differs.
     """
-    rows = []
-    for one in foundations:
-        rows += [_memory_pair(one, one, way, rival) for way, rival in _rivals(ways, one, one)]
-    for observed, original in _observed(foundations):
-        if not observed.fitted:
-            label = f"observer: {PHYSICS_ALONE}"
-            rows.append(Pair("observer", label, (original.name, PHYSICS_ALONE), (observed.name, PHYSICS_ALONE)))
-        for way in ways:
-            if observed.name in way.foundations and original.name in way.foundations:
-                label = f"observer: {way.name}"
-                rows.append(Pair("observer", label, (original.name, way.name), (observed.name, way.name)))
-        rows += [_memory_pair(original, observed, way, rival) for way, rival in _rivals(ways, original, observed)]
-    order: dict[Added, int] = {"memory": 0, "observer": 1, "both": 2}
-    return sorted(rows, key=lambda pair: order[pair.added])
+    pairs = [pair for one in foundations for pair in _method_pairs(one, one, ways)]
+    for observed, original in _observed_foundations(foundations):
+        both = [way.name for way in ways if observed.name in way.foundations and original.name in way.foundations]
+        for method in (*([] if observed.fitted else [PHYSICS_ALONE]), *both):
+            names = (original.name, method), (observed.name, method)
+            pairs.append(MemoryPair("observer", f"observer: {method}", *names))
+        pairs += _method_pairs(original, observed, ways)
+    return sorted(pairs, key=lambda pair: [*WORDS].index(pair.added))
 
 
-def taken(way: Way, foundation: Foundation) -> frozenset[str]:
+def kinds_of_memory(way: Way, foundation: Foundation) -> frozenset[str]:
     """Kinds of memory that a method takes on a foundation: `history`, `error`, `observer`, or `past` for any other."""
     memory = way.method.traits.memory
     kinds = {"history"} if memory.history or memory.turned else set()
@@ -77,78 +73,62 @@ def taken(way: Way, foundation: Foundation) -> frozenset[str]:
     return frozenset(kinds | ({"observer"} if memory.observer and foundation.observer is not None else set()))
 
 
-def _rivals(ways: Sequence[Way], original: Foundation, observed: Foundation) -> Iterator[tuple[Way, Way]]:
+def _method_pairs(original: Foundation, observed: Foundation, ways: Sequence[Way]) -> Iterator[MemoryPair]:
     """Each method with memory on one foundation, and the method of its kind that takes least on the other."""
-    for way in ways:
-        if observed.name not in way.foundations:
-            continue
-        mine = taken(way, observed)
-        others = [one for one in ways if one.kind == way.kind and original.name in one.foundations]
-        fewer = [one for one in others if one is not way and taken(one, original) < mine]
-        if original is not observed and not mine - {"observer"}:
-            continue  # the observer alone: compared with the same method
-        if fewer:
-            yield way, min(fewer, key=lambda one: (len(taken(one, original)), len(_differing(way, one))))
-
-
-def _memory_pair(original: Foundation, observed: Foundation, way: Way, rival: Way) -> Pair:
     added: Added = "memory" if original is observed else "both"
-    words = "memory" if original is observed else "observer and memory"
-    names = (original.name, rival.name), (observed.name, way.name)
-    return Pair(added, f"{words}: {way.name} against {rival.name}", *names, _differing(way, rival))
+    for way in (way for way in ways if observed.name in way.foundations):
+        mine = kinds_of_memory(way, observed)
+        if added == "both" and not mine - {"observer"}:
+            continue  # the observer alone: compared with the same method
+        others = [one for one in ways if one.kind == way.kind and original.name in one.foundations and one is not way]
+        taken = {one.name: kinds_of_memory(one, original) for one in others}
+        if fewer := [one for one in others if taken[one.name] < mine]:
+            rival = min(fewer, key=lambda one: (len(taken[one.name]), len(_differing_settings(way, one))))
+            words = f"{WORDS[added]}: {way.name} against {rival.name}"
+            names = (original.name, rival.name), (observed.name, way.name)
+            yield MemoryPair(added, words, *names, _differing_settings(way, rival))
 
 
-def _differing(one: Way, other: Way) -> tuple[str, ...]:
+def _differing_settings(one: Way, other: Way) -> tuple[str, ...]:
     """Settings, memory's apart, that differ between two methods of a kind."""
-    mine, theirs = one.method.model_dump(mode="json"), other.method.model_dump(mode="json")
-    return tuple(name for name in mine if name not in NOT_COMPARED and mine[name] != theirs.get(name))
+    mine, others = one.method.model_dump(mode="json"), other.method.model_dump(mode="json")
+    return tuple(name for name in mine if name not in NOT_COMPARED and mine[name] != others.get(name))
 
 
-def _observed(foundations: Sequence[Foundation]) -> Iterator[tuple[Foundation, Foundation]]:
+def _observed_foundations(foundations: Sequence[Foundation]) -> Iterator[tuple[Foundation, Foundation]]:
     """Every foundation with an observer and the same without one, where the study has it."""
+    plain = [one for one in foundations if one.observer is None and one.variant is not None]
     for one in foundations:
-        if one.observer is None or one.variant is None:
-            continue
-        for other in foundations:
-            same = other.variant is not None and other.variant.name == one.variant.name
-            if same and other.observer is None and other.identify == one.identify:
-                yield one, other
+        if one.observer is not None and one.variant is not None:
+            for other in plain:
+                if other.variant.name == one.variant.name and other.identify == one.identify:  # type: ignore[union-attr]
+                    yield one, other
 
 
 def memory_frame(results: Results) -> pd.DataFrame:
-    """H [m] of both members of every pair at every N_D, and their difference with its interval by `contrasts`.
-
-    What another training would give is in the interval, as in those of findings.
+    """H [m] of both members of every pair at every N_D, and their difference with its interval by `compare_cells`.
 
     Columns: comparison, added, model (the foundation without), without, with, N_D (0: physics alone), A [m] of the
     foundation without, H_without, H_with, difference, low, high [m], runs, better (test runs with a lower error), seeds
     (that both have), differs.
     """
-    rows, differences, training = list[dict[str, Any]](), list[Array](), list[float]()
-    runs, place = np.unique(results.test.run, return_inverse=True)
-    counts = np.bincount(place).astype(float)
-    family = {one.name: one.family for one in results.plan.foundations}
-    for pair, N_D, first, second in _errors(results):
-        before, after, seeds = first.mean(axis=0), second.mean(axis=0), len(first)
-        learns = [results.plan.learns(family[name], method) for name, method in (pair.without, pair.remembering)]
-        apart = (
-            training_error([one.mean(axis=1)]) for one, moved in zip((first, second), learns, strict=True) if moved
-        )
-        training.append(math.hypot(*apart))
-        sums = np.bincount(place, after - before)
-        differences.append(sums / counts)
+    rows, family = list[dict[str, Any]](), {one.name: one.family for one in results.plan.foundations}
+
+    def errors(named: Named, paths: Sequence[Array]) -> list[CellErrors]:
+        learns = results.plan.learns(family[named[0]], named[1])
+        return [CellErrors(named[0], results.path_errors(path), results.windows, learns) for path in paths]
+
+    for pair, N_D, first, second in _paired_paths(results):
+        before, after = errors(pair.without, first), errors(pair.remembering, second)
+        one = compare_cells(after, before)
+        means = {"H_without": np.mean([cell.mean for cell in before]), "H_with": np.mean([cell.mean for cell in after])}
         rows.append(
-            _names(pair, results.plan.label)
-            | {"N_D": N_D, "A": _accuracy(results, pair.without[0], N_D)}
-            | {"H_without": before.mean(), "H_with": after.mean(), "difference": (after - before).mean()}
-            | {"low": np.nan, "high": np.nan, "runs": len(runs), "better": int((sums < 0).sum()), "seeds": seeds}
-            | {"differs": ", ".join(pair.differs)}
+            _names_of_pair(pair, results)
+            | {"N_D": N_D, "A": _accuracy_at(results, pair.without[0], N_D), **means}
+            | {"difference": one.mean, "low": one.low, "high": one.high, "runs": one.runs, "better": one.better}
+            | {"seeds": len(first), "differs": ", ".join(pair.differs)}
         )
-    frame = pd.DataFrame(rows)
-    if rows:
-        judged = contrasts(np.stack(differences), counts, np.array(training))
-        frame["low"], frame["high"] = judged.low, judged.high
-    return frame
+    return pd.DataFrame(rows)
 
 
 def memory_time_frame(results: Results) -> pd.DataFrame:
@@ -157,65 +137,53 @@ def memory_time_frame(results: Results) -> pd.DataFrame:
     Columns: comparison, model, without, with, N_D, run, t [s], error_without, error_with [m]; mean over seeds; the
     largest N_D alone.
     """
-    shown = np.isin(results.test.run, shown_runs(results))
-    parts, largest = [], int(results.cells["N_D"].max())
-    for pair, N_D, first, second in _errors(results):
+    test, parts, largest = results.test, [], int(results.cells["N_D"].max())
+    shown = np.isin(test.run, shown_runs(results))
+    for pair, N_D, *sides in _paired_paths(results):
         if N_D in (0, largest):
-            before, after = first.mean(axis=0), second.mean(axis=0)
-            names = {key: value for key, value in _names(pair, results.plan.label).items() if key != "added"}
-            columns = {"run": results.test.run[shown], "t": results.test.t[shown]}
-            columns |= {"error_without": before[shown], "error_with": after[shown]}
-            parts.append(pd.DataFrame({**names, "N_D": N_D, **columns}))
+            columns = {"run": test.run[shown], "t": test.t[shown]}
+            for name, paths in zip(("error_without", "error_with"), sides, strict=True):
+                errors = [over_time(position_error(path, test.future)) for path in paths]
+                columns[name] = np.mean(errors, axis=0)[shown]
+            parts.append(pd.DataFrame({**_names_of_pair(pair, results), "N_D": N_D, **columns}).drop(columns="added"))
     if not parts:
         return pd.DataFrame()
-    return with_gaps(pd.concat(parts, ignore_index=True), ["comparison", "model", "without", "with", "N_D", "run"])
+    return insert_gaps(pd.concat(parts, ignore_index=True), ["comparison", "model", "without", "with", "N_D", "run"])
 
 
-def _names(pair: Pair, label: Callable[[str, str], str]) -> dict[str, Any]:
-    words = [
-        f"{name}, {PHYSICS_ALONE}" if method == PHYSICS_ALONE else label(name, method)
+def _names_of_pair(pair: MemoryPair, results: Results) -> dict[str, Any]:
+    without, remembering = (
+        f"{name}, {method}" if method == PHYSICS_ALONE else results.plan.label(name, method)
         for name, method in (pair.without, pair.remembering)
-    ]
-    named = {"comparison": pair.comparison, "added": pair.added, "model": pair.without[0]}
-    return named | {"without": words[0], "with": words[1]}
+    )
+    names = {"comparison": pair.comparison, "added": pair.added, "model": pair.without[0]}
+    return names | {"without": without, "with": remembering}
 
 
-def _errors(results: Results) -> Iterator[tuple[Pair, int, Array, Array]]:
-    """Pair, N_D, and of both the mean error over the horizon (seeds, S) [m], for the seeds that both have."""
-    cells: dict[tuple[str, str, int], dict[int, str]] = {}
+def _paired_paths(results: Results) -> Iterator[tuple[MemoryPair, int, list[Array], list[Array]]]:
+    """Pair, N_D (0: physics alone), and the paths (T, S, 2) [m] of both, for the seeds that both have."""
+    cells: dict[tuple[Named, int], dict[int, str]] = {}
     for row in results.rows:
         if row["cell"] in results.paths:
-            key = str(row["foundation"]), str(row["method"]), int(row["N_D"])
-            cells.setdefault(key, {})[int(row["seed"])] = str(row["cell"])
-    amounts = sorted({key[2] for key in cells})
-    known: dict[str, Array] = {}
-
-    def error(cell: str) -> Array:
-        if cell not in known:
-            known[cell] = over_time(position_error(results.paths[cell], results.test.future))
-        return known[cell]
-
-    for pair in pairs(results.plan.foundations, results.plan.methods):
+            key = (str(row["foundation"]), str(row["method"])), int(row["N_D"])
+            cells.setdefault(key, {})[int(row["seed"])] = row["cell"]
+    for pair in memory_pairs(results.plan.foundations, results.plan.methods):
         if pair.without[1] == PHYSICS_ALONE:
             alone = [results.physics.get(name) for name, _ in (pair.without, pair.remembering)]
-            finite = [path for path in alone if path is not None and np.isfinite(path).all()]
-            if len(finite) == 2:
-                before, after = (over_time(position_error(path, results.test.future))[None] for path in finite)
-                yield pair, 0, before, after
+            if all(path is not None and np.isfinite(path).all() for path in alone):
+                yield pair, 0, [alone[0]], [alone[1]]  # type: ignore[list-item]
             continue
-        for N_D in amounts:
-            first, second = cells.get((*pair.without, N_D), {}), cells.get((*pair.remembering, N_D), {})
-            seeds = sorted(first.keys() & second.keys())
-            if seeds:
-                both = [np.stack([error(one[seed]) for seed in seeds]) for one in (first, second)]
-                yield pair, N_D, both[0], both[1]
+        for N_D in sorted({amount for _, amount in cells}):
+            first, second = (cells.get((named, N_D), {}) for named in (pair.without, pair.remembering))
+            if seeds := sorted(first.keys() & second.keys()):
+                before, after = ([results.paths[one[seed]] for seed in seeds] for one in (first, second))
+                yield pair, N_D, before, after
 
 
-def _accuracy(results: Results, foundation: str, N_D: int) -> float:
+def _accuracy_at(results: Results, foundation: str, N_D: int) -> float:
     """A [m] of a foundation; of the numbers identified at this N_D, where they are."""
     cells = results.cells[results.cells["foundation"] == foundation]
-    here = cells[cells["N_D"] == N_D] if N_D else cells
-    return float(here["A"].astype(float).mean())
+    return float(cells[cells["N_D"].eq(N_D) | (N_D == 0)]["A"].astype(float).mean())
 
 
 def observer_frame(results: Results) -> pd.DataFrame:
@@ -225,7 +193,7 @@ def observer_frame(results: Results) -> pd.DataFrame:
     `observer.current_north`, `.current_east` [m/s]; `observer.test` [1]; model; fade [s], the time constant of the
     force ahead; ahead [s], the horizon.
     """
-    predictor = _exemplar(results)
+    predictor = _observed_exemplar(results)
     if predictor is None or predictor[1].vessel is None:
         return pd.DataFrame()
     name, vessel, settings = predictor[0], predictor[1].vessel, predictor[1].physics.observer
@@ -235,28 +203,26 @@ def observer_frame(results: Results) -> pd.DataFrame:
     table = pd.DataFrame({**part.frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *ALONG]]
     table["observer.test"] = np.where(begins, np.nan, table["observer.test"])
     table = table.assign(model=name, fade=bank(vessel, settings).fade, ahead=results.test.horizon * results.test.step)
-    return with_gaps(table, ["run", "model", "fade", "ahead"])
+    return insert_gaps(table, ["run", "model", "fade", "ahead"])
 
 
 def orders_frame(results: Results) -> pd.DataFrame:
     """Moments of new orders in the shown test runs: run, t [s]; a command jumps, or begins to move as fast."""
     frames = []
-    for run, rows in results.dataset.frame.groupby("run", sort=False):
-        if run in shown_runs(results):
-            values = rows[results.dataset.commands].to_numpy(dtype=float)
-            steps = np.abs(np.diff(values, axis=0)) > ORDER * np.ptp(values, axis=0) + 1e-9
-            moved = steps.any(axis=1)
-            begins = moved & ~np.concatenate([[False], moved[:-1]])
-            frames += [{"run": run, "t": float(t)} for t in rows["t"].to_numpy()[1:][begins]]
+    for run in shown_runs(results):
+        rows = results.dataset.frame[results.dataset.frame["run"] == run]
+        values = rows[results.dataset.commands].to_numpy(dtype=float)
+        moved = (np.abs(np.diff(values, axis=0)) > ORDER * np.ptp(values, axis=0) + 1e-9).any(axis=1)
+        begins = moved & ~np.concatenate([[False], moved[:-1]])
+        frames += [(run, float(t)) for t in rows["t"].to_numpy()[1:][begins]]
     return pd.DataFrame(frames, columns=["run", "t"])
 
 
-def _exemplar(results: Results) -> tuple[str, Predictor] | None:
+def _observed_exemplar(results: Results) -> tuple[str, Predictor] | None:
     """The observed foundation that is shown and a predictor on it: of the first family, the one of middle A."""
-    observed = [one for one in results.plan.foundations if one.observer is not None]
-    observed.sort(key=lambda one: one.fitted)
     good = results.cells[results.cells["cell"].isin(list(results.paths))]
-    known = [one for one in observed if (good["foundation"] == one.name).any()]
+    observed = sorted((one for one in results.plan.foundations if one.observer is not None), key=lambda one: one.fitted)
+    known = [one for one in observed if one.name in set(good["foundation"])]
     if not known:
         return None
     family = [one.name for one in known if one.family == known[0].family]

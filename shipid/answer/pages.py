@@ -10,16 +10,16 @@ from pathlib import Path
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from shipid.answer import bands, memory, methods, sentences
+from shipid.answer import bands, frames, memory, methods, sentences
 from shipid.answer.error_table import intervals_frame
 from shipid.answer.findings import findings
 from shipid.arguments import path_of
 from shipid.errors import ResultError
 from shipid.files import temporary_folder, write_table, write_text
-from shipid.report import Finding, ReportContent, Sentence, Snapshot, write_report, write_summary
+from shipid.metrics import summary
+from shipid.report import Finding, ReportContent, Sentence, write_report, write_summary
 from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent, verdicts
-from shipid.study import results as parts
 from shipid.study import seals, store
 from shipid.study.claims import UnitClaims
 from shipid.study.declared import NO_MODEL
@@ -34,7 +34,7 @@ ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "m
 FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "observer": memory.observer_frame,
     "orders": memory.orders_frame,
-    "kinds": parts.kinds_frame,
+    "kinds": frames.kinds_frame,
     "memory": memory.memory_frame,
     "memory_over_time": memory.memory_time_frame,
     "coverage": bands.coverage_frame,
@@ -49,37 +49,38 @@ FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
 
 def report_content(results: Results, say: Say | None = None) -> ReportContent:
     """Assemble everything that the report of a study shows. say : called with a few words on how far it is."""
-    frames = {}
+    plan, tables = results.plan, {}
     for name, frame in FRAMES.items():
         if say is not None:
-            say(f"{results.plan.name}: table {name.replace('_', ' ')} of {len(results.cells)} cells")
-        frames[name] = parts.in_the_run(results, frame(results))
+            say(f"{plan.name}: table {name.replace('_', ' ')} of {len(results.cells)} cells")
+        tables[name] = frames.count_from_start(results, frame(results))
     if say is not None:
-        say(f"{results.plan.name}: answer, findings and errors of {len(results.cells)} cells")
-    answer = sentences.answer(results, verdicts(frames["methods"])), bands.answer(results)
+        say(f"{plan.name}: answer, findings and errors of {len(results.cells)} cells")
+    words = *sentences.answer(results, verdicts(tables["methods"])), *bands.answer_on_bands(results)
+    best, naive = sentences.best_model(results), summary(results.naive)
     return ReportContent(
-        title=results.plan.question,
-        name=results.plan.name,
-        answer=[Sentence(text, figure) for part in answer for text, figure in part],
+        title=plan.study.question,
+        name=plan.name,
+        answer=[Sentence(text, figure) for text, figure in words],
         findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
         cells=results.cells,
-        naive=parts.naive_summary(results),
+        naive={"mean": naive["mean"], "p90": naive["p90"], "rms": naive["rms"]},
         models=_shown_models(results),
-        factors=parts.factors_frame(results),
-        trials=parts.trials_frame(results),
-        horizon=parts.horizon_frame(results),
-        over_time=parts.in_the_run(results, parts.time_frame(results)),
-        commands=parts.in_the_run(results, parts.commands_frame(results)),
-        snapshots=[Snapshot(**snapshot) for snapshot in parts.snapshots(results)],
-        tracks=parts.tracks_frame(results),
-        envelope=parts.envelope_frame(results),
-        repairs=parts.repairs_frame(results),
-        provenance=parts.provenance_words(results),
-        study_document=results.plan.text(),
-        command=results.plan.command,
-        best=results.plan.label(best, results.plan.judged) if (best := sentences.best_model(results)) else "",
-        alone=parts.alone_models(results),
-        frames=frames,
+        factors=frames.factors_frame(results),
+        trials=frames.trials_frame(results),
+        horizon=frames.horizon_frame(results),
+        over_time=frames.count_from_start(results, frames.time_frame(results)),
+        commands=frames.count_from_start(results, frames.commands_frame(results)),
+        snapshots=frames.window_snapshots(results),
+        tracks=frames.tracks_frame(results),
+        envelope=frames.envelope_frame(results),
+        repairs=frames.repairs_frame(results),
+        provenance=frames.provenance_words(results),
+        study_document=plan.text(),
+        command=plan.command,
+        best="" if best is None else plan.label(best, plan.judged),
+        alone=frames.alone_models(results),
+        frames=tables,
     )
 
 
@@ -168,10 +169,10 @@ def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]
         notes[name] = f"{len(results.cells)} of {part.plan.cells} cells"
     if not cells:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
-    frame = methods.compared(methods.joined(cells), plan.judged)
+    frame = methods.method_table(pd.concat(cells, ignore_index=True), plan.judged)
     write_table(folder / METHODS, frame)
     content = MethodsContent(
-        title=plan.question,
+        title=plan.study.question,
         name=plan.name,
         frames={"methods": frame},
         provenance={"study": f"{plan.name}, digest {plan.digest}", **notes},

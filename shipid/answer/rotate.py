@@ -14,8 +14,8 @@ import pandas as pd
 
 from shipid import document as documents
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.findings import CLAIMS, Rivals, judged
-from shipid.answer.verdict import Finding, undecided
+from shipid.answer.findings_full_scale import FULL_SCALE_RULES, Rivals, judge_rivals
+from shipid.answer.verdict import Finding, leave_undecided
 from shipid.data.checks import repeated
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
@@ -165,20 +165,16 @@ def _read(file: Path) -> pd.DataFrame | None:
         return None
 
 
-def spread(frame: pd.DataFrame) -> pd.DataFrame:
+def turns_table(frame: pd.DataFrame) -> pd.DataFrame:
     """A row per foundation and method over the turns, seeds averaged: A, H, its range, H_90 [m], turns where H < A."""
-    per_turn = _per_turn(frame)
+    good = frame[frame["status"] == "ok"].reindex(columns=KEYS)  # frames of older turns have no bands
+    numbers = ["A", "H", "H_90", "coverage", "width"]
+    per_turn = good.groupby(["test", "foundation", "family", "method"], sort=False)[numbers].mean().reset_index()
     rows = []
     for (foundation, method), part in per_turn.groupby(["foundation", "method"], sort=False):
-        row: dict[str, Any] = {
-            "foundation": foundation,
-            "method": method,
-            "turns": len(part),
-            "A": part["A"].mean(),
-            "H": part["H"].mean(),
-        }
-        row |= {"least": part["H"].min(), "greatest": part["H"].max(), "H_90": part["H_90"].mean()}
-        row |= {"coverage": part["coverage"].mean(), "width": part["width"].mean()}
+        row: dict[str, Any] = {"foundation": foundation, "method": method, "turns": len(part)}
+        row |= {name: part[name].mean() for name in numbers}
+        row |= {"least": part["H"].min(), "greatest": part["H"].max()}
         compensated = part["A"].notna().all() and not (part["H"] == part["A"]).all()
         rows.append(row | {"better": (part["H"] < part["A"]).sum() if compensated else np.nan})
     return pd.DataFrame(rows)
@@ -191,12 +187,12 @@ def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
     the numbers of either model were set from runs that test. Nothing without `accurate` and `inaccurate`, or where
     fewer than two turns have what they need.
     """
-    claims = plan.claims
+    claims = plan.study.claims
     if claims is None or claims.accurate is None or claims.inaccurate is None:
         return []
     tests = set(frame["test"])
     if unfair := plan.unfair(tests):
-        return undecided(CLAIMS, unfair)
+        return leave_undecided(FULL_SCALE_RULES, unfair)
     aside = {*plan.aside, *plan.saw(tests)}
     mine = frame[(frame["method"] == plan.judged) & ~frame["family"].isin(aside)]
     good, bad = claims.accurate, claims.inaccurate
@@ -214,11 +210,4 @@ def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
     table = ErrorTable((1,), np.ones(len(H)), alone, errors)
     steps = {name: values[0].mean(axis=0)[None] for name, values in errors.items()}
     steps |= {f"{name} alone": values[None] for name, values in alone.items()}
-    return judged(Rivals(table, good, bad, steps), remedy="name more runs with --tests")
-
-
-def _per_turn(frame: pd.DataFrame) -> pd.DataFrame:
-    """Means over the seeds of every turn, foundation and method; cells that failed are left out."""
-    good = frame[frame["status"] == "ok"].reindex(columns=KEYS)  # frames of older turns have no bands
-    keys, numbers = ["test", "foundation", "family", "method"], ["A", "H", "H_90", "coverage", "width", "naive"]
-    return good.groupby(keys, sort=False)[numbers].mean().reset_index()
+    return judge_rivals(Rivals(table, good, bad, steps), remedy="name more runs with --tests")

@@ -244,7 +244,7 @@ def study_rotate(
     write_table(file, frame)
     rotate.forget(kept)
     columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
-    over = rotate.spread(frame)
+    over = rotate.turns_table(frame)
     for row in over.to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
         name = plan.label(row["foundation"], row["method"])
@@ -441,9 +441,10 @@ def _to_three_digits(mean: float, low: float, high: float) -> str:
 
 def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     """Show findings, errors and bands of one study over several worlds; returns the errors."""
-    from shipid.answer.worlds import compare_bands, compare_errors, compare_findings
+    from shipid.answer.worlds import compare_errors, compare_findings
 
-    findings, errors, bands = compare_findings(worlds), compare_errors(worlds), compare_bands(worlds)
+    findings, errors = compare_findings(worlds), compare_errors(worlds)
+    bands = errors[errors["width"].notna()]
     words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
     values = [
         _to_three_digits(row["mean"], row["low"], row["high"]) if row["number"] else ""
@@ -451,7 +452,7 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     ]
     shown = table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True))
     answer.rows("findings", findings, shown if len(findings) else None)
-    texts = [_with_ends(*numbers) for numbers in errors[["mean", "low", "high"]].to_numpy()]
+    texts = [_with_ends(*numbers) for numbers in errors[["H", "H_low", "H_high"]].to_numpy()]
     several = bool(errors.duplicated(["family", "N_D"]).any())
     names = errors["family"] + (" + " + errors["method"]).where((errors["N_D"] > 0) & several, "")
     wide = errors.assign(text=texts, family=names).pivot(index="family", columns="N_D", values="text")

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.answer.bands import share_interval
 from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, clock_slack, pieces, sample
 from shipid.data.windows import (
@@ -24,6 +23,7 @@ from shipid.data.windows import (
 )
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError
+from shipid.evidence import share_interval
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Bands, Region, at_level
 from shipid.hybrid.physics import assumed, check_columns

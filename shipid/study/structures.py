@@ -20,10 +20,9 @@ import tomlkit
 from numpy.typing import NDArray
 
 from shipid import document as documents
-from shipid.answer.verdict import shown
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
-from shipid.evidence import FEWEST_RUNS, contrasts
+from shipid.evidence import FEWEST_RUNS, paired_difference, which_significant
 from shipid.files import write_new
 from shipid.identification.bands import Measure, bands, check_level, refusal
 from shipid.identification.design import Candidate, candidates, performed, recorded, steps_between
@@ -350,11 +349,11 @@ def _table(
     worse: set[str] = set()
     if best in sound and len(sound) > 1:
         apart = np.array([[position[name][run] - position[best][run] for run in fitted] for name in sound[1:]])
-        differences = contrasts(apart, np.ones(len(fitted)))
+        differences = paired_difference(apart, np.ones(len(fitted)))
         intervals = dict(
             zip(sound[1:], zip(differences.low.tolist(), differences.high.tolist(), strict=True), strict=True)
         )
-        worse = {name for name, behind in zip(sound[1:], shown(differences.above), strict=True) if behind}
+        worse = {name for name, behind in zip(sound[1:], which_significant(differences.above), strict=True) if behind}
     rows: list[dict[str, Any]] = []
     for name in known:
         low, high = intervals.get(name, (np.nan, np.nan))
