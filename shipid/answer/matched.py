@@ -1,7 +1,7 @@
 """Two or more runs compared cell by cell: the same family, member, method, N_D and seed.
 
-Each run is set against the first one. Where both predict the same test windows, the difference is taken in every test
-manoeuvre and judged over manoeuvres; where they do not, there is a difference of means, and no interval.
+Each run is set against the first one. On the test windows that both predict, the difference is taken in every test
+manoeuvre and judged over manoeuvres. Runs with other test manoeuvres cannot be paired and are refused.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Comparison:
     documents : a row per value that differs: path, and a column of text per name.
     errors : a row per other folder, family, method and N_D: `cells` that match, `first` and `other` [m], mean H over
         them, `difference` other less first [m] with its 95 % interval `low` to `high`, `verdict` ("lower", "higher" or
-        empty, corrected for the number of rows; "identical" where every cell errs alike to the digit), `paired`, and
+        empty, corrected for the number of rows; "identical" where every cell errs alike to the digit), and
         `coverage_first`, `coverage_other` [1] of their bands.
         N_D = 0 is A of the physics alone.
     notes : sentences about what could not be matched, and what the intervals rest on.
@@ -61,7 +61,7 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
     folders : two or more folders of runs.
     pairs : family or method of the first run -> its counterpart in the others. Equal names match without.
 
-    Raises ResultError for a folder without a result, ShipidError where no cell matches.
+    Raises ResultError for a folder without a result, ShipidError where no cell, or no test manoeuvre, is in both.
     """
     if isinstance(folders, str | os.PathLike) or not isinstance(folders, Sequence) or len(folders) < 2:
         raise ShipidError("name two folders or more")
@@ -128,26 +128,25 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
             "grid by --set grid.N_D=... --set grid.seeds=..."
         )
     here, away = _common_windows(first, other)
-    paired, rows = len(here) > 0, []
+    rows, differences = [], []
     for _, part in both.groupby(["family", "method", "N_D"], sort=False):
         one, two = _cell_errors(first, part, "first", here), _cell_errors(other, part, "other", away)
-        means = [float(np.mean([cell.mean for cell in cells])) for cells in (one, two)]
+        differences.append(compare_cells(two, one))
         row: dict[str, Any] = {key: _label(part, key) for key in ("family", "method")}
-        row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part), "first": means[0], "other": means[1]}
-        row |= {"difference": means[1] - means[0], "low": np.nan, "high": np.nan, "above": np.nan, "below": np.nan}
-        row["same"] = paired and all(np.array_equal(a.errors, b.errors) for a, b in zip(one, two, strict=True))
-        if paired:
-            found = compare_cells(two, one)
-            row |= {"difference": found.mean} | {end: getattr(found, end) for end in ("low", "high", "above", "below")}
+        row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part)}
+        row |= {side: np.mean([cell.mean for cell in cells]) for side, cells in (("first", one), ("other", two))}
+        row |= {"difference": differences[-1].mean, "low": differences[-1].low, "high": differences[-1].high}
+        row["verdict"] = all(np.array_equal(a.errors, b.errors) for a, b in zip(one, two, strict=True)) * IDENTICAL
         rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in ("first", "other")})
-    frame = pd.DataFrame(rows)
-    notes += _notes_on_windows(first, other, here, int(frame["same"].sum()), len(frame))
-    sides = (which_significant(frame[side].to_numpy()) for side in ("below", "above"))
-    lower, higher = sides if frame["below"].notna().all() else (np.zeros(len(frame), dtype=bool),) * 2
-    words = np.select([frame["same"].astype(bool), lower, higher], [IDENTICAL, "lower", "higher"], "")
-    columns = ["family", "method", "N_D", "cells", "first", "other", "difference", "low", "high"]
-    frame = frame[columns].assign(verdict=words, paired=paired, **frame[["coverage_first", "coverage_other"]])
-    return frame, notes
+    lower, higher = (which_significant(np.array([getattr(d, s) for d in differences])) for s in ("below", "above"))
+    for row, less, more in zip(rows, lower, higher, strict=True):
+        row["verdict"] = row["verdict"] or ("lower" if less else "higher" if more else "")
+    same, runs = sum(row["verdict"] == IDENTICAL for row in rows), len(set(first.test.run[here]))
+    whole = len(here) == len(first.test) == len(other.test)
+    notes.append(f"paired over {count_manoeuvres(runs)}{'' if whole else f', on the {len(here)} windows of both'}")
+    if same:
+        notes.append(f"{same} of {len(rows)} rows are identical to the digit: no training sets them apart")
+    return pd.DataFrame(rows), [*notes, *([few] if (few := too_few_manoeuvres(runs)) else [])]
 
 
 def _matching_cells(results: Results) -> pd.DataFrame:
@@ -173,7 +172,7 @@ def _label(part: pd.DataFrame, key: str) -> str:
 
 
 def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Places of the windows that both runs have; none where windows of one name are other recordings."""
+    """Places of the windows that both runs have; ShipidError where windows of one name are other recordings, or none."""
     one, two = (
         {(str(run), round(float(t), 4)): place for place, (run, t) in enumerate(zip(of.run, of.t, strict=True))}
         for of in (first.test, other.test)
@@ -182,30 +181,19 @@ def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], 
     columns = [(first.test.columns[name][here], other.test.columns[name][there]) for name in MEASURED]
     same = all(np.allclose(a, b, rtol=1e-6, atol=1e-9) for a, b in columns)
     draws = first.plan.draws is not None and first.plan.draws == other.plan.draws  # the same orders, whatever the ship
-    return (here, there) if same or draws else (here[:0], there[:0])
-
-
-def _notes_on_windows(first: Results, other: Results, here: NDArray[np.int64], identical: int, rows: int) -> list[str]:
-    """What the intervals rest on."""
-    if not len(here):
-        counts = [len(set(results.test.run)) for results in (other, first)]
-        return [f"other test manoeuvres ({counts[0]}, the first has {counts[1]}): not paired, so there is no interval"]
-    runs, whole = len(set(first.test.run[here])), len(here) == len(first.test) == len(other.test)
-    notes = [f"paired over {count_manoeuvres(runs)}"]
-    notes[0] += "" if whole else f", on the {len(here)} windows that both have"
-    if identical:
-        notes.append(f"{identical} of {rows} rows are identical to the digit: no training sets them apart")
-    return [*notes, *([few] if (few := too_few_manoeuvres(runs)) else [])]
+    if not (len(here) and (same or draws)):
+        raise ShipidError(f"tests on other manoeuvres than {first.folder}: nothing can be paired", file=other.folder)
+    return here, there
 
 
 def _cell_errors(results: Results, part: pd.DataFrame, side: str, windows: NDArray[np.int64]) -> list[CellErrors]:
-    """Errors by test manoeuvre of the cells of a group, on some windows, or on all where these are none."""
-    test, places = results.test, windows if len(windows) else np.arange(len(results.test))
-    _, place, counts = np.unique(test.run[places], return_inverse=True, return_counts=True)
+    """Errors by test manoeuvre of the cells of a group, on some windows."""
+    test = results.test
+    _, place, counts = np.unique(test.run[windows], return_inverse=True, return_counts=True)
     cells = []
     for cell, foundation in zip(part[f"cell_{side}"], part[f"foundation_{side}"], strict=True):
         path = results.paths[str(cell)] if cell else results.physics[str(foundation)]
-        error = over_time(position_error(path[:, places], test.future[:, places]))
+        error = over_time(position_error(path[:, windows], test.future[:, windows]))
         row = results.cells[results.cells["cell"] == cell]
         learns = bool(cell) and results.plan.learns(*row.iloc[0][["family", "method"]])
         cells.append(CellErrors(str(foundation), np.bincount(place, error) / counts, counts.astype(float), learns))

@@ -20,7 +20,7 @@ from shipid.metrics import summary
 from shipid.report import Finding, ReportContent, Sentence, write_report, write_summary
 from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent, verdicts
-from shipid.study import seals, store
+from shipid.study import store
 from shipid.study.claims import UnitClaims
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import Plan
@@ -128,28 +128,6 @@ def _write_one(folder: Path, say: Say | None) -> tuple[Path, bool]:
     report = write_report(content, folder / REPORT, say)
     log.debug("report written: %s", report)
     return report, results.complete
-
-
-def share_pages(folder: Path, say: Say | None = None) -> Path:
-    """Write the pages where several processes may end together: one writes, the others wait for it.
-
-    say : called with a few words on how far it is.
-    """
-    report, parts = folder / REPORT, store.stored_plan(folder).parts
-    places = [store.part_folder(folder, name) for name in parts] or [folder]
-    pages = [place / name for place in places for name in (ANSWER, SUMMARY, REPORT)]
-    pages += [folder / name for name in (ANSWER, METHODS, REPORT)] if parts else []
-
-    def is_done() -> bool:
-        try:
-            tables = max(seals.seal_file(place, store.RESULTS).stat().st_mtime for place in places)
-            return report.stat().st_mtime >= tables and all(page.stat().st_size for page in pages)
-        except FileNotFoundError:
-            return False
-
-    with UnitClaims(folder) as claims:
-        claims.once(PAGES, is_done, lambda: _write(folder, say))
-    return report
 
 
 def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]:

@@ -1,12 +1,12 @@
-"""Every run tests in its turn: how much an answer owes to the choice of the test run."""
+"""Each run of a study as the test run in turn: how much an answer owes to the choice of the test run."""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
-from functools import partial
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -19,22 +19,21 @@ from shipid.answer.verdict import Finding, leave_undecided
 from shipid.data.checks import repeated
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
-from shipid.files import make_folder, read_table, sweep, write_table, write_text
-from shipid.logs.importing import sha256_of
-from shipid.study.claims import UnitClaims
+from shipid.study import store
 from shipid.study.code import code_digest
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import Batch, Plan
-from shipid.study.prepare import all_windows, partition, prepare
-from shipid.study.run import run_unit
+from shipid.study.plan import Plan, build_plan
+from shipid.study.prepare import all_windows, partition
+from shipid.study.results import read_cells
+from shipid.study.run import run_study
 
-KEYS = [
+TURN_COLUMNS = [
     *("test", "foundation", "family", "method", "N_D", "seed", "A", "H", "H_90"),
     *("coverage", "width", "naive", "status"),
 ]
 
 
-def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
+def choose_turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
     """Runs with windows that match any pattern, in the order of the dataset; DocumentError where one matches none."""
     cut = all_windows(plan, dataset).spans
     runs = [run for run in dataset.runs if run in cut]
@@ -50,7 +49,7 @@ def turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[str]:
     return [run for run in runs if run in chosen]
 
 
-def copied(plan: Plan, dataset: Dataset) -> str:
+def repeated_runs_in_words(plan: Plan, dataset: Dataset) -> str:
     """Say which runs move as others do, so that a turn tests a run that trains; empty where none does."""
     same = repeated(dataset, all_windows(plan, dataset).spans)
     pairs = ", ".join(f"{run!r} as {other!r}" for run, other in same.items())
@@ -61,113 +60,45 @@ def copied(plan: Plan, dataset: Dataset) -> str:
 def rotate(
     plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cpu", kept: Path | None = None
 ) -> Iterator[pd.DataFrame]:
-    """Set one run aside after the other, train on all others, and yield the cells of each turn, batch by batch.
+    """Set one run aside after the other, train on all others, and yield the cells of each turn.
 
     A row has test, foundation, family, method, N_D (runs that were left), seed, A, H, H_90 [m], coverage
     [1] and width [m] of the band, naive [m], status. No training window shares a moment with the test run.
 
     Parameters
     ----------
-    kept : folder for what is finished, seed by seed, and for the trials of searches; made where it is not there. The
-        same call with the same folder goes on after an interruption, and yields the same digits; two at a time compute
-        each seed once. None: nothing is kept.
+    kept : folder for the runs of the turns, each a study of its own; made where it is not there. The same call with the
+        same folder goes on after an interruption, and yields the same digits. None: nothing is kept.
     """
-    with nullcontext() if kept is None else _sharing(kept) as claims:
+    with TemporaryDirectory() if kept is None else nullcontext(kept) as place:
         for test in tests:
             rest, _, _ = partition(plan.turn(test, 2), dataset)
-            turn = plan.turn(test, len(rest.spans))
-            done = {} if kept is None else {batch: _read(_file(kept, test, batch)) for batch in turn.batches}
-            if any(done.get(batch) is None for batch in turn.batches):
-                yield from _computed(turn, dataset, test, device, kept, claims)
-            else:
-                yield from (frame for frame in done.values() if frame is not None)
-
-
-@contextmanager
-def _sharing(kept: Path) -> Iterator[UnitClaims]:
-    """The claims of this process in a folder of kept turns."""
-    make_folder(kept)
-    sweep(kept)
-    with UnitClaims(kept) as claims:
-        yield claims
-
-
-def _computed(
-    turn: Plan, dataset: Dataset, test: str, device: str, kept: Path | None, claims: UnitClaims | None
-) -> Iterator[pd.DataFrame]:
-    """Cells of a turn, batch by batch; those of batches that nobody has computed are, and kept."""
-    prepared = prepare(turn, dataset, device)
-    floor = float(prepared.naive.mean())
-
-    def computed(batch: Batch, *journal: Any) -> pd.DataFrame:
-        rows = [cell.row for cell in run_unit(turn, prepared, turn.whole(batch), device, *journal)]
-        return pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
-
-    if kept is None or claims is None:
-        yield from (computed(batch) for batch in turn.batches)
-        return
-    trials = kept / documents.digest(test)
-    make_folder(trials)
-    frames: dict[Batch, pd.DataFrame | None] = {}
-    for batch in turn.batches:
-        file = _file(kept, test, batch)
-        check = partial(claims.holder.check, file.stem)
-
-        def is_done(batch: Batch = batch, file: Path = file) -> bool:
-            frames[batch] = _read(file)
-            return frames[batch] is not None
-
-        def keep(batch: Batch = batch, file: Path = file, check: Callable[[], None] = check) -> None:
-            frames[batch] = frame = computed(batch, trials, check)
-            check()
-            write_table(file, frame)
-            write_text(_seal(file), sha256_of(file))
-
-        claims.once(file.stem, is_done, keep)
-        frame = frames[batch]
-        assert frame is not None
-        yield frame
+            changes = {"split.test": [test], "grid.N_D": [len(rest.spans)]}
+            turn = build_plan(documents.replace(plan.document, changes), Path(plan.file), plan.vessels, plan.sources)
+            folder = Path(place) / documents.digest(test)
+            for _ in run_study(turn, folder, device=device):
+                pass
+            floor = float(store.read_test(folder)[2].mean())
+            yield read_cells(folder).assign(test=test, naive=floor)[TURN_COLUMNS]
 
 
 def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:
-    """Folder of the finished turns of an interrupted rotation: one for each study, dataset, device and code."""
+    """Folder of the turns of an interrupted rotation: one for each study, dataset, device and code."""
     vessels = {name: vessel.digest for name, vessel in plan.vessels.items()}  # the digest has them without their names
     decides = [plan.digest, vessels, dataset.digest, device, code_digest(), plan.code]
     return file.with_name(f"{file.name}.turns") / documents.digest(decides)
 
 
-def forget(kept: Path) -> None:
-    """Remove the folder of kept turns, whose table is written; the last one of several processes does."""
-    with UnitClaims(kept) as claims:
-        if claims.others():
-            return
+def remove_kept(kept: Path) -> None:
+    """Remove the folder of kept turns, whose table is written."""
     shutil.rmtree(kept, ignore_errors=True)
     with suppress(OSError):  # of another rotation to the same file
         kept.parent.rmdir()
 
 
-def _file(kept: Path, test: str, batch: Batch) -> Path:
-    return kept / f"{documents.digest(test)}-{batch.key}.parquet"
-
-
-def _seal(file: Path) -> Path:
-    """Where the digest of the rows of a batch is, which is written last."""
-    return file.with_suffix(".sha256")
-
-
-def _read(file: Path) -> pd.DataFrame | None:
-    """Rows of a batch of a turn; None where it is not finished, or the file is not as it was written."""
-    try:
-        if _seal(file).read_text(encoding="utf-8") != sha256_of(file):
-            return None
-        return read_table(file)
-    except (OSError, ValueError):
-        return None
-
-
 def turns_table(frame: pd.DataFrame) -> pd.DataFrame:
     """A row per foundation and method over the turns, seeds averaged: A, H, its range, H_90 [m], turns where H < A."""
-    good = frame[frame["status"] == "ok"].reindex(columns=KEYS)  # frames of older turns have no bands
+    good = frame[frame["status"] == "ok"].reindex(columns=TURN_COLUMNS)  # frames of older turns have no bands
     numbers = ["A", "H", "H_90", "coverage", "width"]
     per_turn = good.groupby(["test", "foundation", "family", "method"], sort=False)[numbers].mean().reset_index()
     rows = []

@@ -161,8 +161,8 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
 
     methods : sentences that compare the methods; of a study of several that learn they come first.
     """
-    every_model, saw_test = errors_by_model(results), _families_that_saw_the_test(results)
-    rows = every_model[~every_model["family"].isin(results.aside)]
+    rows, saw_test = errors_by_model(results), _families_that_saw_the_test(results)
+    rows = rows[~rows["family"].isin(results.aside)]
     caveats = [(text, "cells") for text in _missing_cells(results)]
     if reason := _no_comparison(results, rows):
         return [*caveats, (reason, "cells"), *((text, "models") for text in saw_test)]
@@ -175,10 +175,8 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
         (chart, _runs_that_physics_saves(case)),
         ("gain", _headline(case)),
         ("cells", _judged_method(case) if several else ()),
-        (chart, _models_against_none(case)),
         ("horizon", _error_left(case)),
         ("gain", (*_harm_of_compensation(case), *_harm_of_data(case), *_against_constant_motion(case))),
-        ("gain", _exact_coefficients(case, every_model)),
         ("models", saw_test),
         ("cells", _how_to_read(case)),
     ]
@@ -209,25 +207,19 @@ def _families_that_saw_the_test(results: Results) -> Iterator[str]:
 
 def _no_comparison(results: Results, rows: pd.DataFrame) -> str:
     """Why physics with data is compared with nothing, and the errors that are known; empty where it is compared."""
-    plan, cells = results.plan, results.cells[results.cells["status"] == "ok"]
-    largest = int(rows["N_D"].max()) if len(rows) else 0
-    top = cells[cells["N_D"] == largest]
-    meets = {name for name, way in plan.pairs if way.name == plan.judged}
-    learns = next(way.method.compensates for way in plan.methods if way.name == plan.judged)
-    if len(rows) and not learns:
-        errors = rows[rows["N_D"] == largest].set_index("model")["H"]
-        begins = f"The method {plan.judged!r} learns nothing from data. Mean errors of physics alone"
-        return f"{begins}, {_ahead(results)} ahead{_least_errors(errors)}."
-    if len(rows) and meets == {NO_MODEL}:
-        begins = "No method that learns from data has physics in this study. Mean errors"
-        errors = _least_errors(top.groupby("model")["H"].mean())
-        return f"{begins} {_ahead(results)} ahead, with {count_runs(largest)}{errors}."
-    if rows[(rows["N_D"] == largest) & (rows["family"] != NO_MODEL)].empty:
-        of = f" of the method {plan.judged!r}" if len(plan.methods) > 1 else ""
-        counts = " that counts" if plan.saw(results.test.spans) else ""
-        where = f" at {count_runs(largest)}" if largest else ""
-        return f"No cell{of} with physics{counts} has a result{where}, so there is no conclusion yet."
-    return ""
+    plan, largest = results.plan, int(rows["N_D"].max()) if len(rows) else 0
+    learns = any(way.method.compensates for way in plan.methods if way.name == plan.judged)
+    if learns and not rows[(rows["N_D"] == largest) & (rows["family"] != NO_MODEL)].empty:
+        return ""
+    if not learns:
+        reason = f"The method {plan.judged!r} learns nothing from data"
+    elif {name for name, way in plan.pairs if way.name == plan.judged} == {NO_MODEL}:
+        reason = "No method that learns from data has physics in this study"
+    else:
+        return "No cell with physics and data that counts has a result yet, so there is no conclusion."
+    cells = results.cells[(results.cells["status"] == "ok") & (results.cells["N_D"] == largest)]
+    errors = _least_errors(cells.groupby("model")["H"].mean())
+    return f"{reason}. Mean errors {_ahead(results)} ahead, with {count_runs(largest)}{errors}."
 
 
 def _least_errors(errors: pd.Series[float]) -> str:
@@ -244,34 +236,36 @@ def _ahead(results: Results) -> str:
 
 def _physics_that_pays(case: Case) -> Iterator[str]:
     """How good physics must be to pay, at the smallest and at the largest amount of data."""
-    if NO_MODEL in case.table.H:
-        parts = {amount: _limit_or_sides(case, amount) for amount in case.ends}
-        each = "; with ".join(f"{count_runs(amount)} {part}" for amount, part in parts.items())
-        if len(parts) == 2 and len(set(parts.values())) == 1:
-            each = f"{case.smallest} or {count_runs(case.largest)} {parts[case.largest]}"
-        yield f"How good must the physics be, {_ahead(case.results)} ahead? With {each}."
+    if NO_MODEL not in case.table.H:
+        planned = (NO_MODEL, case.results.plan.judged) in {(name, way.name) for name, way in case.results.plan.pairs}
+        reason = "not every cell without physics has a result" if planned else "the study has no cell without physics"
+        yield f"It is unknown whether physics harms, since {reason}."
+        return
+    parts = {amount: _limit_or_sides(case, amount) for amount in case.ends}
+    each = ". With ".join(f"{count_runs(amount)} {part}" for amount, part in parts.items())
+    if len(parts) == 2 and len(set(parts.values())) == 1:
+        each = f"{case.smallest} or {count_runs(case.largest)} {parts[case.largest]}"
+    yield f"How good must the physics be, {_ahead(case.results)} ahead? With {each}."
 
 
 def _limit_or_sides(case: Case, amount: int) -> str:
-    """Up to which error A physics pays; where no A divides the models, which of them do better than none."""
+    """Up to which error A physics pays, and which models do better than none; these alone where no A divides them."""
     sides, limit = case.against_none[amount]
     if not sides.better and not sides.worse:
         count = len(sides.unknown)
         which = "the physics model" if count == 1 else f"any of {count} physics models"
         return f"the test cannot tell {which} from no physics"
+    models = _sides_in_words(case, sides)
     if limit is None:
         worst = max((case.table.mean(model, ALONE) for model in case.fixed), default=0.0)
         all_pay = worst > 0 and not sides.worse and not sides.unknown
-        return _sides_in_words(case, sides) + (
-            f", even with an error A of {length_in_metres(worst)}" if all_pay else ""
-        )
-    least, most = (length_in_metres(end) for end in limit.limits)
-    bounds = _bounds(limit, _short_length)
+        return models + (f", even with an error A of {length_in_metres(worst)}" if all_pay else "")
+    (least, most), bounds = map(length_in_metres, limit.limits), _bounds(limit, _short_length)
     if limit.above:
-        return f"physics pays even with an error A of {most}, the worst tried{case.whole}{bounds}"
+        return f"physics pays even with an error A of {most}, the worst tried{case.whole}{bounds}: {models}"
     if limit.below:
-        return f"physics does not pay even with an error A of {least}, the best tried{case.whole}{bounds}"
-    return f"physics pays if its error A is below about {_short_length(limit.value)} m{bounds}"
+        return f"physics does not pay even with an error A of {least}, the best tried{case.whole}{bounds}: {models}"
+    return f"physics pays if its error A is below about {_short_length(limit.value)} m{bounds}: {models}"
 
 
 def _short_length(value: float) -> str:
@@ -303,7 +297,8 @@ def _runs_that_physics_saves(case: Case) -> Iterator[str]:
         pure = case.H(NO_MODEL, largest)
         text = f"without physics {count_runs(largest)} are not enough for that{bounds}: they give {pure}"
     elif estimate.below:
-        text = f"without physics the same {count_runs(fewest)} do as well{bounds}, {case.H(NO_MODEL, fewest)}"
+        do = plural(fewest, "does", "do")
+        text = f"without physics the same {count_runs(fewest)} {do} as well{bounds}, {case.H(NO_MODEL, fewest)}"
     else:
         count = f"{estimate.value:.0f} runs{bounds}"
         text = f"without physics the same error takes about {count}, interpolated between amounts"
@@ -331,18 +326,6 @@ def _judged_method(case: Case) -> Iterator[str]:
     plan = case.results.plan
     words = f"The study has {len(plan.learning)} methods that learn from data; the other sentences speak of"
     yield f"{words} {plan.judged!r}, the one that the study judges by."
-
-
-def _models_against_none(case: Case) -> Iterator[str]:
-    """Which physics models beat none and which harm, where a limit of A was given; or why that is unknown."""
-    if NO_MODEL not in case.table.H:
-        planned = (NO_MODEL, case.results.plan.judged) in {(name, way.name) for name, way in case.results.plan.pairs}
-        reason = "not every cell without physics has a result" if planned else "the study has no cell without physics"
-        yield f"It is unknown whether physics harms, since {reason}."
-        return
-    for amount, (sides, limit) in case.against_none.items():
-        if (sides.better or sides.worse) and limit is not None:
-            yield f"At {count_runs(amount)} {_sides_in_words(case, sides)}."
 
 
 def _sides_in_words(case: Case, sides: Sides) -> str:
@@ -414,18 +397,6 @@ def _against_constant_motion(case: Case) -> Iterator[str]:
     parts += [f"{model_list(unknown)} {plural(len(unknown), 'is', 'are')} not shown to beat them"] if unknown else []
     text = ", and ".join(parts) or f"every model{case.whole} beats them"
     yield f"{begins}: at {count_runs(case.largest)} {text}."
-
-
-def _exact_coefficients(case: Case, every_model: pd.DataFrame) -> Iterator[str]:
-    """The error that exact coefficients leave, alone and compensated with the largest amount of data."""
-    claims = case.results.plan.study.claims
-    exact = every_model[(every_model["family"] == claims.nominal) if claims else [False] * len(every_model)]
-    for row in exact[exact["N_D"] == case.largest].to_dict("records"):
-        alone, compensated = length_in_metres(row["A"]), length_in_metres(row["H"])
-        yield (
-            f"Exact coefficients ({row['model']}) leave {alone} alone and {compensated} compensated with "
-            f"{count_runs(case.largest)}: the floor that weather, integrator and unknown orders set."
-        )
 
 
 def _how_to_read(case: Case) -> Iterator[str]:

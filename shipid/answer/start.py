@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from shipid.answer.pages import share_pages
+from shipid.answer.pages import write_pages
 from shipid.arguments import path_of
 from shipid.errors import ShipidError
 from shipid.study.plan import read_plan
@@ -51,7 +51,7 @@ def run(
             log.info("%s", line)
         if event.kind == "end":
             folder = Path(event.text)
-    share_pages(folder)
+    write_pages(folder)
     return read_results(folder)
 
 

@@ -233,7 +233,7 @@ def study_rotate(
 
     plan, file = _before_work(study, changes, device, out, "rotate")
     dataset = obtain(plan)
-    wanted = rotate.turns(plan, dataset, tests)
+    wanted = rotate.choose_turns(plan, dataset, tests)
     cells = len(wanted) * len(plan.pairs) * len(plan.seeds)
     import pandas as pd
 
@@ -242,7 +242,7 @@ def study_rotate(
     sentence = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
     frame = pd.concat(list(counted(blocks, cells, "cells", sentence)), ignore_index=True)
     write_table(file, frame)
-    rotate.forget(kept)
+    rotate.remove_kept(kept)
     columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
     over = rotate.turns_table(frame)
     for row in over.to_dict("records"):
@@ -258,7 +258,7 @@ def study_rotate(
         answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
         answer.rows("turns", over, table(heads, rows))
         answer.say(f"constant u, v, r: {digits(naive)} m", naive=naive)
-        if words := rotate.copied(plan, dataset):
+        if words := rotate.repeated_runs_in_words(plan, dataset):
             answer.say(words, copied=words)
         if saw := plan.saw(wanted):
             answer.say(
@@ -496,7 +496,7 @@ def _before_work(
 
 
 def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool) -> None:
-    from shipid.answer.pages import ANSWER, share_pages
+    from shipid.answer.pages import ANSWER, write_pages
     from shipid.files import as_argument
     from shipid.study import run, store
     from shipid.study.progress import Watch
@@ -511,7 +511,7 @@ def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, d
         typer.echo(f"others work on the last {left}: the one that ends last writes the report. If they die: {resume}")
         return
     with store.in_place(folder, plan), steps() as say:
-        report = share_pages(folder, say)
+        report = write_pages(folder, say)
     for line in (folder / ANSWER).read_text(encoding="utf-8", errors="replace").splitlines():
         typer.echo(f"  {line}")
     typer.echo(f"report: {report}")
