@@ -52,18 +52,20 @@ def document_differences(
         }
         for plan, session, names in zip(plans, sessions or [{}] * len(plans), called or [{}] * len(plans), strict=True)
     ]
-    flat = [dict(_leaves(document, "")) for document in whole]
-    paths = dict.fromkeys(path for one in flat for path in one)
-    rows = [[path, *(one.get(path, ABSENT) for one in flat)] for path in paths]
-    return pd.DataFrame([row for row in rows if len(set(row[1:])) > 1], columns=["path", *map(str, range(len(plans)))])
+    rows = [[path, *map(_value_in_words, values)] for path, values in _differing_values(whole, "")]
+    return pd.DataFrame(rows, columns=["path", *map(str, range(len(plans)))])
 
 
-def _leaves(value: Any, path: str) -> Iterator[tuple[str, str]]:
-    """Dotted path and text of every value that is no table and no list of tables."""
-    if isinstance(value, list) and value and all(isinstance(entry, Mapping) for entry in value):
-        value = {str(place): entry for place, entry in enumerate(value)}
-    if isinstance(value, Mapping):
-        for key, inside in value.items():
-            yield from _leaves(inside, f"{path}.{key}" if path else str(key))
-    elif value is not None:
-        yield path, value if isinstance(value, str) else json.dumps(value)
+def _differing_values(values: Sequence[Any], path: str) -> Iterator[tuple[str, Sequence[Any]]]:
+    """Dotted path and values where they are not all equal, as deep as all of them have tables."""
+    if all(isinstance(value, list) and value and isinstance(value[0], Mapping) for value in values):
+        values = [{str(place): entry for place, entry in enumerate(value)} for value in values]
+    if all(isinstance(value, Mapping) for value in values):
+        for key in dict.fromkeys(key for value in values for key in value):
+            yield from _differing_values([value.get(key) for value in values], f"{path}.{key}".removeprefix("."))
+    elif any(value != values[0] for value in values):
+        yield path, values
+
+
+def _value_in_words(value: Any) -> str:
+    return ABSENT if value is None else value if isinstance(value, str) else json.dumps(value)

@@ -172,7 +172,7 @@ def _label(part: pd.DataFrame, key: str) -> str:
 
 
 def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Places of the windows that both runs have; ShipidError where windows of one name are other recordings, or none."""
+    """Places of the windows that both runs have; ShipidError where there are none, or they are other recordings."""
     one, two = (
         {(str(run), round(float(t), 4)): place for place, (run, t) in enumerate(zip(of.run, of.t, strict=True))}
         for of in (first.test, other.test)

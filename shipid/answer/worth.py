@@ -40,11 +40,6 @@ class Estimate:
         """Whether the value is at least the greatest value that the study covers."""
         return self.value >= self.limits[1]
 
-    @property
-    def unknown(self) -> bool:
-        """Whether the interval holds every value that the study covers."""
-        return self.low <= self.limits[0] and self.high >= self.limits[1]
-
 
 def _estimate(value: Array, drawn: Array, runs: int, limits: tuple[float, float]) -> Estimate:
     """Quantiles of resampled values, further out where manoeuvres are few (expanded percentiles; Hesterberg 2015)."""

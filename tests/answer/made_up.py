@@ -12,11 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.findings import Rivals
-from shipid.answer.findings import judged as judged_rivals
-from shipid.answer.findings_bands import Widths, narrower
-from shipid.answer.findings_simulation import RULES, Grid, rough
-from shipid.answer.findings_simulation import judged as judged_grid
+from shipid.answer.findings_bands import Widths, judge_width_trend
+from shipid.answer.findings_full_scale import FULL_SCALE_RULES, Rivals
+from shipid.answer.findings_simulation import SIMULATION_RULES, Grid, compare_roughness
 from shipid.answer.verdict import Verdict
 from shipid.study.declared import NO_MODEL
 
@@ -71,7 +69,7 @@ def table(
     return ErrorTable(size.amounts, counts, alone, errors)
 
 
-def grids(rng: np.random.Generator, size: Size, case: str, effect: float) -> tuple[Grid, Grid]:
+def grids(rng: np.random.Generator, size: Size, case: str, effect: float) -> Grid:
     """Tables of H and H_90 in a world without an effect in the claim `case` (0), with the paper's (1), or between."""
     moderate, high = size.members
     share = np.array(size.amounts) / size.amounts[0]
@@ -100,7 +98,7 @@ def grids(rng: np.random.Generator, size: Size, case: str, effect: float) -> tup
     else:
         tails = {model: 2.2 * values * factor(rng, 0.05, values.shape) for model, values in by_mean.H.items()}
         by_90 = ErrorTable(size.amounts, by_mean.counts, {m: 2.2 * a for m, a in by_mean.A.items()}, tails)
-    return Grid(by_mean, moderate, high), Grid(by_90, moderate, high)
+    return Grid(by_mean, moderate, high, by_90=by_90)
 
 
 def rivals(rng: np.random.Generator, size: Size, case: str, effect: float) -> Rivals:
@@ -141,25 +139,17 @@ SIMULATION, FULL_SCALE = ("S1", "S2", "S3", "S4", "S5", "S6"), ("R1", "R2", "R3"
 def rule(case: str) -> Callable[[np.random.Generator, Size, float], Verdict]:
     """Return the verdict that today's rule gives on a table drawn for a claim."""
 
-    def wide(rng: np.random.Generator, size: Size, effect: float) -> Verdict:
-        grid = grids(rng, size, case, effect)[0]
-        return narrower(Widths(grid.table, grid.physics))["verdict"]
+    def judge(rng: np.random.Generator, size: Size, effect: float) -> Verdict:
+        if case == "B1":
+            grid = grids(rng, size, case, effect)
+            return judge_width_trend(Widths(grid.table, grid.physics))[0]
+        if case == "S7":
+            return compare_roughness(*roughness(rng, size, effect))[0]
+        if case in FULL_SCALE_RULES:
+            return FULL_SCALE_RULES[case].decide(rivals(rng, size, case, effect))[0]
+        return SIMULATION_RULES[case].decide(grids(rng, size, case, effect))[0]
 
-    def simulated(rng: np.random.Generator, size: Size, effect: float) -> Verdict:
-        both = grids(rng, size, case, effect)
-        if case in RULES:
-            return RULES[case](both[0])["verdict"]
-        return {one["id"]: one["verdict"] for one in judged_grid(*both)}[case]
-
-    def at_full_scale(rng: np.random.Generator, size: Size, effect: float) -> Verdict:
-        return {one["id"]: one["verdict"] for one in judged_rivals(rivals(rng, size, case, effect))}[case]
-
-    def smooth(rng: np.random.Generator, size: Size, effect: float) -> Verdict:
-        return rough(*roughness(rng, size, effect))[0]
-
-    if case == "B1":
-        return wide
-    return smooth if case == "S7" else at_full_scale if case in FULL_SCALE else simulated
+    return judge
 
 
 CASES = (*SIMULATION, "S7", *FULL_SCALE, "B1")

@@ -10,13 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.signal import lfilter
-from scipy.stats import binom, binomtest
 from typer.testing import CliRunner
 
 from shipid.answer import bands
 from shipid.answer.findings import findings
-from shipid.answer.verdict import metres
-from shipid.answer.worlds import compare_bands
 from shipid.cli import app
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
@@ -25,9 +22,8 @@ from shipid.predictor import NO_BAND, NO_REFITS, Predictor
 from shipid.study import store
 from shipid.study.apply import Band, along_run
 from shipid.study.plan import Plan, read_plan
-from shipid.study.results import Results, border, read_results
+from shipid.study.results import Results, read_results
 from shipid.study.schema import Claims
-from shipid.units import percent
 from tests.study.test_commands import weaving
 from tests.study.tiny import run_here, tiny_plan
 
@@ -51,43 +47,6 @@ def results(folder: Path) -> Results:
     return read_results(folder)
 
 
-@pytest.mark.parametrize(("inside", "count"), [(0, 7), (3, 7), (7, 7), (18, 20)])
-def test_one_window_a_run_has_the_exact_interval(inside: int, count: int) -> None:
-    held, run = np.arange(count) < inside, np.arange(count)
-    exact = binomtest(inside, count).proportion_ci(method="exact")
-    np.testing.assert_allclose(bands.share_interval(held, run), (exact.low, exact.high), atol=1e-9)
-
-
-def test_windows_that_are_alike_count_once() -> None:
-    """Whole runs inside or outside: a hundred windows of each are worth no more than one."""
-    once = np.arange(10) < 8
-    low, high = bands.share_interval(np.repeat(once, 100), np.repeat(np.arange(10), 100))
-    np.testing.assert_allclose((low, high), bands.share_interval(once, np.arange(10)), atol=0.02)
-    rng = np.random.default_rng(0)
-    apart = bands.share_interval(rng.random(1000) < 0.8, np.repeat(np.arange(10), 100))
-    assert apart[1] - apart[0] < 0.5 * (high - low)
-
-
-def test_intervals_cover_shares_of_few_runs() -> None:
-    rng, run, covered = np.random.default_rng(1), np.repeat(np.arange(20), 10), 0
-    for _ in range(300):
-        chance = rng.beta(4, 1, 20)  # of each run; 0.8 in the mean
-        low, high = bands.share_interval(rng.random(200) < chance[run], run)
-        covered += low <= 0.8 <= high
-    assert covered / 300 > 0.92
-
-
-@pytest.mark.parametrize("sizes", [(200, *[10] * 6), (5, 5, 5, 5, 5, 100), (1, 1, 1, 1, 50), (300, *[40] * 8)])
-def test_a_long_run_that_is_mostly_outside_breaks_no_promise(sizes: tuple[int, ...]) -> None:
-    """Bands of 90 % that hold 90 %: at most one in forty intervals lies below, whatever share one long run makes."""
-    rng, run, below = np.random.default_rng(2), np.repeat(np.arange(len(sizes)), sizes), 0
-    for _ in range(400):
-        chance = rng.beta(0.9, 0.1, len(sizes))  # of each run; 0.9 in the mean
-        held = rng.random(len(run)) < chance[run]
-        below += bands.share_interval(held, run)[1] < 0.9
-    assert below <= binom.ppf(0.999, 400, 0.025)
-
-
 def test_cells_keep_coverage_and_width(results: Results) -> None:
     for row in results.rows:
         kept = results.bands.get(row["cell"])
@@ -102,23 +61,6 @@ def test_cells_keep_coverage_and_width(results: Results) -> None:
             assert row["coverage"] == pytest.approx(np.mean(by_run))
             assert row["width"] == pytest.approx(region.radius.mean())
     assert results.cells["width"].notna().any()
-
-
-def test_frames_agree_with_the_cells(results: Results) -> None:
-    frame = bands.coverage_frame(results)
-    top = frame[frame["level"].eq(LEVEL)].set_index(["model", "N_D"])
-    known = results.cells[results.cells["width"].notna()].groupby(["model", "N_D"])[["coverage", "width"]].mean()
-    for key, row in known.iterrows():
-        assert top.loc[key, "coverage"] == pytest.approx(row["coverage"])
-        assert top.loc[key, "width"] == pytest.approx(row["width"])
-        assert top.loc[key, "low"] <= row["coverage"] <= top.loc[key, "high"]
-    width = frame.pivot_table(index=["model", "N_D"], columns="level", values="width")
-    assert (np.diff(width.to_numpy(), axis=1)[~np.isnan(np.diff(width.to_numpy(), axis=1))] >= 0).all()
-    groups, worst = bands.groups_frame(results), bands.worst_frame(results)
-    assert set(groups["by"]) == {"kind", "ahead", "speed"}
-    assert (groups["low"] <= groups["coverage"] + 1e-9).all()
-    assert set(worst["run"]) == set(results.test.spans)
-    assert bands.answer(results)[0][0].startswith("Bands of 80 % held ")
 
 
 def test_a_share_counts_runs_and_not_windows(results: Results) -> None:
@@ -146,24 +88,39 @@ def test_a_share_counts_runs_and_not_windows(results: Results) -> None:
         assert whole.loc[mine, "low"].notna().all()
 
 
-def test_one_model_has_one_radius(results: Results) -> None:
-    row = results.cells.dropna(subset="width").sort_values("N_D").iloc[-1]
-    ((sentence, _), *_) = bands.answer(replace(results, bands={row["cell"]: results.bands[row["cell"]]}))
-    assert f"of the whole test paths (with {row['N_D']} runs; 95 % interval " in sentence
-    assert sentence.endswith(f"their mean radius is {metres(row['width'])}.")
-
-
 def test_a_study_of_several_methods_says_whose_bands_it_speaks_of(results: Results) -> None:
     """Findings speak of the method that the study judges by, this sentence of all that have a band."""
     (way,) = results.plan.methods
     plan = replace(results.plan, methods=(way, replace(way, name="other")))
-    assert "of the method" not in bands.answer(results)[0][0]
-    assert f" models of the method {way.name!r} with " in bands.answer(replace(results, plan=plan))[0][0]
+    assert "of the method" not in bands.answer_on_bands(results)[0][0]
+    assert f" models of the method {way.name!r} with " in bands.answer_on_bands(replace(results, plan=plan))[0][0]
     most = results.cells["N_D"].max()
     cells = results.cells.assign(method=np.where(results.cells["family"].eq("none"), "other", way.name))
-    said = bands.answer(replace(results, plan=plan, cells=cells))[0][0]
+    said = bands.answer_on_bands(replace(results, plan=plan, cells=cells))[0][0]
     named = [repr(name) for name in cells["method"][cells["width"].notna() & cells["N_D"].eq(most)].unique()]
     assert f" models of the methods {' and '.join(named)} with {most} runs" in said
+
+
+def test_groups_and_worst_runs_of_the_largest_amount(results: Results) -> None:
+    frame, groups, worst = bands.coverage_frame(results), bands.groups_frame(results), bands.worst_frame(results)
+    width = frame.pivot_table(index=["model", "N_D"], columns="level", values="width").diff(axis=1)
+    assert (width.fillna(0.0) >= 0).all(axis=None), "the higher the level, the wider"
+    assert set(groups["by"]) == {"kind", "ahead", "speed"}
+    assert (groups["low"] <= groups["coverage"] + 1e-9).all()
+    assert set(worst["run"]) == set(results.test.spans)
+    assert worst["coverage"].is_monotonic_increasing
+    assert (worst["coverage"] == 1).eq(worst["reach"] <= 1).all()
+
+
+def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(results: Results) -> None:
+    """Its cell has no band: the report of a whole study ended in a traceback for it."""
+    lost = results.cells["foundation"].eq("none")
+    cells = results.cells.assign(status=results.cells["status"].mask(lost, "failed"))
+    kept = {cell: path for cell, path in results.paths.items() if cell not in set(cells["cell"][lost])}
+    known = {cell: band for cell, band in results.bands.items() if cell in kept}
+    verdicts = findings(replace(results, cells=cells, paths=kept, bands=known))
+    assert [one["id"] for one in verdicts][-2:] == ["B1", "B2"]
+    assert verdicts[-1]["numbers"]
 
 
 def test_findings_say_what_the_cells_hold(results: Results) -> None:
@@ -179,16 +136,6 @@ def test_findings_say_what_the_cells_hold(results: Results) -> None:
     assert verdicts["B2"]["verdict"] == "undecided", "two test runs decide nothing"
 
 
-def test_a_family_that_saw_the_test_is_not_in_the_mean(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
-    frame = bands.coverage_frame(results)
-    top = frame[(frame["N_D"] == frame["N_D"].max()) & (frame["level"] == results.plan.level)]
-    rest = top[top["family"] != top["family"].iloc[0]]
-    monkeypatch.setattr(Plan, "saw", lambda *_: [top["family"].iloc[0]])
-    mean = f"held {percent(rest['coverage'].mean())} of the whole test paths (mean of {len(rest)} models"
-    assert len(rest) > 1
-    assert mean in bands.answer(results)[0][0]
-
-
 def test_a_family_that_the_claims_set_aside_is_not_in_the_mean(results: Results) -> None:
     frame = bands.coverage_frame(results)
     top = frame[(frame["N_D"] == frame["N_D"].max()) & (frame["level"] == results.plan.level)]
@@ -197,49 +144,22 @@ def test_a_family_that_the_claims_set_aside_is_not_in_the_mean(results: Results)
     apart = replace(results, plan=replace(results.plan, study=results.plan.study.model_copy(update={"claims": claims})))
     rest = top[top["family"] != tuned]
     assert 0 < len(rest) < len(top)
-    assert f"(mean of {len(rest)} models" in bands.answer(apart)[0][0]
+    assert f"(mean of {len(rest)} models" in bands.answer_on_bands(apart)[0][0]
 
 
 def test_a_kind_that_no_run_of_calibration_has_is_promised_nothing(results: Results) -> None:
     """The sentence spoke of a band for this kind alone; that of all kinds promises it nothing either."""
     other = {cell: replace(band, kinds={"spiral": band.runs}) for cell, band in results.bands.items()}
-    words = [sentence for sentence, _ in bands.answer(replace(results, bands=other))]
+    words = [sentence for sentence, _ in bands.answer_on_bands(replace(results, bands=other))]
     (kind,) = set(results.kinds.values())
     assert f"Nothing is promised for {kind}: no such run calibrated the bands." in words
     assert not any("Too few runs calibrate" in sentence for sentence in words)
 
 
-def test_a_kind_of_too_few_runs_is_not_said_to_be_unknown(results: Results) -> None:
-    (kind,) = set(results.kinds.values())
-    other = {cell: replace(band, kinds={kind: 2, "spiral": 9}) for cell, band in results.bands.items()}
-    words = [sentence for sentence, _ in bands.answer(replace(results, bands=other))]
-    assert f"Too few runs calibrate a band of {percent(LEVEL)} for one kind of manoeuvre alone: {kind}." in words
-    notes = set(bands.groups_frame(replace(results, bands=other)).query("by == 'kind'")["note"])
-    assert notes == {"2 runs of this kind calibrated the band: too few"}
-
-
 def test_too_few_runs_are_reported(tiny_run: Path) -> None:
     results = read_results(tiny_run)  # 0.9 of 6 runs
     assert results.cells["coverage"].isna().all()
-    assert "needs 9 runs or more" in bands.answer(results)[0][0]
-    assert compare_bands([results, results]).empty
-
-
-def test_compare_has_coverage_and_width(results: Results) -> None:
-    frame = compare_bands([results, results])
-    assert (frame["worlds"] == 2).all()
-    assert frame["width"].notna().all()
-
-
-def test_an_outline_goes_round_the_path(results: Results) -> None:
-    cell, kept = next((cell, kept) for cell, kept in results.bands.items() if kept.promises(LEVEL))
-    paths = results.paths[cell]
-    region = kept.region(paths, results.test.columns, results.test.step, LEVEL)
-    outline = border(region, paths, 0)
-    np.testing.assert_array_equal(outline[0], outline[-1])
-    last = outline[1 + len(paths) : 1 + len(paths) + 13] - paths[-1, 0]
-    apart = region.reach(np.tile(last[:, None], (1, 1, 1))[None, 0].repeat(len(paths), 0)[:, :1])
-    assert apart[-1, 0] == pytest.approx(1.0)
+    assert "needs 9 runs or more" in bands.answer_on_bands(results)[0][0]
 
 
 def test_predict_writes_the_band(folder: Path, tmp_path: Path, results: Results) -> None:
@@ -353,20 +273,14 @@ def test_refits_calibrate_what_has_no_errors_left_out(tmp_path: Path) -> None:
 def test_why_no_band_is_promised_is_the_reason_of_the_cells_with_most_runs(results: Results) -> None:
     most = max(row["N_D"] for row in results.rows)
     reasons = {row["cell"]: f"{NO_BAND}{row['N_D']} runs calibrate it" for row in results.rows}
-    ((sentence, _),) = bands.answer(replace(results, bands={}, no_band=reasons))
+    ((sentence, _),) = bands.answer_on_bands(replace(results, bands={}, no_band=reasons))
     assert sentence == f"No band is promised: {most} runs calibrate it."
-
-
-def test_models_without_a_band_for_different_reasons_are_named(results: Results) -> None:
-    reasons = {row["cell"]: f"{NO_BAND}{'noise' if row['model'] == 'none' else 'few runs'}" for row in results.rows}
-    ((sentence, _),) = bands.answer(replace(results, bands={}, no_band=reasons))
-    assert sentence == 'No band is promised: right and wrong: few runs; "no physics": noise.'
 
 
 def test_a_method_without_errors_on_runs_left_out_says_which_key_gives_them(tiny_run: Path) -> None:
     results = read_results(tiny_run)
     without = replace(results, no_band=dict.fromkeys(results.paths, f"{NO_BAND}{NO_REFITS}"))
-    ((sentence, _),) = bands.answer(without)
+    ((sentence, _),) = bands.answer_on_bands(without)
     assert sentence.startswith("No band is promised: errors on runs left out need")
     assert "`bands.refits`" in sentence
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.answer.error_table import ALONE, _by_run, error_table, intervals_frame
-from shipid.evidence import TRAINING, WORTH, mean_errors
+from shipid.answer.error_table import ALONE, error_table, intervals_frame
+from shipid.evidence import TRAINING, WORTH, paired_difference
 from tests.answer.byhand import grid
 
 H = {"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}
@@ -20,7 +20,7 @@ def test_means_are_those_of_the_cells(made: Any) -> None:
     assert (table.amounts, table.runs) == ((10, 30), 8)
     assert [table.mean("good", k) for k in (0, 1)] == pytest.approx([1.5, 1.0])
     assert table.mean("bad", ALONE) == pytest.approx(6.0)
-    lead = table.against("none", ["good", "bad"], 0)
+    lead = table.lead("none", ["good", "bad"], 0)
     assert lead.mean.tolist() == pytest.approx([7.5, 6.0])
     assert (lead.low > 0).all()
 
@@ -34,14 +34,6 @@ def test_percentiles_are_taken_within_manoeuvres(made: Any) -> None:
     curves = {("good", 10, 0): [0.0, 0.0, 0.0, 10.0]}
     table = error_table(made(grid(H), curves=curves, runs=8), ["good"], "H_90")
     assert table.mean("good", 0) == pytest.approx(np.quantile([0.0, 0.0, 0.0, 10.0], 0.9))
-
-
-def test_physics_alone_has_no_noise_of_training(made: Any) -> None:
-    table = error_table(made(grid(H), runs=8), ["good", "bad"])
-    alone = table.compare([[(1.0, "bad", ALONE), (-1.0, "good", ALONE)]])
-    trained = table.compare([[(1.0, "bad", 0), (-1.0, "good", 0)]])
-    relative = [(interval.high - interval.low)[0] / interval.mean[0] for interval in (alone, trained)]
-    assert relative[0] < relative[1]
 
 
 def test_an_interval_of_an_error_is_that_of_its_difference_to_0_without_what_is_below_0(made: Any) -> None:
@@ -87,24 +79,5 @@ def test_physics_alone_takes_no_training_and_makes_that_of_others_no_smaller(mad
     frame, without = (intervals_frame(one).set_index("model") for one in (mixed, made(learned, runs=8)))
     for name in by_seed:
         assert frame.loc[name, ["low", "high"]].tolist() == without.loc[name, ["low", "high"]].tolist()
-    exact = mean_errors(6.0 * np.linspace(0.9, 1.1, 8)[None], np.ones(8))
+    exact = paired_difference(6.0 * np.linspace(0.9, 1.1, 8)[None], np.ones(8))
     assert frame.loc["still", ["low", "high"]].tolist() == pytest.approx([exact.low[0], exact.high[0]])
-
-
-@pytest.mark.parametrize("run", ["aabbb", "ababa", "abab", "bbaa"])
-def test_both_errors_are_taken_in_each_manoeuvre(run: str) -> None:
-    """Also where manoeuvres have as many windows, which are then taken all at once."""
-    path, place = np.random.default_rng(0).normal(size=(4, len(run), 2)), np.array([name == "b" for name in run], int)
-    error = np.hypot(path[..., 0], path[..., 1])
-    parts = [error[:, place == k] for k in (0, 1)]
-    true = np.zeros_like(path)
-    np.testing.assert_allclose(_by_run(path, true, place), [part.mean() for part in parts])
-    np.testing.assert_allclose(_by_run(path, true, place, "H_90"), [np.quantile(part, 0.9) for part in parts])
-
-
-@pytest.mark.parametrize("seeds", [1, 4])
-def test_what_training_adds_to_a_mean_falls_with_the_root_of_the_seeds(seeds: int, made: Any) -> None:
-    """Seeds that do not differ: what is assumed of one weighs as `WORTH` samples, those of each model as one less."""
-    table = error_table(made({(name, 10, seed): 2.0 for name in H for seed in range(seeds)}, runs=8), ["good", "bad"])
-    of_one = TRAINING * np.sqrt(WORTH / (WORTH + (seeds - 1) * len(H)))
-    np.testing.assert_allclose(table.noise, of_one / np.sqrt(seeds))

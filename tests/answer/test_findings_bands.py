@@ -3,29 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy import stats
 
-from shipid.answer import findings_bands
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.findings_bands import Widths, _of_known_kinds, _width_table, band_findings, kept_promise, narrower
-from shipid.answer.verdict import Verdict
-from shipid.hybrid.bands import Region
+from shipid.answer.findings_bands import BAND_RULES, BandEvidence, Promise, Widths, judge_held_share
 from tests.answer.made_up import Size, table
 
 LEVEL = 0.9
 
 
-def held(rng: np.random.Generator, share: float, runs: int = 20, windows: int = 50) -> Verdict:
+def promise(inside: np.ndarray, run: np.ndarray) -> tuple[str, str, Any]:
+    return judge_held_share(Promise(inside.astype(float), run, LEVEL))
+
+
+def trend(widths: Widths) -> tuple[str, str, Any]:
+    """Verdict on B1; what B2 judges does not matter."""
+    kept = Promise(np.ones(1), np.array(["a"]), LEVEL)
+    return BAND_RULES["B1"].decide(BandEvidence(widths, kept, [0.9]))
+
+
+def held(rng: np.random.Generator, share: float, runs: int = 20, windows: int = 50) -> str:
     """Verdict on B2 where bands hold a share of the paths, more in some manoeuvres than in others."""
     each = rng.beta(4 * share, 4 * (1 - share), runs)
     inside = rng.random((runs, windows)) < each[:, None]
-    return kept_promise(inside.ravel().astype(float), np.repeat(np.arange(runs).astype(str), windows), LEVEL)["verdict"]
+    return promise(inside.ravel(), np.repeat(np.arange(runs).astype(str), windows))[0]
 
 
 def test_a_kept_promise_is_refuted_and_a_broken_one_confirmed_in_at_most_5_percent() -> None:
@@ -41,24 +46,28 @@ def test_long_manoeuvres_that_are_harder_break_no_promise() -> None:
     run = np.repeat(np.arange(24).astype(str), windows)
     for _ in range(120):
         each = np.repeat(rng.beta(8 * share, 8 * (1 - share)), windows)
-        finding = kept_promise((rng.random(len(run)) < each).astype(float), run, LEVEL)
-        verdicts.append(finding["verdict"])
+        verdict, evidence, _ = promise(rng.random(len(run)) < each, run)
+        verdicts.append(verdict)
     assert verdicts.count("refuted") <= 14
-    assert "(24 test manoeuvres, each counts the same)" in finding["evidence"]
+    assert "(24 test manoeuvres, each counts the same)" in evidence
 
 
 def test_a_kind_that_no_run_of_calibration_has_breaks_no_promise() -> None:
     """Circles keep it, zigzags, which no band knows, do not: the promise was refuted for them."""
     run = np.repeat(np.arange(30).astype(str), 10)
-    kinds = {str(k): "zigzag" if k < 10 else "turning" for k in range(30)}
-    inside = np.array([kinds[name] == "turning" for name in run], dtype=float)
+    kinds = np.where(run.astype(int) < 10, "zigzag", "turning")
+    inside = (kinds == "turning").astype(float)
     inside[-1] = 0.0
-    assert kept_promise(inside, run, LEVEL)["verdict"] == "refuted"
-    finding = _of_known_kinds(inside, run, LEVEL, kinds, [{"turning": 12}, {}])
-    assert finding["verdict"] == "confirmed"
-    assert "(20 test manoeuvres); no run of the kind zigzag calibrated them" in finding["evidence"]
-    assert _of_known_kinds(inside, run, LEVEL, kinds, [{"steps": 12}])["verdict"] == "undecided"
-    assert _of_known_kinds(inside, run, LEVEL, kinds, [{}]) == kept_promise(inside, run, LEVEL)
+    widths = Widths(ErrorTable((1,), np.ones(1), {}, {}), ())
+
+    def decide(known: frozenset[str] | None) -> tuple[str, str, Any]:
+        return BAND_RULES["B2"].decide(BandEvidence(widths, Promise(inside, run, LEVEL, kinds, known)))
+
+    assert decide(None)[0] == "refuted"
+    verdict, evidence, _ = decide(frozenset({"turning"}))
+    assert verdict == "confirmed"
+    assert "(20 test manoeuvres); no run of the kind zigzag calibrated them" in evidence
+    assert decide(frozenset({"steps"}))[0] == "undecided"
 
 
 def test_a_plainly_kept_and_a_plainly_broken_promise_are_seen() -> None:
@@ -77,8 +86,7 @@ def test_a_promise_is_kept_from_5_points_below_the_level_on(shares: tuple[float,
     low, high = np.mean(shares) - error, np.mean(shares) + error
     assert expected == ("confirmed" if low >= 0.85 else "refuted" if high < 0.9 else "undecided")
     assert low < 0.9
-    found = kept_promise(np.concatenate(inside).astype(float), np.repeat(np.arange(40).astype(str), 25), LEVEL)
-    assert found["verdict"] == expected
+    assert promise(np.concatenate(inside), np.repeat(np.arange(40).astype(str), 25))[0] == expected
 
 
 def test_few_test_manoeuvres_decide_nothing() -> None:
@@ -90,9 +98,9 @@ def test_of_two_models_the_less_accurate_has_the_wider_band(bad: float, expected
     size = Size(runs=20, amounts=(5, 20))
     widths = {"good": np.array([2.0, 1.0]), "bad": bad * np.array([2.0, 1.0])}
     drawn = table(np.random.default_rng(1), size, {"good": 1.0, "bad": 2.0}, widths)
-    finding = narrower(Widths(drawn, ("good", "bad"), rivals=True))
-    assert finding["verdict"] == expected
-    assert finding["numbers"]["ratio of widths"] == pytest.approx(bad, rel=0.3)
+    verdict, _evidence, numbers = trend(Widths(drawn, ("good", "bad"), rivals=True))
+    assert verdict == expected
+    assert numbers["ratio of widths"] == pytest.approx(bad, rel=0.3)
 
 
 @pytest.mark.parametrize(("A", "expected"), [(0.5, "confirmed"), (1.0, "undecided")])
@@ -101,27 +109,9 @@ def test_which_of_two_models_is_more_accurate_is_seen_from_the_test(A: float, ex
     widths = {"good": np.array([4.0, 2.0]), "bad": np.array([2.0, 1.0])}
     drawn = table(np.random.default_rng(1), Size(runs=20, amounts=(5, 20)), {"good": 1.0, "bad": A}, widths)
     drawn = replace(drawn, A={"good": drawn.A["good"], "bad": A * drawn.A["good"][::-1]})
-    finding = narrower(Widths(drawn, ("good", "bad"), rivals=True))
-    assert finding["verdict"] == expected
-    assert ("it is not shown which of them is more accurate" in finding["evidence"]) == (expected == "undecided")
-
-
-def test_fewer_models_than_an_order_needs_decide_nothing() -> None:
-    size = Size()
-    names = ("a", "b", "c")
-    drawn = table(
-        np.random.default_rng(1), size, dict.fromkeys(names, 1.0), dict.fromkeys(names, np.ones(len(size.amounts)))
-    )
-    assert narrower(Widths(drawn, names))["verdict"] == "undecided"
-
-
-def test_two_members_of_families_are_no_order() -> None:
-    """Which of a moderate and a high member is the more accurate is seen from A alone, and two are too few."""
-    widths = {"moderate": np.array([4.0, 2.0]), "high": np.array([2.0, 1.0])}
-    drawn = table(np.random.default_rng(1), Size(runs=20, amounts=(5, 20)), {"moderate": 2.0, "high": 1.0}, widths)
-    finding = narrower(Widths(drawn, ("moderate", "high")))
-    assert finding["verdict"] == "undecided"
-    assert finding["evidence"] == "2 models with physics, a trend needs 5"
+    verdict, evidence, _numbers = trend(Widths(drawn, ("good", "bad"), rivals=True))
+    assert verdict == expected
+    assert ("it is not shown which of them is more accurate" in evidence) == (expected == "undecided")
 
 
 @pytest.mark.parametrize(("power", "expected"), [(1.0, "confirmed"), (-1.0, "refuted")])
@@ -129,16 +119,9 @@ def test_an_order_of_many_models_and_its_opposite_are_seen(power: float, expecte
     A = {f"model-{k}": float(k) for k in range(1, 9)}
     widths = {name: value**power * np.array([2.0, 1.0]) for name, value in A.items()}
     drawn = table(np.random.default_rng(1), Size(runs=20, amounts=(5, 20)), A, widths)
-    finding = narrower(Widths(drawn, tuple(A)))
-    assert finding["verdict"] == expected
-    assert np.sign(finding["numbers"]["least rank correlation of width and A"]) == power
-
-
-@pytest.mark.parametrize(("runs", "interval"), [(4, False), (20, True)])
-def test_a_share_has_an_interval_where_there_are_enough_manoeuvres(runs: int, interval: bool) -> None:
-    finding = kept_promise(np.tile([1.0, 1.0, 1.0, 0.0], runs), np.repeat(np.arange(runs).astype(str), 4), LEVEL)
-    assert ("[" in finding["evidence"]) == interval
-    assert finding["numbers"] == {"share at 90 %": 0.75}
+    verdict, _evidence, numbers = trend(Widths(drawn, tuple(A)))
+    assert verdict == expected
+    assert np.sign(numbers["least rank correlation of width and A"]) == power
 
 
 @pytest.mark.filterwarnings("error")
@@ -146,69 +129,6 @@ def test_no_width_rises_with_an_A_that_all_models_have() -> None:
     models, hard = tuple("abcde"), np.linspace(0.9, 1.1, 8)
     widths = {name: hard[None, None] * (k + 1) for k, name in enumerate(models)}
     same = ErrorTable((10,), np.ones(8), dict.fromkeys(models, 2.0 * hard), widths)
-    finding = narrower(Widths(same, models))
-    assert finding["verdict"] == "undecided"
-    assert "the same A" in finding["evidence"]
-
-
-def test_widths_are_means_of_each_manoeuvre_where_every_model_has_a_band() -> None:
-    """At N_D = 5 the model without physics has none, so that amount of data is left out."""
-    run, names = np.array(["a", "a", "b"]), ("good", "none")
-    rows = [
-        {"cell": f"{name}-{N}", "foundation": name, "method": "drawn", "N_D": N, "seed": 0}
-        for name in names
-        for N in (5, 20)
-    ]
-    paths = {str(row["cell"]): np.zeros((2, 3, 2)) for row in rows}
-    results: Any = SimpleNamespace(
-        cells=pd.DataFrame(rows),
-        plan=SimpleNamespace(judged="drawn", plain=None),
-        test=SimpleNamespace(run=run, future=np.ones((2, 3, 2))),
-        paths=paths,
-        physics={"good": np.zeros((2, 3, 2))},
-    )
-    widths = {cell: np.array([1.0, 3.0, 7.0]) for cell in paths if cell != "none-5"}
-    drawn = _width_table(results, ["good"], widths)
-    assert drawn.amounts == (20,)
-    np.testing.assert_array_equal(drawn.counts, [2, 1])
-    for name in names:
-        np.testing.assert_array_equal(drawn.H[name], [[[2.0, 7.0]]])
-
-
-@pytest.mark.parametrize(("methods", "of"), [(["drawn"], ""), (["drawn", "memory"], " of the method 'drawn'")])
-def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(
-    methods: list[str], of: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its cell has no band: the report of a whole study ended in a traceback for it."""
-    run, models = np.repeat(["a", "b", "c", "d", "e"], 2), ("good", "bad")
-    rows = [
-        {"cell": f"{name}-9", "foundation": name, "method": "drawn", "N_D": 9, "seed": 0} for name in (*models, "none")
-    ]
-    results: Any = SimpleNamespace(
-        cells=pd.DataFrame(rows),
-        complete=True,
-        plan=SimpleNamespace(judged="drawn", methods=methods, plain=None, level=LEVEL),
-        test=SimpleNamespace(run=run, future=np.ones((2, 10, 2))),
-        paths={f"{name}-9": np.zeros((2, 10, 2)) for name in models},
-        physics=dict.fromkeys(models, np.zeros((2, 10, 2))),
-        kinds=dict.fromkeys("abcde", "zigzag"),
-        bands={f"{name}-9": SimpleNamespace(kinds={"zigzag": 9}) for name in models},
-    )
-    wide = np.full((2, 10), 9.0)
-
-    def regions(*_: Any) -> Any:
-        return (
-            (row, {LEVEL: Region(np.broadcast_to([1.0, 0.0], (2, 10, 2)), wide, wide)}, np.ones((2, 10, 2)))
-            for row in rows[:2]
-        )
-
-    monkeypatch.setattr(findings_bands, "regions", regions)
-    first, second = band_findings(results, models, rivals=True)
-    assert first["verdict"] == "undecided"  # both are as wide
-    assert second["numbers"] == {"share at 90 %": 1.0}
-    for one in (first, second):
-        assert one["evidence"].count("of the method") == one["evidence"].count(f"; bands{of}") == bool(of)
-    results.bands = {}
-    monkeypatch.setattr(findings_bands, "regions", lambda *_: iter(()))
-    for one in band_findings(results, models, rivals=True):
-        assert one["evidence"] == f"no two models with physics{of} have a band of 90 %"
+    verdict, evidence, _numbers = trend(Widths(same, models))
+    assert verdict == "undecided"
+    assert "the same A" in evidence

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from shipid.answer.findings import findings
-from shipid.answer.findings_simulation import CLAIMS, rough
+from shipid.answer.findings_simulation import SIMULATION_RULES as CLAIMS
+from shipid.answer.findings_simulation import compare_roughness
 from shipid.study.results import Results
 
 AMOUNTS = (10, 30, 100)
@@ -99,18 +100,13 @@ def test_S1_every_moderate_model_and_most_to_the_end(judged: Any) -> None:
     finding = judged({**H, "moderate-2": (9.5, 1.2, 0.6)})["S1"]
     assert finding["verdict"] == "refuted"
     assert (
-        "at N_D = 10 refuted: 2 of 3 moderate models are shown to beat no physics (8.00 m), whose H less theirs "
-        "is -1.50 m [" in finding["evidence"]
+        "at N_D = 10 refuted: 2 of 3 moderate models are shown to beat no physics (8.00 m), which has an error "
+        "larger by -1.50 m [" in finding["evidence"]
     )
     finding = judged({**H, "moderate-2": (2.5, 4.0, 0.6), "moderate-3": (3.5, 4.0, 0.7)})["S1"]
     assert finding["verdict"] == "undecided", "one of three is not most at 30 runs, and no most is worse"
     assert "that most keep the lead is undecided: 1 at 30, 3 at 100" in finding["evidence"]
     assert finding["numbers"]["share shown to lead at N_D = 100"] == 1.0
-
-
-def test_S1_a_lead_that_another_training_could_turn_round(judged: Any) -> None:
-    finding = judged({**H, "moderate-2": (7.9, 1.2, 0.6)})["S1"]
-    assert finding["verdict"] == "undecided"
 
 
 def test_S2_names_what_does_not_fall(judged: Any) -> None:
@@ -202,14 +198,8 @@ def test_S7_by_second_differences(judged: Any) -> None:
     alike = {(name, 10, 0): ROUGH for name in H}
     assert judged(curves=alike, changes=JAGGED)["S7"]["verdict"] == "refuted"
     true, counts = np.linspace(0.9, 1.1, 8), np.ones(8)
-    assert rough(true, 2.0 * true, 1.2 * true, counts)[0] == "confirmed"
-    assert rough(true, 1.3 * true, 1.2 * true, counts)[0] == "refuted"
-
-
-def test_S7_is_not_testable_where_the_recipe_is_smooth(judged: Any) -> None:
-    finding = judged()["S7"]
-    assert finding["verdict"] == "not testable"
-    assert "polynomial of time" in finding["evidence"]
+    assert compare_roughness(true, 2.0 * true, 1.2 * true, counts)[0] == "confirmed"
+    assert compare_roughness(true, 1.3 * true, 1.2 * true, counts)[0] == "refuted"
 
 
 def test_a_failed_member_is_left_out_and_named(judged: Any) -> None:

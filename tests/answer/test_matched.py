@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from shipid.answer.matched import _remedy, compare, compare_results
+from shipid.answer.matched import compare, compare_results
 from shipid.cli import app
 from shipid.errors import DocumentError, ResultError, ShipidError
-from shipid.evidence import contrasts, training_noise
 from shipid.study.results import Results
 from tests.answer.byhand import grid
 from tests.study.tiny import run_here, tiny_plan
@@ -39,7 +38,7 @@ def placed(results: Results, name: str) -> Results:
 
 def test_cells_of_runs_on_the_disk(tiny_run: Path, other_run: Path) -> None:
     """The means are those of the cells; windows that one run lacks are left out in both."""
-    comparison = compare([tiny_run, other_run])
+    comparison = compare([tiny_run, other_run], {"drawn": "mine"})
     assert len(comparison.names) == 2
     assert set(comparison.documents["path"]) == {
         "method.drawn.name",
@@ -48,11 +47,10 @@ def test_cells_of_runs_on_the_disk(tiny_run: Path, other_run: Path) -> None:
         "prediction.ahead",
     }
     assert list(comparison.errors["N_D"].unique()) == [0, 4], "6 is in one of them"
-    assert comparison.errors["paired"].all()
     assert set(comparison.errors["method"]) == {"alone", "drawn ~ mine"}
     assert comparison.errors.set_index(["family", "N_D"]).loc[("wrong", 4), "cells"] == 2
-    assert any("on the 60 windows that both have" in note for note in comparison.notes), comparison.notes
-    whole = compare([other_run, tiny_run]).errors  # turned round
+    assert any("on the 60 windows of both" in note for note in comparison.notes), comparison.notes
+    whole = compare([other_run, tiny_run], {"mine": "drawn"}).errors  # turned round
     np.testing.assert_allclose(whole["difference"], -comparison.errors["difference"])
     np.testing.assert_allclose(whole["first"], comparison.errors["other"])
 
@@ -85,22 +83,6 @@ def test_paired_differences_by_hand(made: Made) -> None:
     assert comparison.loc[("bad", "alone", 0), ["low", "high"]].tolist() == [0, 0], "physics alone is not trained"
 
 
-def test_what_training_adds_falls_with_the_number_of_seeds(made: Made) -> None:
-    """Equal H of all seeds leave the noise of a training that is known beforehand; means of S seeds have less of it."""
-    hard = np.linspace(0.9, 1.1, 8)
-    for count in (1, 4):
-        cells = [
-            {("bad", 10, s): bad for s in range(count)} | {("none", 10, s): 5.0 for s in range(count)}
-            for bad in (2.0, 1.0)
-        ]
-        one, other = (made(mine, runs=8, alone={"bad": 6.0}, claims=None) for mine in cells)
-        frame = compare_results([placed(one, "a"), placed(other, "b")]).errors.set_index(["family", "N_D"])
-        noise = training_noise([np.full(count, 2.0)])
-        expected = contrasts(-hard[None], np.ones(8), np.hypot(2.0, 1.0) * noise / count**0.5)
-        row = frame.loc[("bad", 10)]
-        assert row[["low", "high"]].tolist() == pytest.approx([expected.low[0], expected.high[0]])
-
-
 def test_only_seeds_that_differ_bring_noise_of_training(made: Made) -> None:
     """One of two seeds is identical: the noise of the other alone, a half of its weight, is in the interval."""
     seeds = {(name, N_D, seed): error for (name, N_D, _), error in grid(H).items() for seed in (0, 1)}
@@ -115,27 +97,10 @@ def test_only_seeds_that_differ_bring_noise_of_training(made: Made) -> None:
     assert widths[1] / widths[0] == pytest.approx(2**0.5, rel=1e-3)
 
 
-def test_other_manoeuvres_are_no_pairs(made: Made) -> None:
-    """Then the intervals are wider, for the same means."""
-    one, other = made(grid(H), runs=8), made(grid(H), runs=8)
-    apart = replace(other, test=replace(other.test, run=np.array([f"other {name}" for name in other.test.run])))
-    frames = [compare_results([placed(one, "a"), placed(two, "b")]).errors for two in (other, apart)]
-    assert [frame["paired"].iloc[0] for frame in frames] == [True, False]
-    assert ((frames[1]["high"] - frames[1]["low"]) > (frames[0]["high"] - frames[0]["low"])).all()
-    moved = replace(other.test, columns={**other.test.columns, "u": other.test.columns["u"] + 1.0})
-    document = {"truth": {**other.plan.document["truth"], "seed": 99}}
-    foreign = replace(made(grid(H), runs=8, changes=document), test=moved)
-    note = compare_results([placed(one, "a"), placed(foreign, "b")]).notes[-1]
-    assert "not paired" in note, "runs of one name that are other recordings"
-    few = compare_results([placed(made(grid(H), runs=3), "a"), placed(made(grid(H), runs=3), "b")])
-    assert np.isnan(few.errors["low"]).all()
-    assert "3 test manoeuvres give no interval" in few.notes[-1]
-
-
 def test_the_same_orders_on_another_ship_are_pairs(made: Made) -> None:
     one, other = made(grid(H), runs=8), made(grid(H), runs=8)
     moved = replace(other.test, columns={**other.test.columns, "u": other.test.columns["u"] + 1.0})
-    assert compare_results([placed(one, "a"), placed(replace(other, test=moved), "b")]).errors["paired"].all()
+    assert compare_results([placed(one, "a"), placed(replace(other, test=moved), "b")]).errors["cells"].all()
 
 
 def test_counterparts_by_name_and_what_is_left_over(made: Made) -> None:
@@ -143,9 +108,8 @@ def test_counterparts_by_name_and_what_is_left_over(made: Made) -> None:
     renamed = {"clean": (1.0, 0.8), "bad": (2.0, 1.5), "none": (9.0, 5.0)}
     alone = {"clean": 2.0, "bad": 6.0}
     other = made(grid(renamed), runs=8, alone=alone, claims=None)
-    comparison = compare_results([placed(one, "a"), placed(other, "b")])
-    assert "good ~ clean" in set(comparison.errors["family"])
-    assert any("clean is set beside good" in note for note in comparison.notes)
+    notes = compare_results([placed(one, "a"), placed(other, "b")]).notes
+    assert "b: only the first has family good (--pair FIRST=OTHER names counterparts)" in notes
     turned = compare_results([placed(one, "a"), placed(other, "b")], {"good": "bad", "bad": "clean"})
     rows = turned.errors.set_index(["family", "N_D"])
     assert rows.loc[("good ~ bad", 10), "difference"] == pytest.approx(1.0)
@@ -168,25 +132,20 @@ def test_cells_without_a_result_do_not_match(made: Made) -> None:
 
 def test_nothing_in_common_is_one_line(made: Made, tiny_run: Path) -> None:
     one, other = made(grid(H, (10, 30))), made(grid(H, (5, 7)))
-    with pytest.raises(ShipidError, match=r"no cell of .* N_D 10, 30; .* N_D 5, 7; .*--set grid.N_D=\[10,30\]$"):
+    with pytest.raises(
+        ShipidError, match=r"no cell of .* N_D 10, 30; .* N_D 5, 7; .*--pair FIRST=OTHER, or .* --set grid.N_D="
+    ):
         compare_results([placed(one, "a"), placed(other, "b")])
-    assert _remedy(one, one, named=False) == "name counterparts by --pair FIRST=OTHER"
-    assert _remedy(one, other, named=False).startswith("name counterparts by --pair FIRST=OTHER; they have no N_D in")
+    moved = replace(one.test, columns={**one.test.columns, "u": one.test.columns["u"] + 1.0})
+    foreign = made(grid(H), changes={"truth": {**one.plan.document["truth"], "seed": 99}})
+    with pytest.raises(ShipidError, match=r"b: tests on other manoeuvres than .*a: nothing can be paired"):
+        compare_results([placed(one, "a"), placed(replace(foreign, test=moved), "b")])
     with pytest.raises(ShipidError, match="two folders or more"):
         compare([tiny_run])
-    for one in (tiny_run, str(tiny_run)):
-        with pytest.raises(ShipidError, match="two folders or more"):
-            compare(one)  # type: ignore[arg-type]
-    with pytest.raises(ShipidError, match=f"{tiny_run}: is named twice"):
+    with pytest.raises(ShipidError, match="two folders or more"):
+        compare(str(tiny_run))
+    with pytest.raises(ShipidError, match="named twice"):
         compare([tiny_run, tiny_run])
-
-
-def test_no_name_in_common_is_one_line(made: Made) -> None:
-    one, other = made(grid(H)), made(grid(H))
-    names = {"good": "few", "bad": "many", "none": "none"}
-    renamed = other.cells.assign(family=other.cells["family"].map(names), method="mine")
-    with pytest.raises(ShipidError, match=r"no cell of .* family few, many, none; method mine; .*--pair FIRST=OTHER"):
-        compare_results([placed(one, "a"), placed(replace(other, cells=renamed), "b")])
 
 
 def test_seeds_are_those_of_the_document(made: Made) -> None:
@@ -199,7 +158,7 @@ def test_seeds_are_those_of_the_document(made: Made) -> None:
 
 def test_the_command(tiny_run: Path, other_run: Path, tmp_path: Path) -> None:
     folders = [str(tiny_run), str(other_run)]
-    shown = CliRunner().invoke(app, ["study", "compare", *folders])
+    shown = CliRunner().invoke(app, ["study", "compare", *folders, "--pair", "drawn=mine"])
     assert shown.exit_code == 0, shown.output
     lines = [" ".join(line.split()) for line in shown.output.splitlines()]
     assert "method.drawn.units 8 9" in lines
@@ -208,7 +167,9 @@ def test_the_command(tiny_run: Path, other_run: Path, tmp_path: Path) -> None:
     rows = sum(1 for line in lines if line.startswith(("wrong ", "right ", "none ")))
     assert f"verdict: lower or higher where the test shows it, corrected for {rows} rows; empty: it does not" in lines
     table = tmp_path / "rows.csv"
-    result = CliRunner().invoke(app, ["study", "compare", *folders, "--json", "--out", str(table)])
+    result = CliRunner().invoke(
+        app, ["study", "compare", *folders, "--pair", "drawn=mine", "--json", "--out", str(table)]
+    )
     document: dict[str, Any] = json.loads(result.stdout)
     assert {"folders", "documents", "errors", "notes", "file"} == set(document)
     assert document["errors"][0]["low"] is None, "four manoeuvres have no interval"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,8 @@ import numpy as np
 import pytest
 
 from shipid.answer import memory
-from shipid.answer.pages import report_content
-from shipid.evidence import FEWEST_RUNS, contrasts, training_error
+from shipid.evidence import FEWEST_RUNS, TRAINING, paired_difference
 from shipid.metrics import position_error
-from shipid.report.section import drawn
-from shipid.report.sections import SECTIONS
 from shipid.study.results import Results, read_results
 from tests.study.tiny import run_here, tiny_plan
 
@@ -51,7 +49,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 def test_pairs_are_alike_but_for_the_past(results: Results) -> None:
     comparisons: dict[str, set[str]] = {}
-    for pair in memory.pairs(results.plan.foundations, results.plan.methods):
+    for pair in memory.memory_pairs(results.plan.foundations, results.plan.methods):
         comparisons.setdefault(pair.comparison, set()).add(pair.without[0])
         assert pair.differs == ()
         same = pair.without[0] == pair.remembering[0]
@@ -62,22 +60,22 @@ def test_pairs_are_alike_but_for_the_past(results: Results) -> None:
 def test_what_differs_beside_memory_is_named(tmp_path: Path) -> None:
     uneven = [CHANGES["method"][0], {**CHANGES["method"][1], "trials": 2}]
     plan = tiny_plan(tmp_path, {**CHANGES, "method": uneven})
-    assert {pair.differs for pair in memory.pairs(plan.foundations, plan.methods) if pair.added != "observer"} == {
-        ("trials",)
-    }
+    assert {
+        pair.differs for pair in memory.memory_pairs(plan.foundations, plan.methods) if pair.added != "observer"
+    } == {("trials",)}
 
 
 def test_physics_alone_that_depends_on_the_cell_is_no_rival(tmp_path: Path) -> None:
     chosen = [CHANGES["family"][0], {**CHANGES["family"][1], "observer": {"choose": True}}]
     plan = tiny_plan(tmp_path, {**CHANGES, "family": chosen})
-    compared = {pair.comparison for pair in memory.pairs(plan.foundations, plan.methods)}
+    compared = {pair.comparison for pair in memory.memory_pairs(plan.foundations, plan.methods)}
     assert compared == {*COMPARED} - {"observer: physics alone"}
 
 
 def test_other_kinds_are_no_rivals(tmp_path: Path) -> None:
     other = [{"name": "trained", "kind": "path-trained", "trials": 1}, CHANGES["method"][1]]
     plan = tiny_plan(tmp_path, {**CHANGES, "method": other})
-    assert {pair.added for pair in memory.pairs(plan.foundations, plan.methods)} == {"observer"}
+    assert {pair.added for pair in memory.memory_pairs(plan.foundations, plan.methods)} == {"observer"}
 
 
 def test_a_study_without_memory_has_no_pairs(tiny_run: Path) -> None:
@@ -85,7 +83,6 @@ def test_a_study_without_memory_has_no_pairs(tiny_run: Path) -> None:
     assert memory.memory_frame(results).empty
     assert memory.memory_time_frame(results).empty
     assert memory.observer_frame(results).empty
-    assert drawn({"the-past": SECTIONS["the-past"]}, report_content(results)) == []
 
 
 def test_the_frame_holds_the_mean_errors_of_both(results: Results) -> None:
@@ -106,16 +103,6 @@ def test_the_frame_holds_the_mean_errors_of_both(results: Results) -> None:
         ]
         assert alone.loc[f"wrong-{member}", ["H_without", "H_with"]].tolist() == pytest.approx(A)
         assert alone.loc[f"wrong-{member}", "A"] == pytest.approx(A[0])
-
-
-def test_window_by_window_means_what_the_whole_does(results: Results) -> None:
-    """All four test runs of this study are shown, so the mean over windows is H at the largest N_D."""
-    frame, sums = memory.memory_time_frame(results), memory.memory_frame(results)
-    means = frame.groupby(["comparison", "model"])[["error_without", "error_with"]].mean()
-    whole = sums[sums["N_D"].isin([0, 6])].set_index(["comparison", "model"])
-    assert set(means.index) == set(whole.index)
-    for key, row in means.iterrows():
-        assert row.tolist() == pytest.approx(whole.loc[key, ["H_without", "H_with"]].tolist())
 
 
 def test_the_observer_frame_holds_every_row_of_the_shown_runs(results: Results) -> None:
@@ -141,7 +128,7 @@ def test_an_order_is_marked_once(results: Results) -> None:
     frame.loc[place, name] -= 0.1  # a ramp of two rows is one order
     changed = type(results.dataset)(frame, results.dataset.metadata)
     before = memory.orders_frame(results)
-    after = memory.orders_frame(type(results)(**{**vars(results), "dataset": changed}))
+    after = memory.orders_frame(replace(results, dataset=changed))
     assert len(after) == len(before) + 1
     assert after[after["run"] == run]["t"].tolist() == [frame["t"][place]]
 
@@ -155,17 +142,12 @@ def test_intervals_are_those_of_contrasts(results: Results) -> None:
         for name in ("wrong-2", "seen-2")
     )
     windows = np.array([(test.run == run).sum() for run in runs], dtype=float)
-    judged = contrasts(np.subtract(after, before)[None, :], windows)
+    judged = paired_difference(np.subtract(after, before)[None, :], windows)
     frame = memory.memory_frame(results).set_index(["comparison", "model"])
     row = frame.loc[("observer: physics alone", "wrong-2")]
     assert (row["low"], row["high"]) == pytest.approx((judged.low[0], judged.high[0]))
     trained = memory.memory_frame(results).query("N_D > 0 and seeds == 1")
     assert len(trained)
     for one in trained.itertuples():
-        noise = np.hypot(*(training_error([np.array([H])]) for H in (one.H_without, one.H_with)))
+        noise = TRAINING * np.hypot(one.H_without, one.H_with)
         assert one.high - one.low > 2 * 2.77 * noise, "Student's, four degrees of freedom: what training would give"
-
-
-def test_the_page_shows_it(results: Results) -> None:
-    (section,) = drawn({"the-past": SECTIONS["the-past"]}, report_content(results))
-    assert [item.id for item in section.items] == list(SECTIONS["the-past"].anchors)

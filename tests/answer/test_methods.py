@@ -11,15 +11,13 @@ import pandas as pd
 import pytest
 
 import shipid
-from shipid.answer.matched import _cells
-from shipid.answer.methods import COLUMNS, EVERY, compared, method_cells
-from shipid.study.results import read_results
+from shipid.answer.comparison import CellErrors
+from shipid.answer.methods import COLUMNS, EVERY, method_table
 from shipid.study.schema import Claims
-from tests.study.tiny import MIXED, mixed_plan, run_here, without_figures
 
 
 def cells(
-    rng: np.random.Generator, effect: float, worlds: int = 2, runs: int = 12, noise: float = 0.3, **more: Any
+    rng: np.random.Generator, effect: float, worlds: int = 2, runs: int = 12, noise: float = 0.3, trained: bool = False
 ) -> pd.DataFrame:
     """Cells of `drawn` and of `other`, which errs by `effect` [m] more, in runs and worlds that differ much.
 
@@ -27,19 +25,17 @@ def cells(
     """
     rows = []
     for world in range(worlds):
+        windows = np.array([5.0 + k % 3 for k in range(runs)]) * (1 + 4 * world)
         for family, members in (("moderate", 2), ("none", 1)):
             for member in range(members):
                 hard = rng.uniform(1.0, 4.0, runs)
-                for method, more_error in (("drawn", 0.0), ("other", effect)):
-                    error = hard + more_error + noise * rng.standard_normal(runs)
-                    counts = {f"T{k}": int(5 + k % 3) * (1 + 4 * world) for k in range(runs)}
-                    sums = {name: float(error[k] * counts[name]) for k, name in enumerate(counts)}
-                    H = sum(sums.values()) / sum(counts.values())
+                for method, more in (("drawn", 0.0), ("other", effect)):
+                    error = hard + more + noise * rng.standard_normal(runs)
+                    one = CellErrors(f"{family}-{member}", error, windows, trained, str(world))
                     rows.append(
-                        {"condition": "", "world": str(world), "foundation": f"{family}-{member}", "family": family,
-                         "method": method, "N_D": 10, "seed": world, "status": "ok", "H": H, "H_90": 2 * H,
-                         "end": 1.5 * H, "seconds": 3.0, "trials": 4, "trained": False, "saw_test": False,
-                         "sums": sums, "counts": counts, **more}
+                        {"condition": "", "world": str(world), "foundation": one.model, "family": family,
+                         "method": method, "N_D": 10, "seed": world, "status": "ok", "H": one.mean,
+                         "H_90": 2 * one.mean, "end": 1.5 * one.mean, "seconds": 3.0, "trials": 4, "saw_test": False, "errors": one}
                     )  # fmt: skip
     return pd.DataFrame(rows)
 
@@ -50,7 +46,7 @@ def row(frame: pd.DataFrame, method: str = "other", family: str = EVERY) -> Any:
 
 def test_the_difference_is_that_of_the_means() -> None:
     made = cells(np.random.default_rng(0), 0.5)
-    table = compared(made, "drawn")
+    table = method_table(made, "drawn")
     assert list(table.columns) == COLUMNS
     for family in ("moderate", "none"):
         mine = made[made.family.eq(family)].groupby("method").H.mean()
@@ -62,40 +58,23 @@ def test_the_difference_is_that_of_the_means() -> None:
     assert row(table).worlds == 2
     assert row(table).least <= row(table).difference <= row(table).greatest
     assert np.isnan(row(table).world_low)
-    assert row(compared(cells(np.random.default_rng(0), 0.5, worlds=4), "drawn")).world_low < 0.6
+    assert row(method_table(cells(np.random.default_rng(0), 0.5, worlds=4), "drawn")).world_low < 0.6
 
 
 def test_a_family_that_saw_the_test_is_shown_and_not_in_the_mean() -> None:
     made = cells(np.random.default_rng(0), 0.5)
     tuned = made[made.family.eq("moderate")].assign(family="tuned", H=lambda rows: 0.1 * rows.H, saw_test=True)
-    table = compared(pd.concat([made, tuned], ignore_index=True), "drawn")
+    table = method_table(pd.concat([made, tuned], ignore_index=True), "drawn")
     for key in ("H", "H_low", "difference", "cells", "missing"):
-        assert getattr(row(table), key) == getattr(row(compared(made, "drawn")), key)
+        assert getattr(row(table), key) == getattr(row(method_table(made, "drawn")), key)
     assert pytest.approx(0.1 * row(table).H) == row(table, family="tuned").H
 
 
 def test_the_interval_of_H_holds_H_and_needs_five_runs() -> None:
     rng = np.random.default_rng(5)
-    table = compared(cells(rng, 0.5), "drawn")
+    table = method_table(cells(rng, 0.5), "drawn")
     assert ((table.H_low < table.H) & (table.H_high > table.H)).all()
-    assert compared(cells(rng, 0.5, worlds=1, runs=4), "drawn")[["H_low", "H_high"]].isna().all(axis=None)
-
-
-def test_the_interval_of_H_ends_at_0() -> None:
-    made = cells(np.random.default_rng(5), 0.0, worlds=1, runs=6)
-    hard = {f"T{k}": 1e-3 if k else 10.0 for k in range(6)}  # one run has nearly all of the error
-    made["sums"] = [{name: hard[name] * count for name, count in counts.items()} for counts in made["counts"]]
-    made["H"] = [sum(row["sums"].values()) / sum(row["counts"].values()) for _, row in made.iterrows()]
-    assert (compared(made, "drawn")["H_low"] == 0).all()
-
-
-def test_methods_of_a_run_on_the_disk(tiny_run: Path) -> None:
-    results = shipid.read_results(tiny_run)
-    table = shipid.compare_methods(results)
-    for family, part in results.cells.groupby("family"):
-        mean = part.groupby("N_D")["H"].mean()
-        pd.testing.assert_series_equal(table[table.family == family].set_index("N_D")["H"], mean, check_names=False)
-    assert (table.difference.abs() == 0).all(), "one method, the one that the study judges by"
+    assert method_table(cells(rng, 0.5, worlds=1, runs=4), "drawn")[["H_low", "H_high"]].isna().all(axis=None)
 
 
 def test_the_mean_over_physics_is_without_families_that_the_claims_set_aside(tiny_run: Path) -> None:
@@ -115,7 +94,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     for effect in (0.0, -0.4):
         inside, free = 0, 0
         for _ in range(40):
-            one = row(compared(cells(rng, effect), "drawn"))
+            one = row(method_table(cells(rng, effect), "drawn"))
             inside += one.low <= effect <= one.high
             free += one.high < 0
         assert inside >= 33
@@ -127,12 +106,11 @@ def test_another_training_is_in_the_interval() -> None:
     rng, free = np.random.default_rng(6), 0
     for _ in range(60):
         made = cells(rng, 0.0, worlds=1, noise=0.01, trained=True)
-        trained = rng.normal(1.0, 0.03, len(made))
-        made["sums"] = [{run: f * e for run, e in sums.items()} for f, sums in zip(trained, made["sums"], strict=True)]
-        one = row(compared(made.assign(H=trained * made.H), "drawn"))
+        moved = [replace(one, errors=rng.normal(1.0, 0.03) * one.errors) for one in made["errors"]]
+        one = row(method_table(made.assign(errors=moved, H=[cell.mean for cell in moved]), "drawn"))
         free += one.high < 0 or one.low > 0
     assert free <= 9, "5 % of 60, but for one time in a thousand"
-    alike = row(compared(cells(rng, 0.0, worlds=1, noise=0.0, trained=True), "drawn"))
+    alike = row(method_table(cells(rng, 0.0, worlds=1, noise=0.0, trained=True), "drawn"))
     assert (alike.low, alike.high) == (0.0, 0.0)
 
 
@@ -141,16 +119,16 @@ def test_a_failed_cell_is_counted_and_not_averaged() -> None:
     worst = made.index[made.method.eq("other") & made.family.eq("moderate")][0]
     made.loc[worst, "status"] = "diverged"
     made.loc[worst, ["H", "H_90", "end"]] = np.nan
-    made.at[worst, "sums"] = {}
-    one = row(compared(made, "drawn"))
+    made.at[worst, "errors"] = None
+    one = row(method_table(made, "drawn"))
     assert (one.failed, one.cells, one.pairs) == (1, 4, 3)
     assert np.isfinite([one.H, one.difference, one.low, one.high]).all()
-    assert row(compared(made, "drawn"), "drawn").failed == 0
-    assert (one.missing, row(compared(made, "drawn"), "drawn").missing) == (1, 0)
-    apart = row(compared(made.drop(worst), "drawn"))
+    assert row(method_table(made, "drawn"), "drawn").failed == 0
+    assert (one.missing, row(method_table(made, "drawn"), "drawn").missing) == (1, 0)
+    apart = row(method_table(made.drop(worst), "drawn"))
     assert (apart.failed, apart.cells, apart.missing) == (0, 3, 1), "the method does not run on this model"
     every = made.assign(status=np.where(made.method.eq("other"), "failed", made.status))
-    lost = row(compared(every, "drawn"))
+    lost = row(method_table(every, "drawn"))
     assert lost.failed == lost.cells
     assert lost.pairs == 0
     assert np.isnan(lost.H)
@@ -162,25 +140,8 @@ def test_who_is_ahead_over_the_cells_that_both_have() -> None:
     made = cells(np.random.default_rng(2), -0.3, noise=0.01)
     mine = made[made.method.eq("other") & made.family.eq("moderate")]
     made.loc[mine.H.idxmin(), ["status", "H"]] = ["diverged", np.nan]
-    table = compared(made, "drawn")
+    table = method_table(made, "drawn")
     both = made[made.family.eq("moderate") & ~made.foundation.eq(mine.foundation[mine.H.idxmin()])]
     assert both.groupby("method").H.mean()["other"] < both.groupby("method").H.mean()["drawn"]
     assert (row(table, "drawn").ahead, row(table).ahead) == ("other", "")
-    assert set(compared(cells(np.random.default_rng(2), 0.0, noise=0.0), "drawn").ahead) == {""}
-
-
-def test_what_learns_is_what_other_training_runs_change(tmp_path: Path) -> None:
-    """The noise of training is in the intervals of these cells, `alone` on an identified family among them."""
-    methods = [one for one in MIXED if one["name"] in ("drawn", "alone")]
-    plan = mixed_plan(tmp_path, {"method": methods, "grid": {"N_D": [4], "seeds": [0, 1]}})
-    with without_figures():
-        run_here(plan, tmp_path / "run")
-    results = read_results(tmp_path / "run")
-    cells = results.cells[results.cells["status"] == "ok"]
-    changes = cells.groupby(["foundation", "family", "method"])["H"].nunique() > 1
-    assert {key: plan.learns(*key[1:]) for key in changes.index} == changes.to_dict()
-    assert changes.xs(("fitted", "alone"), level=("family", "method")).all()
-    assert not changes.xs("alone", level="method").all()
-    for frame in (method_cells(results), _cells(results)):
-        learns = frame[frame["N_D"] > 0].set_index(["foundation", "family", "method"])["trained"]
-        assert (learns == changes.reindex(learns.index)).all()
+    assert set(method_table(cells(np.random.default_rng(2), 0.0, noise=0.0), "drawn").ahead) == {""}

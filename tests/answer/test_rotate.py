@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import permutations
@@ -14,15 +13,22 @@ import pandas as pd
 import pytest
 
 from shipid.answer import rotate as rotate_module
-from shipid.answer.rotate import copied, rotate, spread, turn_findings, turns
-from shipid.answer.verdict import Finding
+from shipid.answer.rotate import (
+    choose_turns,
+    kept_folder,
+    remove_kept,
+    repeated_runs_in_words,
+    rotate,
+    turn_findings,
+    turns_table,
+)
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
 from shipid.study.plan import Plan
 from shipid.study.prepare import prepare
 from shipid.study.run import run_unit
 from tests.study.test_commands import weaving
-from tests.study.tiny import tiny_plan
+from tests.study.tiny import tiny_plan, without_workers
 
 
 @pytest.fixture
@@ -56,18 +62,26 @@ def by_hand() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
+def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path) -> None:
+    """The same call goes on where it was interrupted, and yields the same digits."""
     plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
-    rows_of_turns = pd.concat(list(rotate(plan, dataset, ["a", "b"])))
+    with without_workers():
+        next(rotate(plan, dataset, ["a", "b"], kept=tmp_path / "kept"))
+        before = [file.stat().st_mtime_ns for file in tmp_path.glob("kept/*/batches/*")]
+        rows_of_turns = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=tmp_path / "kept")))
+    after = [file.stat().st_mtime_ns for file in tmp_path.glob("kept/*/batches/*")]
+    assert set(before) < set(after), "the first turn is not computed again"
     for test in ("a", "b"):
         single, _ = recorded(weaving(), split={"test": [test]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
         prepared = prepare(single, dataset)
         rows = [row for row, *_ in run_unit(single, prepared, single.whole(single.batches[0]), "cpu")]
         turn = rows_of_turns[rows_of_turns["test"] == test]
         assert list(turn["foundation"]) == [row["foundation"] for row in rows]
-        assert (turn["N_D"] == 5).all()
         for name in ("A", "H"):
             np.testing.assert_allclose(turn[name], [row[name] for row in rows], rtol=1e-12)
+        np.testing.assert_allclose(turn["naive"], prepared.naive.mean())
+    remove_kept(tmp_path / "kept")
+    assert not (tmp_path / "kept").exists()
 
 
 def test_copies_of_runs_are_named_before_their_errors_are_believed(
@@ -78,71 +92,17 @@ def test_copies_of_runs_are_named_before_their_errors_are_believed(
     copy = log.frame[log.frame["run"] == "a"].assign(run="again", t=lambda rows: rows["t"] + 1e4)
     twice = Dataset(pd.concat([log.frame, copy], ignore_index=True), {**log.metadata, "clock": "run"})
     plan, dataset = recorded(twice, split={"test": ["f"]}, prediction={"ahead": 5.0})
-    assert copied(plan, dataset).startswith("runs that move as others do ('again' as 'a'): where one tests")
-    plan, dataset = recorded(log, split={"test": ["f"]}, prediction={"ahead": 5.0})
-    assert not copied(plan, dataset)
-
-
-@pytest.mark.parametrize("after", [3, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2, 4))])
-def test_an_interrupted_rotation_goes_on_to_the_same_digits(
-    after: int, recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Interrupted in the n-th batch, whatever turn it is of: nothing that was finished is computed again."""
-    plan, dataset = recorded(
-        weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5], "seeds": [0, 1]}
+    assert repeated_runs_in_words(plan, dataset).startswith(
+        "runs that move as others do ('again' as 'a'): where one tests"
     )
-    whole = pd.concat(list(rotate(plan, dataset, ["a", "b"])))
-    kept, begun = rotate_module.kept_folder(tmp_path / "rows.csv", plan, dataset), []
-
-    def counted(*arguments: Any) -> Any:
-        begun.append(arguments)
-        if len(begun) == after:
-            raise KeyboardInterrupt
-        return run_unit(*arguments)
-
-    monkeypatch.setattr(rotate_module, "run_unit", counted)
-    with pytest.raises(KeyboardInterrupt):
-        list(rotate(plan, dataset, ["a", "b"], kept=kept))
-    again = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=kept)))
-    assert len(begun) == 4 + 1, "the interrupted batch alone is begun twice"
-    pd.testing.assert_frame_equal(again, whole, check_exact=True)
-    rotate_module.forget(kept)
-    assert not (tmp_path / "rows.csv.turns").exists()
-
-
-def test_two_rotations_to_one_file_share_the_work(
-    recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each batch is computed once, the other process waits for it; the one that ends last removes what was kept."""
-    plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
-    kept, begun = rotate_module.kept_folder(tmp_path / "rows.csv", plan, dataset), []
-
-    def counted(*arguments: Any) -> Any:
-        begun.append(arguments)
-        return run_unit(*arguments)
-
-    monkeypatch.setattr(rotate_module, "run_unit", counted)
-    first = rotate(plan, dataset, ["a", "b"], kept=kept)
-    one = [next(first)]
-    second = threading.Thread(target=lambda: frames.extend(rotate(plan, dataset, ["a", "b"], kept=kept)))
-    frames: list[pd.DataFrame] = []
-    second.start()
-    one += list(first)
-    rotate_module.forget(kept)
-    second.join()
-    assert len(begun) == 2
-    pd.testing.assert_frame_equal(pd.concat(frames), pd.concat(one), check_exact=True)
-    rotate_module.forget(kept)
-    assert not kept.exists()
+    plan, dataset = recorded(log, split={"test": ["f"]}, prediction={"ahead": 5.0})
+    assert not repeated_runs_in_words(plan, dataset)
 
 
 def test_what_is_kept_belongs_to_one_question(
     recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Other settings, data, devices or code have another folder; a damaged or edited file is computed again.
-
-    So have two vessels that are exchanged, whose digests are the same two.
-    """
+    """Other settings, data, devices, code, or vessels that are exchanged, have another folder."""
     plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
     file = tmp_path / "rows.csv"
     other, _ = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 6.0}, grid={"N_D": [5]})
@@ -150,35 +110,23 @@ def test_what_is_kept_belongs_to_one_question(
     here = next(iter(plan.vessels.values()))
     two = {"here": here, "there": here.with_values({"inertia.m": 1.1 * here.parameters["inertia.m"]})}
     placed = [replace(plan, vessels=dict(zip(two, pair, strict=True))) for pair in permutations(two.values())]
-    folders = [
-        rotate_module.kept_folder(file, *one)
-        for one in ((plan, dataset), (other, dataset), (plan, moved), (plan, dataset, "cuda"))
-    ]
-    folders += [rotate_module.kept_folder(file, each, dataset) for each in placed]
+    cases = [(plan, dataset), (other, dataset), (plan, moved), (plan, dataset, "cuda")]
+    folders = [kept_folder(file, *one) for one in (*cases, *((each, dataset) for each in placed))]
     monkeypatch.setattr(rotate_module, "code_digest", lambda: "another commit")
-    folders.append(rotate_module.kept_folder(file, plan, dataset))
-    assert len(set(folders)) == 7
-    first = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
-    next(folders[0].glob("*.parquet")).write_bytes(b"PAR1 no more")
-    again = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
-    pd.testing.assert_frame_equal(again, first, check_exact=True)
-    edited = next(folders[0].glob("*.parquet"))
-    pd.read_parquet(edited).assign(H=0.0).to_parquet(edited)
-    again = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=folders[0])))
-    pd.testing.assert_frame_equal(again, first, check_exact=True)
+    assert len({*folders, kept_folder(file, plan, dataset)}) == 7
 
 
 def test_which_runs_take_turns(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
     plan, dataset = recorded(weaving(), split={"test": 1})
-    assert turns(plan, dataset, ["c", "a*"]) == ["a", "c"]
+    assert choose_turns(plan, dataset, ["c", "a*"]) == ["a", "c"]
     with pytest.raises(DocumentError, match="'z' matches no run: valid: a, b, c"):
-        turns(plan, dataset, ["z"])
+        choose_turns(plan, dataset, ["z"])
     with pytest.raises(DocumentError, match="only 'a' matches"):
-        turns(plan, dataset, ["a"])
+        choose_turns(plan, dataset, ["a"])
 
 
 def test_spread_by_hand() -> None:
-    rows = spread(by_hand()).set_index("foundation")
+    rows = turns_table(by_hand()).set_index("foundation")
     assert rows.loc["bad", ["turns", "A", "H", "least", "greatest"]].tolist() == pytest.approx([3, 6.0, 2.5, 1.5, 3.5])
     assert rows["better"].tolist() == pytest.approx([3, 3, 0, np.nan], nan_ok=True)
 
@@ -238,35 +186,11 @@ def test_a_failed_cell_is_left_out(claimed: Plan) -> None:
     frame = many()
     frame.loc[(frame["foundation"] == "good") & (frame["test"] == "ZZ 0"), ["status", "H"]] = ["failed", np.nan]
     assert turn_findings(frame, claimed)[0]["evidence"].endswith("5 test manoeuvres")
-    assert spread(frame).set_index("foundation").loc["good", "turns"] == 5
-
-
-def test_families_of_several_members_and_models_without_any_result(claimed: Plan) -> None:
-    """Members are averaged; where a side of a difference has no result at all there is no finding."""
-    frame = many()
-    two = frame.assign(foundation=frame["foundation"] + "-2", H=frame["H"] + 1.0)
-    assert "bad 6.00 m -> 3.02 m" in turn_findings(pd.concat([frame, two]), claimed)[0]["evidence"]
-    assert turn_findings(frame[frame["foundation"] != "good"], claimed) == []
-
-
-def test_no_physics_is_compared_with_every_member_of_a_family_and_with_its_physics_alone(claimed: Plan) -> None:
-    """As in a run. `none` has 33 m in the mean, the members 1 and 49 m, or 60 m alone: their mean would hide it."""
-    frame = many()
-    frame["H"] += 30.0 * (frame["foundation"] == "none")
-
-    def judged(H: float, A: float) -> Finding:
-        good = frame[frame["foundation"] == "good"].assign(family="wide", A=1.0, H=1.0)
-        wide = [good.assign(foundation="wide-1"), good.assign(foundation="wide-2", A=A, H=H)]
-        return turn_findings(pd.concat([frame, *wide]), claimed)[3]
-
-    worst = {'"no physics"': judged(H=1.0, A=1.0), "wide-2": judged(H=49.0, A=1.0), "wide-2 alone": judged(1.0, 60.0)}
-    for name, one in worst.items():
-        assert one["evidence"].startswith(f"worst over the horizon, physics alone included: {name}; ")
-        assert (one["verdict"] == "refuted") == name.startswith("wide")
+    assert turns_table(frame).set_index("foundation").loc["good", "turns"] == 5
 
 
 def test_a_run_without_windows_takes_no_turn(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
     dataset = weaving()
     short = dataset.frame[(dataset.frame["run"] != "c") | (dataset.frame["t"] < 3.0)].reset_index(drop=True)
     plan, cut = recorded(Dataset(short, dataset.metadata), split={"test": 1}, prediction={"ahead": 5.0})
-    assert turns(plan, cut, ["*"]) == ["a", "b", "d", "e", "f"]
+    assert choose_turns(plan, cut, ["*"]) == ["a", "b", "d", "e", "f"]

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.worth import Estimate, _estimate, break_even, runs_without_physics
+from shipid.answer.worth import _estimate, break_even, runs_without_physics
 
 
 def table(
@@ -44,7 +44,7 @@ def test_break_even_by_hand() -> None:
     assert worth is not None
     assert worth.value == pytest.approx(6.0)
     assert worth.low < 6.0 < worth.high
-    assert not any((worth.above, worth.below, worth.unknown))
+    assert not any((worth.above, worth.below))
     assert break_even(table(A, {m: [1.0] for m in [*A, "none"]}, (10,)), list(A)[:3], 0) is None
 
 
@@ -100,9 +100,9 @@ def test_runs_are_interpolated_between_amounts() -> None:
 
 @pytest.mark.parametrize("runs", [6, 20])
 def test_runs_that_the_test_cannot_tell_from_the_model_are_in_the_interval(runs: int) -> None:
-    """300 tables of one model, which is as good as no physics with the fewest runs, and no better."""
+    """100 tables of one model, which is as good as no physics with the fewest runs, and no better."""
     rng, excluded, amounts = np.random.default_rng(runs), 0, (3, 8, 13)
-    for _ in range(300):
+    for _ in range(100):
         hard, level = rng.lognormal(0.0, 1.0, runs), np.array([4.0, 2.45, 1.92])
         H = {
             name: level[:, None, None] * hard * rng.lognormal(0, 0.25, runs) * rng.lognormal(0, 0.03, (3, 1, 1))
@@ -110,10 +110,10 @@ def test_runs_that_the_test_cannot_tell_from_the_model_are_in_the_interval(runs:
         }
         errors = ErrorTable(amounts, np.ones(runs), {"m0": hard}, H)
         worth = runs_without_physics(errors, "m0", 0)
-        differs = errors.against("none", ["m0"], 0)
+        differs = errors.lead("none", ["m0"], 0)
         excluded += worth.low > amounts[0]
         assert differs.above[0] <= 0.025 or differs.below[0] <= 0.025 or worth.low == amounts[0]
-    assert excluded <= stats.binom.ppf(0.999, 300, 0.025)
+    assert excluded <= stats.binom.ppf(0.999, 100, 0.025)
 
 
 def test_more_data_that_harm_take_nothing_back() -> None:
@@ -137,7 +137,7 @@ def test_one_manoeuvre_has_no_interval() -> None:
     assert np.isnan([worth.low, worth.high]).all()
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_better_model_is_worth_more_runs(seed: int) -> None:
     """Whatever the curves: a lower level never takes fewer runs, and the value lies inside its interval."""
     rng = np.random.default_rng(seed)
@@ -149,10 +149,3 @@ def test_a_better_model_is_worth_more_runs(seed: int) -> None:
     values = [one.value for one in worth]
     assert values == sorted(values, reverse=True)
     assert all(one.low <= one.value <= one.high for one in worth)
-
-
-def test_an_interval_says_nothing_where_it_holds_all_that_was_tried() -> None:
-    limits = (10.0, 40.0)
-    ends = [(5.0, 45.0), (10.0, 40.0), (5.0, 39.0), (11.0, 45.0), (11.0, 39.0), (np.nan, np.nan)]
-    unknown = [Estimate(20.0, low, high, limits).unknown for low, high in ends]
-    assert unknown == [True, True, False, False, False, False]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,8 @@ def before(case: str) -> Rule:
             return by_seeds.R(rivals(rng, size, case, effect))[case]
         if case == "S7":
             return by_seeds.S7(*roughness(rng, size, effect))
-        both = grids(rng, size, case, effect)
+        grid = grids(rng, size, case, effect)
+        both = grid, replace(grid, table=grid.by_90)
         if case == "S5":
             return by_seeds.S5(*both)
         verdict: Verdict = getattr(by_seeds, case)(both[0])

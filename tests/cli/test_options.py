@@ -273,7 +273,7 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "shipid.study.prepare:obtain": lambda *_: LOG,
         "shipid.study.prepare:partition": lambda *_: (),
         "shipid.study.screen:notes": lambda *_: [],
-        "shipid.answer.rotate:turns": lambda *given: given[2],
+        "shipid.answer.rotate:choose_turns": lambda *given: given[2],
         "shipid.study.store:stored_plan": lambda *_: SimpleNamespace(program="shipid", parts={}),
     }
     for place, stand_in in stand_ins.items():
