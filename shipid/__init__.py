@@ -14,8 +14,8 @@ from shipid.version import __version__ as __version__
 
 if TYPE_CHECKING:  # for editors and type checkers; at run time a name is imported when it is first used
     from shipid import figures as figures
-    from shipid.answer.matched import Comparison as Comparison
-    from shipid.answer.matched import compare as compare
+    from shipid.answer.compare import Comparison as Comparison
+    from shipid.answer.compare import compare as compare
     from shipid.answer.methods import compare_methods as compare_methods
     from shipid.answer.pages import write_pages as write_pages
     from shipid.answer.start import events as events
@@ -71,7 +71,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
 _PUBLIC = {
     "Alone": "shipid.hybrid.alone",
     "Case": "shipid.hybrid.method",
-    "Comparison": "shipid.answer.matched",
+    "Comparison": "shipid.answer.compare",
     "Dataset": "shipid.data.dataset",
     "Family": "shipid.vessel.perturb",
     "Fitted": "shipid.hybrid.method",
@@ -93,7 +93,7 @@ _PUBLIC = {
     "Vessel": "shipid.vessel.load",
     "Windows": "shipid.data.windows",
     "check_dataset": "shipid.data.checks",
-    "compare": "shipid.answer.matched",
+    "compare": "shipid.answer.compare",
     "compare_methods": "shipid.answer.methods",
     "cut_windows": "shipid.data.windows",
     "draw": "shipid.vessel.perturb",

@@ -11,7 +11,6 @@ import pandas as pd
 
 from shipid.answer.comparison import CellErrors, compare_cells
 from shipid.answer.frames import insert_gaps, shown_runs
-from shipid.metrics import over_time, position_error
 from shipid.observer import bank, observe
 from shipid.predictor import Predictor
 from shipid.study import store
@@ -129,26 +128,6 @@ def memory_frame(results: Results) -> pd.DataFrame:
             | {"seeds": len(first), "differs": ", ".join(pair.differs)}
         )
     return pd.DataFrame(rows)
-
-
-def memory_time_frame(results: Results) -> pd.DataFrame:
-    """Mean error over the horizon [m] at each instant of the shown test runs, of both members of every pair.
-
-    Columns: comparison, model, without, with, N_D, run, t [s], error_without, error_with [m]; mean over seeds; the
-    largest N_D alone.
-    """
-    test, parts, largest = results.test, [], int(results.cells["N_D"].max())
-    shown = np.isin(test.run, shown_runs(results))
-    for pair, N_D, *sides in _paired_paths(results):
-        if N_D in (0, largest):
-            columns = {"run": test.run[shown], "t": test.t[shown]}
-            for name, paths in zip(("error_without", "error_with"), sides, strict=True):
-                errors = [over_time(position_error(path, test.future)) for path in paths]
-                columns[name] = np.mean(errors, axis=0)[shown]
-            parts.append(pd.DataFrame({**_names_of_pair(pair, results), "N_D": N_D, **columns}).drop(columns="added"))
-    if not parts:
-        return pd.DataFrame()
-    return insert_gaps(pd.concat(parts, ignore_index=True), ["comparison", "model", "without", "with", "N_D", "run"])
 
 
 def _names_of_pair(pair: MemoryPair, results: Results) -> dict[str, Any]:

@@ -36,7 +36,6 @@ FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "orders": memory.orders_frame,
     "kinds": frames.kinds_frame,
     "memory": memory.memory_frame,
-    "memory_over_time": memory.memory_time_frame,
     "coverage": bands.coverage_frame,
     "coverage_groups": bands.groups_frame,
     "coverage_runs": bands.worst_frame,

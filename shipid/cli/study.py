@@ -21,7 +21,7 @@ from shipid.units import decimals_for, decimals_of, length_text, level_text, per
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from shipid.answer.matched import Comparison
+    from shipid.answer.compare import Comparison
     from shipid.study.plan import Plan
     from shipid.study.results import Results
 
@@ -348,17 +348,17 @@ def study_compare(
     Finished runs of one study in several worlds (another --set seed= each) are repetitions: then it shows findings and
     errors over the worlds.
     """
-    from shipid.answer import matched, worlds
+    from shipid.answer import compare
     from shipid.files import check_table, write_table
 
     if out is not None:
         check_table(out)
     with answering(as_json) as answer:
-        if pair is None and worlds.are_worlds(folders):
-            errors = _show_worlds(worlds.read_worlds(folders), answer)
+        if pair is None and compare.are_worlds(folders):
+            errors = _show_worlds(compare.read_worlds(folders), answer)
         else:
             pairs = dict(_counterpart(one) for one in pair or ())
-            errors = _show_matched(matched.compare(folders, pairs), answer)
+            errors = _show_matched(compare.compare(folders, pairs), answer)
         if out is not None:
             write_table(out, errors)
             answer.say(f"{len(errors)} rows -> {out}", file=out)
@@ -441,7 +441,7 @@ def _to_three_digits(mean: float, low: float, high: float) -> str:
 
 def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     """Show findings, errors and bands of one study over several worlds; returns the errors."""
-    from shipid.answer.worlds import compare_errors, compare_findings
+    from shipid.answer.compare import compare_errors, compare_findings
 
     findings, errors = compare_findings(worlds), compare_errors(worlds)
     bands = errors[errors["width"].notna()]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shipid.answer.differences import document_differences, whole_document
+from shipid.answer.compare import document_differences, whole_document
 from shipid.document import bundled
 from shipid.study.plan import read_plan
 from tests.study.tiny import tiny_plan

@@ -81,7 +81,6 @@ def test_other_kinds_are_no_rivals(tmp_path: Path) -> None:
 def test_a_study_without_memory_has_no_pairs(tiny_run: Path) -> None:
     results = read_results(tiny_run)
     assert memory.memory_frame(results).empty
-    assert memory.memory_time_frame(results).empty
     assert memory.observer_frame(results).empty
 
 

@@ -35,7 +35,8 @@ def cells(
                     rows.append(
                         {"condition": "", "world": str(world), "foundation": one.model, "family": family,
                          "method": method, "N_D": 10, "seed": world, "status": "ok", "H": one.mean,
-                         "H_90": 2 * one.mean, "end": 1.5 * one.mean, "seconds": 3.0, "trials": 4, "saw_test": False, "errors": one}
+                         "H_90": 2 * one.mean, "end": 1.5 * one.mean, "seconds": 3.0,
+                         "trials": 4, "saw_test": False, "errors": one}
                     )  # fmt: skip
     return pd.DataFrame(rows)
 

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from shipid.answer import worlds as module
-from shipid.answer.worlds import compare_errors, compare_findings, read_worlds
+from shipid.answer import compare as module
+from shipid.answer.compare import compare_errors, compare_findings, read_worlds
 from shipid.cli import app
 from shipid.errors import ResultError
 from tests.answer.byhand import grid

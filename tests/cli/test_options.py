@@ -244,7 +244,7 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         {"folder": Path("folder"), "workers": 3, "scheduler": "tcp://here", "device": "gpu", "leave": True},
     ),
     "study compare": (
-        "shipid.answer.matched:compare",
+        "shipid.answer.compare:compare",
         "study compare one two --pair drawn=trained --pair a=b",
         {"folders": [Path("one"), Path("two")], "pairs": {"drawn": "trained", "a": "b"}},
     ),

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from shipid.answer.matched import Comparison
+from shipid.answer.compare import Comparison
 from shipid.cli import app
 from shipid.cli.answer import Answer
 from shipid.cli.study import _show_matched, _to_three_digits

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from shipid.answer.matched import compare, compare_results
+from shipid.answer.compare import compare, compare_results
 from shipid.cli import app
 from shipid.errors import DocumentError, ResultError, ShipidError
 from shipid.study.results import Results

@@ -1,13 +1,16 @@
-"""Two or more runs compared cell by cell: the same family, member, method, N_D and seed.
+"""Finished runs compared: what their documents differ in, errors cell by cell, and one study in several worlds.
 
-Each run is set against the first one. On the test windows that both predict, the difference is taken in every test
-manoeuvre and judged over manoeuvres. Runs with other test manoeuvres cannot be paired and are refused.
+Each run is set against the first one: the same family, member, method, N_D and seed. On the test windows that both
+predict, the difference is taken in every test manoeuvre and judged over manoeuvres. Runs with other test manoeuvres
+cannot be paired and are refused. Runs of one study that differ in their top-level seed alone are repetitions of it.
 """
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,21 +19,33 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid import document as documents
 from shipid.answer.comparison import CellErrors, compare_cells
-from shipid.answer.differences import document_differences
+from shipid.answer.findings import findings
 from shipid.answer.verdict import count_manoeuvres, too_few_manoeuvres
 from shipid.arguments import path_of
+from shipid.document import Document
 from shipid.errors import DocumentError, ResultError, ShipidError, choices
-from shipid.evidence import which_significant
+from shipid.evidence import which_significant, world_interval
+from shipid.files import as_argument
 from shipid.metrics import over_time, position_error
 from shipid.study.declared import NO_METHOD, NO_MODEL
+from shipid.study.plan import Plan
 from shipid.study.results import Results, read_results
-from shipid.study.schema import WORLDS
+from shipid.study.schema import WORLDS, Study
+from shipid.study.store import stored_plan
 
 IDENTICAL = "identical"
 """Verdict on cells that err alike to the digit."""
 KEYS = ["family", "member", "method", "N_D", "seed"]
 MEASURED = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
+ABSENT = "-"  # shown where a document has no such key
+POSSIBLE = {
+    "rank correlation": (-1.0, 1.0),
+    "share": (0.0, 1.0),
+    **dict.fromkeys(("H ", "gap", "ratio", "roughness", "variation", "verdicts"), (0.0, np.inf)),
+}
+"""What a key number of a finding can be, by a word in its name; others can be any."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,3 +213,111 @@ def _cell_errors(results: Results, part: pd.DataFrame, side: str, windows: NDArr
         learns = bool(cell) and results.plan.learns(*row.iloc[0][["family", "method"]])
         cells.append(CellErrors(str(foundation), np.bincount(place, error) / counts, counts.astype(float), learns))
     return cells
+
+
+def whole_document(plan: Plan, called: Mapping[str, str] | None = None) -> Document:
+    """Return the study of a plan with every default; methods, families and conditions go by name, not by place.
+
+    called : method or family -> the name that it goes by here instead.
+    """
+    study = documents.parse(Study, plan.document, plan.file)
+    document: Document = study.model_dump(mode="json")
+    for block, way in zip(document["method"], plan.methods, strict=True):
+        block |= way.method.model_dump(mode="json")
+    for key in ("method", "family", "condition"):
+        document[key] = {(called or {}).get(entry["name"], entry["name"]): entry for entry in document[key]}
+    return document
+
+
+def document_differences(
+    plans: Sequence[Plan], sessions: Sequence[Mapping[str, Any]] = (), called: Sequence[Mapping[str, str]] = ()
+) -> pd.DataFrame:
+    """One row per value that is not the same in all plans: `path`, then a column of text for each plan, from 0 on.
+
+    Compared are the studies with their defaults, the vessels that all have by one name, and the digests of data.
+
+    Parameters
+    ----------
+    sessions : for each plan, what its run was computed with; compared, too.
+    called : for each plan, method or family -> the name that it is compared under.
+    """
+    shared = set.intersection(*({*plan.vessels} for plan in plans))
+    whole = [
+        {
+            **whole_document(plan, names),
+            "digest of": dict(plan.sources),
+            "vessel": {name: {"digest": plan.vessels[name].digest, **plan.vessels[name].document} for name in shared},
+            "computed with": dict(session),
+        }
+        for plan, session, names in zip(plans, sessions or [{}] * len(plans), called or [{}] * len(plans), strict=True)
+    ]
+    rows = [[path, *map(_value_in_words, values)] for path, values in _differing_values(whole, "")]
+    return pd.DataFrame(rows, columns=["path", *map(str, range(len(plans)))])
+
+
+def _differing_values(values: Sequence[Any], path: str) -> Iterator[tuple[str, Sequence[Any]]]:
+    """Dotted path and values where they are not all equal, as deep as all of them have tables."""
+    if all(isinstance(value, list) and value and isinstance(value[0], Mapping) for value in values):
+        values = [{str(place): entry for place, entry in enumerate(value)} for value in values]
+    if all(isinstance(value, Mapping) for value in values):
+        for key in dict.fromkeys(key for value in values for key in value):
+            yield from _differing_values([value.get(key) for value in values], f"{path}.{key}".removeprefix("."))
+    elif any(value != values[0] for value in values):
+        yield path, values
+
+
+def _value_in_words(value: Any) -> str:
+    return ABSENT if value is None else value if isinstance(value, str) else json.dumps(value)
+
+
+def are_worlds(folders: Sequence[Path]) -> bool:
+    """Whether folders hold one study in different worlds, so that they are repetitions of one another."""
+    plans = [stored_plan(folder) for folder in folders]
+    same = len({plan.digest_in_any_world for plan in plans}) == 1
+    return same and len(plans) > 1 and len({plan.study.seed for plan in plans}) == len(plans)
+
+
+def read_worlds(folders: Sequence[Path]) -> list[Results]:
+    """Read finished runs of one study in different worlds, see `are_worlds`; ResultError for one not finished."""
+    worlds = [read_results(folder) for folder in folders]
+    for results in worlds:
+        if not results.complete:
+            message = f"is not finished: continue with `shipid study resume {as_argument(results.folder)}`"
+            raise ResultError(message, file=results.folder)
+    return worlds
+
+
+def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
+    """One row per finding and key number: id, claim, verdicts, number, mean over the worlds that have it, low, high.
+
+    low and high are Student's 95 % interval over worlds, within what the number can be.
+    """
+    rows = []
+    for same in zip(*(findings(results) for results in worlds), strict=True):
+        verdicts = ", ".join(f"{count} {word}" for word, count in Counter(one["verdict"] for one in same).most_common())
+        for name in dict.fromkeys(name for one in same for name in one["numbers"]) or [""]:
+            values = np.array([one["numbers"][name] for one in same if name in one["numbers"]], dtype=float)
+            within = next((limits for word, limits in POSSIBLE.items() if word in name), (-np.inf, np.inf))
+            mean = values.mean() if len(values) else np.nan
+            rows.append((same[0]["id"], same[0]["claim"], verdicts, name, mean, *world_interval(values, *within)))
+    return pd.DataFrame(rows, columns=["id", "claim", "verdicts", "number", "mean", "low", "high"])
+
+
+def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
+    """H [m], coverage [1] and width [m] of bands per family, method and N_D, over worlds; of N_D = 0, A in place of H.
+
+    Columns: family, method, N_D; H, H_low, H_high: mean, least and greatest over the worlds of the means over members
+    and seeds; so for coverage and width, not numbers without a band; worlds (that have a result). Failed cells are left
+    out.
+    """
+    parts, keys, numbers = [], ["family", "method", "N_D"], ["H", "coverage", "width"]
+    for results in worlds:
+        good = results.cells[results.cells["status"] == "ok"].reindex(columns=[*keys, "foundation", "A", *numbers])
+        known = ~good["family"].isin([NO_MODEL, *results.plan.fitted])
+        alone = good[known].drop_duplicates("foundation")
+        alone = alone.assign(N_D=0, H=alone["A"], method=NO_METHOD, coverage=np.nan, width=np.nan)
+        every = pd.concat([alone, good]).astype(dict.fromkeys(numbers, float))
+        parts.append(every.groupby(keys, sort=False)[numbers].mean().reset_index())
+    ends = {"": "mean", "_low": "min", "_high": "max"}
+    named = {f"{name}{end}": (name, how) for name in numbers for end, how in ends.items()}
+    return pd.concat(parts).groupby(keys, sort=False).agg(**named, worlds=("H", "size")).reset_index()
