@@ -14,6 +14,12 @@ from shipid.version import __version__ as __version__
 
 if TYPE_CHECKING:  # for editors and type checkers; at run time a name is imported when it is first used
     from shipid import figures as figures
+    from shipid.answer.compare import Comparison as Comparison
+    from shipid.answer.compare import compare as compare
+    from shipid.answer.methods import compare_methods as compare_methods
+    from shipid.answer.pages import write_pages as write_pages
+    from shipid.answer.start import events as events
+    from shipid.answer.start import run as run
     from shipid.data.checks import check_dataset as check_dataset
     from shipid.data.dataset import Dataset as Dataset
     from shipid.data.dataset import read_dataset as read_dataset
@@ -46,10 +52,6 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.simulation.standard import standard as standard
     from shipid.simulation.truth import Truth as Truth
     from shipid.simulation.truth import simulate as simulate
-    from shipid.study.contents import write_pages as write_pages
-    from shipid.study.matched import Comparison as Comparison
-    from shipid.study.matched import compare as compare
-    from shipid.study.methods import compare_methods as compare_methods
     from shipid.study.plan import Plan as Plan
     from shipid.study.plan import read_plan as read_plan
     from shipid.study.results import Results as Results
@@ -57,8 +59,6 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.study.results import read_results as read_results
     from shipid.study.run import run_study as run_study
     from shipid.study.screen import screen as screen
-    from shipid.study.start import events as events
-    from shipid.study.start import run as run
     from shipid.vessel.load import Vessel as Vessel
     from shipid.vessel.load import load_vessel as load_vessel
     from shipid.vessel.perturb import Family as Family
@@ -71,7 +71,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
 _PUBLIC = {
     "Alone": "shipid.hybrid.alone",
     "Case": "shipid.hybrid.method",
-    "Comparison": "shipid.study.matched",
+    "Comparison": "shipid.answer.compare",
     "Dataset": "shipid.data.dataset",
     "Family": "shipid.vessel.perturb",
     "Fitted": "shipid.hybrid.method",
@@ -93,11 +93,11 @@ _PUBLIC = {
     "Vessel": "shipid.vessel.load",
     "Windows": "shipid.data.windows",
     "check_dataset": "shipid.data.checks",
-    "compare": "shipid.study.matched",
-    "compare_methods": "shipid.study.methods",
+    "compare": "shipid.answer.compare",
+    "compare_methods": "shipid.answer.methods",
     "cut_windows": "shipid.data.windows",
     "draw": "shipid.vessel.perturb",
-    "events": "shipid.study.start",
+    "events": "shipid.answer.start",
     "figures": "shipid",
     "fit": "shipid.predictor",
     "guess": "shipid.logs.guess.columns",
@@ -114,14 +114,14 @@ _PUBLIC = {
     "read_plan": "shipid.study.plan",
     "read_results": "shipid.study.results",
     "rollout": "shipid.engine.rollout",
-    "run": "shipid.study.start",
+    "run": "shipid.answer.start",
     "run_identification": "shipid.identification.outcome",
     "run_study": "shipid.study.run",
     "screen": "shipid.study.screen",
     "simulate": "shipid.simulation.truth",
     "standard": "shipid.simulation.standard",
     "write_dataset": "shipid.data.dataset",
-    "write_pages": "shipid.study.contents",
+    "write_pages": "shipid.answer.pages",
 }
 """Public name -> module that defines it."""
 

@@ -212,7 +212,7 @@ def content_of(source: Source) -> ReportContent:
         return content_of({"cells": source})
     if isinstance(source, Mapping):
         return _from_frames(dict(source))
-    from shipid.study.contents import report_content
+    from shipid.answer.pages import report_content
     from shipid.study.results import Results
 
     of_class("source", source, Results, "as of `read_results`, or a table of cells, as of `read_cells`")

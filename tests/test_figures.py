@@ -12,10 +12,10 @@ import plotly.graph_objects as go
 import pytest
 
 from shipid import figures
+from shipid.answer.pages import report_content
 from shipid.errors import ShipidError
 from shipid.report import ReportContent
 from shipid.report.standalone import FIGURES, _colours
-from shipid.study.contents import report_content
 from shipid.study.results import read_results
 from tests.report import test_checks, test_identification, test_manoeuvre
 

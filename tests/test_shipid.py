@@ -111,7 +111,7 @@ def test_importing_is_light() -> None:
 def test_a_study_is_prepared_and_reported_without_pytorch() -> None:
     """PyTorch takes two seconds to import: the workers do that meanwhile. Nothing else that is slow is imported."""
     code = (
-        "import sys, shipid.study.run, shipid.study.contents, shipid.identification.solve; "
+        "import sys, shipid.study.run, shipid.answer.pages, shipid.identification.solve; "
         "print(sorted({'torch', 'scipy.stats', 'sklearn', 'distributed'} & set(sys.modules)))"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -21,7 +21,7 @@ from shipid.units import decimals_for, decimals_of, length_text, level_text, per
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from shipid.study.matched import Comparison
+    from shipid.answer.compare import Comparison
     from shipid.study.plan import Plan
     from shipid.study.results import Results
 
@@ -222,13 +222,13 @@ def study_rotate(
     as_json: Json = False,
 ) -> None:
     """Test on every run in turn and train on all others; the same command goes on after an interruption."""
+    from shipid.answer import rotate
     from shipid.files import write_table
-    from shipid.study import rotate
     from shipid.study.prepare import obtain
 
     plan, file = _before_work(study, changes, device, out, "rotate")
     dataset = obtain(plan)
-    wanted = rotate.turns(plan, dataset, tests)
+    wanted = rotate.choose_turns(plan, dataset, tests)
     cells = len(wanted) * len(plan.pairs) * len(plan.seeds)
     import pandas as pd
 
@@ -237,9 +237,9 @@ def study_rotate(
     sentence = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
     frame = pd.concat(list(counted(blocks, cells, "cells", sentence)), ignore_index=True)
     write_table(file, frame)
-    rotate.forget(kept)
+    rotate.remove_kept(kept)
     columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
-    over = rotate.spread(frame)
+    over = rotate.turns_table(frame)
     for row in over.to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
         name = plan.label(row["foundation"], row["method"])
@@ -253,7 +253,7 @@ def study_rotate(
         answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
         answer.rows("turns", over, table(heads, rows))
         answer.say(f"constant u, v, r: {digits(naive)} m", naive=naive)
-        if words := rotate.copied(plan, dataset):
+        if words := rotate.repeated_runs_in_words(plan, dataset):
             answer.say(words, copied=words)
         if saw := plan.saw(wanted):
             answer.say(
@@ -306,7 +306,7 @@ def study_resume(
 @app.command("report")
 def study_report(folder: Folder) -> None:
     """Write report.html, summary.md and results.parquet from what is stored."""
-    from shipid.study.contents import write_pages
+    from shipid.answer.pages import write_pages
 
     with steps() as say:
         report = write_pages(folder, say)
@@ -343,8 +343,8 @@ def study_compare(
     Finished runs of one study in several worlds (another --set seed= each) are repetitions: then it shows findings and
     errors over the worlds.
     """
+    from shipid.answer import compare
     from shipid.files import check_table, write_table
-    from shipid.study import compare, matched
 
     if out is not None:
         check_table(out)
@@ -353,7 +353,7 @@ def study_compare(
             errors = _show_worlds(compare.read_worlds(folders), answer)
         else:
             pairs = dict(_counterpart(one) for one in pair or ())
-            errors = _show_matched(matched.compare(folders, pairs), answer)
+            errors = _show_matched(compare.compare(folders, pairs), answer)
         if out is not None:
             write_table(out, errors)
             answer.say(f"{len(errors)} rows -> {out}", file=out)
@@ -436,9 +436,10 @@ def _to_three_digits(mean: float, low: float, high: float) -> str:
 
 def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     """Show findings, errors and bands of one study over several worlds; returns the errors."""
-    from shipid.study.compare import compare_bands, compare_errors, compare_findings
+    from shipid.answer.compare import compare_errors, compare_findings
 
-    findings, errors, bands = compare_findings(worlds), compare_errors(worlds), compare_bands(worlds)
+    findings, errors = compare_findings(worlds), compare_errors(worlds)
+    bands = errors[errors["width"].notna()]
     words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
     values = [
         _to_three_digits(row["mean"], row["low"], row["high"]) if row["number"] else ""
@@ -446,7 +447,7 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     ]
     shown = table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True))
     answer.rows("findings", findings, shown if len(findings) else None)
-    texts = [_with_ends(*numbers) for numbers in errors[["mean", "low", "high"]].to_numpy()]
+    texts = [_with_ends(*numbers) for numbers in errors[["H", "H_low", "H_high"]].to_numpy()]
     several = bool(errors.duplicated(["family", "N_D"]).any())
     names = errors["family"] + (" + " + errors["method"]).where((errors["N_D"] > 0) & several, "")
     wide = errors.assign(text=texts, family=names).pivot(index="family", columns="N_D", values="text")
@@ -490,9 +491,9 @@ def _before_work(
 
 
 def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool) -> None:
+    from shipid.answer.pages import ANSWER, write_pages
     from shipid.files import as_argument
     from shipid.study import run, store
-    from shipid.study.contents import ANSWER, share_pages
     from shipid.study.progress import Watch
 
     resume = f"{plan.program} study resume {as_argument(folder)}"
@@ -505,7 +506,7 @@ def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, d
         typer.echo(f"others work on the last {left}: the one that ends last writes the report. If they die: {resume}")
         return
     with store.in_place(folder, plan), steps() as say:
-        report = share_pages(folder, say)
+        report = write_pages(folder, say)
     for line in (folder / ANSWER).read_text(encoding="utf-8", errors="replace").splitlines():
         typer.echo(f"  {line}")
     typer.echo(f"report: {report}")

@@ -293,7 +293,7 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
 
     watch : what says how far searches are, so that there is news within long cells, too.
     """
-    from shipid.study.start import event_line
+    from shipid.answer.start import event_line
 
     event = None
     if not sys.stdout.isatty():

@@ -13,6 +13,7 @@ from shipid.data.dataset import Dataset, clock_slack, pieces
 from shipid.data.windows import coarse_in_words, gaps_in_words
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError
+from shipid.evidence import share_interval
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region
 from shipid.hybrid.physics import assumed, check_columns
@@ -20,7 +21,6 @@ from shipid.logs.dates import span_of
 from shipid.predictor import Predictor
 from shipid.report.content import Line
 from shipid.study.apply import Band, Forecast, dataset_of, instants_along, predict_instants, tables_along
-from shipid.study.bands import share_interval
 from shipid.study.store import read_predictor
 from shipid.units import length_text, level_text, listed, percent, plural
 

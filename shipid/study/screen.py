@@ -19,9 +19,9 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError, choices
+from shipid.evidence import SIGNIFICANT, holm_correction
 from shipid.hybrid.physics import check_columns
 from shipid.metrics import BINS, rank_correlation, tally_quantile
-from shipid.study.evidence import SIGNIFICANT, holm
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
@@ -177,7 +177,9 @@ def drivers(frame: pd.DataFrame) -> pd.DataFrame:
                 alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
         pairs = {", ".join(paths): (part[paths[0]], (part[paths[0]] - 1).abs()) for paths in alike.values()}
         chances = [kendalltau(A, values).pvalue for pair in pairs.values() for values in pair]
-        chance = holm(np.nan_to_num(chances, nan=1.0)).reshape(-1, 2).min(axis=1)  # nan: all are as far from 1
+        chance = (
+            holm_correction(np.nan_to_num(chances, nan=1.0)).reshape(-1, 2).min(axis=1)
+        )  # nan: all are as far from 1
         for (named, pair), least in zip(pairs.items(), chance, strict=True):
             if least <= 2 * SIGNIFICANT:  # of both sides
                 strength = [rank_correlation(A, values.to_numpy()) for values in pair]

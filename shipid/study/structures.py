@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
+from shipid.evidence import FEWEST_RUNS, paired_difference, which_significant
 from shipid.files import write_new
 from shipid.identification.bands import Measure, bands, check_level, refusal
 from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
@@ -42,9 +43,7 @@ from shipid.identification.statistics import LEVEL, LinearFit, Statistics, stati
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange
 from shipid.report.structures import StructuresContent
 from shipid.simulation.measured import Measured, measure_all
-from shipid.study.evidence import FEWEST_RUNS, contrasts
 from shipid.study.new import proposed_horizon
-from shipid.study.verdict import shown
 from shipid.version import __version__
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.ranges import UNUSUAL, contradictions
@@ -335,9 +334,9 @@ def _table(
     between, worse = dict.fromkeys(known, (np.nan, np.nan)), set[str]()
     if best in sound and len(sound) > 1:
         apart = np.array([[position[name][run] - position[best][run] for run in fitted] for name in sound[1:]])
-        differences = contrasts(apart, np.ones(len(fitted)))
+        differences = paired_difference(apart, np.ones(len(fitted)))
         between |= dict(zip(sound[1:], np.stack([differences.low, differences.high], axis=1).tolist(), strict=True))
-        worse = {name for name, behind in zip(sound[1:], shown(differences.above), strict=True) if behind}
+        worse = {name for name, behind in zip(sound[1:], which_significant(differences.above), strict=True) if behind}
     rows: list[dict[str, Any]] = [
         {
             "structure": name,

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from shipid.answer.bands import share_interval
 from shipid.data.windows import Windows, run_folds
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.bands import Bands, Region, needed, track
@@ -32,7 +33,6 @@ from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.metrics import share_of, shares_by_run
 from shipid.predictor import limits_of
-from shipid.study.bands import share_interval
 from shipid.study.plan import Batch, read_plan
 from shipid.study.prepare import instants_of, obtain, partition, prepare
 from shipid.study.run import run_unit

@@ -10,11 +10,11 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from shipid.answer.findings_full_scale import Rivals
+from shipid.answer.findings_simulation import Grid
+from shipid.answer.verdict import Verdict
 from shipid.metrics import rank_correlation
 from shipid.study.declared import NO_MODEL
-from shipid.study.findings import Rivals
-from shipid.study.findings_simulation import Grid
-from shipid.study.verdict import Verdict
 
 Array = np.ndarray
 Means = Mapping[str, Array]  # model -> (amounts,)

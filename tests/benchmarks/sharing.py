@@ -18,9 +18,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from shipid.answer.pages import write_pages
 from shipid.study import store
 from shipid.study.claims import LATE, UnitClaims
-from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, Unit
 from shipid.study.prepare import obtain, prepare
 from shipid.study.run import _write_common, _write_data, run_unit

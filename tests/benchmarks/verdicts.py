@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from shipid.study.verdict import Verdict
+from shipid.answer.verdict import Verdict
+from tests.answer.made_up import CASES, FULL_SCALE, Size, grids, rivals, roughness, rule
 from tests.benchmarks import by_seeds
-from tests.study.made_up import CASES, FULL_SCALE, Size, grids, rivals, roughness, rule
 
 SIZES = {"20 manoeuvres, 1 seed": Size(), "20 manoeuvres, 5 seeds": Size(seeds=5), "7 manoeuvres, 3 seeds": Size(7, 3)}
 NEW = ("B1",)  # not before version 0.2
@@ -24,7 +25,8 @@ def before(case: str) -> Rule:
             return by_seeds.R(rivals(rng, size, case, effect))[case]
         if case == "S7":
             return by_seeds.S7(*roughness(rng, size, effect))
-        both = grids(rng, size, case, effect)
+        grid = grids(rng, size, case, effect)
+        both = grid, replace(grid, table=grid.by_90)
         if case == "S5":
             return by_seeds.S5(*both)
         verdict: Verdict = getattr(by_seeds, case)(both[0])

@@ -234,7 +234,7 @@ def test_notes_of_the_library_are_shown_on_request(tiny_run: Path, tmp_path: Pat
     quiet, loud = CliRunner().invoke(app, ["study", "report", str(folder)]), shell("-v", "study", "report", folder)
     assert (quiet.exit_code, quiet.stderr) == (0, "")
     assert loud.returncode == 0
-    assert f"shipid.study.contents: report written: {folder / 'report.html'}" in loud.stderr
+    assert f"shipid.answer.pages: report written: {folder / 'report.html'}" in loud.stderr
     assert quiet.stdout == loud.stdout
 
 

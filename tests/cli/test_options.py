@@ -229,7 +229,7 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         | {"device": "gpu", "engine": "single"},
     ),
     "study rotate": (
-        "shipid.study.rotate:rotate",
+        "shipid.answer.rotate:rotate",
         f"study rotate {STUDY} --tests A* --tests B1 --set grid.N_D=[5] --device gpu",
         {"plan": is_changed, "tests": ["A*", "B1"], "device": "gpu"},
     ),
@@ -244,7 +244,7 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         {"folder": Path("folder"), "workers": 3, "scheduler": "tcp://here", "device": "gpu", "leave": True},
     ),
     "study compare": (
-        "shipid.study.matched:compare",
+        "shipid.answer.compare:compare",
         "study compare one two --pair drawn=trained --pair a=b",
         {"folders": [Path("one"), Path("two")], "pairs": {"drawn": "trained", "a": "b"}},
     ),
@@ -273,7 +273,7 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "shipid.study.prepare:obtain": lambda *_: LOG,
         "shipid.study.prepare:partition": lambda *_: (),
         "shipid.study.screen:notes": lambda *_: [],
-        "shipid.study.rotate:turns": lambda *given: given[2],
+        "shipid.answer.rotate:choose_turns": lambda *given: given[2],
         "shipid.study.store:stored_plan": lambda *_: SimpleNamespace(program="shipid", parts={}),
     }
     for place, stand_in in stand_ins.items():

@@ -12,13 +12,13 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from shipid.answer.compare import Comparison
 from shipid.cli import app
 from shipid.cli.answer import Answer
 from shipid.cli.study import _show_matched, _to_three_digits
 from shipid.document import bundled
 from shipid.engine import engines
 from shipid.errors import ShipidError
-from shipid.study.matched import Comparison
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
 from tests.cli.running import ended, output_of

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.answer.methods import COLUMNS, EVERY
 from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent, methods, table, verdicts
-from shipid.study.methods import COLUMNS, EVERY
 
 
 def frame(seed: int, conditions: tuple[str, ...] = ("calm", "rough"), failing: bool = True) -> pd.DataFrame:

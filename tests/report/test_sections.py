@@ -4,11 +4,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from shipid.answer.pages import FRAMES
 from shipid.report import ReportContent, checks, identification, manoeuvre
 from shipid.report.page import render
 from shipid.report.section import OF_EVERY_PAGE, Section, drawn
 from shipid.report.sections import SECTIONS
-from shipid.study.contents import FRAMES
 from tests.documented import module
 from tests.report import test_checks, test_identification, test_manoeuvre
 

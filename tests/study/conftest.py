@@ -11,7 +11,7 @@ import pytest
 
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.study.plan import Plan, build_plan
-from tests.study.byhand import by_hand
+from tests.answer.byhand import by_hand
 from tests.study.tiny import tiny_plan
 
 

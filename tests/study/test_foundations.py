@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from shipid.answer.sentences import answer
 from shipid.data.dataset import Dataset, pieces
 from shipid.data.windows import Windows
 from shipid.errors import DataError, DocumentError
@@ -21,7 +22,6 @@ from shipid.observer import Observer, observe
 from shipid.predictor import Predictor
 from shipid.study import foundations, run, store
 from shipid.study import prepare as preparing
-from shipid.study.advise import answer
 from shipid.study.foundations import predictions
 from shipid.study.plan import Batch, Plan
 from shipid.study.prepare import apart, instants_of, prepare

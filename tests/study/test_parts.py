@@ -10,10 +10,10 @@ import pandas as pd
 import pytest
 
 import shipid
+from shipid.answer.pages import write_pages
 from shipid.errors import DocumentError, ResultError, ShipidError
 from shipid.study import store
 from shipid.study.check import check_folder
-from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, read_plan
 from shipid.study.results import read_cells, read_results
 from tests.study.tiny import events_here, run_here, tiny_plan, without_figures

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shipid.answer.pages import write_pages
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.predictor import Predictor
 from shipid.study import store
-from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, read_plan
 from shipid.study.results import Results, read_results
 from shipid.vessel.load import load_vessel

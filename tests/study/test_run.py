@@ -19,6 +19,8 @@ import pandas as pd
 import pytest
 import tomlkit
 
+from shipid.answer.pages import write_pages
+from shipid.answer.rotate import kept_folder
 from shipid.data.dataset import read_dataset
 from shipid.engine import native
 from shipid.errors import DataError, ResultError, ShipidError
@@ -34,11 +36,9 @@ from shipid.study import run, seals, store
 from shipid.study.check import check_folder
 from shipid.study.claims import UnitClaims
 from shipid.study.code import code_digest
-from shipid.study.contents import write_pages
 from shipid.study.plan import METHOD_CODE, Plan, read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.results import provenance_words, read_results
-from shipid.study.rotate import kept_folder
 from shipid.study.run import run_study, run_unit
 from shipid.version import __version__
 from shipid.vessel.load import load_vessel

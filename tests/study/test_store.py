@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.answer.pages import write_pages
 from shipid.errors import ResultError
 from shipid.files import TEMPORARY, read_json, temporary_folder, write_json
 from shipid.hybrid.alone import Alone
@@ -26,7 +27,6 @@ from shipid.hybrid.methods import METHODS
 from shipid.physics import TERMS
 from shipid.study import seals, store
 from shipid.study.check import check_folder
-from shipid.study.contents import write_pages
 from shipid.study.plan import Batch, Unit, build_plan, read_plan
 from shipid.study.results import read_results
 from tests.study.test_run import skeg_plan

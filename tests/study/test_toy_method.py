@@ -9,6 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
+from shipid.answer.findings_simulation import smooth_by_construction
+from shipid.answer.memory import taken
+from shipid.answer.pages import report_content
 from shipid.data.dataset import read_dataset
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.method import Fitted, Method, Task, Traits
@@ -17,9 +20,6 @@ from shipid.hybrid.trials import row_of
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.apply import predict_log
-from shipid.study.contents import report_content
-from shipid.study.findings_simulation import smooth_by_construction
-from shipid.study.memory import taken
 from shipid.study.prepare import prepare
 from shipid.study.progress import Watch
 from shipid.study.results import provenance_words, read_results

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.answer.pages import write_pages
 from shipid.data.dataset import Dataset, read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, cut_windows, from_frame
 from shipid.errors import DocumentError
@@ -24,7 +25,6 @@ from shipid.observer import Estimates, Observer, observe
 from shipid.predictor import Predictor
 from shipid.study import apply, store
 from shipid.study.apply import predict_log
-from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import at_instants, instants_of, prepare
 from shipid.study.results import Results, read_results

@@ -1,0 +1,323 @@
+"""Finished runs compared: what their documents differ in, errors cell by cell, and one study in several worlds.
+
+Each run is set against the first one: the same family, member, method, N_D and seed. On the test windows that both
+predict, the difference is taken in every test manoeuvre and judged over manoeuvres. Runs with other test manoeuvres
+cannot be paired and are refused. Runs of one study that differ in their top-level seed alone are repetitions of it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid import document as documents
+from shipid.answer.comparison import CellErrors, compare_cells
+from shipid.answer.findings import findings
+from shipid.answer.verdict import count_manoeuvres, too_few_manoeuvres
+from shipid.arguments import path_of
+from shipid.document import Document
+from shipid.errors import DocumentError, ResultError, ShipidError, choices
+from shipid.evidence import which_significant, world_interval
+from shipid.files import as_argument
+from shipid.metrics import over_time, position_error
+from shipid.study.declared import NO_METHOD, NO_MODEL
+from shipid.study.plan import Plan
+from shipid.study.results import Results, read_results
+from shipid.study.schema import WORLDS, Study
+from shipid.study.store import stored_plan
+
+IDENTICAL = "identical"
+"""Verdict on cells that err alike to the digit."""
+KEYS = ["family", "member", "method", "N_D", "seed"]
+MEASURED = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
+ABSENT = "-"  # shown where a document has no such key
+POSSIBLE = {
+    "rank correlation": (-1.0, 1.0),
+    "share": (0.0, 1.0),
+    **dict.fromkeys(("H ", "gap", "ratio", "roughness", "variation", "verdicts"), (0.0, np.inf)),
+}
+"""What a key number of a finding can be, by a word in its name; others can be any."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Several runs beside the first of them.
+
+    names : of the folders, the first one first.
+    documents : a row per value that differs: path, and a column of text per name.
+    errors : a row per other folder, family, method and N_D: `cells` that match, `first` and `other` [m], mean H over
+        them, `difference` other less first [m] with its 95 % interval `low` to `high`, `verdict` ("lower", "higher" or
+        empty, corrected for the number of rows; "identical" where every cell errs alike to the digit), and
+        `coverage_first`, `coverage_other` [1] of their bands.
+        N_D = 0 is A of the physics alone.
+    notes : sentences about what could not be matched, and what the intervals rest on.
+    """
+
+    names: tuple[str, ...]
+    documents: pd.DataFrame
+    errors: pd.DataFrame
+    notes: tuple[str, ...]
+
+
+def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] | None = None) -> Comparison:
+    """Set finished cells of any runs beside those of the first.
+
+    Parameters
+    ----------
+    folders : two or more folders of runs.
+    pairs : family or method of the first run -> its counterpart in the others. Equal names match without.
+
+    Raises ResultError for a folder without a result, ShipidError where no cell, or no test manoeuvre, is in both.
+    """
+    if isinstance(folders, str | os.PathLike) or not isinstance(folders, Sequence) or len(folders) < 2:
+        raise ShipidError("name two folders or more")
+    places = [path_of("folder", folder) for folder in folders]
+    if len({os.path.realpath(place) for place in places}) < len(places):
+        raise ShipidError("a folder is named twice: name each folder once")
+    return compare_results([read_results(place) for place in places], pairs)
+
+
+def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = None) -> Comparison:
+    """Set the cells of runs that have been read beside those of the first: `compare` without its folders."""
+    names, pairs, notes, frames = _short_names([results.folder for results in runs]), pairs or {}, [], []
+    _check_pairs(runs, pairs)
+    for name, results in zip(names, runs, strict=True):
+        good = int((results.cells["status"] == "ok").sum())
+        if not good:
+            raise ResultError("has no cell with a result", file=results.folder)
+        if good < results.plan.cells:
+            notes.append(f"{name}: {good} of {results.plan.cells} cells have a result")
+    for name, results in zip(names[1:], runs[1:], strict=True):
+        frame, words = _compare_with_first(runs[0], results, pairs)
+        frames.append(frame.assign(folder=name))
+        notes += [f"{name}: {note}" for note in words]
+    sessions = [(results.provenance.get("sessions") or [{}])[-1] for results in runs]
+    called = [{}, *({other: first for first, other in pairs.items()} for _ in runs[1:])]
+    documents = document_differences([results.plan for results in runs], sessions, called)
+    documents.columns = pd.Index(["path", *names])
+    errors = pd.concat(frames, ignore_index=True)
+    return Comparison(names, documents, errors[["folder", *errors.columns.drop("folder")]], tuple(notes))
+
+
+def _check_pairs(runs: Sequence[Results], pairs: Mapping[str, str]) -> None:
+    """DocumentError for a name that is no family or method of the first run, or a counterpart that no other run has."""
+    first, *others = ({*results.cells["family"], *results.cells["method"], NO_METHOD} for results in runs)
+    there = set[str]().union(*others)
+    for words, named, known in (("the first run", pairs, first), ("any other run", pairs.values(), there)):
+        wrong = next((name for name in named if name not in known), None)
+        if wrong is not None:
+            raise DocumentError(f"{wrong!r} is no family or method of {words}: {choices(wrong, known)}", path="--pair")
+
+
+def _short_names(folders: Sequence[Path]) -> tuple[str, ...]:
+    """The shortest last parts of folders that make their names different."""
+    parts = [folder.resolve().parts for folder in folders]
+    names = (tuple("/".join(part[-count:]) for part in parts) for count in range(1, max(map(len, parts)) + 1))
+    return next((short for short in names if len(set(short)) == len(short)), tuple(map(str, folders)))
+
+
+def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[pd.DataFrame, list[str]]:
+    """Rows of `Comparison.errors` for one run, without its name, and notes."""
+    mine, others, notes = _matching_cells(first), _matching_cells(other), []
+    called = {other: first for first, other in pairs.items()}
+    for key in ("family", "method"):
+        names = others[key].map(lambda name: called.get(name, name if name not in pairs else None))
+        others = others.assign(**{key: names, f"{key} there": others[key]})
+        for who, one, rest in (("the first", mine, others), ("this", others, mine)):
+            if lonely := [name for name in dict.fromkeys(one[key].dropna()) if name not in set(rest[key])]:
+                notes.append(f"only {who} has {key} {', '.join(lonely)} (--pair FIRST=OTHER names counterparts)")
+    both = mine.merge(others, on=KEYS, suffixes=("_first", "_other")).sort_values("N_D", kind="stable")
+    if not (both["N_D"] > 0).any():
+        raise ShipidError(
+            f"no cell of {other.folder} matches one of {first.folder}: {_keys_in_words(first)}; there: "
+            f"{_keys_in_words(other)}; name counterparts by --pair FIRST=OTHER, or run the other study with the same "
+            "grid by --set grid.N_D=... --set grid.seeds=..."
+        )
+    here, away = _common_windows(first, other)
+    rows, differences = [], []
+    for _, part in both.groupby(["family", "method", "N_D"], sort=False):
+        one, two = _cell_errors(first, part, "first", here), _cell_errors(other, part, "other", away)
+        differences.append(compare_cells(two, one))
+        row: dict[str, Any] = {key: _label(part, key) for key in ("family", "method")}
+        row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part)}
+        row |= {side: np.mean([cell.mean for cell in cells]) for side, cells in (("first", one), ("other", two))}
+        row |= {"difference": differences[-1].mean, "low": differences[-1].low, "high": differences[-1].high}
+        row["verdict"] = all(np.array_equal(a.errors, b.errors) for a, b in zip(one, two, strict=True)) * IDENTICAL
+        rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in ("first", "other")})
+    lower, higher = (which_significant(np.array([getattr(d, s) for d in differences])) for s in ("below", "above"))
+    for row, less, more in zip(rows, lower, higher, strict=True):
+        row["verdict"] = row["verdict"] or ("lower" if less else "higher" if more else "")
+    same, runs = sum(row["verdict"] == IDENTICAL for row in rows), len(set(first.test.run[here]))
+    whole = len(here) == len(first.test) == len(other.test)
+    notes.append(f"paired over {count_manoeuvres(runs)}{'' if whole else f', on the {len(here)} windows of both'}")
+    if same:
+        notes.append(f"{same} of {len(rows)} rows are identical to the digit: no training sets them apart")
+    return pd.DataFrame(rows), [*notes, *([few] if (few := too_few_manoeuvres(runs)) else [])]
+
+
+def _matching_cells(results: Results) -> pd.DataFrame:
+    """Keys, predictor and band of every cell with a result; one more row per foundation for A, where it is known."""
+    columns = ["cell", "foundation", *KEYS, "coverage"]
+    good = results.cells[results.cells["status"] == "ok"].reindex(columns=columns)
+    good = good.assign(seed=good["seed"] - WORLDS * results.plan.study.seed)
+    known = [name for name, path in results.physics.items() if name != NO_MODEL and np.isfinite(path).all()]
+    alone = results.cells.drop_duplicates("foundation").reindex(columns=columns)
+    alone = alone[alone["foundation"].isin(known) & ~alone["family"].isin(results.plan.fitted)]
+    alone = alone.assign(cell="", method=NO_METHOD, N_D=0, seed=0, coverage=np.nan)
+    return pd.concat([alone, good], ignore_index=True).astype({"coverage": float})
+
+
+def _keys_in_words(results: Results) -> str:
+    names = {key: ", ".join(map(str, dict.fromkeys(results.cells[key]))) for key in ("family", "method", "N_D", "seed")}
+    return "; ".join(f"{key} {words}" for key, words in names.items())
+
+
+def _label(part: pd.DataFrame, key: str) -> str:
+    here, there = part[key].iloc[0], part[f"{key} there"].iloc[0]
+    return str(here) if here == there else f"{here} ~ {there}"
+
+
+def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Places of the windows that both runs have; ShipidError where there are none, or they are other recordings."""
+    one, two = (
+        {(str(run), round(float(t), 4)): place for place, (run, t) in enumerate(zip(of.run, of.t, strict=True))}
+        for of in (first.test, other.test)
+    )
+    here, there = (np.array([of[key] for key in one if key in two], dtype=np.int64) for of in (one, two))
+    columns = [(first.test.columns[name][here], other.test.columns[name][there]) for name in MEASURED]
+    same = all(np.allclose(a, b, rtol=1e-6, atol=1e-9) for a, b in columns)
+    draws = first.plan.draws is not None and first.plan.draws == other.plan.draws  # the same orders, whatever the ship
+    if not (len(here) and (same or draws)):
+        raise ShipidError(f"tests on other manoeuvres than {first.folder}: nothing can be paired", file=other.folder)
+    return here, there
+
+
+def _cell_errors(results: Results, part: pd.DataFrame, side: str, windows: NDArray[np.int64]) -> list[CellErrors]:
+    """Errors by test manoeuvre of the cells of a group, on some windows."""
+    test = results.test
+    _, place, counts = np.unique(test.run[windows], return_inverse=True, return_counts=True)
+    cells = []
+    for cell, foundation in zip(part[f"cell_{side}"], part[f"foundation_{side}"], strict=True):
+        path = results.paths[str(cell)] if cell else results.physics[str(foundation)]
+        error = over_time(position_error(path[:, windows], test.future[:, windows]))
+        row = results.cells[results.cells["cell"] == cell]
+        learns = bool(cell) and results.plan.learns(*row.iloc[0][["family", "method"]])
+        cells.append(CellErrors(str(foundation), np.bincount(place, error) / counts, counts.astype(float), learns))
+    return cells
+
+
+def whole_document(plan: Plan, called: Mapping[str, str] | None = None) -> Document:
+    """Return the study of a plan with every default; methods, families and conditions go by name, not by place.
+
+    called : method or family -> the name that it goes by here instead.
+    """
+    study = documents.parse(Study, plan.document, plan.file)
+    document: Document = study.model_dump(mode="json")
+    for block, way in zip(document["method"], plan.methods, strict=True):
+        block |= way.method.model_dump(mode="json")
+    for key in ("method", "family", "condition"):
+        document[key] = {(called or {}).get(entry["name"], entry["name"]): entry for entry in document[key]}
+    return document
+
+
+def document_differences(
+    plans: Sequence[Plan], sessions: Sequence[Mapping[str, Any]] = (), called: Sequence[Mapping[str, str]] = ()
+) -> pd.DataFrame:
+    """One row per value that is not the same in all plans: `path`, then a column of text for each plan, from 0 on.
+
+    Compared are the studies with their defaults, the vessels that all have by one name, and the digests of data.
+
+    Parameters
+    ----------
+    sessions : for each plan, what its run was computed with; compared, too.
+    called : for each plan, method or family -> the name that it is compared under.
+    """
+    shared = set.intersection(*({*plan.vessels} for plan in plans))
+    whole = [
+        {
+            **whole_document(plan, names),
+            "digest of": dict(plan.sources),
+            "vessel": {name: {"digest": plan.vessels[name].digest, **plan.vessels[name].document} for name in shared},
+            "computed with": dict(session),
+        }
+        for plan, session, names in zip(plans, sessions or [{}] * len(plans), called or [{}] * len(plans), strict=True)
+    ]
+    rows = [[path, *map(_value_in_words, values)] for path, values in _differing_values(whole, "")]
+    return pd.DataFrame(rows, columns=["path", *map(str, range(len(plans)))])
+
+
+def _differing_values(values: Sequence[Any], path: str) -> Iterator[tuple[str, Sequence[Any]]]:
+    """Dotted path and values where they are not all equal, as deep as all of them have tables."""
+    if all(isinstance(value, list) and value and isinstance(value[0], Mapping) for value in values):
+        values = [{str(place): entry for place, entry in enumerate(value)} for value in values]
+    if all(isinstance(value, Mapping) for value in values):
+        for key in dict.fromkeys(key for value in values for key in value):
+            yield from _differing_values([value.get(key) for value in values], f"{path}.{key}".removeprefix("."))
+    elif any(value != values[0] for value in values):
+        yield path, values
+
+
+def _value_in_words(value: Any) -> str:
+    return ABSENT if value is None else value if isinstance(value, str) else json.dumps(value)
+
+
+def are_worlds(folders: Sequence[Path]) -> bool:
+    """Whether folders hold one study in different worlds, so that they are repetitions of one another."""
+    plans = [stored_plan(folder) for folder in folders]
+    same = len({plan.digest_in_any_world for plan in plans}) == 1
+    return same and len(plans) > 1 and len({plan.study.seed for plan in plans}) == len(plans)
+
+
+def read_worlds(folders: Sequence[Path]) -> list[Results]:
+    """Read finished runs of one study in different worlds, see `are_worlds`; ResultError for one not finished."""
+    worlds = [read_results(folder) for folder in folders]
+    for results in worlds:
+        if not results.complete:
+            message = f"is not finished: continue with `shipid study resume {as_argument(results.folder)}`"
+            raise ResultError(message, file=results.folder)
+    return worlds
+
+
+def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
+    """One row per finding and key number: id, claim, verdicts, number, mean over the worlds that have it, low, high.
+
+    low and high are Student's 95 % interval over worlds, within what the number can be.
+    """
+    rows = []
+    for same in zip(*(findings(results) for results in worlds), strict=True):
+        verdicts = ", ".join(f"{count} {word}" for word, count in Counter(one["verdict"] for one in same).most_common())
+        for name in dict.fromkeys(name for one in same for name in one["numbers"]) or [""]:
+            values = np.array([one["numbers"][name] for one in same if name in one["numbers"]], dtype=float)
+            within = next((limits for word, limits in POSSIBLE.items() if word in name), (-np.inf, np.inf))
+            mean = values.mean() if len(values) else np.nan
+            rows.append((same[0]["id"], same[0]["claim"], verdicts, name, mean, *world_interval(values, *within)))
+    return pd.DataFrame(rows, columns=["id", "claim", "verdicts", "number", "mean", "low", "high"])
+
+
+def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
+    """H [m], coverage [1] and width [m] of bands per family, method and N_D, over worlds; of N_D = 0, A in place of H.
+
+    Columns: family, method, N_D; H, H_low, H_high: mean, least and greatest over the worlds of the means over members
+    and seeds; so for coverage and width, not numbers without a band; worlds (that have a result). Failed cells are left
+    out.
+    """
+    parts, keys, numbers = [], ["family", "method", "N_D"], ["H", "coverage", "width"]
+    for results in worlds:
+        good = results.cells[results.cells["status"] == "ok"].reindex(columns=[*keys, "foundation", "A", *numbers])
+        known = ~good["family"].isin([NO_MODEL, *results.plan.fitted])
+        alone = good[known].drop_duplicates("foundation")
+        alone = alone.assign(N_D=0, H=alone["A"], method=NO_METHOD, coverage=np.nan, width=np.nan)
+        every = pd.concat([alone, good]).astype(dict.fromkeys(numbers, float))
+        parts.append(every.groupby(keys, sort=False)[numbers].mean().reset_index())
+    ends = {"": "mean", "_low": "min", "_high": "max"}
+    named = {f"{name}{end}": (name, how) for name in numbers for end, how in ends.items()}
+    return pd.concat(parts).groupby(keys, sort=False).agg(**named, worlds=("H", "size")).reset_index()

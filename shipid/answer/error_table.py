@@ -1,0 +1,145 @@
+"""Errors of a study by test manoeuvre: what findings and the answer judge."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.evidence import Differences, paired_difference, training_noise
+from shipid.metrics import position_error
+from shipid.study.declared import NO_MODEL
+from shipid.study.results import Results
+
+Array = NDArray[np.float64]
+Metric = Literal["H", "H_90"]
+ALONE = -1  # place of the physics alone in a term
+EXACT = 1e-9  # m: errors below count as this one, which has a logarithm and can be divided by
+Term = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or ALONE
+
+
+@dataclass(frozen=True)
+class ErrorTable:
+    """Errors [m] by test manoeuvre.
+
+    amounts : N_D, rising. counts : (R,) windows of each test manoeuvre.
+    A : model -> (R,) mean error of the physics alone. H : model -> (amounts, seeds, R) of the prediction. What is below
+        `EXACT`, such as the error of the physics that made the data, is raised to it.
+    """
+
+    amounts: tuple[int, ...]
+    counts: Array
+    A: Mapping[str, Array]
+    H: Mapping[str, Array]
+
+    def __post_init__(self) -> None:
+        """Raise errors to `EXACT`."""
+        for name in ("A", "H"):
+            raised = {model: np.maximum(values, EXACT) for model, values in getattr(self, name).items()}
+            object.__setattr__(self, name, raised)
+
+    @property
+    def runs(self) -> int:
+        """Number of test manoeuvres R."""
+        return len(self.counts)
+
+    @property
+    def weights(self) -> Array:
+        """(R,) share of the windows in each manoeuvre."""
+        weights: Array = self.counts / self.counts.sum()
+        return weights
+
+    @cached_property
+    def noise(self) -> Array:
+        """(amounts,) relative standard error [1] that H of one cell has from training, as a mean over seeds."""
+        by_seed = [values @ self.weights for values in self.H.values()]
+        seeds = max((values.shape[1] for values in by_seed), default=1)
+        noise = [training_noise([values[k] for values in by_seed]) for k in range(len(self.amounts))]
+        return np.array(noise, dtype=float) / seeds**0.5
+
+    def by_run(self, model: str, place: int) -> Array:
+        """(R,) error of a model at an amount, mean over seeds, or of its physics alone."""
+        return self.A[model] if place == ALONE else self.H[model][place].mean(axis=0)
+
+    def mean(self, model: str, place: int) -> float:
+        """Error [m] of a model at an amount, mean over seeds and windows, or of its physics alone."""
+        return float(self.by_run(model, place) @ self.weights)
+
+    def interval(self, model: str, place: int) -> tuple[float, float]:
+        """95 % interval [m] of the error of a model at an amount, mean over seeds and windows."""
+        errors = self.compare([[(1.0, model, place)]])
+        return max(float(errors.low[0]), 0.0), float(errors.high[0])
+
+    def compare(self, differences: Sequence[Sequence[Term]]) -> Differences:
+        """Judge sums of errors, each with its factor: `[(1, "none", 0), (-1, "good", 0)]` is what physics saves."""
+        values, training = np.zeros((len(differences), self.runs)), np.zeros(len(differences))
+        for row, terms in enumerate(differences):
+            for factor, model, place in terms:
+                values[row] += factor * self.by_run(model, place)
+                if place != ALONE:
+                    training[row] += (factor * self.mean(model, place) * self.noise[place]) ** 2
+        return paired_difference(values, self.counts, np.sqrt(training))
+
+    def lead(self, rival: str, models: Sequence[str], place: int) -> Differences:
+        """How much lower [m] than a rival's the errors of models are at an amount of data."""
+        return self.compare([[(1.0, rival, place), (-1.0, model, place)] for model in models])
+
+
+def error_table(
+    results: Results, models: Sequence[str], metric: Metric = "H", amounts: Sequence[int] | None = None
+) -> ErrorTable:
+    """Errors of models and `none` that have a result in every cell; H_90 is taken in each manoeuvre.
+
+    amounts : values of N_D that count, rising; all by default.
+    """
+    cells = results.judged_cells
+    amounts = sorted(set(cells["N_D"])) if amounts is None else amounts
+    seeds = sorted(set(cells["seed"]))
+    keys = zip(cells["foundation"], cells["N_D"], cells["seed"], strict=True)
+    known = dict(zip(keys, cells["cell"], strict=True))
+    H = {}
+    for name in (*models, NO_MODEL):
+        mine = [[known.get((name, N, seed)) for seed in seeds] for N in amounts]
+        if all(cell in results.paths for row in mine for cell in row):
+            H[name] = np.array([[_by_run(results, str(cell), metric) for cell in row] for row in mine])
+    alone = {
+        name: results.path_errors(path) if metric == "H" else _upper_errors(results, path)
+        for name, path in results.physics.items()
+        if name in models and name != NO_MODEL and np.isfinite(path).all()
+    }
+    return ErrorTable(tuple(int(N) for N in amounts), results.windows, alone, H)
+
+
+def _by_run(results: Results, cell: str, metric: Metric) -> Array:
+    return results.errors[cell] if metric == "H" else _upper_errors(results, results.paths[cell])
+
+
+def _upper_errors(results: Results, path: Array) -> Array:
+    """(R,) 90th percentile [m] of the errors of a path (T, S, 2) [m] in each test manoeuvre."""
+    error, run = position_error(path, results.test.future), results.test.run
+    return np.array([np.quantile(error[:, run == name], 0.9) for name in np.unique(run)])
+
+
+def intervals_frame(results: Results) -> pd.DataFrame:
+    """95 % interval of H over test manoeuvres, of every model at every amount of data.
+
+    Columns: model, N_D, low, high [m]; not numbers with fewer than five test manoeuvres. H is the mean over seeds; what
+    another training would give is in the interval of every model that learns.
+    """
+    parts, weights = [], results.windows / results.windows.sum()
+    for N_D, mine in results.cells[results.cells["cell"].isin(list(results.errors))].groupby("N_D", sort=True):
+        by_model = {str(name): same for name, same in mine.groupby("model", sort=False)}
+        errors = [np.stack([results.errors[str(cell)] for cell in same["cell"]]) for same in by_model.values()]
+        trained = np.array([results.plan.learns(*same.iloc[0][["family", "method"]]) for same in by_model.values()])
+        noise = training_noise([each @ weights for each, moved in zip(errors, trained, strict=True) if moved])
+        means = np.stack([each.mean(axis=0) for each in errors])
+        training = trained * noise * (means @ weights) / np.sqrt([len(each) for each in errors])
+        one = paired_difference(means, results.windows, training)
+        low = np.maximum(one.low, 0.0)
+        parts.append(pd.DataFrame({"model": list(by_model), "N_D": N_D, "low": low, "high": one.high}))
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["model", "N_D", "low", "high"])

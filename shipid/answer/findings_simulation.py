@@ -1,0 +1,425 @@
+"""Findings S1-S7 (method, section 4): verdicts on the map H(A, N_D) of a simulated study.
+
+All are taken over the members of the moderate and the high family that have a result in every cell; a member that
+failed anywhere is left out and named. The unit of evidence is the test manoeuvre: "shown" means a paired difference
+whose 95 % interval over test manoeuvres is free of 0 (`shipid.evidence`). A claim about all needs each of its
+differences shown; a claim about some, and a list of names, is corrected for how many could have been (Holm). A finding
+is confirmed if it is shown, refuted if its opposite is shown, else undecided: too few manoeuvres decide nothing.
+
+S1 : every moderate member has a lower H than no physics at the smallest N_D, and more than half of them have it
+    at every N_D.
+S2 : for every model, no physics included, H falls along ln N_D (slope by least squares over all N_D).
+S3 : at every N_D H rises along ln A over the physics models, and it rises more steeply at the smallest N_D than at the
+    largest; and neither the rise nor its fall would come by chance if the models had their A in any other order.
+S4 : at the largest N_D at least one high member is better than no physics and at least one is worse; and over the
+    seeds, each another nested order of runs, H of those that are worse varies more than that of the moderate members.
+    Never decided with fewer than five seeds.
+S5 : the rank correlation of H and H_90 over cells is at least 0.95 and H_90 turns none of S1-S4 round; refuted if it is
+    below 0.8 or H_90 confirms what H refutes, or the other way round. Undecided with too few manoeuvres, as all are.
+S6 : a moderate member with a small N_D (at most half of the largest) is better than no physics with the next
+    larger one, and one is better than physics alone that is more accurate than its physics.
+S7 : at the smallest N_D the roughness of paths without physics is more than 1.5 times that of the true paths, and that
+    of the cooperative models, in the mean, is less. Not testable where the compensation is a polynomial of time.
+
+The thresholds are free: the paper gives none. Error rates of every rule: docs/findings.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import ttest_1samp
+
+from shipid.answer.error_table import ALONE, ErrorTable, Metric, Term, error_table
+from shipid.answer.verdict import (
+    SAME_A,
+    Finding,
+    Judgement,
+    Rule,
+    Undecided,
+    Verdict,
+    count_manoeuvres,
+    difference_with_interval,
+    judge_claims,
+    least_to_greatest,
+    leave_undecided,
+    length_in_metres,
+    model_list,
+    quoted_model,
+    too_few_manoeuvres,
+    verdict_of,
+    weakest_verdict,
+)
+from shipid.evidence import (
+    FEWEST_MODELS,
+    FEWEST_RUNS,
+    SIGNIFICANT,
+    Differences,
+    all_significant,
+    any_significant,
+    doubling_weights,
+    order_chance,
+    paired_difference,
+    partial_conjunction,
+    which_significant,
+)
+from shipid.metrics import rank_correlation, roughness
+from shipid.report.wording import listed
+from shipid.study.declared import NO_MODEL
+from shipid.study.results import Results
+from shipid.units import percent, plural
+
+Array = NDArray[np.float64]
+FEWEST_ORDERS = 5  # S4: nested orders of runs that a fluctuation needs
+ALIKE, UNLIKE = 0.95, 0.8  # S5
+ROUGH = 1.5  # S7: times the roughness of the true paths
+MOST_PAIRS = 2  # S6: of each kind, in words
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The errors that S1-S6 judge, and which members belong to the moderate and the high family.
+
+    by_90 : the same of H_90, for S5. results : what S7 takes the roughness of paths from.
+    """
+
+    table: ErrorTable
+    moderate: tuple[str, ...]
+    high: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
+    by_90: ErrorTable | None = None
+    results: Results | None = None
+
+    @property
+    def physics(self) -> tuple[str, ...]:
+        """Members of both families."""
+        return (*self.moderate, *self.high)
+
+    @property
+    def amounts(self) -> tuple[int, ...]:
+        """N_D, rising."""
+        return self.table.amounts
+
+    def members(self, family: str) -> tuple[str, ...]:
+        """Members of a family with a result in every cell, of both for `physics`; Undecided without one."""
+        names: tuple[str, ...] = getattr(self, family)
+        if not names:
+            raise Undecided(f"no {family} model has a result in every cell")
+        return names
+
+    def metres(self, model: str, place: int) -> str:
+        """H of a model, or A where its physics is alone, in words."""
+        return length_in_metres(self.table.mean(model, place))
+
+
+def simulation_findings(results: Results) -> list[Finding]:
+    """Verdicts on S1-S7; all undecided, with the reason, where the study is no evidence."""
+    try:
+        grid = read_grid(results)
+    except Undecided as reason:
+        return leave_undecided(SIMULATION_RULES, str(reason))
+    left_out = f"left out for want of results: {model_list(grid.left_out)}" if grid.left_out else ""
+    notes = [note for note in (too_few_manoeuvres(grid.table.runs), left_out) if note]
+    return judge_claims(SIMULATION_RULES, grid, "; ".join(notes))
+
+
+def read_grid(results: Results) -> Grid:
+    """The errors of a finished study; Undecided, with the reason, where there are none."""
+    claims, cells = results.plan.study.claims, results.judged_cells
+    assert claims is not None
+    if not results.complete:
+        raise Undecided(results.missing)
+    if NO_MODEL not in set(cells["model"]):
+        raise Undecided(f"the method {results.plan.judged!r} is not run without physics")
+    if NO_MODEL in set(cells["model"][cells["status"] != "ok"]):
+        raise Undecided(f"{quoted_model(NO_MODEL)} has no result in every cell")
+    if cells["N_D"].nunique() < 2:
+        raise Undecided("the findings are about a growing N_D, and the study has one")
+    families = (claims.moderate, claims.high)
+    names = {f: tuple(one.name for one in results.plan.foundations if one.family == f) for f in families}
+    every = [name for family in families for name in names[family]]
+
+    def table(metric: Metric) -> ErrorTable:
+        known = error_table(results, every, metric)
+        return replace(known, A={name: A for name, A in known.A.items() if name in known.H})
+
+    by_mean = table("H")
+    moderate, high = (tuple(name for name in names[family] if name in by_mean.A) for family in families)
+    left_out = tuple(name for name in every if name not in by_mean.A)
+    return Grid(by_mean, moderate, high, left_out, table("H_90"), results)
+
+
+def _range_of(differences: Differences) -> str:
+    """The least and the greatest of some differences, with their intervals."""
+    ends = dict.fromkeys((int(differences.mean.argmin()), int(differences.mean.argmax())))
+    return " to ".join(difference_with_interval(differences, index) for index in ends)
+
+
+def _judge_lead(grid: Grid) -> Judgement:
+    moderate, amounts, table = grid.members("moderate"), grid.amounts, grid.table
+    count, most = len(moderate), len(moderate) // 2 + 1
+    leads = [table.lead(NO_MODEL, moderate, place) for place in range(len(amounts))]
+    begins = verdict_of(all_significant(leads[0].above), any_significant(leads[0].below))
+    ahead = np.array([partial_conjunction(lead.above, most) for lead in leads])
+    behind = np.array([partial_conjunction(lead.below, most) for lead in leads])
+    keeps = verdict_of(all_significant(ahead), any_significant(behind))
+    won = [int(which_significant(lead.above).sum()) for lead in leads]
+    later = ", ".join(f"{number} at {N}" for number, N in zip(won[1:], amounts[1:], strict=True))
+    evidence = (
+        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural(won[0], 'is', 'are')} shown to "
+        f"beat no physics ({grid.metres(NO_MODEL, 0)}), which has an error larger by {_range_of(leads[0])}; "
+        f"that most keep the lead is {keeps}: {later}"
+    )
+    numbers = {f"share shown to lead at N_D = {amounts[k]}": won[k] / count for k in (0, -1)}
+    return weakest_verdict((begins, keeps)), evidence, numbers
+
+
+def _judge_fall(grid: Grid) -> Judgement:
+    weights = -doubling_weights(np.log(np.array(grid.amounts, dtype=float)))
+    models, (first, *_, last) = [*grid.physics, NO_MODEL], grid.amounts
+    falls = grid.table.compare([[(float(w), model, k) for k, w in enumerate(weights)] for model in models])
+    fallen = which_significant(falls.above)
+    end = len(weights) - 1
+    left = float(np.median([grid.table.mean(model, end) / grid.table.mean(model, 0) for model in models]))
+    evidence = (
+        f"H is shown to fall for {fallen.sum() or 'none'} of {len(models)} models; twice the runs lower it by "
+        f"{_range_of(falls)}; N_D = {last} leaves {percent(left)} of the error at {first} in the median"
+    )
+    if not fallen.all():
+        evidence += f"; not shown for: {model_list(m for m, good in zip(models, fallen, strict=True) if not good)}"
+    numbers = {"share of models shown to fall": float(fallen.mean()), f"H at N_D = {last} / at {first}, median": left}
+    return verdict_of(all_significant(falls.above), any_significant(falls.below)), evidence, numbers
+
+
+def trend_over_accuracy(table: ErrorTable, models: Sequence[str]) -> tuple[Array, list[list[Term]]]:
+    """A of models [m], and at each amount of data the terms of the rise of H for twice the A; Undecided without."""
+    if len(models) < FEWEST_MODELS:
+        raise Undecided(f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
+    A = np.array([table.mean(model, ALONE) for model in models])
+    if np.isclose(A.min(), A.max()):
+        raise Undecided(SAME_A)
+    weights, places = doubling_weights(np.log(A)), range(len(table.amounts))
+    return A, [[(float(w), model, k) for w, model in zip(weights, models, strict=True)] for k in places]
+
+
+def trend_verdict(slopes: Differences, A: Array, order: Array) -> Verdict:
+    """Whether values rise over A, and would hardly do so in another order of the models; order : (J, models) values."""
+    risen = np.maximum(slopes.above, order_chance(A, order))
+    fallen = np.maximum(slopes.below, order_chance(A, -order))
+    return verdict_of(all_significant(risen), any_significant(fallen))
+
+
+def _judge_rise(grid: Grid) -> Judgement:
+    table, models = grid.table, grid.physics
+    A, each = trend_over_accuracy(table, models)
+    last, (first_N, *_, last_N) = len(each) - 1, grid.amounts
+    slopes = table.compare([*each, [*each[0], *((-factor, model, last) for factor, model, _ in each[last])]])
+    H = np.array([[table.mean(model, k) for model in models] for k in range(len(each))])
+    rises = [rank_correlation(A, values) for values in H]
+    at_first, at_last, less = (difference_with_interval(slopes, k) for k in (0, last, len(each)))
+    evidence = (
+        f"for twice the A, H rises by {at_first} at N_D = {first_N} and by {at_last} at {last_N}, {less} less; rank "
+        f"correlation of H and A {least_to_greatest(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D "
+        f"({len(A)} models)"
+    )
+    numbers = {"least rank correlation of H and A": min(rises)}
+    numbers |= {f"rise for twice the A at N_D = {grid.amounts[k]} [m]": float(slopes.mean[k]) for k in (0, last)}
+    return trend_verdict(slopes, A, np.vstack([H, H[0] - H[last]])), evidence, numbers
+
+
+def _judge_harm(grid: Grid) -> Judgement:
+    high, table, place = grid.members("high"), grid.table, len(grid.amounts) - 1
+    lead = table.lead(NO_MODEL, high, place)
+    better, worse = which_significant(lead.above), which_significant(lead.below)
+    worst = [model for model, behind in zip(high, worse, strict=True) if behind]
+    names = f" ({listed([f'{model} {grid.metres(model, place)}' for model in worst])})" if worst else ""
+    evidence = (
+        f"at N_D = {grid.amounts[-1]}, {better.sum()} of {len(better)} high models "
+        f"{plural(better.sum(), 'is', 'are')} shown to beat no physics ({grid.metres(NO_MODEL, place)}), {len(worst)} "
+        f"{plural(len(worst), 'is', 'are')} shown to be worse{names}"
+    )
+    numbers = {
+        f"share of high models shown to lead at N_D = {grid.amounts[-1]}": float(better.mean()),
+        f"share of high models shown to be worse at N_D = {grid.amounts[-1]}": float(worse.mean()),
+    }
+    orders = table.H[NO_MODEL].shape[1]
+    if orders < FEWEST_ORDERS or not grid.moderate:
+        lacks = (
+            f"fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has {orders} "
+            f"{plural(orders, 'seed')}"
+            if orders < FEWEST_ORDERS
+            else "no moderate model to compare their fluctuation with"
+        )
+        return "undecided", f"{evidence}; {lacks}", numbers
+    moves: Verdict = "undecided"
+    if worst:
+        of_worst, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
+        more = float(ttest_1samp(of_worst - calm, 0.0, alternative="greater").pvalue)
+        moves = verdict_of(more <= SIGNIFICANT, 1 - more <= SIGNIFICANT)
+        evidence += (
+            f"; over {orders} nested orders H of these varies by {percent(of_worst.mean())}, of moderate models by "
+            f"{percent(calm.mean())}"
+        )
+        numbers |= {"variation of the worst": of_worst.mean(), "variation of moderate models": calm.mean()}
+    one_sided = all_significant(lead.above) or all_significant(lead.below)
+    split = verdict_of(bool(better.any() and worse.any()), one_sided)
+    return weakest_verdict((split, moves)), evidence, numbers
+
+
+def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
+    """(seeds,) distance of H from its mean over seeds, relative to it, in the mean over amounts and models."""
+    H = np.array([table.H[model] @ table.weights for model in models])
+    moved: Array = np.abs(H / H.mean(axis=2, keepdims=True) - 1).mean(axis=(0, 1))
+    return moved
+
+
+def _judge_metric(grid: Grid) -> Judgement:
+    assert grid.by_90 is not None
+    tables, other = (grid.table, grid.by_90), replace(grid, table=grid.by_90)
+    both = [np.concatenate([table.H[m] @ table.weights for m in grid.table.H]).ravel() for table in tables]
+    alike, verdicts = (
+        rank_correlation(*both),
+        {k: [SIMULATION_RULES[k].decide(g)[0] for g in (grid, other)] for k in FIRST_FOUR},
+    )
+    changed = {key: pair for key, pair in verdicts.items() if pair[0] != pair[1]}
+    opposite = any({"confirmed", "refuted"} <= set(pair) for pair in changed.values())
+    words = [f"{key} is {by_90} instead of {by_mean}" for key, (by_mean, by_90) in changed.items()]
+    evidence = (
+        f"rank correlation of H and H_90 over {both[0].size} cells {alike:.3f}; by H_90 "
+        f"{listed(words) if words else 'S1-S4 are the same'}"
+    )
+    enough = grid.table.runs >= FEWEST_RUNS
+    decided = verdict_of(enough and alike >= ALIKE and not opposite, enough and (opposite or alike < UNLIKE))
+    numbers = {"rank correlation of H and H_90": alike, "verdicts of S1-S4 that differ": float(len(changed))}
+    return decided, evidence, numbers
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A moderate model against something dearer: what it saves, and the words.
+
+    terms : the difference that must be shown. also : a second one that must be shown, too.
+    """
+
+    terms: tuple[Term, ...]
+    saved: float
+    text: str
+    also: tuple[Term, ...] | None = None
+
+
+def _judge_savings(grid: Grid) -> Judgement:
+    grid.members("moderate")
+    if len(grid.physics) < 2:
+        raise Undecided("one physics model: there is no other to compare it with")
+    small = [k for k, amount in enumerate(grid.amounts) if amount <= grid.amounts[-1] / 2]
+    if not small:
+        raise Undecided(f"no N_D is at most half of the largest, {grid.amounts[-1]}")
+    kinds = {
+        "no physics with more runs": _pairs_with_more_data(grid, small),
+        "more accurate physics alone": _pairs_with_better_physics(grid, small[-1]),
+    }
+    if not all(kinds.values()):
+        raise Undecided("no physics model is more accurate than a moderate one")
+    parts, examples, numbers = [], [], {}
+    for what, pairs in kinds.items():
+        first, second = (
+            grid.table.compare(of) for of in ([p.terms for p in pairs], [p.also or p.terms for p in pairs])
+        )
+        better = which_significant(np.maximum(first.above, second.above))
+        sure = [pair for pair, good in zip(pairs, better, strict=True) if good]
+        best = sorted(sure, key=lambda pair: -pair.saved)[:MOST_PAIRS]
+        parts.append(verdict_of(bool(sure), all_significant(first.below)))
+        text = f"{len(sure)} of {len(pairs)} comparisons show a moderate model better than {what}"
+        examples.append(text + (f": {', '.join(pair.text for pair in best)}" if best else ""))
+        numbers[f"share shown to beat {what}"] = len(sure) / len(pairs)
+    return weakest_verdict(parts), "; ".join(examples), numbers
+
+
+def _pairs_with_more_data(grid: Grid, small: Sequence[int]) -> list[Pair]:
+    """Every moderate model with a small amount against no physics with the next larger one."""
+    mean, amounts = grid.table.mean, grid.amounts
+    return [
+        Pair(
+            ((1.0, NO_MODEL, k + 1), (-1.0, model, k)),
+            amounts[k + 1] / amounts[k] - mean(model, k) / mean(NO_MODEL, k + 1),
+            f"{model} with {amounts[k]} runs {grid.metres(model, k)} against {amounts[k + 1]} runs without "
+            f"physics, {grid.metres(NO_MODEL, k + 1)}",
+        )
+        for model in grid.moderate
+        for k in small
+    ]
+
+
+def _pairs_with_better_physics(grid: Grid, k: int) -> list[Pair]:
+    """Every moderate model with the largest small amount against every more accurate physics alone."""
+    mean = grid.table.mean
+    return [
+        Pair(
+            ((1.0, other, ALONE), (-1.0, model, k)),
+            mean(model, ALONE) / mean(other, ALONE),
+            f"{model} ({grid.metres(model, ALONE)} alone) with {grid.amounts[k]} runs {grid.metres(model, k)} "
+            f"against {other} alone, {grid.metres(other, ALONE)}",
+            ((1.0, model, ALONE), (-1.0, other, ALONE)),
+        )
+        for model in grid.moderate
+        for other in grid.physics
+        if mean(other, ALONE) < mean(model, ALONE)
+    ]
+
+
+def _judge_roughness(grid: Grid) -> Judgement:
+    physics, results = grid.members("physics"), grid.results
+    assert results is not None
+    if results.test.horizon < 3:
+        raise Undecided("a second difference needs three steps ahead")
+    terms = next(way.method.traits.terms for way in results.plan.methods if way.name == results.plan.judged)
+    if terms is not None and terms < results.plan.study.prediction.horizon:
+        evidence = "the compensation is a polynomial of time, which is smooth whatever it learned"
+        return "not testable", f"{evidence}; 'path-trained' is not", {}
+    cells, names = results.judged_cells, np.unique(results.test.run)
+    cells = cells[cells["N_D"] == grid.amounts[0]]
+
+    def by_run(path: Array) -> Array:
+        return np.array([roughness(path[:, results.test.run == name]) for name in names])
+
+    pure, together = (
+        np.mean([by_run(results.paths[cell]) for m in models for cell in cells["cell"][cells["model"] == m]], axis=0)
+        for models in ([NO_MODEL], physics)
+    )
+    decided, numbers = compare_roughness(by_run(results.test.future), pure, together, results.windows)
+    rough, cooperative, true = (length_in_metres(value) for value in numbers.values())
+    evidence = (
+        f"at N_D = {grid.amounts[0]}: {quoted_model(NO_MODEL)} {rough}, cooperative {cooperative} in the mean, true "
+        f"paths {true} ({count_manoeuvres(len(names))})"
+    )
+    return decided, evidence, numbers
+
+
+def compare_roughness(true: Array, pure: Array, together: Array, counts: Array) -> tuple[Verdict, dict[str, float]]:
+    """Verdict on S7 from the roughness (R,) [m] of true paths, those without physics and cooperative ones, by run."""
+    differences = paired_difference(np.stack([pure - ROUGH * true, ROUGH * true - together]), counts)
+    of = {"no physics": pure, "cooperative models": together, "true paths": true}
+    numbers = {f"roughness of {what} [m]": float(values @ counts / counts.sum()) for what, values in of.items()}
+    return verdict_of(all_significant(differences.above), any_significant(differences.below)), numbers
+
+
+FIRST_FOUR = ("S1", "S2", "S3", "S4")
+SIMULATION_RULES: dict[str, Rule[Grid]] = {
+    "S1": Rule(
+        "every moderate cooperative model beats no physics at the smallest N_D, and most keep the lead", _judge_lead
+    ),
+    "S2": Rule("H falls with N_D for every model", _judge_fall),
+    "S3": Rule("H rises with A at fixed N_D, most steeply at small N_D", _judge_rise),
+    "S4": Rule(
+        "some high models beat no physics; the worst stay worse even at the largest N_D, and fluctuate", _judge_harm
+    ),
+    "S5": Rule("H_90 leads to the same findings as H", _judge_metric),
+    "S6": Rule(
+        "moderate models with small N_D beat no physics with a larger one, and more accurate physics alone",
+        _judge_savings,
+    ),
+    "S7": Rule("paths without physics are rough at small N_D, those of cooperative models are not", _judge_roughness),
+}

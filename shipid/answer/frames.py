@@ -1,0 +1,300 @@
+"""From results to frames: what the figures and tables of a report show, in the units that they are labelled with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.files import read_json
+from shipid.hybrid.bands import Region
+from shipid.metrics import course_over_horizon, over_horizon, over_horizon_by_axis, over_time, position_error
+from shipid.physics.signals import SIGNALS, read_unit, signal_of
+from shipid.report import Snapshot
+from shipid.report.selection import FEW_RUNS, spread
+from shipid.study import store
+from shipid.study.declared import NO_MODEL, Way
+from shipid.study.envelope import envelope_table
+from shipid.study.prepare import constant_motion
+from shipid.study.results import Results
+from shipid.vessel.outline import ship_outline
+
+ALL_KINDS = "all"
+MOST_POINTS = 400  # of a track on the map: more than its pixels can show
+CLOCK = 6  # digits after the point of a time in a run [s]
+INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
+
+
+def shown_amounts(results: Results) -> list[int]:
+    """Return the N_D that curves and paths are kept for: smallest, middle (of the logarithm) and largest."""
+    amounts = sorted(set(results.cells["N_D"]))
+    middle = np.sqrt(amounts[0] * amounts[-1])
+    return sorted({amounts[0], min(amounts, key=lambda amount: abs(np.log(amount / middle))), amounts[-1]})
+
+
+def shown_runs(results: Results) -> list[str]:
+    """Test runs that figures over time show: of many some at even distances, first and last included."""
+    return spread(list(results.test.spans), FEW_RUNS)
+
+
+def alone_models(results: Results) -> frozenset[str]:
+    """Models of the cells whose method learns nothing from data: each is the path of its physics."""
+    learning = {way.name for way in results.plan.methods if way.method.compensates}
+    return frozenset(row["model"] for row in results.rows if row["method"] not in learning)
+
+
+def _finite_physics(results: Results) -> dict[str, np.ndarray]:
+    """Paths of physics alone that diverge in no window, by model."""
+    return {m: path for m, path in results.physics.items() if m != NO_MODEL and np.isfinite(path).all()}
+
+
+def _shown_paths(results: Results) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
+    """Keys of a curve and its path: physics alone, where no cell has the same name, and the cells of shown amounts."""
+    alone, amounts = alone_models(results), shown_amounts(results)
+    for model, path in _finite_physics(results).items():
+        if model not in alone:
+            yield {"model": model, "N_D": 0, "seed": 0, "source": "physics"}, path
+    for row in results.rows:
+        if row["cell"] in results.paths and row["N_D"] in amounts:
+            keys = {name: row[name] for name in ("model", "N_D", "seed")}
+            yield keys | {"source": "cooperative"}, results.paths[row["cell"]]
+
+
+def horizon_frame(results: Results) -> pd.DataFrame:
+    """Mean and 90th percentile error, mean error along x and across [m] and of the course [deg], per step ahead [s].
+
+    Of physics, cooperative models and constant u, v, r; x and y are those of the frame (11).
+    """
+    true, test = results.test.future, results.test
+    ahead, parts = test.step * np.arange(1, test.horizon + 1), []
+    naive = {"model": "naive", "N_D": 0, "seed": 0, "source": "naive"}, constant_motion(test)
+    for keys, path in (naive, *_shown_paths(results)):
+        errors = over_horizon(position_error(path, true)) | over_horizon_by_axis(path, true)
+        errors["course"] = np.degrees(course_over_horizon(path, true, test.step))
+        parts.append(pd.DataFrame({**keys, "ahead": ahead, **errors}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def time_frame(results: Results) -> pd.DataFrame:
+    """Mean error over the horizon [m] per instant of prediction [s] in the shown test runs, first seed."""
+    test, seed, mask = results.test, int(results.cells["seed"].min()), np.isin(results.test.run, shown_runs(results))
+    curves = [({"model": "naive", "N_D": 0, "source": "naive"}, results.naive)]
+    for keys, path in _shown_paths(results):
+        if keys["seed"] == seed or keys["source"] == "physics":
+            curves.append((keys, position_error(path, test.future)))
+    columns = ["run", "t", "model", "N_D", "seed", "source", "error"]
+    parts = [
+        pd.DataFrame({"run": test.run[mask], "t": test.t[mask], **keys, "seed": seed, "error": over_time(error)[mask]})
+        for keys, error in curves
+    ]
+    return insert_gaps(pd.concat(parts, ignore_index=True)[columns], ["run", "model", "N_D", "source"])
+
+
+def kinds_frame(results: Results) -> pd.DataFrame:
+    """Mean error over the horizon and at its end [m], by kind of test run: kind, runs, model, source, N_D, mean, end.
+
+    At the largest N_D; over the seeds that have a result. `all` are the test runs of every kind, if there are several.
+    """
+    kinds = np.array([results.kinds.get(str(run), "") for run in results.test.run])
+    errors: dict[tuple[str, str, int], list[np.ndarray]] = {("naive", "naive", 0): [results.naive]}
+    for model, path in _finite_physics(results).items():
+        errors[model, "physics", 0] = [position_error(path, results.test.future)]
+    largest = int(results.cells["N_D"].max()) if len(results.cells) else 0
+    for row in results.rows:
+        if row["cell"] in results.paths and row["N_D"] == largest and results.plan.learns(row["family"], row["method"]):
+            error = position_error(results.paths[row["cell"]], results.test.future)
+            errors.setdefault((row["model"], "cooperative", largest), []).append(error)
+    rows = []
+    for kind in [*dict.fromkeys(kinds), *([ALL_KINDS] if len(set(kinds)) > 1 else [])]:
+        mask = (kinds == kind) | (kind == ALL_KINDS)
+        runs = ", ".join(dict.fromkeys(map(str, results.test.run[mask])))
+        for keys, distances in errors.items():
+            mean = float(np.mean([error[:, mask].mean() for error in distances]))
+            end = float(np.mean([error[-1, mask].mean() for error in distances]))
+            rows.append((kind, runs, *keys, mean, end))
+    return pd.DataFrame(rows, columns=["kind", "runs", "model", "source", "N_D", "mean", "end"])
+
+
+def count_from_start(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
+    """Rows of runs with the time `t` [s] since the begin of each; other frames as they are.
+
+    Figures are in single precision, in which a clock that counts from 1970 has steps of two minutes.
+    """
+    if not {"run", "t"} <= set(frame.columns):
+        return frame
+    begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
+    return frame.assign(t=(frame["t"] - frame["run"].map(begins).astype(float)).round(CLOCK))
+
+
+def insert_gaps(frame: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """A row without numbers wherever time jumps within a group, so that no line is drawn across what is not there."""
+    step = frame.groupby(keys, sort=False)["t"].diff()
+    hole = step > 1.5 * step.median()
+    holes = frame[hole].assign(t=frame["t"][hole] - step[hole] / 2)
+    numbers = [name for name in frame.columns if name not in keys and frame[name].dtype.kind == "f" and name != "t"]
+    holes[numbers] = np.nan
+    holes.index = holes.index - 0.5
+    return pd.concat([frame, holes]).sort_index(kind="stable").reset_index(drop=True)
+
+
+def commands_frame(results: Results) -> pd.DataFrame:
+    """Commands over time in the shown test runs, in the units of sailors; equal commands are shown once."""
+    frame = results.dataset.frame
+    frame = frame[frame["run"].isin(shown_runs(results))]
+    shown: dict[str, str] = {}
+    for name in results.dataset.commands:
+        alike = (other for other in shown if signal_of(other) == signal_of(name))
+        twin = next((other for other in alike if np.allclose(frame[other], frame[name], atol=1e-9)), None)
+        word = SIGNALS[signal_of(name)].word
+        component = name.partition(".")[0].replace("_", " ").removesuffix(word).strip()  # port_rudder, rudder
+        shown[twin or name] = component if twin is None else f"{shown[twin]} and {component}"
+    result = frame[["run", "t"]].reset_index(drop=True)
+    for name, components in shown.items():
+        unit, factor = read_unit(name)
+        words = f"{components} {SIGNALS[signal_of(name)].word}".strip()
+        result[f"{words} [{unit}]"] = frame[name].to_numpy() * factor
+    return insert_gaps(result, ["run"])
+
+
+def window_snapshots(results: Results) -> list[Snapshot]:
+    """Windows of the shown test runs, spread over each run, with every model's paths of the first seed."""
+    particulars: Mapping[str, float] = next(
+        (one.base.document.get("particulars", {}) for one in results.plan.foundations if one.base), {}
+    )
+    begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
+    test, level, origin = results.test, results.plan.level, np.zeros((1, 2))
+    seed, amounts, alone = int(results.cells["seed"].min()), shown_amounts(results), alone_models(results)
+    paths = {(m, "physics", 0): path for m, path in results.physics.items() if m != NO_MODEL and m not in alone}
+    edges: dict[tuple[str, str, int], Region] = {}
+    for row in results.rows:
+        if row["cell"] in results.paths and row["N_D"] in amounts and row["seed"] == seed:
+            key = row["model"], "cooperative", int(row["N_D"])
+            paths[key], bands = results.paths[row["cell"]], results.bands.get(row["cell"])
+            if bands is not None and bands.promises(level):
+                edges[key] = bands.region(paths[key], test.columns, test.step, level)
+    paths["", "naive", 0] = constant_motion(test)
+    windows, most = [], min(INSTANTS, max(3, MOST_WINDOWS // len(shown_runs(results))))
+    for run in shown_runs(results):
+        indices = np.flatnonzero(test.run == run)
+        for index in indices[np.unique(np.linspace(0, len(indices) - 1, most).round().astype(int))]:
+            lines = {key: path[:, index] for key, path in paths.items() if np.isfinite(path[:, index]).all()}
+            windows.append(
+                Snapshot(
+                    run=run,
+                    t=round(float(test.t[index] - begins[run]), CLOCK),
+                    outline=ship_outline(particulars),
+                    psi_end=_final_heading(results, run, float(test.t[index])),
+                    truth=np.concatenate([origin, test.future[:, index]]),
+                    paths={key: np.concatenate([origin, line]) for key, line in lines.items()},
+                    wind=_wind_in_frame(test.columns, int(index)),
+                    bands={key: band_outline(region, paths[key], index) for key, region in edges.items()},
+                )
+            )
+    return windows
+
+
+def band_outline(region: Region, paths: np.ndarray, index: int) -> np.ndarray:
+    """Outline (n, 2) [m] of a band in the frame (11): port side, round the last region, and back along starboard."""
+    path, ahead = paths[:, index], region.ahead[:, index]
+    aside = np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    reach = region.across[:, index, None] * aside
+    round_ = np.linspace(-np.pi / 2, np.pi / 2, 13)[:, None]
+    end = path[-1] + region.along[-1, index] * np.cos(round_) * ahead[-1] + np.sin(round_) * reach[-1]
+    origin = np.zeros((1, 2))
+    return np.concatenate([origin, path - reach, end, (path + reach)[::-1], origin])
+
+
+def _final_heading(results: Results, run: str, t: float) -> float:
+    rows = results.dataset.frame[results.dataset.frame["run"] == run]
+    psi = np.unwrap(rows["psi"].to_numpy())
+    end = t + results.test.horizon * results.test.step
+    return float(np.interp(end, rows["t"], psi) - np.interp(t, rows["t"], psi))
+
+
+def _wind_in_frame(columns: Mapping[str, np.ndarray], index: int) -> tuple[float, float] | None:
+    if "V_w" not in columns:
+        return None
+    return float(columns["V_w"][index]), float(columns["beta_w"][index] - columns["psi"][index])
+
+
+def tracks_frame(results: Results) -> pd.DataFrame:
+    """Path of every run [m] and its part in the study, thinned to what pixels can show."""
+    parts = []
+    for run, rows in results.dataset.frame.groupby("run", sort=False):
+        thin = rows.iloc[:: max(1, len(rows) // MOST_POINTS)]
+        part = "test" if run in results.test.spans else "training and validation"
+        parts.append(pd.DataFrame({"run": run, "set": part, "north": thin["north"], "east": thin["east"]}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def envelope_frame(results: Results) -> pd.DataFrame:
+    """Least, mean and greatest input per set, as the paper's Tables 1 and 2; degrees and rpm."""
+    return envelope_table(read_json(results.folder / store.ENVELOPE), results.plan.published)
+
+
+def factors_frame(results: Results) -> pd.DataFrame:
+    """One row per perturbed number of a model: its path, its group (hull, inertia, ...) and factor; 0 is removed."""
+    rows = [
+        (model["model"], path, path.partition(".")[0], float(factor))
+        for model in results.models.to_dict("records")
+        for path, factor in (model["factors"].items() if isinstance(model.get("factors"), Mapping) else ())
+    ]
+    return pd.DataFrame(rows, columns=["model", "path", "group", "factor"])
+
+
+def trials_frame(results: Results) -> pd.DataFrame:
+    """One row per trial of the search, value [m^2], with a column for all that varies; the best trials are `chosen`."""
+    methods = {way.name: way.method for way in results.plan.methods}
+    searched = list(dict.fromkeys(name for method in methods.values() for name in method.varied()))
+    rows = []
+    for cell in results.rows:
+        done = [trial for trial in cell["trials"] if trial["state"] == "complete" and trial["value"] is not None]
+        best = sorted(done, key=lambda trial: trial["value"])[: methods[cell["method"]].num_chosen()]
+        for trial in cell["trials"]:
+            row = {name: cell[name] for name in ("cell", "model", "N_D", "seed")}
+            row |= {name: trial[name] for name in ("number", "state", "value", "epochs", "seconds")}
+            rows.append(row | {"chosen": trial in best, **{name: trial["params"].get(name) for name in searched}})
+    columns = ["cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen", *searched]
+    return pd.DataFrame(rows, columns=columns).astype(dict.fromkeys(["value", "seconds", *searched], float))
+
+
+def repairs_frame(results: Results) -> pd.DataFrame:
+    """Every repair that the importer made, with its count."""
+    rows = results.dataset.metadata.get("repairs", [])
+    return pd.DataFrame(rows, columns=["kind", "column", "count", "note"])
+
+
+def _method_words(way: Way) -> str:
+    """A method in a few words: its name, its kind and how much it searches."""
+    trials = way.method.num_trials()
+    kind = "" if way.kind == way.name else f" ({way.kind})"
+    return f"{way.name}{kind}" + (f": {trials} trials" if trials else "")
+
+
+def provenance_words(results: Results) -> dict[str, str]:
+    """What the results are based on, as label -> text."""
+    record, plan, source = results.provenance, results.plan, results.dataset.metadata.get("source", "")
+    machine, sessions = record.get("machine", {}), record.get("sessions", [])
+    redrawn = [row for row in results.models.to_dict("records") if (row.get("counter") or 0) > 0]
+    whole = isinstance(source, Mapping)
+    words = {
+        "study": f"{plan.name}, digest {record['digest']}",
+        "vessels": "; ".join(sorted({f"{v.key} {v.digest}" for v in plan.used_vessels})),
+        "data": "; ".join(f"{key} {value}" for key, value in source.items()) if whole else str(source),
+        "cells": f"{len(results.cells)} of {plan.cells} finished",
+        "seeds": ", ".join(map(str, plan.seeds)),
+        "methods": "; ".join(map(_method_words, plan.methods)),
+        "computed with": f"Python {machine.get('python', '?')} on {machine.get('system', '?')}, "
+        f"{machine.get('cores', '?')} cores",
+        "packages": ", ".join(f"{name} {number}" for name, number in machine.get("packages", {}).items()),
+        "wall time": f"{record.get('wall_seconds', float('nan')):.0f} s, without interrupted sessions",
+        "world": f"seed {plan.seed}" if plan.seed else "",
+        "published envelope": plan.published.source if plan.published else "",
+        "redrawn": "; ".join(f"{row['model']}: counter {int(row['counter'])}" for row in redrawn),
+        "computed in parts": "; ".join(w for pair in pairwise(sessions) for w in store.differences(*pair)),
+        "notes": "; ".join(record.get("notes", [])),
+    }
+    return {label: text for label, text in words.items() if text or label in ("data", "vessels")}

@@ -1,0 +1,132 @@
+"""Methods on the same cells: their errors, price and failures, and what one gains on another over test manoeuvres."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.answer.comparison import CellErrors, compare_cells
+from shipid.arguments import of_class
+from shipid.evidence import ROUNDING, world_interval
+from shipid.metrics import position_error
+from shipid.study.declared import NO_MODEL
+from shipid.study.results import Results
+
+EVERY = "with physics"  # all families but `none` and those that saw the test runs
+COLUMNS = [
+    *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
+    *("H", "H_low", "H_high", "H_90", "end", "seconds", "trials"),
+    *("reference", "pairs", "difference", "low", "high", "runs", "better"),
+    *("worlds", "least", "greatest", "world_low", "world_high"),
+    "ahead",
+]
+Known = Mapping[tuple[str, str, int], CellErrors]  # by world, foundation and seed
+
+
+def compare_methods(results: Results) -> pd.DataFrame:
+    """Compare the methods of a run: a row per family, N_D and method, in the columns of `method_table`.
+
+    The family `with physics` is the mean over all families but `none` and those that saw the test runs. The difference
+    is that to the method by which the study judges. To choose the lowest H of a test chooses by the test: the interval
+    does not count that.
+
+    Raises ShipidError for results that are none.
+    """
+    of_class("results", results, Results, "as of `read_results`")
+    return method_table(method_cells(results), results.plan.judged)
+
+
+def methods_frame(results: Results) -> pd.DataFrame:
+    """Compare the methods of one run, see `method_table`; no rows where fewer than two learn from data."""
+    if sum(way.method.compensates for way in results.plan.methods) < 2:
+        return pd.DataFrame(columns=COLUMNS)
+    return compare_methods(results)
+
+
+def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
+    """A row per cell, as `method_table` takes it.
+
+    Columns: condition, world, foundation, family, method, N_D, seed, status, H, H_90, end (mean error at the end of the
+    horizon) [m], seconds (core-seconds), trials, saw_test (whether the numbers of the family rest on test runs), and
+    `errors`, its `CellErrors`. Without a result the errors are not numbers, or None.
+    """
+    saw, rows = results.saw_test, []
+    for row in results.rows:
+        kept = {name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")}
+        kept |= {"condition": condition, "world": world, "end": np.nan, "errors": None}
+        kept |= {"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw}
+        if (cell := row["cell"]) in results.paths:
+            kept["end"] = float(position_error(results.paths[cell][-1:], results.test.future[-1:]).mean())
+            learns = results.plan.learns(row["family"], row["method"])
+            kept["errors"] = CellErrors(row["foundation"], results.errors[cell], results.windows, learns, world)
+        rows.append(kept)
+    return pd.DataFrame(rows)
+
+
+def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
+    """Compare methods by condition, family and N_D; cells as of `method_cells`, of one or several worlds.
+
+    H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
+    the others, and `missing` also the cells of other methods that this one does not have, since it does not run on
+    their model: means of methods are over the same cells where both have 0. `H_low`, `H_high`: 95 % interval of H over
+    test runs, without what another training would give; not a number with fewer than five. `difference` is H less that
+    of the method `reference` over the `pairs` of cells in which both have one, with a 95 % interval `low`, `high`, as
+    of `compare_cells`. `better` counts test runs with a lower error. `least`, `greatest`: the difference by world;
+    `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. `ahead` names the methods that err
+    less over the cells that both have. The family `with physics` is all of them but `none` and those that saw the test
+    runs.
+    """
+    frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=EVERY)]
+    every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
+    rows = []
+    for (condition, family, N_D), group in every.groupby(["condition", "family", "N_D"], sort=False):
+        by_method = {str(name): _errors_by_cell(mine) for name, mine in group.groupby("method", sort=False)}
+        every_cell = len(group.drop_duplicates(["world", "foundation", "seed"]))
+        for method, mine in group.groupby("method", sort=False):
+            good, errors = mine[mine["status"] == "ok"], by_method[str(method)]
+            row: dict[str, Any] = {"condition": condition, "family": family, "N_D": N_D, "method": method}
+            row |= {"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)}
+            row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
+            row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
+            row["ahead"] = ", ".join(name for name, others in by_method.items() if _is_lower(others, errors))
+            row |= {"reference": reference, **_difference_row(errors, by_method.get(reference, {}))}
+            rows.append(row | _interval_of_mean(errors))
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _errors_by_cell(cells: pd.DataFrame) -> Known:
+    good = cells[cells["status"] == "ok"]
+    keys = zip(good["world"], good["foundation"], good["seed"], strict=True)
+    return dict(zip(keys, good["errors"], strict=True))
+
+
+def _is_lower(one: Known, other: Known) -> bool:
+    """Whether the mean error of one method is lower over the cells that both have, by more than rounding."""
+    mine, others = (math.fsum(of[key].mean for key in one.keys() & other.keys()) for of in (one, other))
+    return mine < (1 - ROUNDING) * others
+
+
+def _interval_of_mean(mine: Known) -> dict[str, float]:
+    """95 % interval of the mean error over test runs, each drawn with all its windows and cells."""
+    if not mine:
+        return {"H_low": np.nan, "H_high": np.nan}
+    cells = [replace(cell, trained=False) for cell in mine.values()]
+    one = compare_cells(cells, [replace(cell, errors=0 * cell.errors) for cell in cells])
+    return {"H_low": float(np.maximum(one.low, 0.0)), "H_high": one.high}
+
+
+def _difference_row(mine: Known, others: Known) -> dict[str, Any]:
+    """Difference of H over the cells that both have, its intervals, over test runs and over worlds."""
+    keys = [key for key in mine if key in others]
+    if not keys:
+        return {"pairs": 0, "runs": 0, "better": 0, "worlds": 0}
+    one = compare_cells([mine[key] for key in keys], [others[key] for key in keys])
+    low, high = world_interval(one.worlds)
+    row = {"pairs": len(keys), "difference": one.mean, "low": one.low, "high": one.high, "runs": one.runs}
+    row |= {"better": one.better, "worlds": len(one.worlds), "world_low": low, "world_high": high}
+    return row | {"least": float(one.worlds.min()), "greatest": float(one.worlds.max())}

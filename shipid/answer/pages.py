@@ -1,0 +1,160 @@
+"""What the report of a study shows, assembled from its results; the pages written from a run's folder."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from shipid.answer import bands, frames, memory, methods, sentences
+from shipid.answer.error_table import intervals_frame
+from shipid.answer.findings import findings
+from shipid.arguments import path_of
+from shipid.errors import ResultError
+from shipid.files import temporary_folder, write_table, write_text
+from shipid.metrics import summary
+from shipid.report import Finding, ReportContent, Sentence, write_report, write_summary
+from shipid.report.comparison import write_comparison
+from shipid.report.methods import MethodsContent, verdicts
+from shipid.study import store
+from shipid.study.claims import UnitClaims
+from shipid.study.declared import NO_MODEL
+from shipid.study.plan import Plan
+from shipid.study.results import Results, read_results
+
+log = logging.getLogger(__name__)
+
+Say = Callable[[str], object]
+PAGES = "report"  # name of the claim on the pages
+ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
+FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
+    "observer": memory.observer_frame,
+    "orders": memory.orders_frame,
+    "kinds": frames.kinds_frame,
+    "memory": memory.memory_frame,
+    "coverage": bands.coverage_frame,
+    "coverage_groups": bands.groups_frame,
+    "coverage_runs": bands.worst_frame,
+    "no_band": bands.refused_frame,
+    "methods": methods.methods_frame,
+    "intervals": intervals_frame,
+}
+"""Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
+
+
+def report_content(results: Results, say: Say | None = None) -> ReportContent:
+    """Assemble everything that the report of a study shows. say : called with a few words on how far it is."""
+    plan, tables = results.plan, {}
+    for name, frame in FRAMES.items():
+        if say is not None:
+            say(f"{plan.name}: table {name.replace('_', ' ')} of {len(results.cells)} cells")
+        tables[name] = frames.count_from_start(results, frame(results))
+    if say is not None:
+        say(f"{plan.name}: answer, findings and errors of {len(results.cells)} cells")
+    words = *sentences.answer(results, verdicts(tables["methods"])), *bands.answer_on_bands(results)
+    best, naive = sentences.best_model(results), summary(results.naive)
+    return ReportContent(
+        title=plan.study.question,
+        name=plan.name,
+        answer=[Sentence(text, figure) for text, figure in words],
+        findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
+        cells=results.cells,
+        naive={"mean": naive["mean"], "p90": naive["p90"], "rms": naive["rms"]},
+        models=_shown_models(results),
+        factors=frames.factors_frame(results),
+        trials=frames.trials_frame(results),
+        horizon=frames.horizon_frame(results),
+        over_time=frames.count_from_start(results, frames.time_frame(results)),
+        commands=frames.count_from_start(results, frames.commands_frame(results)),
+        snapshots=frames.window_snapshots(results),
+        tracks=frames.tracks_frame(results),
+        envelope=frames.envelope_frame(results),
+        repairs=frames.repairs_frame(results),
+        provenance=frames.provenance_words(results),
+        study_document=plan.text(),
+        command=plan.command,
+        best="" if best is None else plan.label(best, plan.judged),
+        alone=frames.alone_models(results),
+        frames=tables,
+    )
+
+
+def _shown_models(results: Results) -> pd.DataFrame:
+    """The models; without `none` where no method that the study judges by meets it: nothing of it can be drawn."""
+    judged = (NO_MODEL, results.plan.judged) in {(name, way.name) for name, way in results.plan.pairs}
+    return results.models if judged else results.models[results.models["model"].ne(NO_MODEL)]
+
+
+def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
+    """Write report.html, summary.md, answer.txt and the tables from what a run's folder holds; returns the report.
+
+    A study of several parts has these in the folder of each part, and a page that compares its methods over all parts,
+    with `methods.csv` beside it. say : called with a few words on how far it is.
+
+    Raises ResultError if the folder holds no run or cannot be written.
+    """
+    folder = path_of("folder", folder)
+    store.stored_plan(folder)
+    store.check_writable(folder)
+    with UnitClaims(folder) as claims, claims.alone(PAGES):
+        return _write(folder, say)
+
+
+def _write(folder: Path, say: Say | None) -> Path:
+    """Write the pages, alone; those of an unfinished run are as old as the results that were read for them."""
+    plan = store.stored_plan(folder)
+    with temporary_folder(folder) as place:
+        read = place.stat().st_mtime_ns
+    with threadpool_limits(1, user_api="blas"):  # products are small: on a busy machine threads cost half of the time
+        report, whole = _write_parts(plan, folder, say) if plan.parts else _write_one(folder, say)
+    if not whole:
+        os.utime(report, ns=(read, read))
+    return report
+
+
+def _write_one(folder: Path, say: Say | None) -> tuple[Path, bool]:
+    """The pages of one run, and whether all of its cells are in them."""
+    with UnitClaims(folder) as claims, claims.alone(store.RESULTS):  # tables are those of the page, or of the whole run
+        results = read_results(folder, say)
+        store.write_results(folder, results.plan, results.cells, whole=results.complete)
+    content = report_content(results, say)
+    write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
+    write_summary(content, folder / SUMMARY)
+    report = write_report(content, folder / REPORT, say)
+    log.debug("report written: %s", report)
+    return report, results.complete
+
+
+def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]:
+    """The pages of all parts that have results and one that compares methods over them, and whether all is in it."""
+    cells: list[pd.DataFrame] = []
+    notes: dict[str, str] = {}
+    whole: list[bool] = []
+    for name, part in plan.parts.items():
+        mine = store.check_part(folder, name, part.plan)
+        if not (mine / store.STUDY).is_file() or not store.finished(mine, part.plan.units):
+            notes[name] = "no cell is finished yet"
+            continue
+        write_pages(mine, say)
+        results = read_results(mine)
+        whole.append(results.complete)
+        cells.append(methods.method_cells(results, part.condition, name))
+        notes[name] = f"{len(results.cells)} of {part.plan.cells} cells"
+    if not cells:
+        raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
+    frame = methods.method_table(pd.concat(cells, ignore_index=True), plan.judged)
+    write_table(folder / METHODS, frame)
+    content = MethodsContent(
+        title=plan.study.question,
+        name=plan.name,
+        frames={"methods": frame},
+        provenance={"study": f"{plan.name}, digest {plan.digest}", **notes},
+        study_document=plan.text(),
+        command=plan.command,
+    )
+    write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
+    return write_comparison(content, folder / REPORT), len(whole) == len(plan.parts) and all(whole)

@@ -1,0 +1,92 @@
+"""Run a study from its name or path to its report: the words of the command line, as functions."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from shipid.answer.pages import write_pages
+from shipid.arguments import path_of
+from shipid.errors import ShipidError
+from shipid.study.plan import read_plan
+from shipid.study.results import Results, read_results
+from shipid.study.run import Event, run_study
+from shipid.units import decimals_of
+
+log = logging.getLogger(__name__)
+
+
+def run(
+    study: str | Path,
+    set: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    *,
+    scheduler: str | None = None,
+    device: str = "cpu",
+) -> Results:
+    """Run a study to its end, write its report, and return its results; what is finished already is not run again.
+
+    Progress is logged at level INFO to the logger "shipid". In a script, call it under `if __name__ == "__main__":`,
+    because workers are processes.
+
+    Parameters
+    ----------
+    study : name of a bundled study, or path of a study document.
+    set : dotted path -> value: changes of the document, such as `{"grid.N_D": [10, 30]}`.
+    out : folder of the run; default: `results/<study>-<digest>` in the working folder.
+    workers : local processes of one thread each; default: one per core.
+    scheduler : address of a Dask scheduler to use instead of local processes.
+    device : PyTorch device of rollouts and training: "cpu" or "cuda".
+
+    Raises ShipidError for whatever a user can mend.
+    """
+    if read_plan(study, set).parts:
+        message = "is a study of several parts: run it by `shipid.events`, and read each folder in parts/ separately"
+        raise ShipidError(message, path=str(study))
+    for event in events(study, set, out, workers, scheduler=scheduler, device=device):
+        if line := event_line(event):
+            log.info("%s", line)
+        if event.kind == "end":
+            folder = Path(event.text)
+    write_pages(folder)
+    return read_results(folder)
+
+
+def events(
+    study: str | Path,
+    set: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    *,
+    scheduler: str | None = None,
+    device: str = "cpu",
+) -> Iterator[Event]:
+    """Run a study and yield what happens, as it happens: notes, the start, every finished cell, the end.
+
+    The arguments are those of `run`. The report is not written; `write_pages(folder)` writes it, and the text of the
+    last event is that folder.
+    """
+    plan = read_plan(study, set)
+    folder = plan.folder if out is None else path_of("out", out)
+    log.debug("study %s, digest %s, folder %s", plan.name, plan.digest, folder)
+    yield from run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
+
+
+def event_line(event: Event) -> str:
+    """Write an event as one line of text; empty for the end."""
+    row = event.row
+    if event.kind == "note":
+        return event.text
+    if event.kind == "start":
+        return f"{event.total - event.done} of {event.total} cells to do"
+    if event.kind != "cell":
+        return ""
+    if row["status"] == "ok":
+        H, H_90 = (f"{row[name]:.{max(decimals_of(row[name]), 3)}f} m" for name in ("H", "H_90"))
+        result = f"H {H}, H_90 {H_90}"
+    else:
+        result = f"{row['status']}: {row['sentence']}"
+    return f"[{event.done}/{event.total}] {row['cell']}: {result}, {row['seconds']:.1f} s"

@@ -1,0 +1,138 @@
+"""Findings: a claim and its rule, when it counts as shown, and how its numbers are written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypedDict, TypeVar
+
+import numpy as np
+
+from shipid.evidence import FEWEST_RUNS, Differences
+from shipid.report.content import spoken
+from shipid.report.wording import listed
+from shipid.study.declared import NO_MODEL
+from shipid.units import decimals_of, plural
+
+Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
+Judgement = tuple[Verdict, str, Mapping[str, float]]  # with the evidence in words, and key numbers by name and unit
+Case = TypeVar("Case", contravariant=True)
+MOST_NAMES = 5  # in one sentence
+SAME_A = "all physics models have the same A, so nothing can rise with it"
+EQUAL_A = "it is not shown which of them is more accurate"
+
+
+class Finding(TypedDict):
+    """A claim of the method with its verdict, the evidence in words, and its key numbers by name and unit."""
+
+    id: str
+    claim: str
+    verdict: Verdict
+    evidence: str
+    numbers: Mapping[str, float]
+
+
+class Undecided(Exception):
+    """Raised by a rule that lacks what it needs; its text says what that is."""
+
+
+@dataclass(frozen=True)
+class Rule(Generic[Case]):
+    """A claim and how it is judged: `judge` takes what the claim is about, and raises Undecided where that lacks."""
+
+    claim: str
+    judge: Callable[[Case], Judgement]
+
+    def decide(self, case: Case) -> Judgement:
+        """Verdict, evidence and numbers; undecided, with the reason as evidence, where something lacks."""
+        try:
+            return self.judge(case)
+        except Undecided as reason:
+            return "undecided", str(reason), {}
+
+
+def judge_claims(rules: Mapping[str, Rule[Any]], case: object, note: str = "") -> list[Finding]:
+    """The finding of each rule, in order. note : what is added to the evidence of all."""
+    findings: list[Finding] = []
+    for key, rule in rules.items():
+        decided, evidence, numbers = rule.decide(case)
+        words = "; ".join(part for part in (evidence, note) if part)
+        findings.append(Finding(id=key, claim=rule.claim, verdict=decided, evidence=words, numbers=numbers))
+    return findings
+
+
+def leave_undecided(rules: Mapping[str, Rule[Any]], reason: str) -> list[Finding]:
+    """Every claim undecided, for the same reason."""
+    return [Finding(id=k, claim=r.claim, verdict="undecided", evidence=reason, numbers={}) for k, r in rules.items()]
+
+
+def verdict_of(confirmed: bool, refuted: bool) -> Verdict:
+    """Confirmed if the claim is shown, refuted if its opposite is shown, else undecided."""
+    return "confirmed" if confirmed else "refuted" if refuted else "undecided"
+
+
+def weakest_verdict(verdicts: Iterable[Verdict]) -> Verdict:
+    """Verdict on a claim of several parts: refuted if one is, confirmed if all are, else undecided."""
+    parts = list(verdicts)
+    return "refuted" if "refuted" in parts else verdict_of(set(parts) == {"confirmed"}, False)
+
+
+def length_in_metres(value: float) -> str:
+    """Return a length with two decimals, from 10 m on with one, of a model below 0.1 m with two digits or more."""
+    return f"{_decimal(value, _places(value))} m"
+
+
+def _places(value: float) -> int:
+    return 1 if abs(value) >= 9.995 else decimals_of(value)
+
+
+def _decimal(value: float, places: int) -> str:
+    """Return a number with so many decimals, and no minus zero."""
+    return f"{round(value, places) + 0.0:.{places}f}"
+
+
+def interval_after(low: float, high: float, value: float) -> str:
+    """Return ` [low, high]` with the decimals of the value that it follows, or nothing where there is none."""
+    places = _places(value)
+    return f" [{_decimal(low, places)}, {_decimal(high, places)}]" if np.isfinite([low, high]).all() else ""
+
+
+def difference_with_interval(differences: Differences, index: int = 0) -> str:
+    """Return a difference with its 95 % interval, all with the decimals of the greatest."""
+    mean, low, high = (float(values[index]) for values in (differences.mean, differences.low, differences.high))
+    greatest = float(np.nanmax(np.abs([mean, low, high])))
+    return f"{_decimal(mean, _places(greatest))} m{interval_after(low, high, greatest)}"
+
+
+def least_to_greatest(*numbers: str) -> str:
+    """Return `least to greatest`, or the one number that both are written as."""
+    return " to ".join(dict.fromkeys(numbers))
+
+
+def count_manoeuvres(count: int) -> str:
+    """Return `1 test manoeuvre`, `20 test manoeuvres`, ..."""
+    return f"{count} {plural(count, 'test manoeuvre')}"
+
+
+def too_few_manoeuvres(count: int) -> str:
+    """Say that so many test manoeuvres give no interval; empty if they do."""
+    if count >= FEWEST_RUNS:
+        return ""
+    return f"{count_manoeuvres(count)} {plural(count, 'gives', 'give')} no interval, {FEWEST_RUNS} would"
+
+
+def count_runs(count: int) -> str:
+    """Return `1 run`, `2 runs`, ..."""
+    return f"{count} {plural(count, 'run')}"
+
+
+def quoted_model(model: str) -> str:
+    """Name a model inside a sentence; that without physics in quotes: `no physics is worse` would say that none is."""
+    name, plus, method = model.partition(" + ")  # of a method beside the one that the study judges by
+    return f'"{spoken(name)}"{plus}{method}' if name == NO_MODEL else model
+
+
+def model_list(models: Iterable[str]) -> str:
+    """Return names as in a sentence, the first few of many."""
+    names = [quoted_model(model) for model in models]
+    return listed(names, MOST_NAMES + 1) if names else ""

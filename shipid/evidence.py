@@ -1,0 +1,207 @@
+"""Evidence of test manoeuvres: intervals of paired differences, and how easily chance makes them.
+
+Windows of one test manoeuvre are alike, test manoeuvres are not: so manoeuvres are resampled, whole and paired (cluster
+bootstrap; Davison and Hinkley 1997, section 3.8), and the difference is measured in its standard error (bootstrap-t;
+Efron and Tibshirani 1993, section 12.5), which suits few manoeuvres and skewed errors. Where Student's interval is
+wider, it counts. What another training would give adds to the standard error. Repeated training is no evidence: it only
+averages this part out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betaincinv, stdtr, stdtrit
+from scipy.stats import kendalltau
+
+from shipid.metrics import shares_by_run
+
+Array = NDArray[np.float64]
+SIGNIFICANT = 0.025  # of one side: an interval of 95 % is free of 0
+RESAMPLES, SEED = 1999, 0
+FEWEST_RUNS = 5  # test manoeuvres below which no interval is given
+FEWEST_WORLDS = 3  # below which no interval over worlds is given
+LEAST_SPREAD, ROUNDING = 0.01, 1e-9  # of training and of the mean: a smaller spread between manoeuvres is none
+FEWEST_MODELS = 5  # whose order by A says anything: that of fewer comes by chance too often
+TRAINING, WORTH = 0.03, 4  # relative sd of H between trainings, and how many observations this number counts for
+
+
+@dataclass(frozen=True)
+class Differences:
+    """Differences (J,) of mean errors over test manoeuvres.
+
+    mean, low, high : [m], with the 95 % interval of each.
+    above, below : chance of a difference as far above 0, or as far below, if there were none (one-sided p-values).
+    """
+
+    mean: Array
+    low: Array
+    high: Array
+    above: Array
+    below: Array
+
+
+def paired_difference(differences: Array, counts: Array, training: Array | float = 0.0) -> Differences:
+    """Means of paired differences with intervals and chances; only means with fewer than `FEWEST_RUNS` manoeuvres.
+
+    The interval is that of a bootstrap-t over manoeuvres, or Student's where it is wider.
+
+    Parameters
+    ----------
+    differences : (J, R) mean of each difference in each test manoeuvre [m].
+    counts : (R,) windows of each manoeuvre, its weight.
+    training : standard error of each difference from training alone [m], (J,) or one for all.
+    """
+    weights, freedom = counts / counts.sum(), len(counts) - 1
+    mean = differences @ weights
+    if len(counts) < FEWEST_RUNS:
+        blank = np.full_like(mean, np.nan)
+        return Differences(mean, blank, blank, blank, blank)
+    drawn, spread = _bootstrap_distances(differences, weights, training)
+    # If all manoeuvres scatter alike: one with most of the windows lies near the mean because it makes the mean.
+    alike = np.sqrt(np.square(weights).sum()) * differences.std(axis=1, ddof=1)
+    error, widest = np.hypot(spread, training), np.hypot(np.maximum(spread, alike), training)
+    student = stdtrit(freedom, 1 - SIGNIFICANT) * widest
+    lower = np.minimum(np.quantile(drawn, SIGNIFICANT, axis=0, method="lower") * error, -student)
+    upper = np.maximum(np.quantile(drawn, 1 - SIGNIFICANT, axis=0, method="higher") * error, student)
+    least = 1e-12 * np.abs(mean) + 1e-300
+    ahead, far = mean / np.maximum(error, least), mean / np.maximum(widest, least)
+    above, below = (
+        np.maximum((sign * drawn >= sign * ahead).mean(axis=0), stdtr(freedom, -sign * far)) for sign in (1, -1)
+    )
+    return Differences(mean, mean - upper, mean - lower, above, below)
+
+
+def _bootstrap_distances(values: Array, weights: Array, training: Array | float) -> tuple[Array, Array]:
+    """(B, J) resampled weighted means less the mean, in their standard errors, and (J,) the standard error of the mean.
+
+    The distance is 0 where the spread of manoeuvres is that of rounding, or far below that of training. One manoeuvre
+    drawn again and again has no spread: its distance is very large.
+    """
+    draws = _resampling_counts(len(weights))
+    mean, sums, total = values @ weights, weights * values, draws @ weights
+    means = (draws @ sums.T) / total[:, None]
+    squares = draws @ (sums**2).T - 2 * means * (draws @ (sums * weights).T)
+    squares += means**2 * (draws @ weights**2)[:, None]
+    correction = len(weights) / (len(weights) - 1)
+    spread = np.sqrt(correction * np.maximum(squares, 0.0)) / total[:, None]
+    here = np.sqrt(correction * np.square(sums - mean[:, None] * weights).sum(axis=1))
+    least = np.maximum(ROUNDING * np.abs(mean), LEAST_SPREAD * np.asarray(training))
+    smallest = np.maximum(1e-6 * here, 1e-300)
+    return np.where(here <= least, 0.0, (means - mean) / np.maximum(spread, smallest)), here
+
+
+@lru_cache(maxsize=8)
+def _resampling_counts(runs: int) -> Array:
+    """(B, R) how often each of R manoeuvres is drawn, with replacement."""
+    rng = np.random.default_rng(SEED)
+    return rng.multinomial(runs, np.full(runs, 1 / runs), RESAMPLES).astype(float)
+
+
+def resampled_means(values: Array, counts: Array) -> Array:
+    """(B, ...) weighted means of values (..., R) over resampled manoeuvres, the same resamples for all values."""
+    draws = _resampling_counts(len(counts))
+    means: Array = np.tensordot(draws * counts, values, axes=(1, values.ndim - 1))
+    return means / (draws @ counts).reshape(-1, *[1] * (values.ndim - 1))
+
+
+def share_interval(held: Array, run: Array) -> tuple[float, float]:
+    """95 % interval of `share_of`, by Clopper and Pearson for so many windows as those of few runs are worth.
+
+    Windows of one run are alike: the number of windows is reduced until their variance is that between runs, and is
+    never below the number of runs. Source: Korn and Graubard (1998), Survey Methodology 24. For one window a run it is
+    the exact interval.
+
+    Parameters
+    ----------
+    held : (S,) whether each window lies in its band. run : its run, (S,).
+    """
+    shares, windows = shares_by_run(held, run), len(held)
+    runs, share = len(shares), float(shares.mean())
+    count = float(runs)
+    if runs > 1 and 0 < share < 1:
+        variance = float(shares.var(ddof=1)) / runs
+        freedom = (stdtrit(max(windows - 1, 1), SIGNIFICANT) / stdtrit(runs - 1, SIGNIFICANT)) ** 2
+        count = float(np.clip(freedom * share * (1 - share) / max(variance, 1e-12), runs, windows))
+    inside = share * count
+    low = 0.0 if inside == 0 else float(betaincinv(inside, count - inside + 1, SIGNIFICANT))
+    high = 1.0 if inside >= count else float(betaincinv(inside + 1, count - inside, 1 - SIGNIFICANT))
+    return low, high
+
+
+def world_interval(values: Array, least: float = -np.inf, greatest: float = np.inf) -> tuple[float, float]:
+    """Student's 95 % interval of a mean over worlds, which are independent; NaN from fewer than `FEWEST_WORLDS`.
+
+    least, greatest : what such a number can be; what lies beyond is cut off, which costs no coverage.
+    """
+    if len(values) < FEWEST_WORLDS:
+        return np.nan, np.nan
+    wide = float(stdtrit(len(values) - 1, 1 - SIGNIFICANT) * values.std(ddof=1) / len(values) ** 0.5)
+    return max(float(values.mean()) - wide, least), min(float(values.mean()) + wide, greatest)
+
+
+def doubling_weights(x: Array) -> Array:
+    """Weights (J,) that turn values at x, a logarithm, into their slope by least squares, for a doubling."""
+    centred = x - x.mean()
+    weights: Array = np.log(2) * centred / np.square(centred).sum()
+    return weights
+
+
+def holm_correction(chances: Array) -> Array:
+    """Return p-values (J,) corrected for their number (Holm 1979): one of them at most `SIGNIFICANT` is a finding."""
+    order = np.argsort(chances)
+    raised = np.maximum.accumulate(chances[order] * np.arange(len(chances), 0, -1))
+    corrected = np.empty_like(chances)
+    corrected[order] = np.minimum(raised, 1.0)
+    return corrected
+
+
+def all_significant(chances: Array) -> bool:
+    """Whether each difference is shown: "all of them" needs no correction for their number (Berger 1982)."""
+    return bool(len(chances) and (chances <= SIGNIFICANT).all())
+
+
+def which_significant(chances: Array) -> NDArray[np.bool_]:
+    """Which differences are shown: all where each is, else those that are after Holm's correction."""
+    return np.full(len(chances), True) if all_significant(chances) else holm_correction(chances) <= SIGNIFICANT
+
+
+def any_significant(chances: Array) -> bool:
+    """Whether at least one difference is shown, corrected for their number (Holm)."""
+    return bool(which_significant(chances).any())
+
+
+def partial_conjunction(chances: Array, count: int) -> float:
+    """Return the p-value of "at least `count` of these are real" (Benjamini and Heller 2008)."""
+    return float(min(1.0, (len(chances) - count + 1) * np.sort(chances)[count - 1]))
+
+
+def order_chance(A: Array, values: Array) -> Array:
+    """Chance (J,) that values (J, M) rise with A as they do, if models were in any order (Kendall's rank test)."""
+    return np.array([kendalltau(A, row, alternative="greater").pvalue for row in values])
+
+
+def training_noise(H: Sequence[Array]) -> float:
+    """Relative standard deviation [1] of H between trainings, from H by seed of several models at one amount of data.
+
+    With one seed it is `TRAINING`, the value of bundled studies; more seeds replace it.
+    """
+    squares, freedom = WORTH * TRAINING**2, float(WORTH)
+    for values in H:
+        if len(values) > 1 and values.mean() > 0:
+            squares += float(np.square(values / values.mean() - 1).sum())
+            freedom += len(values) - 1
+    return float(np.sqrt(squares / freedom))
+
+
+def training_error(H: Sequence[Array], trained: Sequence[NDArray[np.bool_]]) -> float:
+    """Standard error [m] that training alone gives a mean over cells of equal weight, from H by seed of each model.
+
+    trained : which cells another training would change, as H.
+    """
+    squares = sum(values.mean() ** 2 * moved.sum() for values, moved in zip(H, trained, strict=True))
+    return training_noise(H) * float(np.sqrt(squares)) / max(sum(map(len, H)), 1)

@@ -1,0 +1,178 @@
+"""Any runs side by side: which cells match, and differences that follow by hand."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from shipid.answer.compare import compare, compare_results
+from shipid.cli import app
+from shipid.errors import DocumentError, ResultError, ShipidError
+from shipid.study.results import Results
+from tests.answer.byhand import grid
+from tests.study.tiny import run_here, tiny_plan
+
+H = {"good": (1.0, 0.8), "bad": (2.0, 1.5), "none": (9.0, 5.0)}
+Made = Callable[..., Results]
+
+
+@pytest.fixture(scope="module")
+def other_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The tiny study with another method, more seeds, fewer amounts and a longer horizon."""
+    folder = tmp_path_factory.mktemp("other")
+    changes = {"method.0.name": "mine", "method.0.units": 9, "grid.N_D": [4], "prediction.ahead": 6.0}
+    run_here(tiny_plan(folder, changes), folder / "run")
+    return folder / "run"
+
+
+def placed(results: Results, name: str) -> Results:
+    return replace(results, folder=results.folder / name)
+
+
+def test_cells_of_runs_on_the_disk(tiny_run: Path, other_run: Path) -> None:
+    """The means are those of the cells; windows that one run lacks are left out in both."""
+    comparison = compare([tiny_run, other_run], {"drawn": "mine"})
+    assert len(comparison.names) == 2
+    assert set(comparison.documents["path"]) == {
+        "method.drawn.name",
+        "method.drawn.units",
+        "grid.N_D",
+        "prediction.ahead",
+    }
+    assert list(comparison.errors["N_D"].unique()) == [0, 4], "6 is in one of them"
+    assert set(comparison.errors["method"]) == {"alone", "drawn ~ mine"}
+    assert comparison.errors.set_index(["family", "N_D"]).loc[("wrong", 4), "cells"] == 2
+    assert any("on the 60 windows of both" in note for note in comparison.notes), comparison.notes
+    whole = compare([other_run, tiny_run], {"mine": "drawn"}).errors  # turned round
+    np.testing.assert_allclose(whole["difference"], -comparison.errors["difference"])
+    np.testing.assert_allclose(whole["first"], comparison.errors["other"])
+
+
+def test_a_run_and_itself_differ_in_nothing(made: Made) -> None:
+    one = made(grid(H), runs=8)
+    comparison = compare_results([placed(one, "a"), placed(one, "b")])
+    assert comparison.documents.empty
+    assert (comparison.errors["difference"] == 0).all()
+    assert set(comparison.errors["verdict"]) == {"identical"}
+    assert (comparison.errors[["low", "high"]] == 0).all(axis=None), "no training sets equal cells apart"
+    assert "8 of 8 rows are identical to the digit" in comparison.notes[-1]
+    assert comparison.errors["N_D"].tolist() == [0, 0, 10, 10, 10, 30, 30, 30]
+
+
+def test_paired_differences_by_hand(made: Made) -> None:
+    """Errors are hard * H with hard 0.9 to 1.1 over manoeuvres: a difference of means, and what training adds."""
+    one, other = (made(grid({**H, "bad": bad}), runs=8) for bad in ((2.0, 1.5), (1.0, 1.5 + 1e-6)))
+    comparison = compare_results([placed(one, "a"), placed(other, "b")]).errors.set_index(["family", "method", "N_D"])
+    row = comparison.loc[("bad", "drawn", 10)]
+    assert row[["first", "other", "difference"]].tolist() == pytest.approx([2.0, 1.0, -1.0])
+    assert row["verdict"] == "lower"
+    assert row["low"] < -1.0 < row["high"] < 0
+    noise = 0.03 * 5**0.5  # of one seed each, and no other knowledge: 3 % of 2 m and of 1 m
+    assert row["high"] - row["low"] > 2 * 2.3 * noise
+    same = comparison.loc[("bad", "drawn", 30)]
+    assert same["difference"] == pytest.approx(0, abs=1e-5)
+    assert same["low"] < 0 < same["high"], "alike, but trained apart: only what is equal to the digit is identical"
+    assert same["verdict"] == ""
+    assert comparison.loc[("bad", "alone", 0), ["low", "high"]].tolist() == [0, 0], "physics alone is not trained"
+
+
+def test_only_seeds_that_differ_bring_noise_of_training(made: Made) -> None:
+    """One of two seeds is identical: the noise of the other alone, a half of its weight, is in the interval."""
+    seeds = {(name, N_D, seed): error for (name, N_D, _), error in grid(H).items() for seed in (0, 1)}
+    one = made(seeds, runs=8)
+    half, whole = ({**seeds, **{("bad", 10, seed): 2.0 + 1e-9 for seed in apart}} for apart in ((1,), (0, 1)))
+    widths = []
+    for cells in (half, whole):
+        row = compare_results([placed(one, "a"), placed(made(cells, runs=8), "b")]).errors.query("family == 'bad'")
+        row = row[row["N_D"] == 10].iloc[0]
+        assert row["verdict"] == ""
+        widths.append(row["high"] - row["low"])
+    assert widths[1] / widths[0] == pytest.approx(2**0.5, rel=1e-3)
+
+
+def test_the_same_orders_on_another_ship_are_pairs(made: Made) -> None:
+    one, other = made(grid(H), runs=8), made(grid(H), runs=8)
+    moved = replace(other.test, columns={**other.test.columns, "u": other.test.columns["u"] + 1.0})
+    assert compare_results([placed(one, "a"), placed(replace(other, test=moved), "b")]).errors["cells"].all()
+
+
+def test_counterparts_by_name_and_what_is_left_over(made: Made) -> None:
+    one = made(grid(H), runs=8)
+    renamed = {"clean": (1.0, 0.8), "bad": (2.0, 1.5), "none": (9.0, 5.0)}
+    alone = {"clean": 2.0, "bad": 6.0}
+    other = made(grid(renamed), runs=8, alone=alone, claims=None)
+    notes = compare_results([placed(one, "a"), placed(other, "b")]).notes
+    assert "b: only the first has family good (--pair FIRST=OTHER names counterparts)" in notes
+    turned = compare_results([placed(one, "a"), placed(other, "b")], {"good": "bad", "bad": "clean"})
+    rows = turned.errors.set_index(["family", "N_D"])
+    assert rows.loc[("good ~ bad", 10), "difference"] == pytest.approx(1.0)
+    assert rows.loc[("bad ~ clean", 10), "difference"] == pytest.approx(-1.0)
+    with pytest.raises(DocumentError, match="'goood' is no family or method of the first run: did you mean 'good'"):
+        compare_results([placed(one, "a"), placed(other, "b")], {"goood": "clean"})
+    with pytest.raises(DocumentError, match="'cleen' is no family or method of any other run: did you mean 'clean'"):
+        compare_results([placed(one, "a"), placed(other, "b")], {"good": "cleen"})
+
+
+def test_cells_without_a_result_do_not_match(made: Made) -> None:
+    failed = {**H, "bad": (None, 1.5)}
+    comparison = compare_results([placed(made(grid(H), runs=8), "a"), placed(made(grid(failed), runs=8), "b")])
+    assert ("bad", 10) not in set(zip(comparison.errors["family"], comparison.errors["N_D"], strict=True))
+    assert any(note.startswith("b: 5 of 6 cells have a result") for note in comparison.notes)
+    nothing = dict.fromkeys(H, (None, None))
+    with pytest.raises(ResultError, match="has no cell with a result"):
+        compare_results([placed(made(grid(H)), "a"), placed(made(grid(nothing)), "b")])
+
+
+def test_nothing_in_common_is_one_line(made: Made, tiny_run: Path) -> None:
+    one, other = made(grid(H, (10, 30))), made(grid(H, (5, 7)))
+    with pytest.raises(
+        ShipidError, match=r"no cell of .* N_D 10, 30; .* N_D 5, 7; .*--pair FIRST=OTHER, or .* --set grid.N_D="
+    ):
+        compare_results([placed(one, "a"), placed(other, "b")])
+    moved = replace(one.test, columns={**one.test.columns, "u": one.test.columns["u"] + 1.0})
+    foreign = made(grid(H), changes={"truth": {**one.plan.document["truth"], "seed": 99}})
+    with pytest.raises(ShipidError, match=r"b: tests on other manoeuvres than .*a: nothing can be paired"):
+        compare_results([placed(one, "a"), placed(replace(foreign, test=moved), "b")])
+    with pytest.raises(ShipidError, match="two folders or more"):
+        compare([tiny_run])
+    with pytest.raises(ShipidError, match="two folders or more"):
+        compare(str(tiny_run))
+    with pytest.raises(ShipidError, match="named twice"):
+        compare([tiny_run, tiny_run])
+
+
+def test_seeds_are_those_of_the_document(made: Made) -> None:
+    """Another world adds 1000 to every seed; its cells match all the same."""
+    one = made(grid(H), runs=8)
+    other = made(grid(H), runs=8, changes={"seed": 1})
+    other.cells["seed"] += 1000
+    assert (compare_results([placed(one, "a"), placed(other, "b")]).errors["cells"] == 1).all()
+
+
+def test_the_command(tiny_run: Path, other_run: Path, tmp_path: Path) -> None:
+    folders = [str(tiny_run), str(other_run)]
+    shown = CliRunner().invoke(app, ["study", "compare", *folders, "--pair", "drawn=mine"])
+    assert shown.exit_code == 0, shown.output
+    lines = [" ".join(line.split()) for line in shown.output.splitlines()]
+    assert "method.drawn.units 8 9" in lines
+    assert any(line.startswith("wrong drawn ~ mine 4 2 ") for line in lines)
+    assert any(line.startswith("family method N_D cells") and line.endswith("difference verdict") for line in lines)
+    rows = sum(1 for line in lines if line.startswith(("wrong ", "right ", "none ")))
+    assert f"verdict: lower or higher where the test shows it, corrected for {rows} rows; empty: it does not" in lines
+    table = tmp_path / "rows.csv"
+    result = CliRunner().invoke(
+        app, ["study", "compare", *folders, "--pair", "drawn=mine", "--json", "--out", str(table)]
+    )
+    document: dict[str, Any] = json.loads(result.stdout)
+    assert {"folders", "documents", "errors", "notes", "file"} == set(document)
+    assert document["errors"][0]["low"] is None, "four manoeuvres have no interval"
+    assert len(table.read_text().splitlines()) == 1 + len(document["errors"])
+    wrong = CliRunner().invoke(app, ["study", "compare", *folders, "--pair", "drawn"])
+    assert isinstance(wrong.exception, DocumentError)

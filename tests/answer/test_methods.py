@@ -1,0 +1,148 @@
+"""What the comparison of methods says, on tables made by hand and drawn by seed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import shipid
+from shipid.answer.comparison import CellErrors
+from shipid.answer.methods import COLUMNS, EVERY, method_table
+from shipid.study.schema import Claims
+
+
+def cells(
+    rng: np.random.Generator, effect: float, worlds: int = 2, runs: int = 12, noise: float = 0.3, trained: bool = False
+) -> pd.DataFrame:
+    """Cells of `drawn` and of `other`, which errs by `effect` [m] more, in runs and worlds that differ much.
+
+    The runs of one world are longer than those of another, as the parts of a study with each run as the test in turn.
+    """
+    rows = []
+    for world in range(worlds):
+        windows = np.array([5.0 + k % 3 for k in range(runs)]) * (1 + 4 * world)
+        for family, members in (("moderate", 2), ("none", 1)):
+            for member in range(members):
+                hard = rng.uniform(1.0, 4.0, runs)
+                for method, more in (("drawn", 0.0), ("other", effect)):
+                    error = hard + more + noise * rng.standard_normal(runs)
+                    one = CellErrors(f"{family}-{member}", error, windows, trained, str(world))
+                    rows.append(
+                        {"condition": "", "world": str(world), "foundation": one.model, "family": family,
+                         "method": method, "N_D": 10, "seed": world, "status": "ok", "H": one.mean,
+                         "H_90": 2 * one.mean, "end": 1.5 * one.mean, "seconds": 3.0,
+                         "trials": 4, "saw_test": False, "errors": one}
+                    )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def row(frame: pd.DataFrame, method: str = "other", family: str = EVERY) -> Any:
+    return frame[frame.method.eq(method) & frame.family.eq(family)].iloc[0]
+
+
+def test_the_difference_is_that_of_the_means() -> None:
+    made = cells(np.random.default_rng(0), 0.5)
+    table = method_table(made, "drawn")
+    assert list(table.columns) == COLUMNS
+    for family in ("moderate", "none"):
+        mine = made[made.family.eq(family)].groupby("method").H.mean()
+        assert row(table, family=family).difference == pytest.approx(mine["other"] - mine["drawn"])
+        assert pytest.approx(mine["other"]) == row(table, family=family).H
+    assert row(table, "drawn").difference == 0
+    assert row(table).pairs == 4
+    assert row(table).runs == 24  # 12 runs of each world, whatever the number of members
+    assert row(table).worlds == 2
+    assert row(table).least <= row(table).difference <= row(table).greatest
+    assert np.isnan(row(table).world_low)
+    assert row(method_table(cells(np.random.default_rng(0), 0.5, worlds=4), "drawn")).world_low < 0.6
+
+
+def test_a_family_that_saw_the_test_is_shown_and_not_in_the_mean() -> None:
+    made = cells(np.random.default_rng(0), 0.5)
+    tuned = made[made.family.eq("moderate")].assign(family="tuned", H=lambda rows: 0.1 * rows.H, saw_test=True)
+    table = method_table(pd.concat([made, tuned], ignore_index=True), "drawn")
+    for key in ("H", "H_low", "difference", "cells", "missing"):
+        assert getattr(row(table), key) == getattr(row(method_table(made, "drawn")), key)
+    assert pytest.approx(0.1 * row(table).H) == row(table, family="tuned").H
+
+
+def test_the_interval_of_H_holds_H_and_needs_five_runs() -> None:
+    rng = np.random.default_rng(5)
+    table = method_table(cells(rng, 0.5), "drawn")
+    assert ((table.H_low < table.H) & (table.H_high > table.H)).all()
+    assert method_table(cells(rng, 0.5, worlds=1, runs=4), "drawn")[["H_low", "H_high"]].isna().all(axis=None)
+
+
+def test_the_mean_over_physics_is_without_families_that_the_claims_set_aside(tiny_run: Path) -> None:
+    results = shipid.read_results(tiny_run)
+    study = results.plan.study.model_copy(update={"claims": Claims(aside=["wrong"])})
+    apart = replace(results, plan=replace(results.plan, study=study))
+    for one, families in ((results, ["right", "wrong"]), (apart, ["right"])):
+        table, cells = shipid.compare_methods(one), results.cells
+        mean = cells[cells.family.isin(families)].groupby("N_D")["H"].mean()
+        pd.testing.assert_series_equal(table[table.family == EVERY].set_index("N_D")["H"], mean, check_names=False)
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    """40 tables without and with an effect: 95 % intervals over test runs, give or take what chance allows."""
+    rng = np.random.default_rng(1)
+    for effect in (0.0, -0.4):
+        inside, free = 0, 0
+        for _ in range(40):
+            one = row(method_table(cells(rng, effect), "drawn"))
+            inside += one.low <= effect <= one.high
+            free += one.high < 0
+        assert inside >= 33
+        assert free <= 5 if effect == 0 else free >= 34
+
+
+def test_another_training_is_in_the_interval() -> None:
+    """Two methods alike, each trained once: networks differ by 3 %, alike in all runs, which is no difference."""
+    rng, free = np.random.default_rng(6), 0
+    for _ in range(60):
+        made = cells(rng, 0.0, worlds=1, noise=0.01, trained=True)
+        moved = [replace(one, errors=rng.normal(1.0, 0.03) * one.errors) for one in made["errors"]]
+        one = row(method_table(made.assign(errors=moved, H=[cell.mean for cell in moved]), "drawn"))
+        free += one.high < 0 or one.low > 0
+    assert free <= 9, "5 % of 60, but for one time in a thousand"
+    alike = row(method_table(cells(rng, 0.0, worlds=1, noise=0.0, trained=True), "drawn"))
+    assert (alike.low, alike.high) == (0.0, 0.0)
+
+
+def test_a_failed_cell_is_counted_and_not_averaged() -> None:
+    made = cells(np.random.default_rng(2), 1.0)
+    worst = made.index[made.method.eq("other") & made.family.eq("moderate")][0]
+    made.loc[worst, "status"] = "diverged"
+    made.loc[worst, ["H", "H_90", "end"]] = np.nan
+    made.at[worst, "errors"] = None
+    one = row(method_table(made, "drawn"))
+    assert (one.failed, one.cells, one.pairs) == (1, 4, 3)
+    assert np.isfinite([one.H, one.difference, one.low, one.high]).all()
+    assert row(method_table(made, "drawn"), "drawn").failed == 0
+    assert (one.missing, row(method_table(made, "drawn"), "drawn").missing) == (1, 0)
+    apart = row(method_table(made.drop(worst), "drawn"))
+    assert (apart.failed, apart.cells, apart.missing) == (0, 3, 1), "the method does not run on this model"
+    every = made.assign(status=np.where(made.method.eq("other"), "failed", made.status))
+    lost = row(method_table(every, "drawn"))
+    assert lost.failed == lost.cells
+    assert lost.pairs == 0
+    assert np.isnan(lost.H)
+    assert np.isnan(lost.difference)
+
+
+def test_who_is_ahead_over_the_cells_that_both_have() -> None:
+    """Errors of `other` are lower; without its easiest cell its mean is higher."""
+    made = cells(np.random.default_rng(2), -0.3, noise=0.01)
+    mine = made[made.method.eq("other") & made.family.eq("moderate")]
+    made.loc[mine.H.idxmin(), ["status", "H"]] = ["diverged", np.nan]
+    table = method_table(made, "drawn")
+    both = made[made.family.eq("moderate") & ~made.foundation.eq(mine.foundation[mine.H.idxmin()])]
+    assert both.groupby("method").H.mean()["other"] < both.groupby("method").H.mean()["drawn"]
+    assert (row(table, "drawn").ahead, row(table).ahead) == ("other", "")
+    assert set(method_table(cells(np.random.default_rng(2), 0.0, noise=0.0), "drawn").ahead) == {""}

@@ -1,0 +1,362 @@
+"""Sentences on tables made by hand: the numbers they name, the harm they tell, the doubt they keep."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.answer.sentences import _bounds, answer, best_model, errors_by_model
+from shipid.answer.worth import Estimate
+from shipid.report.section import declared
+from shipid.report.sections import SECTIONS
+from shipid.study.results import Results
+from tests.answer.byhand import grid
+
+
+def text(results: Results) -> str:
+    sentences = answer(results)
+    assert all(anchor in declared(SECTIONS) for _, anchor in sentences)
+    for sentence, _ in sentences:
+        assert re.fullmatch(r"[\"A-Z0-9].*\.", sentence), sentence
+        assert "nan" not in sentence.split()
+        assert "inf" not in sentence.split()
+    return "\n".join(sentence for sentence, _ in sentences)
+
+
+def test_best_model_and_its_worth_in_runs(made: Any) -> None:
+    """10 runs with `good` leave 1.5 m; without physics 30 runs leave 4 m and 60 leave 1.25 m."""
+    H = {"good": (1.5, 1.0, 0.5), "bad": (3.0, 2.0, 1.5), "none": (9.0, 4.0, 1.25)}
+    advice = text(made(grid(H, (10, 30, 60))))
+    assert (
+        "With 60 runs, good (best in validation; 2.00 m mean error alone) predicts 8 s ahead with 0.50 m mean" in advice
+    )
+    assert "nine errors in ten are below 0.75 m" in advice
+    runs = 30 * 2 ** (np.log(4.0 / 1.5) / np.log(4.0 / 1.25))
+    assert "How many runs? With 10 runs, good (best in validation) has 1.50 m mean error" in advice
+    assert f"without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
+    assert "leaves 25 % of the error of physics alone (over 2 models)" in advice
+    assert "Constant u, v, r give 10.0 m: at 60 runs every model beats them." in advice
+    assert "With 60 runs 1 of 2 physics models does better than no physics; bad does worse." in advice
+
+
+def test_validation_chooses_and_never_the_test(made: Any) -> None:
+    advice = text(
+        made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}), losses={"good": 2.0, "bad": 1.0})
+    )
+    assert "bad (best in validation)" in advice
+    assert "With 30 runs, bad (best in validation; 6.00 m mean error alone)" in advice
+
+
+def test_harmful_compensation_is_reported(made: Any) -> None:
+    """`good` alone has 2 m and `bad` 4 m."""
+    advice = text(made(grid({"good": (3.0, 2.5), "bad": (3.0, 2.2), "none": (9.0, 4.0)})))
+    assert "Compensation harms good.\nAlone, good has 2.00 m, less than any compensated model." in advice
+    assert "harms" not in text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
+
+
+def test_physics_worth_no_run_at_all(made: Any) -> None:
+    """Where the least data does without physics what the best physics does, nobody needs more runs."""
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (1.25, 1.1)})))
+    assert (
+        "good (best in validation) has 1.50 m mean error; without physics the same 10 runs do as well, 1.25 m."
+        in advice
+    )
+
+
+def test_what_holds_at_both_ends_is_said_once(made: Any) -> None:
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
+    first = (
+        "How good must the physics be, 8 s ahead? With 10 or 30 runs every physics model does better than no physics"
+    )
+    assert advice.startswith(f"{first}, even with an error A of 6.00 m.\n")
+
+
+def test_a_tie_is_no_harm(made: Any) -> None:
+    """`bad` has 6 m alone and compensated, and so have constant u, v, r."""
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (7.0, 6.0), "none": (9.0, 8.0)}), naive=6.0))
+    assert "harms" not in advice
+    assert "It is not shown that compensation helps bad." in advice
+    assert 'at 30 runs "no physics" is worse, and bad is not shown to beat them.' in advice
+
+
+def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
+    methods = [{"name": "drawn", "kind": "path-drawn", "families": ["good", "bad"]}]
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0)}), changes={"method": methods}))
+    assert "With 30 runs, good (best in validation; 2.00 m mean error alone)" in advice
+    assert "It is unknown whether physics harms, since the study has no cell without physics." in advice
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (None, None)})))
+    assert "It is unknown whether physics harms, since not every cell without physics has a result." in advice
+
+
+def test_methods_without_physics_are_answered_with_their_errors(made: Any) -> None:
+    """No method joins physics and data: that no cell with physics has a result would be untrue."""
+    methods = [{"name": name, "kind": "path-drawn", "families": ["none"]} for name in ("drawn", "other")]
+    methods += [{"name": "alone", "kind": "alone"}]
+    results = made(grid({"none": (4.0, 3.0)}), changes={"method": methods}, claims=None, planned=8)
+    (row,) = results.cells[results.cells["N_D"] == 30].to_dict("records")
+    further = [{**row, "method": "other", "model": "none + other", "H": 2.5}]
+    further += [{**row, "method": "alone", "foundation": "good", "model": "good + alone", "family": "good", "H": 2.0}]
+    results = replace(results, cells=pd.concat([results.cells, pd.DataFrame(further)], ignore_index=True))
+    advice = text(results)
+    assert "no conclusion" not in advice
+    assert (
+        "No method that learns from data has physics in this study. Mean errors 8 s ahead, with 30 runs: good + alone "
+        '2.00 m, "no physics" + other 2.50 m and "no physics" 3.00 m.'
+    ) in advice
+
+
+def test_data_that_did_not_help_is_reported(made: Any) -> None:
+    advice = text(made(grid({"good": (1.5, 1.6), "bad": (3.0, 2.0), "none": (4.0, 5.0)})))
+    assert 'With 30 runs good and "no physics" are no better than with 10.' in advice
+    assert "no better than with" not in text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (5.0, 4.0)})))
+
+
+def test_constant_u_v_r_that_are_not_beaten(made: Any) -> None:
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.5))
+    assert 'give 2.50 m: at 30 runs "no physics" is worse.' in advice
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=1.9))
+    assert 'bad and "no physics" are worse.' in advice
+
+
+def test_test_manoeuvres_become_an_interval_and_seeds_do_not(made: Any) -> None:
+    cells = {("good", 10, seed): H for seed, H in enumerate((1.0, 2.0, 3.0))}
+    cells |= {("bad", 10, seed): 4.0 for seed in range(3)} | {("none", 10, seed): 9.0 for seed in range(3)}
+    assert "2.00 m mean error;" in text(made(cells))
+    assert "1 test manoeuvre gives no interval, 5 would: every comparison here holds on this test" in text(made(cells))
+    advice = text(made(cells, runs=8))
+    assert re.search(r"2\.00 m \[1\.\d\d, 2\.\d\d\] mean error", advice)
+    assert "Brackets are 95 % intervals over 8 test manoeuvres" in advice
+    table = errors_by_model(made(cells)).set_index("model")
+    assert table.loc["good", "H"] == 2.0
+
+
+def test_one_seed_cannot_see_what_other_runs_would_give(made: Any) -> None:
+    """At the largest amount all seeds may have the same runs; there is nothing to say where it is the only one."""
+    H = {"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (5.0, 4.0)}
+    words = "One seed drew the training runs. With other draws of 10 runs the errors may lie outside the brackets"
+    assert words in text(made(grid(H), runs=8))
+    assert words not in text(made(grid(H)))  # one manoeuvre: no brackets
+    assert words not in text(made({(name, 10, 0): values[0] for name, values in H.items()}, runs=8))
+    cells = {
+        (name, N, seed): value for name in H for N, value in zip((10, 30), H[name], strict=True) for seed in (0, 1)
+    }
+    assert words not in text(made(cells, runs=8))
+
+
+def test_how_good_physics_must_be(made: Any) -> None:
+    """H = A / 2 for five models, `none` has 3 m: physics pays below A = 6 m; with 30 runs it is all the same."""
+    alone = {f"m{k}": 2.0**k for k in range(5)}
+    H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (3.0, 1.0)}
+    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
+    assert re.search(r"8 s ahead\? With 10 runs physics pays if its error A is below about 6\.0 m \[\d\.\d, \d", advice)
+    assert ". With 30 runs the test cannot tell any of 5 physics models from no physics." in advice
+    H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (30.0, 20.0)}
+    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
+    assert advice.startswith(
+        "How good must the physics be, 8 s ahead? With 10 or 30 runs physics pays even with an error A of 16.0 m, the "
+        "worst tried: every physics model does better than no physics.\n"
+    )
+    H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (0.2, 0.2)}
+    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
+    assert "With 10 or 30 runs physics does not pay even with an error A of 1.00 m, the best tried" in advice
+
+
+def test_the_worst_tried_is_not_the_worst_that_has_every_result(made: Any) -> None:
+    """The least accurate model has no result at one amount: the line knows nothing of it."""
+    alone = {f"m{k}": 2.0**k for k in range(5)}
+    H = grid({name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (30.0, 20.0)})
+    advice = text(made(H | {("m4", 10, 0): None}, alone=alone, claims=None, runs=8))
+    assert "pays even with an error A of 8.00 m, the worst tried with a result in every cell" in advice
+    assert "in every cell" not in text(made(H, alone=alone, claims=None, runs=8))
+
+
+def test_no_limit_of_A_where_better_physics_does_worse(made: Any) -> None:
+    """The better the physics, the worse it predicts with data: no A divides what pays from what harms."""
+    alone = {f"m{k}": 2.0**k for k in range(5)}
+    H = {name: (10.0 / A, 10.0 / A) for name, A in alone.items()} | {"none": (3.0, 3.0)}
+    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
+    assert "physics pays" not in advice
+    sides = "3 of 5 physics models do better than no physics; m0 and m1 do worse"
+    assert f"With 10 or 30 runs {sides}.\n" in advice
+    assert advice.count(sides) == 1
+    H = {name: (10.0 / A, 10.0 / A) for name, A in alone.items()} | {"none": (1.0, 1.0)}
+    assert "physics does not pay" not in text(made(grid(H), alone=alone, claims=None, runs=8))
+
+
+def test_runs_that_are_not_enough_may_still_be_too_many(made: Any) -> None:
+    """`none` with 30 runs has about what `good` has with 10: the test cannot tell which has less."""
+    H = grid({"good": (2.0, 1.0), "bad": (3.0, 2.0), "none": (2.1, 2.05)})
+    advice = text(made(H, runs=8))
+    assert "without physics 30 runs are not enough for that [at most 10, over 30]: they give 2.05 m" in advice
+
+
+def test_names_are_those_that_the_test_can_tell(made: Any) -> None:
+    """`bad` is 1 % below no physics in all eight manoeuvres; another training may differ by 3 %."""
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (8.91, 2.0), "none": (9.0, 4.0)}), runs=8))
+    assert "With 10 runs 1 of 2 physics models does better than no physics; for bad the test cannot tell. " in advice
+
+
+def test_known_orders_are_an_upper_bound_where_they_may_react(made: Any) -> None:
+    H = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})
+    known = {"prediction": {"ahead": 8.0, "step": 2.0, "commands": "known"}}
+    results = made(H, changes=known)
+    assert "upper bound" not in text(results), "turns under constant orders react to nothing"
+    truth = dict(results.plan.document["truth"]) | {"manoeuvre": [{"kind": "zigzag", "n_rpm": 120.0}]}
+    assert "an upper bound of its worth" in text(made(H, changes={**known, "truth": truth}))
+
+
+def test_identified_models_are_not_best_in_validation(made: Any) -> None:
+    """They were fitted to the runs that validate them; `good` is best of the others."""
+    family = [
+        {"name": "good", "base": "gunnerus-28.9"},
+        {"name": "bad", "base": "gunnerus-28.9"},
+        {"name": "fitted", "extends": "bad", "identify": {"parameters": ["hull.derivatives.N_ur"]}},
+    ]
+    H = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "fitted": (0.8, 0.7), "none": (9.0, 4.0)})
+    alone = {"good": 2.0, "bad": 6.0, "fitted": 3.0}
+    results = made(H, alone=alone, changes={"family": family})
+    advice = text(results)
+    assert best_model(results) == "good"
+    harmed = grid({"good": (3.0, 2.5), "bad": (3.0, 2.2), "fitted": (0.8, 0.7), "none": (9.0, 4.0)})
+    said = text(made(harmed, alone=alone, changes={"family": family}))
+    assert "Compensation harms good." in said, "2 m alone, but `fitted` has less"
+    assert "so they cannot be called best in validation: fitted has 0.70 m with 30 runs." in advice
+
+
+def test_numbers_that_were_set_from_runs_that_train_are_named(made: Any) -> None:
+    """Such a model knows more runs than its N_D says. One that saw a test run is in one sentence, which says so."""
+    H = grid({"good": (1.0, 0.5), "bad": (2.0, 1.0), "none": (4.0, 2.0)})
+
+    def seen(*runs: str) -> Results:
+        bad = {"name": "bad", "base": "gunnerus-28.9"}
+        family = [{"name": "good", "base": "gunnerus-28.9", "seen": list(runs)}, bad]
+        results: Results = made(H, changes={"family": family})
+        every = pd.concat([results.dataset.frame, results.dataset.frame.assign(run="trains")], ignore_index=True)
+        return replace(results, dataset=replace(results.dataset, frame=every))
+
+    assert "The numbers of good were set from runs that train, whatever the amount of data" in text(seen("trains"))
+    assert "were set from" not in text(seen("no run"))
+    assert best_model(seen("trains")) == "good"
+    assert best_model(seen("trains", "a")) == "bad"
+    unfair = text(seen("trains", "a"))
+    assert "The numbers of good were set from runs that test: it is shown, and no other sentence counts it." in unfair
+    assert unfair.removeprefix("How good ").count("good ") == 1, "the figures have two models, the other sentences one"
+    assert "were set from" not in text(seen())
+
+
+def test_incomplete_study_is_provisional(made: Any) -> None:
+    cells = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})
+    del cells["bad", 10, 0]
+    advice = text(made(cells, planned=6))
+    assert advice.startswith("1 of 6 cells are not finished: what follows is provisional.")
+
+
+def test_failed_cells_are_reported_and_not_counted(made: Any) -> None:
+    """`bad` has no result at 30 runs: nothing is claimed of every model, and the failure is named."""
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, None), "none": (9.0, 4.0)})))
+    assert "1 of 6 cells has no result (bad: no training converged)" in advice
+    assert "With 10 or 30 runs every physics model with a result in every cell does better than no physics" in advice
+    assert "(over 1 model)" in advice
+
+
+def test_an_amount_without_any_result_takes_no_interval_of_the_others(made: Any) -> None:
+    """Too few runs for the method, such as 10 of a single window each: the answer is that of 20 and 30 runs."""
+    H = {"good": (None, 2.0, 1.0), "bad": (None, 3.0, 2.0), "none": (None, 9.0, 4.0)}
+    advice = text(made(grid(H, (10, 20, 30)), runs=8))
+    assert "3 of 9 cells have no result" in advice
+    assert "With 20 or 30 runs every physics model" in advice
+    assert "With 20 runs, good (best in validation) has 2.00 m [" in advice
+
+
+def test_what_is_not_known_of_the_best_model_is_said_of_it(made: Any) -> None:
+    H = {"good": (1.5, None, 1.0), "bad": (3.0, 2.0, 1.5), "none": (9.0, 4.0, 2.0)}
+    advice = text(made(grid(H, (10, 20, 30))))
+    assert "How many runs? Unknown: of good not every cell has a result." in advice
+
+
+def test_nothing_is_claimed_against_a_missing_data_driven_model(made: Any) -> None:
+    advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, None)})))
+    assert "does better" not in advice
+    assert "How many runs? Unknown: without physics not every cell has a result." in advice
+
+
+def test_without_results_there_is_no_conclusion(made: Any) -> None:
+    advice = text(made(grid({"good": (None, None), "bad": (None, None), "none": (9.0, 4.0)})))
+    assert "there is no conclusion" in advice
+    assert "does better" not in advice
+    assert "there is no conclusion" in text(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (10,))))
+
+
+@pytest.mark.parametrize(
+    "trials",
+    [
+        [],
+        [{"value": None, "state": "complete"}],
+        [{"value": 2.0, "state": "stopped"}],
+    ],
+)
+def test_results_are_answered_whatever_their_trials_say(made: Any, trials: list[dict[str, Any]]) -> None:
+    """The answer said that no cell had a result, where trials of a user's method had no value."""
+    H = {"good": (1.5, 1.0), "bad": (5.0, 4.5), "none": (9.0, 4.0)}
+    whole = made(grid(H), runs=20)
+    odd = replace(whole, cells=whole.cells.assign(trials=[trials] * len(whole.cells)))
+    assert best_model(odd) is None
+    with_best, without = (text(results).split("\n") for results in (whole, odd))
+    assert not any("no conclusion" in sentence for sentence in without)
+    of_best = ("How many runs?", "With 30 runs, good")
+    kept = [sentence for sentence in with_best if not sentence.startswith(of_best)]
+    added = [sentence for sentence in without if sentence not in kept]
+    assert [sentence for sentence in without if sentence not in added] == kept
+    begins = (
+        "With 30 runs, no trial of the method 'drawn' has a value, so no model is best in validation. Mean errors 8 s"
+    )
+    assert len(added) == 1
+    assert added[0].startswith(f"{begins} ahead: good 1.00 m and bad 4.50 m. Without physics: 4.00 m")
+
+
+def test_where_the_method_that_judges_has_no_result_others_may_have_one(made: Any) -> None:
+    methods = [{"name": "drawn", "kind": "path-drawn"}, {"name": "other", "kind": "path-drawn"}]
+    results = made(grid({"good": (None, None), "none": (9.0, 4.0)}), changes={"method": methods}, planned=12)
+    (row,) = results.cells[results.cells["model"].eq("none") & results.cells["N_D"].eq(30)].to_dict("records")
+    other = pd.DataFrame([{**row, "method": "other", "foundation": "good", "model": "good + other", "family": "good"}])
+    results = replace(results, cells=pd.concat([results.cells, other], ignore_index=True))
+    advice = text(results)
+    assert "No cell with physics and data that counts has a result yet, so there is no conclusion." in advice
+
+
+def test_a_long_list_of_names_is_cut(made: Any) -> None:
+    names = [f"m{k}" for k in range(9)]
+    H = dict.fromkeys(names, (5.0, 5.0)) | {"good": (1.5, 1.0), "none": (4.0, 3.0)}
+    assert "does better than no physics; m0, m1, m2, m3, m4 and 4 more do worse" in text(
+        made(grid(H), alone=dict.fromkeys([*names, "good"], 9.0), claims=None)
+    )
+
+
+def test_bounds_are_those_that_the_study_covers() -> None:
+    """An interval of everything is no bound, and one beyond all that was tried is none at all."""
+    ends = (2.0, 9.0)
+    known = [
+        _bounds(Estimate(5.0, *interval, ends), "{:.0f}".format) for interval in ((3.0, 7.0), (2.0, 9.0), (9.0, 9.0))
+    ]
+    assert known == [" [3, 7]", " [at most 2, over 9]", ""]
+
+
+def test_the_comparison_of_methods_comes_first(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    results = made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}))
+    plain = [sentence for sentence, _ in answer(results, ["Memory errs least."])]
+    monkeypatch.setattr(type(results.plan), "learning", ["drawn", "memory"])
+    sentences = [sentence for sentence, _ in answer(results, ["Memory errs least."])]
+    assert sentences[0] == "Memory errs least."
+    assert [one for one in sentences[1:] if "judges by" not in one] == plain
+    assert len(sentences) == len(plain) + 2
+
+
+def test_models_that_do_worse_are_named(made: Any) -> None:
+    advice = text(made(grid({"good": (1.5, 3.5), "bad": (5.0, 4.0), "none": (4.0, 3.0)})))
+    assert "With 10 runs 1 of 2 physics models does better than no physics; bad does worse. " in advice
+    assert "With 30 runs none of 2 physics models does better than no physics; good and bad do worse." in advice
