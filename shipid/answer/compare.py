@@ -145,13 +145,16 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
     here, away = _common_windows(first, other)
     rows, differences = [], []
     for _, part in both.groupby(["family", "method", "N_D"], sort=False):
-        one, two = _cell_errors(first, part, "first", here), _cell_errors(other, part, "other", away)
-        differences.append(compare_cells(two, one))
+        here_errors, away_errors = _cell_errors(first, part, "first", here), _cell_errors(other, part, "other", away)
+        differences.append(compare_cells(away_errors, here_errors))
         row: dict[str, Any] = {key: _label(part, key) for key in ("family", "method")}
         row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part)}
-        row |= {side: np.mean([cell.mean for cell in cells]) for side, cells in (("first", one), ("other", two))}
+        sides = {"first": here_errors, "other": away_errors}
+        row |= {side: np.mean([cell.mean for cell in cells]) for side, cells in sides.items()}
         row |= {"difference": differences[-1].mean, "low": differences[-1].low, "high": differences[-1].high}
-        row["verdict"] = all(np.array_equal(a.errors, b.errors) for a, b in zip(one, two, strict=True)) * IDENTICAL
+        row["verdict"] = (
+            all(np.array_equal(a.errors, b.errors) for a, b in zip(*sides.values(), strict=True)) * IDENTICAL
+        )
         rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in ("first", "other")})
     lower, higher = (which_significant(np.array([getattr(d, s) for d in differences])) for s in ("below", "above"))
     for row, less, more in zip(rows, lower, higher, strict=True):

@@ -59,8 +59,9 @@ class ErrorTable:
         """(amounts,) relative standard error [1] that H of one cell has from training, as a mean over seeds."""
         by_seed = [values @ self.weights for values in self.H.values()]
         seeds = max((values.shape[1] for values in by_seed), default=1)
-        noise = [training_noise([values[k] for values in by_seed]) for k in range(len(self.amounts))]
-        return np.array(noise, dtype=float) / seeds**0.5
+        each = [training_noise([values[k] for values in by_seed]) for k in range(len(self.amounts))]
+        noise: Array = np.array(each, dtype=float) / seeds**0.5
+        return noise
 
     def by_run(self, model: str, place: int) -> Array:
         """(R,) error of a model at an amount, mean over seeds, or of its physics alone."""

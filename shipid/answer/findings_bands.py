@@ -94,9 +94,9 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
         return leave_undecided(BAND_RULES, results.missing)
     level, run, of = results.plan.study.bands.level, results.test.run, of_methods(results, [results.plan.judged])
     widths, held = {}, {}
-    for row, by_level, errors in cell_regions(results, [level]):
+    for row, by_level, apart in cell_regions(results, [level]):
         region, cell = by_level[level], str(row["cell"])
-        widths[cell], held[cell] = results.by_run(region.radius.mean(axis=0)), region.holds(errors)
+        widths[cell], held[cell] = results.by_run(region.radius.mean(axis=0)), region.holds(apart)
     errors, cells = error_table(results, physics), results.judged_cells
     cells = cells[cells["foundation"].isin(errors.H)]  # a model with a failed cell may have no band
     table = _width_table(errors, cells[~cells["N_D"].isin(cells["N_D"][~cells["cell"].isin(widths)])], widths)

@@ -314,7 +314,7 @@ def _headline(case: Case) -> Iterator[str]:
         text = f"no trial of the method {case.results.plan.judged!r} has a value, so no model is {BEST}. Mean errors "
         text += f"{_ahead(case.results)} ahead{_least_errors(rows['H'])}"
     else:
-        alone, worst = (length_in_metres(float(rows.at[case.best, name])) for name in ("A", "H_90"))
+        alone, worst = (length_in_metres(float(rows[name][case.best])) for name in ("A", "H_90"))
         text = (
             f"{case.best} ({BEST}; {alone} mean error alone) predicts {_ahead(case.results)} ahead with "
             f"{case.H(case.best, largest)} mean error; nine errors in ten are below {worst}"
