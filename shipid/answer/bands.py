@@ -23,7 +23,7 @@ from shipid.study.results import Results
 from shipid.units import level_text, percent, plural
 
 Array = np.ndarray
-SHOWN = (0.5, 0.8, 0.9, 0.95)
+REPORTED_LEVELS = (0.5, 0.8, 0.9, 0.95)
 """Nominal levels that the report compares with what was measured."""
 SPEEDS = 3  # groups of equal size
 NEW_KIND = "no run of this kind calibrated the band: nothing is promised"
@@ -58,7 +58,7 @@ def coverage_frame(results: Results) -> pd.DataFrame:
     over the horizon), end [m] (at its end), lengths (the same end in ship lengths), runs (test runs), seeds.
     """
     length, run, count = ship_length(results), results.test.run, len(results.test.spans)
-    levels = sorted({*SHOWN, results.plan.study.bands.level})
+    levels = sorted({*REPORTED_LEVELS, results.plan.study.bands.level})
     parts: dict[tuple[float, str, str, int], list[tuple[Array, float, float]]] = {}
     for row, by_level, errors in cell_regions(results, levels):
         for level, region in by_level.items():

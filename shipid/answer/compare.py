@@ -37,8 +37,8 @@ from shipid.study.store import stored_plan
 
 IDENTICAL = "identical"
 """Verdict on cells that err alike to the digit."""
-KEYS = ["family", "member", "method", "N_D", "seed"]
-MEASURED = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
+MATCHED_KEYS = ["family", "member", "method", "N_D", "seed"]
+MOTION_COLUMNS = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
 ABSENT = "-"  # shown where a document has no such key
 POSSIBLE = {
     "rank correlation": (-1.0, 1.0),
@@ -135,7 +135,7 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
         for who, one, rest in (("the first", mine, others), ("this", others, mine)):
             if lonely := [name for name in dict.fromkeys(one[key].dropna()) if name not in set(rest[key])]:
                 notes.append(f"only {who} has {key} {', '.join(lonely)} (--pair FIRST=OTHER names counterparts)")
-    both = mine.merge(others, on=KEYS, suffixes=("_first", "_other")).sort_values("N_D", kind="stable")
+    both = mine.merge(others, on=MATCHED_KEYS, suffixes=("_first", "_other")).sort_values("N_D", kind="stable")
     if not (both["N_D"] > 0).any():
         raise ShipidError(
             f"no cell of {other.folder} matches one of {first.folder}: {_keys_in_words(first)}; there: "
@@ -169,7 +169,7 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
 
 def _matching_cells(results: Results) -> pd.DataFrame:
     """Keys, predictor and band of every cell with a result; one more row per foundation for A, where it is known."""
-    columns = ["cell", "foundation", *KEYS, "coverage"]
+    columns = ["cell", "foundation", *MATCHED_KEYS, "coverage"]
     good = results.cells[results.cells["status"] == "ok"].reindex(columns=columns)
     good = good.assign(seed=good["seed"] - WORLDS * results.plan.study.seed)
     known = [name for name, path in results.physics.items() if name != NO_MODEL and np.isfinite(path).all()]
@@ -196,7 +196,7 @@ def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], 
         for of in (first.test, other.test)
     )
     here, there = (np.array([of[key] for key in one if key in two], dtype=np.int64) for of in (one, two))
-    columns = [(first.test.columns[name][here], other.test.columns[name][there]) for name in MEASURED]
+    columns = [(first.test.columns[name][here], other.test.columns[name][there]) for name in MOTION_COLUMNS]
     same = all(np.allclose(a, b, rtol=1e-6, atol=1e-9) for a, b in columns)
     draws = first.plan.draws is not None and first.plan.draws == other.plan.draws  # the same orders, whatever the ship
     if not (len(here) and (same or draws)):
