@@ -12,11 +12,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, stdtr, stdtrit
-from scipy.stats import kendalltau
 
 from shipid.metrics import shares_by_run
 
@@ -109,7 +109,7 @@ def resampled_means(values: Array, counts: Array) -> Array:
     return means / (draws @ counts).reshape(-1, *[1] * (values.ndim - 1))
 
 
-def share_interval(held: Array, run: Array) -> tuple[float, float]:
+def share_interval(held: NDArray[Any], run: NDArray[Any]) -> tuple[float, float]:
     """95 % interval of `share_of`, by Clopper and Pearson for so many windows as those of few runs are worth.
 
     Windows of one run are alike: the number of windows is reduced until their variance is that between runs, and is
@@ -182,6 +182,8 @@ def partial_conjunction(chances: Array, count: int) -> float:
 
 def order_chance(A: Array, values: Array) -> Array:
     """Chance (J,) that values (J, M) rise with A as they do, if models were in any order (Kendall's rank test)."""
+    from scipy.stats import kendalltau  # its import takes longer than the rest of a page's
+
     return np.array([kendalltau(A, row, alternative="greater").pvalue for row in values])
 
 

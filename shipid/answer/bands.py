@@ -23,7 +23,7 @@ from shipid.study.results import Results
 from shipid.units import level_text, percent, plural
 
 Array = np.ndarray
-SHOWN = (0.5, 0.8, 0.9, 0.95)
+REPORTED_LEVELS = (0.5, 0.8, 0.9, 0.95)
 """Nominal levels that the report compares with what was measured."""
 SPEEDS = 3  # groups of equal size
 NEW_KIND = "no run of this kind calibrated the band: nothing is promised"
@@ -58,7 +58,7 @@ def coverage_frame(results: Results) -> pd.DataFrame:
     over the horizon), end [m] (at its end), lengths (the same end in ship lengths), runs (test runs), seeds.
     """
     length, run, count = ship_length(results), results.test.run, len(results.test.spans)
-    levels = sorted({*SHOWN, results.plan.study.bands.level})
+    levels = sorted({*REPORTED_LEVELS, results.plan.study.bands.level})
     parts: dict[tuple[float, str, str, int], list[tuple[Array, float, float]]] = {}
     for row, by_level, errors in cell_regions(results, levels):
         for level, region in by_level.items():
@@ -67,7 +67,8 @@ def coverage_frame(results: Results) -> pd.DataFrame:
             parts.setdefault(key, []).append((region.holds(errors), *sizes))
     rows = []
     for (level, model, family, N_D), seeds in sorted(parts.items(), key=lambda part: part[0][0]):
-        held, width, end = (np.mean([one[k] for one in seeds], axis=0) for k in range(3))  # seeds: the same windows
+        inside, widths, ends = zip(*seeds, strict=True)  # seeds predict the same windows: no further evidence
+        held, width, end = np.mean(inside, axis=0), np.mean(widths), np.mean(ends)
         numbers = share_of(held, run), *share_interval(held, run), width, end, end / length
         rows.append((model, family, N_D, level, *numbers, count, len(seeds)))
     columns = ["model", "family", "N_D", "level", "coverage", "low", "high", "width", "end", "lengths", "runs", "seeds"]
@@ -176,7 +177,7 @@ def refused_frame(results: Results) -> pd.DataFrame:
     """Models without a band of the study's level at the largest N_D, and why: model, N_D, reason."""
     done = results.cells[results.cells["status"] == "ok"]
     refused = done[(done["N_D"] == done["N_D"].max()) & done["cell"].isin(list(results.no_band))]
-    frame = refused[["model", "N_D"]].assign(reason=refused["cell"].map(dict(results.no_band)))
+    frame: pd.DataFrame = refused[["model", "N_D"]].assign(reason=refused["cell"].map(dict(results.no_band)))
     return frame.drop_duplicates(ignore_index=True)
 
 

@@ -37,8 +37,8 @@ from shipid.study.store import stored_plan
 
 IDENTICAL = "identical"
 """Verdict on cells that err alike to the digit."""
-KEYS = ["family", "member", "method", "N_D", "seed"]
-MEASURED = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
+MATCHED_KEYS = ["family", "member", "method", "N_D", "seed"]
+MOTION_COLUMNS = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
 ABSENT = "-"  # shown where a document has no such key
 POSSIBLE = {
     "rank correlation": (-1.0, 1.0),
@@ -135,7 +135,7 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
         for who, one, rest in (("the first", mine, others), ("this", others, mine)):
             if lonely := [name for name in dict.fromkeys(one[key].dropna()) if name not in set(rest[key])]:
                 notes.append(f"only {who} has {key} {', '.join(lonely)} (--pair FIRST=OTHER names counterparts)")
-    both = mine.merge(others, on=KEYS, suffixes=("_first", "_other")).sort_values("N_D", kind="stable")
+    both = mine.merge(others, on=MATCHED_KEYS, suffixes=("_first", "_other")).sort_values("N_D", kind="stable")
     if not (both["N_D"] > 0).any():
         raise ShipidError(
             f"no cell of {other.folder} matches one of {first.folder}: {_keys_in_words(first)}; there: "
@@ -145,13 +145,16 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
     here, away = _common_windows(first, other)
     rows, differences = [], []
     for _, part in both.groupby(["family", "method", "N_D"], sort=False):
-        one, two = _cell_errors(first, part, "first", here), _cell_errors(other, part, "other", away)
-        differences.append(compare_cells(two, one))
+        here_errors, away_errors = _cell_errors(first, part, "first", here), _cell_errors(other, part, "other", away)
+        differences.append(compare_cells(away_errors, here_errors))
         row: dict[str, Any] = {key: _label(part, key) for key in ("family", "method")}
         row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part)}
-        row |= {side: np.mean([cell.mean for cell in cells]) for side, cells in (("first", one), ("other", two))}
+        sides = {"first": here_errors, "other": away_errors}
+        row |= {side: np.mean([cell.mean for cell in cells]) for side, cells in sides.items()}
         row |= {"difference": differences[-1].mean, "low": differences[-1].low, "high": differences[-1].high}
-        row["verdict"] = all(np.array_equal(a.errors, b.errors) for a, b in zip(one, two, strict=True)) * IDENTICAL
+        row["verdict"] = (
+            all(np.array_equal(a.errors, b.errors) for a, b in zip(*sides.values(), strict=True)) * IDENTICAL
+        )
         rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in ("first", "other")})
     lower, higher = (which_significant(np.array([getattr(d, s) for d in differences])) for s in ("below", "above"))
     for row, less, more in zip(rows, lower, higher, strict=True):
@@ -166,7 +169,7 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
 
 def _matching_cells(results: Results) -> pd.DataFrame:
     """Keys, predictor and band of every cell with a result; one more row per foundation for A, where it is known."""
-    columns = ["cell", "foundation", *KEYS, "coverage"]
+    columns = ["cell", "foundation", *MATCHED_KEYS, "coverage"]
     good = results.cells[results.cells["status"] == "ok"].reindex(columns=columns)
     good = good.assign(seed=good["seed"] - WORLDS * results.plan.study.seed)
     known = [name for name, path in results.physics.items() if name != NO_MODEL and np.isfinite(path).all()]
@@ -193,7 +196,7 @@ def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], 
         for of in (first.test, other.test)
     )
     here, there = (np.array([of[key] for key in one if key in two], dtype=np.int64) for of in (one, two))
-    columns = [(first.test.columns[name][here], other.test.columns[name][there]) for name in MEASURED]
+    columns = [(first.test.columns[name][here], other.test.columns[name][there]) for name in MOTION_COLUMNS]
     same = all(np.allclose(a, b, rtol=1e-6, atol=1e-9) for a, b in columns)
     draws = first.plan.draws is not None and first.plan.draws == other.plan.draws  # the same orders, whatever the ship
     if not (len(here) and (same or draws)):

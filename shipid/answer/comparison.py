@@ -66,9 +66,9 @@ def compare_cells(mine: Sequence[CellErrors], others: Sequence[CellErrors]) -> C
     values, weights = np.concatenate(means), np.concatenate(shares)
     training = math.hypot(*(_training_of(side, pairs) for side in zip(*pairs, strict=True)))
     one = paired_difference(values[None], weights, training)
-    numbers = (float(number[0]) for number in (one.mean, one.low, one.high, one.above, one.below))
+    mean, low, high, above, below = (float(number[0]) for number in (one.mean, one.low, one.high, one.above, one.below))
     worlds = np.array([mean @ share / share.sum() for mean, share in zip(means, shares, strict=True)])
-    return CellDifference(*numbers, len(values), int((values < 0).sum()), worlds)
+    return CellDifference(mean, low, high, above, below, len(values), int((values < 0).sum()), worlds)
 
 
 def _training_of(cells: Sequence[CellErrors], pairs: Sequence[tuple[CellErrors, CellErrors]]) -> float:

@@ -18,9 +18,9 @@ from shipid.study.results import Results
 
 Array = NDArray[np.float64]
 Metric = Literal["H", "H_90"]
-ALONE = -1  # place of the physics alone in a term
-EXACT = 1e-9  # m: errors below count as this one, which has a logarithm and can be divided by
-Term = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or ALONE
+PHYSICS_ONLY = -1  # place of the physics alone in a term
+SMALLEST_ERROR = 1e-9  # m: errors below count as this one, which has a logarithm and can be divided by
+ErrorTerm = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or PHYSICS_ONLY
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class ErrorTable:
 
     amounts : N_D, rising. counts : (R,) windows of each test manoeuvre.
     A : model -> (R,) mean error of the physics alone. H : model -> (amounts, seeds, R) of the prediction. What is below
-        `EXACT`, such as the error of the physics that made the data, is raised to it.
+        `SMALLEST_ERROR`, such as the error of the physics that made the data, is raised to it.
     """
 
     amounts: tuple[int, ...]
@@ -38,9 +38,9 @@ class ErrorTable:
     H: Mapping[str, Array]
 
     def __post_init__(self) -> None:
-        """Raise errors to `EXACT`."""
+        """Raise errors to `SMALLEST_ERROR`."""
         for name in ("A", "H"):
-            raised = {model: np.maximum(values, EXACT) for model, values in getattr(self, name).items()}
+            raised = {model: np.maximum(values, SMALLEST_ERROR) for model, values in getattr(self, name).items()}
             object.__setattr__(self, name, raised)
 
     @property
@@ -59,12 +59,13 @@ class ErrorTable:
         """(amounts,) relative standard error [1] that H of one cell has from training, as a mean over seeds."""
         by_seed = [values @ self.weights for values in self.H.values()]
         seeds = max((values.shape[1] for values in by_seed), default=1)
-        noise = [training_noise([values[k] for values in by_seed]) for k in range(len(self.amounts))]
-        return np.array(noise, dtype=float) / seeds**0.5
+        each = [training_noise([values[k] for values in by_seed]) for k in range(len(self.amounts))]
+        noise: Array = np.array(each, dtype=float) / seeds**0.5
+        return noise
 
     def by_run(self, model: str, place: int) -> Array:
         """(R,) error of a model at an amount, mean over seeds, or of its physics alone."""
-        return self.A[model] if place == ALONE else self.H[model][place].mean(axis=0)
+        return self.A[model] if place == PHYSICS_ONLY else self.H[model][place].mean(axis=0)
 
     def mean(self, model: str, place: int) -> float:
         """Error [m] of a model at an amount, mean over seeds and windows, or of its physics alone."""
@@ -75,13 +76,13 @@ class ErrorTable:
         errors = self.compare([[(1.0, model, place)]])
         return max(float(errors.low[0]), 0.0), float(errors.high[0])
 
-    def compare(self, differences: Sequence[Sequence[Term]]) -> Differences:
+    def compare(self, differences: Sequence[Sequence[ErrorTerm]]) -> Differences:
         """Judge sums of errors, each with its factor: `[(1, "none", 0), (-1, "good", 0)]` is what physics saves."""
         values, training = np.zeros((len(differences), self.runs)), np.zeros(len(differences))
         for row, terms in enumerate(differences):
             for factor, model, place in terms:
                 values[row] += factor * self.by_run(model, place)
-                if place != ALONE:
+                if place != PHYSICS_ONLY:
                     training[row] += (factor * self.mean(model, place) * self.noise[place]) ** 2
         return paired_difference(values, self.counts, np.sqrt(training))
 

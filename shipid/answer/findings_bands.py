@@ -22,13 +22,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.answer.bands import cell_regions, of_methods
-from shipid.answer.error_table import ALONE, ErrorTable, error_table
+from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
 from shipid.answer.findings_simulation import trend_over_accuracy, trend_verdict
 from shipid.answer.verdict import (
     EQUAL_A,
+    ClaimRule,
     Finding,
     Judgement,
-    Rule,
     Undecided,
     count_manoeuvres,
     difference_with_interval,
@@ -47,7 +47,7 @@ from shipid.study.results import Results
 from shipid.units import level_text, percent
 
 Array = NDArray[np.float64]
-SHORT = 0.05  # B2: a share that lies so far below its level is a broken promise
+BROKEN_BY = 0.05  # B2: a share that lies so far below its level is a broken promise
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,9 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
         return leave_undecided(BAND_RULES, results.missing)
     level, run, of = results.plan.study.bands.level, results.test.run, of_methods(results, [results.plan.judged])
     widths, held = {}, {}
-    for row, by_level, errors in cell_regions(results, [level]):
+    for row, by_level, apart in cell_regions(results, [level]):
         region, cell = by_level[level], str(row["cell"])
-        widths[cell], held[cell] = results.by_run(region.radius.mean(axis=0)), region.holds(errors)
+        widths[cell], held[cell] = results.by_run(region.radius.mean(axis=0)), region.holds(apart)
     errors, cells = error_table(results, physics), results.judged_cells
     cells = cells[cells["foundation"].isin(errors.H)]  # a model with a failed cell may have no band
     table = _width_table(errors, cells[~cells["N_D"].isin(cells["N_D"][~cells["cell"].isin(widths)])], widths)
@@ -144,9 +144,9 @@ def judge_width_trend(widths: Widths) -> Judgement:
     """Verdict on B1, without the shares that the bands hold."""
     table, models, last = widths.table, widths.physics, len(widths.table.amounts) - 1
     if widths.rivals:
-        good, bad = sorted(models, key=lambda model: table.mean(model, ALONE))  # the roles say nothing of the test
+        good, bad = sorted(models, key=lambda model: table.mean(model, PHYSICS_ONLY))
         wider = table.compare([[(1.0, bad, last), (-1.0, good, last)]])
-        apart = all_significant(table.compare([[(1.0, bad, ALONE), (-1.0, good, ALONE)]]).above)
+        apart = all_significant(table.compare([[(1.0, bad, PHYSICS_ONLY), (-1.0, good, PHYSICS_ONLY)]]).above)
         evidence = (
             f"at N_D = {table.amounts[last]} the mean radius of the band is {length_in_metres(table.mean(bad, last))} "
             f"for {bad}, {length_in_metres(table.mean(good, last))} for {good}: {difference_with_interval(wider)} more"
@@ -192,11 +192,11 @@ def judge_held_share(promise: Promise) -> Judgement:
     interval = "" if few else f" [{percent(low)}, {percent(high)}]"
     each = "" if (sizes == sizes[0]).all() else ", each counts the same"
     hold = f"bands of {level_text(level)} hold {percent(share)}{interval} of whole paths"
-    decided = "undecided" if few else verdict_of(low >= level - SHORT, high < level)
+    decided = "undecided" if few else verdict_of(low >= level - BROKEN_BY, high < level)
     return decided, f"{hold} ({count_manoeuvres(len(sizes))}{each})", {f"share at {level_text(level)}": share}
 
 
-BAND_RULES: dict[str, Rule[BandEvidence]] = {
-    "B1": Rule("more accurate physics gives a narrower band", _judge_widths),
-    "B2": Rule("bands hold the share of whole paths that they promise", _judge_promise),
+BAND_RULES: dict[str, ClaimRule[BandEvidence]] = {
+    "B1": ClaimRule("more accurate physics gives a narrower band", _judge_widths),
+    "B2": ClaimRule("bands hold the share of whole paths that they promise", _judge_promise),
 }

@@ -19,12 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.answer.error_table import ALONE, ErrorTable, error_table
+from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
 from shipid.answer.verdict import (
     EQUAL_A,
+    ClaimRule,
     Finding,
     Judgement,
-    Rule,
     count_manoeuvres,
     difference_with_interval,
     judge_claims,
@@ -66,7 +66,7 @@ class Rivals:
     @property
     def by_accuracy(self) -> tuple[str, str]:
         """The model with the smaller A on the test, and the other: the names of the study say nothing of the test."""
-        less, more = sorted((self.good, self.bad), key=lambda model: self.table.mean(model, ALONE))
+        less, more = sorted((self.good, self.bad), key=lambda model: self.table.mean(model, PHYSICS_ONLY))
         return less, more
 
     def metres(self, model: str, place: int) -> str:
@@ -76,35 +76,35 @@ class Rivals:
 
 def _judge_gain(rivals: Rivals) -> Judgement:
     table, last, models = rivals.table, rivals.last, (rivals.good, rivals.bad)
-    gains = table.compare([[(1.0, model, ALONE), (-1.0, model, last)] for model in models])
+    gains = table.compare([[(1.0, model, PHYSICS_ONLY), (-1.0, model, last)] for model in models])
     parts = [
-        f"{m} {rivals.metres(m, ALONE)} -> {rivals.metres(m, last)}, {difference_with_interval(gains, k)} less"
+        f"{m} {rivals.metres(m, PHYSICS_ONLY)} -> {rivals.metres(m, last)}, {difference_with_interval(gains, k)} less"
         for k, m in enumerate(models)
     ]
-    good, bad = (table.mean(model, last) / table.mean(model, ALONE) for model in models)
+    good, bad = (table.mean(model, last) / table.mean(model, PHYSICS_ONLY) for model in models)
     decided = verdict_of(all_significant(gains.above), any_significant(gains.below))
     return decided, "; ".join(parts), {"H / A, accurate": good, "H / A, inaccurate": bad}
 
 
-def _judge_equality(rivals: Rivals) -> Judgement:
+def _judge_equal(rivals: Rivals) -> Judgement:
     table, last, (less, more) = rivals.table, rivals.last, rivals.by_accuracy
-    apart = all_significant(table.compare([[(1.0, more, ALONE), (-1.0, less, ALONE)]]).above)
+    apart = all_significant(table.compare([[(1.0, more, PHYSICS_ONLY), (-1.0, less, PHYSICS_ONLY)]]).above)
     sides = [(less, more)] if apart else [(less, more), (more, less)]
-    about = table.compare([[(1 + ABOUT, one, ALONE), (-1.0, other, last)] for one, other in sides])
-    by = table.compare([[(1.0, less, ALONE), (-1.0, more, last)]])
+    about = table.compare([[(1 + ABOUT, one, PHYSICS_ONLY), (-1.0, other, last)] for one, other in sides])
+    by = table.compare([[(1.0, less, PHYSICS_ONLY), (-1.0, more, last)]])
     evidence = (
-        f"inaccurate and compensated {rivals.metres(more, last)}, accurate alone {rivals.metres(less, ALONE)}: "
+        f"inaccurate and compensated {rivals.metres(more, last)}, accurate alone {rivals.metres(less, PHYSICS_ONLY)}: "
         f"{difference_with_interval(by)} less{'' if apart else f'; {EQUAL_A}'}"
     )
     decided = verdict_of(all_significant(about.above), all_significant(about.below))
-    return decided, evidence, {"H inaccurate / A accurate": table.mean(more, last) / table.mean(less, ALONE)}
+    return decided, evidence, {"H inaccurate / A accurate": table.mean(more, last) / table.mean(less, PHYSICS_ONLY)}
 
 
 def _judge_gap(rivals: Rivals) -> Judgement:
     table, last, (less, more) = rivals.table, rivals.last, rivals.by_accuracy
-    gap = [(1.0, more, ALONE), (-1.0, less, ALONE)]
+    gap = [(1.0, more, PHYSICS_ONLY), (-1.0, less, PHYSICS_ONLY)]
     gaps = table.compare([[*gap, (sign, more, last), (-sign, less, last)] for sign in (-1.0, 1.0)])
-    before, after = (abs(table.mean(rivals.bad, at) - table.mean(rivals.good, at)) for at in (ALONE, last))
+    before, after = (abs(table.mean(rivals.bad, at) - table.mean(rivals.good, at)) for at in (PHYSICS_ONLY, last))
     counts = 0 if gaps.mean[0] < gaps.mean[1] else 1  # the gap of H has the sign of that of A, or not
     evidence = (
         f"gap {length_in_metres(before)} before, {length_in_metres(after)} after: "
@@ -141,10 +141,10 @@ def _lead_of_others(table: ErrorTable, pure: Array, others: list[Array]) -> Diff
 
 
 FULL_SCALE_RULES = {
-    "R1": Rule("compensated physics beats the physics alone, accurate or not", _judge_gain),
-    "R2": Rule("the inaccurate model, compensated, is about as good as the accurate physics alone", _judge_equality),
-    "R3": Rule("the gap between accurate and inaccurate physics shrinks after compensation", _judge_gap),
-    "R4": Rule(f"{quoted_model(NO_MODEL)} is worst over the whole horizon", _judge_worst),
+    "R1": ClaimRule("compensated physics beats the physics alone, accurate or not", _judge_gain),
+    "R2": ClaimRule("the inaccurate model, compensated, is about as good as the accurate physics alone", _judge_equal),
+    "R3": ClaimRule("the gap between accurate and inaccurate physics shrinks after compensation", _judge_gap),
+    "R4": ClaimRule(f"{quoted_model(NO_MODEL)} is worst over the whole horizon", _judge_worst),
 }
 
 

@@ -31,14 +31,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import ttest_1samp
+from scipy.special import stdtr
 
-from shipid.answer.error_table import ALONE, ErrorTable, Metric, Term, error_table
+from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, ErrorTerm, Metric, error_table
 from shipid.answer.verdict import (
     SAME_A,
+    ClaimRule,
     Finding,
     Judgement,
-    Rule,
     Undecided,
     Verdict,
     count_manoeuvres,
@@ -80,7 +80,7 @@ MOST_PAIRS = 2  # S6: of each kind, in words
 
 
 @dataclass(frozen=True)
-class Grid:
+class ErrorGrid:
     """The errors that S1-S6 judge, and which members belong to the moderate and the high family.
 
     by_90 : the same of H_90, for S5. results : what S7 takes the roughness of paths from.
@@ -126,7 +126,7 @@ def simulation_findings(results: Results) -> list[Finding]:
     return judge_claims(SIMULATION_RULES, grid, "; ".join(notes))
 
 
-def read_grid(results: Results) -> Grid:
+def read_grid(results: Results) -> ErrorGrid:
     """The errors of a finished study; Undecided, with the reason, where there are none."""
     claims, cells = results.plan.study.claims, results.judged_cells
     assert claims is not None
@@ -149,7 +149,7 @@ def read_grid(results: Results) -> Grid:
     by_mean = table("H")
     moderate, high = (tuple(name for name in names[family] if name in by_mean.A) for family in families)
     left_out = tuple(name for name in every if name not in by_mean.A)
-    return Grid(by_mean, moderate, high, left_out, table("H_90"), results)
+    return ErrorGrid(by_mean, moderate, high, left_out, table("H_90"), results)
 
 
 def _range_of(differences: Differences) -> str:
@@ -158,7 +158,7 @@ def _range_of(differences: Differences) -> str:
     return " to ".join(difference_with_interval(differences, index) for index in ends)
 
 
-def _judge_lead(grid: Grid) -> Judgement:
+def _judge_lead(grid: ErrorGrid) -> Judgement:
     moderate, amounts, table = grid.members("moderate"), grid.amounts, grid.table
     count, most = len(moderate), len(moderate) // 2 + 1
     leads = [table.lead(NO_MODEL, moderate, place) for place in range(len(amounts))]
@@ -177,7 +177,7 @@ def _judge_lead(grid: Grid) -> Judgement:
     return weakest_verdict((begins, keeps)), evidence, numbers
 
 
-def _judge_fall(grid: Grid) -> Judgement:
+def _judge_fall(grid: ErrorGrid) -> Judgement:
     weights = -doubling_weights(np.log(np.array(grid.amounts, dtype=float)))
     models, (first, *_, last) = [*grid.physics, NO_MODEL], grid.amounts
     falls = grid.table.compare([[(float(w), model, k) for k, w in enumerate(weights)] for model in models])
@@ -194,11 +194,11 @@ def _judge_fall(grid: Grid) -> Judgement:
     return verdict_of(all_significant(falls.above), any_significant(falls.below)), evidence, numbers
 
 
-def trend_over_accuracy(table: ErrorTable, models: Sequence[str]) -> tuple[Array, list[list[Term]]]:
+def trend_over_accuracy(table: ErrorTable, models: Sequence[str]) -> tuple[Array, list[list[ErrorTerm]]]:
     """A of models [m], and at each amount of data the terms of the rise of H for twice the A; Undecided without."""
     if len(models) < FEWEST_MODELS:
         raise Undecided(f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
-    A = np.array([table.mean(model, ALONE) for model in models])
+    A = np.array([table.mean(model, PHYSICS_ONLY) for model in models])
     if np.isclose(A.min(), A.max()):
         raise Undecided(SAME_A)
     weights, places = doubling_weights(np.log(A)), range(len(table.amounts))
@@ -212,7 +212,7 @@ def trend_verdict(slopes: Differences, A: Array, order: Array) -> Verdict:
     return verdict_of(all_significant(risen), any_significant(fallen))
 
 
-def _judge_rise(grid: Grid) -> Judgement:
+def _judge_rise(grid: ErrorGrid) -> Judgement:
     table, models = grid.table, grid.physics
     A, each = trend_over_accuracy(table, models)
     last, (first_N, *_, last_N) = len(each) - 1, grid.amounts
@@ -230,7 +230,7 @@ def _judge_rise(grid: Grid) -> Judgement:
     return trend_verdict(slopes, A, np.vstack([H, H[0] - H[last]])), evidence, numbers
 
 
-def _judge_harm(grid: Grid) -> Judgement:
+def _judge_harm(grid: ErrorGrid) -> Judgement:
     high, table, place = grid.members("high"), grid.table, len(grid.amounts) - 1
     lead = table.lead(NO_MODEL, high, place)
     better, worse = which_significant(lead.above), which_significant(lead.below)
@@ -257,7 +257,7 @@ def _judge_harm(grid: Grid) -> Judgement:
     moves: Verdict = "undecided"
     if worst:
         of_worst, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
-        more = float(ttest_1samp(of_worst - calm, 0.0, alternative="greater").pvalue)
+        more = _chance_of_mean(of_worst - calm)
         moves = verdict_of(more <= SIGNIFICANT, 1 - more <= SIGNIFICANT)
         evidence += (
             f"; over {orders} nested orders H of these varies by {percent(of_worst.mean())}, of moderate models by "
@@ -269,6 +269,12 @@ def _judge_harm(grid: Grid) -> Judgement:
     return weakest_verdict((split, moves)), evidence, numbers
 
 
+def _chance_of_mean(values: Array) -> float:
+    """Chance of a mean as far above 0 if there were none (Student's t, one-sided)."""
+    spread = values.std(ddof=1) / len(values) ** 0.5
+    return float(stdtr(len(values) - 1, -values.mean() / max(spread, 1e-300)))
+
+
 def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
     """(seeds,) distance of H from its mean over seeds, relative to it, in the mean over amounts and models."""
     H = np.array([table.H[model] @ table.weights for model in models])
@@ -276,7 +282,7 @@ def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
     return moved
 
 
-def _judge_metric(grid: Grid) -> Judgement:
+def _judge_metric(grid: ErrorGrid) -> Judgement:
     assert grid.by_90 is not None
     tables, other = (grid.table, grid.by_90), replace(grid, table=grid.by_90)
     both = [np.concatenate([table.H[m] @ table.weights for m in grid.table.H]).ravel() for table in tables]
@@ -298,19 +304,19 @@ def _judge_metric(grid: Grid) -> Judgement:
 
 
 @dataclass(frozen=True)
-class Pair:
+class SavingPair:
     """A moderate model against something dearer: what it saves, and the words.
 
     terms : the difference that must be shown. also : a second one that must be shown, too.
     """
 
-    terms: tuple[Term, ...]
+    terms: tuple[ErrorTerm, ...]
     saved: float
     text: str
-    also: tuple[Term, ...] | None = None
+    also: tuple[ErrorTerm, ...] | None = None
 
 
-def _judge_savings(grid: Grid) -> Judgement:
+def _judge_savings(grid: ErrorGrid) -> Judgement:
     grid.members("moderate")
     if len(grid.physics) < 2:
         raise Undecided("one physics model: there is no other to compare it with")
@@ -338,11 +344,11 @@ def _judge_savings(grid: Grid) -> Judgement:
     return weakest_verdict(parts), "; ".join(examples), numbers
 
 
-def _pairs_with_more_data(grid: Grid, small: Sequence[int]) -> list[Pair]:
+def _pairs_with_more_data(grid: ErrorGrid, small: Sequence[int]) -> list[SavingPair]:
     """Every moderate model with a small amount against no physics with the next larger one."""
     mean, amounts = grid.table.mean, grid.amounts
     return [
-        Pair(
+        SavingPair(
             ((1.0, NO_MODEL, k + 1), (-1.0, model, k)),
             amounts[k + 1] / amounts[k] - mean(model, k) / mean(NO_MODEL, k + 1),
             f"{model} with {amounts[k]} runs {grid.metres(model, k)} against {amounts[k + 1]} runs without "
@@ -353,24 +359,24 @@ def _pairs_with_more_data(grid: Grid, small: Sequence[int]) -> list[Pair]:
     ]
 
 
-def _pairs_with_better_physics(grid: Grid, k: int) -> list[Pair]:
+def _pairs_with_better_physics(grid: ErrorGrid, k: int) -> list[SavingPair]:
     """Every moderate model with the largest small amount against every more accurate physics alone."""
     mean = grid.table.mean
     return [
-        Pair(
-            ((1.0, other, ALONE), (-1.0, model, k)),
-            mean(model, ALONE) / mean(other, ALONE),
-            f"{model} ({grid.metres(model, ALONE)} alone) with {grid.amounts[k]} runs {grid.metres(model, k)} "
-            f"against {other} alone, {grid.metres(other, ALONE)}",
-            ((1.0, model, ALONE), (-1.0, other, ALONE)),
+        SavingPair(
+            ((1.0, other, PHYSICS_ONLY), (-1.0, model, k)),
+            mean(model, PHYSICS_ONLY) / mean(other, PHYSICS_ONLY),
+            f"{model} ({grid.metres(model, PHYSICS_ONLY)} alone) with {grid.amounts[k]} runs {grid.metres(model, k)} "
+            f"against {other} alone, {grid.metres(other, PHYSICS_ONLY)}",
+            ((1.0, model, PHYSICS_ONLY), (-1.0, other, PHYSICS_ONLY)),
         )
         for model in grid.moderate
         for other in grid.physics
-        if mean(other, ALONE) < mean(model, ALONE)
+        if mean(other, PHYSICS_ONLY) < mean(model, PHYSICS_ONLY)
     ]
 
 
-def _judge_roughness(grid: Grid) -> Judgement:
+def _judge_paths(grid: ErrorGrid) -> Judgement:
     physics, results = grid.members("physics"), grid.results
     assert results is not None
     if results.test.horizon < 3:
@@ -407,19 +413,19 @@ def compare_roughness(true: Array, pure: Array, together: Array, counts: Array) 
 
 
 FIRST_FOUR = ("S1", "S2", "S3", "S4")
-SIMULATION_RULES: dict[str, Rule[Grid]] = {
-    "S1": Rule(
+SIMULATION_RULES: dict[str, ClaimRule[ErrorGrid]] = {
+    "S1": ClaimRule(
         "every moderate cooperative model beats no physics at the smallest N_D, and most keep the lead", _judge_lead
     ),
-    "S2": Rule("H falls with N_D for every model", _judge_fall),
-    "S3": Rule("H rises with A at fixed N_D, most steeply at small N_D", _judge_rise),
-    "S4": Rule(
+    "S2": ClaimRule("H falls with N_D for every model", _judge_fall),
+    "S3": ClaimRule("H rises with A at fixed N_D, most steeply at small N_D", _judge_rise),
+    "S4": ClaimRule(
         "some high models beat no physics; the worst stay worse even at the largest N_D, and fluctuate", _judge_harm
     ),
-    "S5": Rule("H_90 leads to the same findings as H", _judge_metric),
-    "S6": Rule(
+    "S5": ClaimRule("H_90 leads to the same findings as H", _judge_metric),
+    "S6": ClaimRule(
         "moderate models with small N_D beat no physics with a larger one, and more accurate physics alone",
         _judge_savings,
     ),
-    "S7": Rule("paths without physics are rough at small N_D, those of cooperative models are not", _judge_roughness),
+    "S7": ClaimRule("paths without physics are rough at small N_D, those of cooperative models are not", _judge_paths),
 }

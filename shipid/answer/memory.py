@@ -20,15 +20,15 @@ from shipid.study.results import Results
 
 Array = np.ndarray
 Added = Literal["memory", "observer", "both"]
-Named = tuple[str, str]  # foundation and method
+CellName = tuple[str, str]  # foundation and method
 PHYSICS_ALONE = "physics alone"
-ORDER = 0.05  # share of a command's range in a run that counts as a new order
+NEW_ORDER = 0.05  # share of a command's range in a run that counts as a new order
 NOT_COMPARED = ("memory", "choose", "history_scale", "error_scale", "observer_scale")  # settings of memory itself
-ALONG = [
+OBSERVER_COLUMNS = [
     *("u", "v", "r", "observer.u", "observer.v", "observer.r", "observer.X", "observer.Y", "observer.N"),
     *("observer.current_north", "observer.current_east", "observer.test"),
 ]
-WORDS: dict[Added, str] = {"memory": "memory", "observer": "observer", "both": "observer and memory"}
+ADDED_WORDS: dict[Added, str] = {"memory": "memory", "observer": "observer", "both": "observer and memory"}
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class MemoryPair:
 
     added: Added
     comparison: str
-    without: Named
-    remembering: Named
+    without: CellName
+    remembering: CellName
     differs: tuple[str, ...] = ()
 
 
@@ -59,7 +59,7 @@ def memory_pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list
             names = (original.name, method), (observed.name, method)
             pairs.append(MemoryPair("observer", f"observer: {method}", *names))
         pairs += _method_pairs(original, observed, ways)
-    return sorted(pairs, key=lambda pair: [*WORDS].index(pair.added))
+    return sorted(pairs, key=lambda pair: [*ADDED_WORDS].index(pair.added))
 
 
 def kinds_of_memory(way: Way, foundation: Foundation) -> frozenset[str]:
@@ -83,7 +83,7 @@ def _method_pairs(original: Foundation, observed: Foundation, ways: Sequence[Way
         taken = {one.name: kinds_of_memory(one, original) for one in others}
         if fewer := [one for one in others if taken[one.name] < mine]:
             rival = min(fewer, key=lambda one: (len(taken[one.name]), len(_differing_settings(way, one))))
-            words = f"{WORDS[added]}: {way.name} against {rival.name}"
+            words = f"{ADDED_WORDS[added]}: {way.name} against {rival.name}"
             names = (original.name, rival.name), (observed.name, way.name)
             yield MemoryPair(added, words, *names, _differing_settings(way, rival))
 
@@ -113,7 +113,7 @@ def memory_frame(results: Results) -> pd.DataFrame:
     """
     rows, family = list[dict[str, Any]](), {one.name: one.family for one in results.plan.foundations}
 
-    def errors(named: Named, paths: Sequence[Array]) -> list[CellErrors]:
+    def errors(named: CellName, paths: Sequence[Array]) -> list[CellErrors]:
         learns = results.plan.learns(family[named[0]], named[1])
         return [CellErrors(named[0], results.path_errors(path), results.windows, learns) for path in paths]
 
@@ -141,7 +141,7 @@ def _names_of_pair(pair: MemoryPair, results: Results) -> dict[str, Any]:
 
 def _paired_paths(results: Results) -> Iterator[tuple[MemoryPair, int, list[Array], list[Array]]]:
     """Pair, N_D (0: physics alone), and the paths (T, S, 2) [m] of both, for the seeds that both have."""
-    cells: dict[tuple[Named, int], dict[int, str]] = {}
+    cells: dict[tuple[CellName, int], dict[int, str]] = {}
     for row in results.rows:
         if row["cell"] in results.paths:
             key = (str(row["foundation"]), str(row["method"])), int(row["N_D"])
@@ -179,7 +179,7 @@ def observer_frame(results: Results) -> pd.DataFrame:
     part = results.dataset.select(shown_runs(results))
     known = observe(vessel, known_by_then(results.plan, part), settings)
     begins = np.isnan(known.innovation).all(axis=1)
-    table = pd.DataFrame({**part.frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *ALONG]]
+    table = pd.DataFrame({**part.frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *OBSERVER_COLUMNS]]
     table["observer.test"] = np.where(begins, np.nan, table["observer.test"])
     table = table.assign(model=name, fade=bank(vessel, settings).fade, ahead=results.test.horizon * results.test.step)
     return insert_gaps(table, ["run", "model", "fade", "ahead"])
@@ -191,7 +191,7 @@ def orders_frame(results: Results) -> pd.DataFrame:
     for run in shown_runs(results):
         rows = results.dataset.frame[results.dataset.frame["run"] == run]
         values = rows[results.dataset.commands].to_numpy(dtype=float)
-        moved = (np.abs(np.diff(values, axis=0)) > ORDER * np.ptp(values, axis=0) + 1e-9).any(axis=1)
+        moved = (np.abs(np.diff(values, axis=0)) > NEW_ORDER * np.ptp(values, axis=0) + 1e-9).any(axis=1)
         begins = moved & ~np.concatenate([[False], moved[:-1]])
         frames += [(run, float(t)) for t in rows["t"].to_numpy()[1:][begins]]
     return pd.DataFrame(frames, columns=["run", "t"])

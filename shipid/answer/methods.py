@@ -25,7 +25,7 @@ COLUMNS = [
     *("worlds", "least", "greatest", "world_low", "world_high"),
     "ahead",
 ]
-Known = Mapping[tuple[str, str, int], CellErrors]  # by world, foundation and seed
+ErrorsByCell = Mapping[tuple[str, str, int], CellErrors]  # by world, foundation and seed
 
 
 def compare_methods(results: Results) -> pd.DataFrame:
@@ -99,19 +99,19 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _errors_by_cell(cells: pd.DataFrame) -> Known:
+def _errors_by_cell(cells: pd.DataFrame) -> ErrorsByCell:
     good = cells[cells["status"] == "ok"]
     keys = zip(good["world"], good["foundation"], good["seed"], strict=True)
     return dict(zip(keys, good["errors"], strict=True))
 
 
-def _is_lower(one: Known, other: Known) -> bool:
+def _is_lower(one: ErrorsByCell, other: ErrorsByCell) -> bool:
     """Whether the mean error of one method is lower over the cells that both have, by more than rounding."""
     mine, others = (math.fsum(of[key].mean for key in one.keys() & other.keys()) for of in (one, other))
     return mine < (1 - ROUNDING) * others
 
 
-def _interval_of_mean(mine: Known) -> dict[str, float]:
+def _interval_of_mean(mine: ErrorsByCell) -> dict[str, float]:
     """95 % interval of the mean error over test runs, each drawn with all its windows and cells."""
     if not mine:
         return {"H_low": np.nan, "H_high": np.nan}
@@ -120,7 +120,7 @@ def _interval_of_mean(mine: Known) -> dict[str, float]:
     return {"H_low": float(np.maximum(one.low, 0.0)), "H_high": one.high}
 
 
-def _difference_row(mine: Known, others: Known) -> dict[str, Any]:
+def _difference_row(mine: ErrorsByCell, others: ErrorsByCell) -> dict[str, Any]:
     """Difference of H over the cells that both have, its intervals, over test runs and over worlds."""
     keys = [key for key in mine if key in others]
     if not keys:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from shipid.answer.error_table import ALONE, ErrorTable, error_table
+from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
 from shipid.answer.verdict import (
     count_manoeuvres,
     count_runs,
@@ -34,7 +34,7 @@ from shipid.units import percent, plural
 
 MOST_SHOWN = 5  # models that a sentence lists with their errors
 BEST = "best in validation"
-WHOLE = " with a result in every cell"
+IN_EVERY_CELL = " with a result in every cell"
 
 
 def errors_by_model(results: Results) -> pd.DataFrame:
@@ -75,7 +75,7 @@ class Sides:
 
 
 @dataclass(frozen=True)
-class Case:
+class AnswerCase:
     """Inputs of the sentences of one study: `rows` are `errors_by_model` without families set aside.
 
     best : as of `best_model`; None where no trial of a physics model has a value.
@@ -153,7 +153,7 @@ class Case:
         """What the compared physics models have, where others have not."""
         cells = self.results.judged_cells
         tried = set(cells["model"][~cells["family"].isin([NO_MODEL, *self.results.aside])])
-        return "" if tried <= set(self.table.H) else WHOLE
+        return "" if tried <= set(self.table.H) else IN_EVERY_CELL
 
 
 def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str]]:
@@ -166,7 +166,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     caveats = [(text, "cells") for text in _missing_cells(results)]
     if reason := _no_comparison(results, rows):
         return [*caveats, (reason, "cells"), *((text, "models") for text in saw_test)]
-    case, learning = Case(results, rows, best_model(results)), results.plan.learning
+    case, learning = AnswerCase(results, rows, best_model(results)), results.plan.learning
     chart = "map" if case.smallest < case.largest and case.at(case.largest)["model"].nunique() > 1 else "gain"
     several = len(learning) > 1
     parts: list[tuple[str, Iterable[str]]] = [
@@ -219,7 +219,7 @@ def _no_comparison(results: Results, rows: pd.DataFrame) -> str:
         return "No cell with physics and data that counts has a result yet, so there is no conclusion."
     cells = results.cells[(results.cells["status"] == "ok") & (results.cells["N_D"] == largest)]
     errors = _least_errors(cells.groupby("model")["H"].mean())
-    return f"{reason}. Mean errors {_ahead(results)} ahead, with {count_runs(largest)}{errors}."
+    return f"{reason}. Mean errors {_horizon_in_words(results)} ahead, with {count_runs(largest)}{errors}."
 
 
 def _least_errors(errors: pd.Series[float]) -> str:
@@ -230,11 +230,11 @@ def _least_errors(errors: pd.Series[float]) -> str:
     return f"{of}: {listed(words, MOST_SHOWN)}"
 
 
-def _ahead(results: Results) -> str:
+def _horizon_in_words(results: Results) -> str:
     return f"{results.test.horizon * results.test.step:g} s"
 
 
-def _physics_that_pays(case: Case) -> Iterator[str]:
+def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
     """How good physics must be to pay, at the smallest and at the largest amount of data."""
     if NO_MODEL not in case.table.H:
         planned = (NO_MODEL, case.results.plan.judged) in {(name, way.name) for name, way in case.results.plan.pairs}
@@ -245,10 +245,10 @@ def _physics_that_pays(case: Case) -> Iterator[str]:
     each = ". With ".join(f"{count_runs(amount)} {part}" for amount, part in parts.items())
     if len(parts) == 2 and len(set(parts.values())) == 1:
         each = f"{case.smallest} or {count_runs(case.largest)} {parts[case.largest]}"
-    yield f"How good must the physics be, {_ahead(case.results)} ahead? With {each}."
+    yield f"How good must the physics be, {_horizon_in_words(case.results)} ahead? With {each}."
 
 
-def _limit_or_sides(case: Case, amount: int) -> str:
+def _limit_or_sides(case: AnswerCase, amount: int) -> str:
     """Up to which error A physics pays, and which models do better than none; these alone where no A divides them."""
     sides, limit = case.against_none[amount]
     if not sides.better and not sides.worse:
@@ -257,7 +257,7 @@ def _limit_or_sides(case: Case, amount: int) -> str:
         return f"the test cannot tell {which} from no physics"
     models = _sides_in_words(case, sides)
     if limit is None:
-        worst = max((case.table.mean(model, ALONE) for model in case.fixed), default=0.0)
+        worst = max((case.table.mean(model, PHYSICS_ONLY) for model in case.fixed), default=0.0)
         all_pay = worst > 0 and not sides.worse and not sides.unknown
         return models + (f", even with an error A of {length_in_metres(worst)}" if all_pay else "")
     (least, most), bounds = map(length_in_metres, limit.limits), _bounds(limit, _short_length)
@@ -282,7 +282,7 @@ def _bounds(estimate: Estimate, write: Callable[[float], str]) -> str:
     return f" [{low_words}, {f'over {write(most)}' if high >= most else write(high)}]"
 
 
-def _runs_that_physics_saves(case: Case) -> Iterator[str]:
+def _runs_that_physics_saves(case: AnswerCase) -> Iterator[str]:
     """Error of the best model with the fewest runs, and how many runs give the same error without physics."""
     best, fewest, largest = case.best, case.smallest, case.largest
     if best is None or fewest == largest or NO_MODEL not in set(case.rows["family"]):
@@ -305,30 +305,30 @@ def _runs_that_physics_saves(case: Case) -> Iterator[str]:
     yield f"How many runs? With {count_runs(fewest)}, {best} ({BEST}) has {case.H(best, fewest)} mean error; {text}."
 
 
-def _headline(case: Case) -> Iterator[str]:
+def _headline(case: AnswerCase) -> Iterator[str]:
     """Error of the best model at the largest amount of data; of all models where none is known to be the best."""
     largest, rows = case.largest, case.at(case.largest).set_index("model")
     pure = case.rows[(case.rows["family"] == NO_MODEL) & (case.rows["N_D"] == largest)]
     without = f" Without physics: {case.H(NO_MODEL, largest)}." if len(pure) else ""
     if case.best is None:
         text = f"no trial of the method {case.results.plan.judged!r} has a value, so no model is {BEST}. Mean errors "
-        text += f"{_ahead(case.results)} ahead{_least_errors(rows['H'])}"
+        text += f"{_horizon_in_words(case.results)} ahead{_least_errors(rows['H'])}"
     else:
-        alone, worst = (length_in_metres(float(rows.at[case.best, name])) for name in ("A", "H_90"))
+        alone, worst = (length_in_metres(float(rows[name][case.best])) for name in ("A", "H_90"))
         text = (
-            f"{case.best} ({BEST}; {alone} mean error alone) predicts {_ahead(case.results)} ahead with "
+            f"{case.best} ({BEST}; {alone} mean error alone) predicts {_horizon_in_words(case.results)} ahead with "
             f"{case.H(case.best, largest)} mean error; nine errors in ten are below {worst}"
         )
     yield f"With {count_runs(largest)}, {text}.{without}"
 
 
-def _judged_method(case: Case) -> Iterator[str]:
+def _judged_method(case: AnswerCase) -> Iterator[str]:
     plan = case.results.plan
     words = f"The study has {len(plan.learning)} methods that learn from data; the other sentences speak of"
     yield f"{words} {plan.judged!r}, the one that the study judges by."
 
 
-def _sides_in_words(case: Case, sides: Sides) -> str:
+def _sides_in_words(case: AnswerCase, sides: Sides) -> str:
     """Which models are better than no physics and which are worse."""
     count = len(sides.better) + len(sides.worse) + len(sides.unknown)
     if len(sides.better) == count:
@@ -342,7 +342,7 @@ def _sides_in_words(case: Case, sides: Sides) -> str:
     return "; ".join(parts)
 
 
-def _error_left(case: Case) -> Iterator[str]:
+def _error_left(case: AnswerCase) -> Iterator[str]:
     """How much of the error of physics alone is left, over the models that are not exact."""
     known = case.at(case.largest)
     known = known[known["A"] > 0]
@@ -353,22 +353,24 @@ def _error_left(case: Case) -> Iterator[str]:
         yield f"Compensation with {count_runs(case.largest)} leaves {share} of the error of physics alone {models}."
 
 
-def _harm_of_compensation(case: Case) -> Iterator[str]:
+def _harm_of_compensation(case: AnswerCase) -> Iterator[str]:
     """Which models are better without their compensator, and the best physics alone if nothing compensated beats it."""
     models, last = case.fixed, case.ends[case.largest]
     if not models:
         return
-    sides = case.sides(models, case.table.compare([[(1.0, model, ALONE), (-1.0, model, last)] for model in models]))
+    sides = case.sides(
+        models, case.table.compare([[(1.0, model, PHYSICS_ONLY), (-1.0, model, last)] for model in models])
+    )
     if sides.worse:
         yield f"Compensation harms {model_list(sides.worse)}."
     if sides.unknown:
         yield f"It is not shown that compensation helps {model_list(sides.unknown)}."
-    error, best = min((case.table.mean(model, ALONE), model) for model in models)
+    error, best = min((case.table.mean(model, PHYSICS_ONLY), model) for model in models)
     if len(sides.better) < len(models) and error < case.at(case.largest)["H"].min():
         yield f"Alone, {best} has {length_in_metres(error)}, less than any compensated model."
 
 
-def _harm_of_data(case: Case) -> Iterator[str]:
+def _harm_of_data(case: AnswerCase) -> Iterator[str]:
     """Which models are not better with the most data than with the least."""
     if case.smallest == case.largest:
         return
@@ -381,7 +383,7 @@ def _harm_of_data(case: Case) -> Iterator[str]:
             yield f"With {count_runs(case.largest)} {model_list(names)} {are} {how} {than}."
 
 
-def _against_constant_motion(case: Case) -> Iterator[str]:
+def _against_constant_motion(case: AnswerCase) -> Iterator[str]:
     """Which models do no better than constant u, v, r, at the largest amount of data."""
     results, table, last = case.results, case.table, case.ends[case.largest]
     models = [str(name) for name in case.rows["model"][case.rows["N_D"] == case.largest] if name in table.H]
@@ -399,7 +401,7 @@ def _against_constant_motion(case: Case) -> Iterator[str]:
     yield f"{begins}: at {count_runs(case.largest)} {text}."
 
 
-def _how_to_read(case: Case) -> Iterator[str]:
+def _how_to_read(case: AnswerCase) -> Iterator[str]:
     """What "no physics" is, what identified models, models set from the runs and known commands mean, and brackets."""
     results, plan, top = case.results, case.results.plan, case.at(case.largest)
     judged = next(way.method for way in plan.methods if way.name == plan.judged)

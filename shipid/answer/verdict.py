@@ -16,7 +16,7 @@ from shipid.units import decimals_of, plural
 
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
 Judgement = tuple[Verdict, str, Mapping[str, float]]  # with the evidence in words, and key numbers by name and unit
-Case = TypeVar("Case", contravariant=True)
+Judged = TypeVar("Judged", contravariant=True)
 MOST_NAMES = 5  # in one sentence
 SAME_A = "all physics models have the same A, so nothing can rise with it"
 EQUAL_A = "it is not shown which of them is more accurate"
@@ -37,13 +37,13 @@ class Undecided(Exception):
 
 
 @dataclass(frozen=True)
-class Rule(Generic[Case]):
+class ClaimRule(Generic[Judged]):
     """A claim and how it is judged: `judge` takes what the claim is about, and raises Undecided where that lacks."""
 
     claim: str
-    judge: Callable[[Case], Judgement]
+    judge: Callable[[Judged], Judgement]
 
-    def decide(self, case: Case) -> Judgement:
+    def decide(self, case: Judged) -> Judgement:
         """Verdict, evidence and numbers; undecided, with the reason as evidence, where something lacks."""
         try:
             return self.judge(case)
@@ -51,7 +51,7 @@ class Rule(Generic[Case]):
             return "undecided", str(reason), {}
 
 
-def judge_claims(rules: Mapping[str, Rule[Any]], case: object, note: str = "") -> list[Finding]:
+def judge_claims(rules: Mapping[str, ClaimRule[Any]], case: object, note: str = "") -> list[Finding]:
     """The finding of each rule, in order. note : what is added to the evidence of all."""
     findings: list[Finding] = []
     for key, rule in rules.items():
@@ -61,7 +61,7 @@ def judge_claims(rules: Mapping[str, Rule[Any]], case: object, note: str = "") -
     return findings
 
 
-def leave_undecided(rules: Mapping[str, Rule[Any]], reason: str) -> list[Finding]:
+def leave_undecided(rules: Mapping[str, ClaimRule[Any]], reason: str) -> list[Finding]:
     """Every claim undecided, for the same reason."""
     return [Finding(id=k, claim=r.claim, verdict="undecided", evidence=reason, numbers={}) for k, r in rules.items()]
 
@@ -79,29 +79,29 @@ def weakest_verdict(verdicts: Iterable[Verdict]) -> Verdict:
 
 def length_in_metres(value: float) -> str:
     """Return a length with two decimals, from 10 m on with one, of a model below 0.1 m with two digits or more."""
-    return f"{_decimal(value, _places(value))} m"
+    return f"{_fixed(value, _decimal_places(value))} m"
 
 
-def _places(value: float) -> int:
+def _decimal_places(value: float) -> int:
     return 1 if abs(value) >= 9.995 else decimals_of(value)
 
 
-def _decimal(value: float, places: int) -> str:
+def _fixed(value: float, places: int) -> str:
     """Return a number with so many decimals, and no minus zero."""
     return f"{round(value, places) + 0.0:.{places}f}"
 
 
 def interval_after(low: float, high: float, value: float) -> str:
     """Return ` [low, high]` with the decimals of the value that it follows, or nothing where there is none."""
-    places = _places(value)
-    return f" [{_decimal(low, places)}, {_decimal(high, places)}]" if np.isfinite([low, high]).all() else ""
+    places = _decimal_places(value)
+    return f" [{_fixed(low, places)}, {_fixed(high, places)}]" if np.isfinite([low, high]).all() else ""
 
 
 def difference_with_interval(differences: Differences, index: int = 0) -> str:
     """Return a difference with its 95 % interval, all with the decimals of the greatest."""
     mean, low, high = (float(values[index]) for values in (differences.mean, differences.low, differences.high))
     greatest = float(np.nanmax(np.abs([mean, low, high])))
-    return f"{_decimal(mean, _places(greatest))} m{interval_after(low, high, greatest)}"
+    return f"{_fixed(mean, _decimal_places(greatest))} m{interval_after(low, high, greatest)}"
 
 
 def least_to_greatest(*numbers: str) -> str:

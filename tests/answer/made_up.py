@@ -14,7 +14,7 @@ import numpy as np
 from shipid.answer.error_table import ErrorTable
 from shipid.answer.findings_bands import Widths, judge_width_trend
 from shipid.answer.findings_full_scale import FULL_SCALE_RULES, Rivals
-from shipid.answer.findings_simulation import SIMULATION_RULES, Grid, compare_roughness
+from shipid.answer.findings_simulation import SIMULATION_RULES, ErrorGrid, compare_roughness
 from shipid.answer.verdict import Verdict
 from shipid.study.declared import NO_MODEL
 
@@ -69,7 +69,7 @@ def table(
     return ErrorTable(size.amounts, counts, alone, errors)
 
 
-def grids(rng: np.random.Generator, size: Size, case: str, effect: float) -> Grid:
+def grids(rng: np.random.Generator, size: Size, case: str, effect: float) -> ErrorGrid:
     """Tables of H and H_90 in a world without an effect in the claim `case` (0), with the paper's (1), or between."""
     moderate, high = size.members
     share = np.array(size.amounts) / size.amounts[0]
@@ -98,7 +98,7 @@ def grids(rng: np.random.Generator, size: Size, case: str, effect: float) -> Gri
     else:
         tails = {model: 2.2 * values * factor(rng, 0.05, values.shape) for model, values in by_mean.H.items()}
         by_90 = ErrorTable(size.amounts, by_mean.counts, {m: 2.2 * a for m, a in by_mean.A.items()}, tails)
-    return Grid(by_mean, moderate, high, by_90=by_90)
+    return ErrorGrid(by_mean, moderate, high, by_90=by_90)
 
 
 def rivals(rng: np.random.Generator, size: Size, case: str, effect: float) -> Rivals:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.answer.error_table import ALONE, error_table, intervals_frame
+from shipid.answer.error_table import PHYSICS_ONLY, error_table, intervals_frame
 from shipid.evidence import TRAINING, WORTH, paired_difference
 from tests.answer.byhand import grid
 
@@ -19,7 +19,7 @@ def test_means_are_those_of_the_cells(made: Any) -> None:
     table = error_table(made(grid(H), runs=8), ["good", "bad"])
     assert (table.amounts, table.runs) == ((10, 30), 8)
     assert [table.mean("good", k) for k in (0, 1)] == pytest.approx([1.5, 1.0])
-    assert table.mean("bad", ALONE) == pytest.approx(6.0)
+    assert table.mean("bad", PHYSICS_ONLY) == pytest.approx(6.0)
     lead = table.lead("none", ["good", "bad"], 0)
     assert lead.mean.tolist() == pytest.approx([7.5, 6.0])
     assert (lead.low > 0).all()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from shipid.answer.verdict import (
-    Rule,
+    ClaimRule,
     Undecided,
     count_runs,
     difference_with_interval,
@@ -39,7 +39,7 @@ def test_a_rule_without_what_it_needs_is_undecided() -> None:
     def lacking(_: object) -> Any:
         raise Undecided("no model")
 
-    rules = {"S1": Rule("one", lambda _: ("confirmed", "so", {"x": 1.0})), "S2": Rule("two", lacking)}
+    rules = {"S1": ClaimRule("one", lambda _: ("confirmed", "so", {"x": 1.0})), "S2": ClaimRule("two", lacking)}
     assert [tuple(one.values()) for one in judge_claims(rules, None, "of few")] == [
         ("S1", "one", "confirmed", "so; of few", {"x": 1.0}),
         ("S2", "two", "undecided", "no model; of few", {}),

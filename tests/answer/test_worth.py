@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.worth import _estimate, break_even, runs_without_physics
+from shipid.answer.worth import _quantile_estimate, break_even, runs_without_physics
 
 
 def table(
@@ -33,7 +33,7 @@ def test_of_normal_means_the_interval_is_students(runs: int) -> None:
     """Resampled means scatter less than means do, by sqrt(1 - 1 / runs): the expansion makes up for it."""
     error = 0.7
     drawn = 4.0 + error * (1 - 1 / runs) ** 0.5 * stats.norm.ppf((np.arange(19999) + 0.5) / 19999)
-    estimate = _estimate(np.array([4.0]), drawn, runs, (0.0, 100.0))
+    estimate = _quantile_estimate(np.array([4.0]), drawn, runs, (0.0, 100.0))
     wide = stats.t.ppf(0.975, runs - 1) * error
     assert (estimate.low, estimate.high) == pytest.approx((4.0 - wide, 4.0 + wide), abs=0.02 * wide)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from shipid.answer.findings_full_scale import Rivals
-from shipid.answer.findings_simulation import Grid
+from shipid.answer.findings_simulation import ErrorGrid
 from shipid.answer.verdict import Verdict
 from shipid.metrics import rank_correlation
 from shipid.study.declared import NO_MODEL
@@ -35,7 +35,7 @@ def verdict(always: bool, on_average: bool) -> Verdict:
     return "confirmed" if always else "undecided" if on_average else "refuted"
 
 
-def by_seed(grid: Grid) -> dict[str, Array]:
+def by_seed(grid: ErrorGrid) -> dict[str, Array]:
     """Model -> (amounts, seeds) mean errors [m]."""
     return {model: values @ grid.table.weights for model, values in grid.table.H.items()}
 
@@ -50,7 +50,7 @@ def asked(
     return verdict(holds(mean) and each, (weakly or holds)(mean))
 
 
-def S1(grid: Grid) -> Verdict:
+def S1(grid: ErrorGrid) -> Verdict:
     """Every moderate member leads at the smallest amount, more than half at every amount."""
 
     def holds(H: Means) -> bool:
@@ -60,7 +60,7 @@ def S1(grid: Grid) -> Verdict:
     return asked(by_seed(grid), holds)
 
 
-def S2(grid: Grid) -> Verdict:
+def S2(grid: ErrorGrid) -> Verdict:
     """Rank correlation of H and N_D at most -0.5, and H lower at the end."""
     amounts = np.array(grid.amounts, dtype=float)
     return asked(
@@ -70,7 +70,7 @@ def S2(grid: Grid) -> Verdict:
     )
 
 
-def S3(grid: Grid) -> Verdict:
+def S3(grid: ErrorGrid) -> Verdict:
     """Rank correlation of H and A at least 0.5 everywhere, and a slope that falls."""
     A = np.array([grid.table.A[model] @ grid.table.weights for model in grid.physics])
     amounts = np.array(grid.amounts, dtype=float)
@@ -95,7 +95,7 @@ def S3(grid: Grid) -> Verdict:
     return asked(by_seed(grid), holds, weakly)
 
 
-def S4(grid: Grid) -> Verdict:
+def S4(grid: ErrorGrid) -> Verdict:
     """Some high members lead at the end and some do not, and those fluctuate more than the moderate ones."""
     H = by_seed(grid)
     if H[NO_MODEL].shape[1] < 5:
@@ -115,7 +115,7 @@ def S4(grid: Grid) -> Verdict:
     return asked(H, holds) if moved[0] > moved[1] else "refuted"
 
 
-def S5(H: Grid, H_90: Grid) -> Verdict:
+def S5(H: ErrorGrid, H_90: ErrorGrid) -> Verdict:
     """Rank correlation of H and H_90 at least 0.95 and the same verdicts on S1-S4."""
     both = [np.concatenate([values.ravel() for values in by_seed(grid).values()]) for grid in (H, H_90)]
     alike = rank_correlation(*both)
@@ -125,7 +125,7 @@ def S5(H: Grid, H_90: Grid) -> Verdict:
     return verdict(alike >= 0.95 and not changed, not opposite and alike >= 0.8)
 
 
-def S6(grid: Grid) -> Verdict:
+def S6(grid: ErrorGrid) -> Verdict:
     """Any moderate member with few runs below `none` with more, and any below more accurate physics alone."""
     H = by_seed(grid)
     A = {model: float(values @ grid.table.weights) for model, values in grid.table.A.items()}
