@@ -7,9 +7,8 @@ form as there. A network that calibrates a model's prediction of ship motion by 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,25 +48,12 @@ class TrajectoryInputs(Inputs):
             inputs |= {f"{label}.{name}": np.where(sound, states[name][k - 1], 0.0) for name in SEEN}
         return inputs
 
-    def header(self) -> dict[str, Any]:
-        """Return the inputs as plain JSON."""
-        return {**super().header(), "moments": self.moments}
-
-    @classmethod
-    def from_header(cls, header: Mapping[str, Any]) -> TrajectoryInputs:
-        """Rebuild what `header` gave."""
-        plain = Inputs.from_header(header)
-        return cls(plain.commands, plain.memory, int(header["moments"]))
-
 
 @dataclass(frozen=True)
 class Calibrated(Compensator):
     """A compensator whose inputs hold the trajectory of the physics."""
 
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header()` and `arrays()`; ResultError where a part is missing or shapes do not fit."""
-        return replace(super().from_arrays(header, arrays), inputs=TrajectoryInputs.from_header(header["inputs"]))
+    inputs: TrajectoryInputs
 
 
 class Calibrator(PathDrawn):

@@ -10,17 +10,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.windows import Instants
-from shipid.errors import ResultError
-from shipid.files import entries_of
 from shipid.hybrid.features import Inputs, rows_of
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.stored import Stored
 
 Array = NDArray[np.float64]
 Layers = tuple[tuple[Array, Array], ...]
@@ -28,7 +26,7 @@ KEPT = 2**27  # bytes of hidden units that `shared_units` keeps, at most
 
 
 @dataclass(frozen=True)
-class Normaliser:
+class Normaliser(Stored):
     """The z-score of the training samples: (value - mean) / std of each named feature.
 
     Parameters
@@ -53,7 +51,7 @@ class Normaliser:
 
 
 @dataclass(frozen=True)
-class Network:
+class Network(Stored):
     """One trained network with what belongs to its data: inputs, statistics, shapes of its outputs.
 
     Parameters
@@ -125,7 +123,7 @@ def _of_layers(layers: Sequence[tuple[Array, Array]], inputs: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Compensator:
+class Compensator(Stored):
     """The mean of some networks: what is known at an instant -> compensation of the path after it.
 
     Parameters
@@ -152,55 +150,6 @@ class Compensator:
         """Return the compensation (T, S, 2) [m] in the frame (11) of the instant, from inputs (S,) by name."""
         total = sum((network.predict(table) for network in self.networks), start=np.zeros(()))
         return np.asarray(total / len(self.networks))
-
-    def header(self) -> dict[str, Any]:
-        """Return all that is not an array, as plain JSON."""
-        return {
-            "inputs": self.inputs.header(),
-            "hyperparameters": dict(self.hyperparameters),
-            "networks": [
-                {"features": {k: list(v) for k, v in n.features.items()}, "layers": len(n.layers)}
-                for n in self.networks
-            ],
-        }
-
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by flat names: `0.mean`, `0.std`, `0.basis`, `0.weight.0`, `0.bias.0`, ..."""
-        flat: dict[str, Array] = {}
-        for i, network in enumerate(self.networks):
-            flat |= {
-                f"{i}.mean": network.normaliser.mean,
-                f"{i}.std": network.normaliser.std,
-                f"{i}.basis": network.basis,
-            }
-            for j, (weight, bias) in enumerate(network.layers):
-                flat |= {f"{i}.weight.{j}": weight, f"{i}.bias.{j}": bias}
-        return flat
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header()` and `arrays()`; raises ResultError where a part is missing or shapes do not fit."""
-        try:
-            networks = []
-            for i, entry in enumerate(entries_of(header, "networks")):
-                features = {k: tuple(v) for k, v in entry["features"].items()}
-                layers = tuple((arrays[f"{i}.weight.{j}"], arrays[f"{i}.bias.{j}"]) for j in range(entry["layers"]))
-                normaliser = Normaliser(tuple(features), arrays[f"{i}.mean"], arrays[f"{i}.std"])
-                networks.append(Network(features, normaliser, arrays[f"{i}.basis"], layers))
-                _check(networks[-1], i)
-            return cls(Inputs.from_header(header["inputs"]), tuple(networks), dict(header["hyperparameters"]))
-        except KeyError as error:
-            raise ResultError("missing in the saved compensator", path=str(error.args[0])) from None
-
-
-def _check(network: Network, index: int) -> None:
-    """Refuse a network whose arrays do not fit together."""
-    widths = [len(network.features), *(weight.shape[1] for weight, _ in network.layers)]
-    expected = [((i, o), (o,)) for i, o in pairwise(widths)]
-    shapes = [(weight.shape, bias.shape) for weight, bias in network.layers]
-    statistics = {network.normaliser.mean.shape, network.normaliser.std.shape}
-    if shapes != expected or statistics != {(widths[0],)} or network.basis.shape[1:] != (widths[-1] // 2,):
-        raise ResultError("the arrays of the saved compensator do not fit together", path=f"networks.{index}")
 
 
 def flatten(paths: Array) -> Array:

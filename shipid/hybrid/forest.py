@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveInt
 
 from shipid.data.windows import Instants
-from shipid.errors import ResultError, ShipidError
+from shipid.errors import ShipidError
 from shipid.hybrid.compensator import unflatten
 from shipid.hybrid.features import Inputs, Memory, choose_features, rows_of
 from shipid.hybrid.method import Fitted, Index, Task, Traits, shared_tables
@@ -25,18 +25,17 @@ from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Searched, seed_of
+from shipid.hybrid.stored import Stored
 from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of, used
-from shipid.hybrid.units import taken
 
 Array = NDArray[np.float64]
 Leaf = Annotated[float, Field(ge=1.0)]
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 LEAF = -1  # the child of a node that has none
-NODES = ("first", "left", "right", "feature", "threshold", "value")
 
 
 @dataclass(frozen=True)
-class Trees:
+class Trees(Stored):
     """Regression trees as arrays of nodes, one tree after the other.
 
     first : (trees,) root of each tree. left, right : (nodes,) children, -1 for a leaf; a sample goes left where its
@@ -68,20 +67,6 @@ class Trees:
             np.concatenate([tree.value[:, :, 0] for tree in trees]),
         )
 
-    def fit_together(self, inputs: int) -> bool:
-        """Whether each way down a tree ends: children come after their node, and each that is no leaf asks an input."""
-        nodes = np.arange(self.threshold.size)
-        if any(part.shape != nodes.shape for part in (self.left, self.right, self.feature, self.threshold)):
-            return False
-        inner = self.left != LEAF
-        return bool(
-            self.first.size > 0
-            and np.all((self.first >= 0) & (self.first < len(nodes)))
-            and np.array_equal(inner, self.right != LEAF)
-            and all(np.all((nodes < part)[inner] & (part < len(nodes))[inner]) for part in (self.left, self.right))
-            and np.all((self.feature >= 0)[inner] & (self.feature < inputs)[inner])
-        )
-
     def predict(self, inputs: Array) -> Array:
         """Mean over the trees (S, outputs) for inputs (S, d), which scikit-learn compares in single precision."""
         largest = float(np.finfo(np.float32).max)
@@ -98,7 +83,7 @@ class Trees:
 
 
 @dataclass(frozen=True)
-class ForestCorrector:
+class ForestCorrector(Stored):
     """Trees that give the compensation of the path.
 
     inputs : which quantities the trees may take. names : those that they take, in order.
@@ -121,26 +106,6 @@ class ForestCorrector:
         table = self.inputs.table(physics, instants)
         weights = self.trees.predict(rows_of(table, self.names))
         return np.asarray(paths + np.tensordot(self.basis, unflatten(weights), 1))
-
-    def header(self) -> dict[str, Any]:
-        """Return names and hyperparameters."""
-        names, hyperparameters = list(self.names), dict(self.hyperparameters)
-        return {"inputs": self.inputs.header(), "names": names, "hyperparameters": hyperparameters}
-
-    def arrays(self) -> dict[str, Array]:
-        """Return the basis and the nodes of the trees by name."""
-        return {"basis": self.basis} | {name: getattr(self.trees, name).astype(float) for name in NODES}
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        first, left, right, feature, threshold, value = (taken(arrays, name) for name in NODES)
-        names, basis = tuple(header["names"]), taken(arrays, "basis")
-        whole = [part.astype(np.int64) for part in (first, left, right, feature)]
-        trees = Trees(whole[0], whole[1], whole[2], whole[3], threshold, value)
-        if not trees.fit_together(len(names)) or value.shape != (len(threshold), 2 * basis.shape[1]):
-            raise ResultError("the arrays of the saved trees do not fit together", path="value")
-        return cls(Inputs.from_header(header["inputs"]), names, basis, trees, dict(header["hyperparameters"]))
 
 
 class Forest(Searched):

@@ -20,7 +20,7 @@ from pydantic import Field, PositiveFloat
 from pydantic import model_validator as validator
 
 from shipid.data.windows import Instants
-from shipid.errors import DataError, ResultError
+from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import MOTIONS, choose_features, feature_table, steps_of
 from shipid.hybrid.method import Index, Task
@@ -38,14 +38,15 @@ from shipid.hybrid.stepping import (
     true_motion,
     true_steps,
 )
-from shipid.hybrid.units import solve, taken
+from shipid.hybrid.stored import Stored
+from shipid.hybrid.units import solve
 
 Array = NDArray[np.float64]
 MISSED = ("missed.u", "missed.v", "missed.r")
 
 
 @dataclass(frozen=True)
-class Law:
+class Law(Stored):
     """The linear law, with its inputs.
 
     commands : names of the command columns. delays : number of past steps.
@@ -121,7 +122,7 @@ def _missed_before(physics: Physics, instants: Instants, delays: int) -> list[Ar
 
 
 @dataclass(frozen=True)
-class HankelCorrector:
+class HankelCorrector(Stored):
     """The law, rolled over the horizon from the past of the instants."""
 
     law: Law
@@ -139,30 +140,6 @@ class HankelCorrector:
             return residual
 
         return stepped_paths(physics, instants, acceleration)
-
-    def header(self) -> dict[str, Any]:
-        """Return names and hyperparameters."""
-        return {
-            "commands": list(self.law.commands),
-            "delays": self.law.delays,
-            "names": list(self.law.normaliser.names),
-            "past": self.past,
-            "hyperparameters": dict(self.hyperparameters),
-        }
-
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by name."""
-        return {"mean": self.law.normaliser.mean, "std": self.law.normaliser.std, "weights": self.law.weights}
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        names = tuple(header["names"])
-        mean, std, weights = (taken(arrays, name) for name in ("mean", "std", "weights"))
-        if mean.shape != (len(names),) or std.shape != mean.shape or weights.shape != (len(names) + 1, 3):
-            raise ResultError("the arrays of the saved method do not fit together", path="weights")
-        law = Law(tuple(header["commands"]), int(header["delays"]), Normaliser(names, mean, std), weights)
-        return cls(law, float(header["past"]), dict(header["hyperparameters"]))
 
 
 class HankelDMD(Stepped):

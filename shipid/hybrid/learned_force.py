@@ -12,7 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,12 @@ from pydantic import PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.document import LEAST_NUMBER
-from shipid.errors import ResultError
 from shipid.hybrid.method import Fitted, Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
 from shipid.hybrid.stepping import TrueSteps, true_steps
+from shipid.hybrid.stored import Stored
 from shipid.hybrid.trials import best_of, diverged, ridges_of, row_of, sound, used
 from shipid.hybrid.units import solve
 from shipid.vessel.dynamics import dynamics
@@ -43,7 +43,7 @@ LEAST_SCALE = 1e-3  # m/s and rad/s: of a motion that does not vary
 
 
 @dataclass(frozen=True)
-class ForceCorrector:
+class ForceCorrector(Stored):
     """A force added to the equations: numbers of the block `hull.learned`, name -> (units,) or (1,)."""
 
     block: Mapping[str, Array]
@@ -57,28 +57,6 @@ class ForceCorrector:
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
         """Return paths (T, S, 2) [m] in the frame (11) of the physics with the learned force."""
         return self.with_force(physics).paths(instants)
-
-    def header(self) -> dict[str, Any]:
-        """Return the hyperparameters."""
-        return {"hyperparameters": dict(self.hyperparameters)}
-
-    def arrays(self) -> dict[str, Array]:
-        """Return the numbers of the block by name."""
-        return dict(self.block)
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where a number is missing or lists differ in length."""
-        names = (*SCALES, *LIMITS, *HIDDEN, *OUTPUT)
-        missing = next((name for name in names if name not in arrays), None)
-        if missing is not None:
-            raise ResultError("missing in the saved force", path=missing)
-        if len({arrays[name].shape for name in (*HIDDEN, *OUTPUT)}) != 1:
-            raise ResultError("the lists of the saved force differ in length", path=BLOCK)
-        several = next((name for name in (*SCALES, *LIMITS) if arrays[name].shape != (1,)), None)
-        if several is not None:
-            raise ResultError("must be one number in a list", path=several)
-        return cls({name: arrays[name] for name in names}, dict(header["hyperparameters"]))
 
 
 class LearnedForce(Searched):

@@ -22,7 +22,6 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
-from shipid.files import part_of
 from shipid.hybrid.bands import nearest
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
@@ -30,7 +29,8 @@ from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale, seed_of
 from shipid.hybrid.stepping import Point, Solve, Stepped, TrueSteps, free, stepped_paths, true_steps
-from shipid.hybrid.units import Seen, Units, solve, taken
+from shipid.hybrid.stored import Stored
+from shipid.hybrid.units import Seen, Units, solve
 from shipid.physics import TERMS
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import behind, term_blocks
@@ -69,7 +69,7 @@ def shares(reduced: list[Physics], at: Instants, whole: Array, step: float) -> A
 
 
 @dataclass(frozen=True)
-class Alarm:
+class Alarm(Stored):
     """How far a moment is from the training data: the distance to the nearest of some of its moments.
 
     centres : (C, d) normalised inputs. radius : how far the moments of one run of training are from the other runs, at
@@ -108,7 +108,7 @@ def _away(z: Array, centres: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class ModulesCorrector:
+class ModulesCorrector(Stored):
     """Factors of the modules of the physics.
 
     commands : names of the command columns. modules : names, in order.
@@ -148,44 +148,6 @@ class ModulesCorrector:
         raw = (even.reshape(count, -1, even.shape[1]) @ weights).reshape(len(even), -1)
         scale: Array = 1 + self.alarm.weight(table, self.fade)[:, None] * np.clip(raw, -self.limit, self.limit)
         return scale
-
-    def header(self) -> dict[str, Any]:
-        """Return names, limits and hyperparameters."""
-        return {
-            "commands": list(self.commands),
-            "modules": list(self.modules),
-            "units": self.units.header(),
-            "limit": self.limit,
-            "fade": self.fade,
-            "radius": self.alarm.radius,
-            "hyperparameters": dict(self.hyperparameters),
-        }
-
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by name."""
-        units = {f"units.{name}": values for name, values in self.units.arrays().items()}
-        return {**units, "weights": self.weights, "centres": self.alarm.centres}
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        units = Units.from_arrays(header["units"], part_of(arrays, "units."))
-        weights, centres = taken(arrays, "weights"), taken(arrays, "centres")
-        if (
-            weights.shape != (len(header["modules"]), len(units.offset) + 1)
-            or centres.shape[1:] != units.weight.shape[:1]
-        ):
-            raise ResultError("the arrays of the saved method do not fit together", path="weights")
-        return cls(
-            tuple(header["commands"]),
-            tuple(header["modules"]),
-            units,
-            weights,
-            Alarm(units.normaliser, centres, float(header["radius"])),
-            float(header["limit"]),
-            float(header["fade"]),
-            dict(header["hyperparameters"]),
-        )
 
 
 class Modules(Stepped):

@@ -10,27 +10,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import PositiveInt
 
 from shipid.data.windows import Instants
-from shipid.errors import ResultError
-from shipid.files import entries_of, part_of
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale, seed_of
 from shipid.hybrid.stepping import Point, Solve, Stepped, TrueSteps, stepped_paths, true_steps
-from shipid.hybrid.units import Seen, Units, solve, taken
+from shipid.hybrid.stored import Stored
+from shipid.hybrid.units import Seen, Units, solve
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Head:
+class Head(Stored):
     """One network: hidden units and their output weights, (M + 1, 1) for surge and (M or M + 1, 2) for sway and yaw.
 
     Weights may have R more in front, (R, M + 1, 1) and (R, M, 2), for R networks on the same units.
@@ -54,7 +53,7 @@ class Head:
 
 
 @dataclass(frozen=True)
-class OneStepCorrector:
+class OneStepCorrector(Stored):
     """The mean of some networks, applied at every step of the rollout.
 
     commands : names of the command columns.
@@ -73,32 +72,6 @@ class OneStepCorrector:
             return np.asarray(np.mean([head.acceleration(table) for head in self.heads], axis=0))
 
         return stepped_paths(physics, instants, acceleration)
-
-    def header(self) -> dict[str, Any]:
-        """Return names and hyperparameters."""
-        units = [head.units.header() for head in self.heads]
-        return {"commands": list(self.commands), "units": units, "hyperparameters": dict(self.hyperparameters)}
-
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by flat names: `0.weight`, `0.surge`, ..."""
-        stored: dict[str, Array] = {}
-        for i, head in enumerate(self.heads):
-            parts = {**head.units.arrays(), "surge": head.surge, "sway_yaw": head.sway_yaw}
-            stored |= {f"{i}.{name}": values for name, values in parts.items()}
-        return stored
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        heads = []
-        for i, entry in enumerate(entries_of(header, "units")):
-            parts = part_of(arrays, f"{i}.")
-            head = Head(Units.from_arrays(entry, parts), taken(parts, "surge"), taken(parts, "sway_yaw"))
-            count = len(head.units.offset)
-            if head.surge.shape != (count + 1, 1) or head.sway_yaw.shape != (count + (not entry["mirror"]), 2):
-                raise ResultError("the arrays of the saved method do not fit together", path=f"{i}.surge")
-            heads.append(head)
-        return cls(tuple(header["commands"]), tuple(heads), dict(header["hyperparameters"]))
 
 
 class OneStep(Stepped):

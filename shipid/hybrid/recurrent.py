@@ -14,29 +14,28 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, pi
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
-from shipid.errors import DataError, ResultError
-from shipid.files import entries_of, part_of
+from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser, unflatten
 from shipid.hybrid.features import Inputs, Memory, feature_table, steps_of
 from shipid.hybrid.method import Fitted, Index, Task, Traits, shared_tables
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Scale, Searched, seed_of
+from shipid.hybrid.stored import Stored
 from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of
-from shipid.hybrid.units import Seen, taken
+from shipid.hybrid.units import Seen
 
 if TYPE_CHECKING:
     import torch
 
 Array = NDArray[np.float64]
-LAYERS = ("W_i", "W_h", "b_i", "b_h", "W_1", "c_1", "W_2", "c_2")
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ class Sequences:
 
 
 @dataclass(frozen=True)
-class Reader:
+class Reader(Stored):
     """Names, statistics and mirrors of what a network reads.
 
     past, now : z-scores of the signals of the past, the instant among them, and of the inputs at the instant.
@@ -83,7 +82,7 @@ def signals_of(instants: Instants, steps: int, commands: tuple[str, ...]) -> lis
 
 
 @dataclass(frozen=True)
-class GatedNetwork:
+class GatedNetwork(Stored):
     """One trained network: what it reads, its layers by name, and its basis (T, r) [m]."""
 
     reader: Reader
@@ -98,18 +97,6 @@ class GatedNetwork:
             half = np.repeat([1.0, -1.0], outputs.shape[1] // 2)
             outputs = (outputs + half * self._outputs(self.reader.mirrored(seen))) / 2
         return np.tensordot(self.basis, unflatten(outputs), 1)
-
-    def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Shape of each array, by those of `W_h` and `W_2`, the names and the basis."""
-        units, hidden = self.layers["W_h"].shape[-1], self.layers["W_2"].shape[-1]
-        d, e, outputs = len(self.reader.past.names), len(self.reader.now.names), 2 * self.basis.shape[-1]
-        shapes: dict[str, tuple[int, ...]] = {
-            "W_i": (3 * units, d), "b_i": (3 * units,), "W_h": (3 * units, units), "b_h": (3 * units,),
-            "W_1": (hidden, units + e), "c_1": (hidden,), "W_2": (outputs, hidden), "c_2": (outputs,),
-            "basis": (len(self.basis), outputs // 2),
-            **{f"past.{name}": (d,) for name in ("mean", "std")}, **{f"now.{name}": (e,) for name in ("mean", "std")},
-        }  # fmt: skip
-        return shapes if self.reader.mirrors is None else shapes | {"past.mirror": (d, d), "now.mirror": (e, e)}
 
     def _outputs(self, seen: Sequences) -> Array:
         layers = self.layers
@@ -131,7 +118,7 @@ def _sigmoid(values: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class RecurrentCorrector:
+class RecurrentCorrector(Stored):
     """The mean of the networks of the folds."""
 
     inputs: Inputs
@@ -144,58 +131,6 @@ class RecurrentCorrector:
         table = self.inputs.table(physics, instants)
         corrections = [network.predict(table, instants, self.inputs.commands) for network in self.networks]
         return np.asarray(paths + np.mean(corrections, axis=0))
-
-    def header(self) -> dict[str, Any]:
-        """Return names and hyperparameters."""
-        readers = [network.reader for network in self.networks]
-        return {
-            "inputs": self.inputs.header(),
-            "past": self.past,
-            "networks": [
-                {
-                    "past": list(r.past.names),
-                    "now": list(r.now.names),
-                    "steps": r.steps,
-                    "mirror": r.mirrors is not None,
-                }
-                for r in readers
-            ],
-            "hyperparameters": dict(self.hyperparameters),
-        }
-
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by flat names: `0.W_i`, `0.past.mean`, ..."""
-        stored: dict[str, Array] = {}
-        for i, network in enumerate(self.networks):
-            parts = {**network.layers, "basis": network.basis}
-            for name, normaliser in (("past", network.reader.past), ("now", network.reader.now)):
-                parts |= {f"{name}.mean": normaliser.mean, f"{name}.std": normaliser.std}
-            if network.reader.mirrors is not None:
-                parts |= dict(zip(("past.mirror", "now.mirror"), network.reader.mirrors, strict=True))
-            stored |= {f"{i}.{name}": values for name, values in parts.items()}
-        return stored
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        networks = []
-        for i, entry in enumerate(entries_of(header, "networks")):
-            parts = part_of(arrays, f"{i}.")
-            if not all(isinstance(name, str) for name in (*entry["past"], *entry["now"])):
-                raise ResultError("past and now must be lists of texts", path=f"networks.{i}")
-            past, now = (
-                Normaliser(tuple(entry[key]), taken(parts, f"{key}.mean"), taken(parts, f"{key}.std"))
-                for key in ("past", "now")
-            )
-            mirrors = (taken(parts, "past.mirror"), taken(parts, "now.mirror")) if entry["mirror"] else None
-            layers = {name: taken(parts, name) for name in LAYERS}
-            network = GatedNetwork(Reader(past, now, mirrors, int(entry["steps"])), layers, taken(parts, "basis"))
-            wrong = next((name for name, shape in network.shapes().items() if parts[name].shape != shape), None)
-            if wrong is not None:
-                raise ResultError("the arrays of the saved network do not fit together", path=f"{i}.{wrong}")
-            networks.append(network)
-        inputs, hyperparameters = Inputs.from_header(header["inputs"]), dict(header["hyperparameters"])
-        return cls(inputs, float(header["past"]), tuple(networks), hyperparameters)
 
 
 class Recurrent(Searched):
@@ -374,16 +309,9 @@ def _begun(part: Part, units: int, generator: torch.Generator) -> tuple[torch.Te
     import torch
 
     read, _, outputs = part
-    shapes = {
-        "W_i": (3 * units, read.past.shape[2]),
-        "W_h": (3 * units, units),
-        "b_i": (3 * units,),
-        "b_h": (3 * units,),
-        "W_1": (units, units + read.now.shape[1]),
-        "c_1": (units,),
-        "W_2": (outputs.shape[1], units),
-        "c_2": (outputs.shape[1],),
-    }
+    shapes = {"W_i": (3 * units, read.past.shape[2]), "W_h": (3 * units, units), "b_i": (3 * units,)}
+    shapes |= {"b_h": (3 * units,), "W_1": (units, units + read.now.shape[1]), "c_1": (units,)}
+    shapes |= {"W_2": (outputs.shape[1], units), "c_2": (outputs.shape[1],)}
     bounds = {name: (units if name[2] in "ih" else shape[-1]) ** -0.5 for name, shape in shapes.items()}
     draws = [(torch.rand(shape, generator=generator) * 2 - 1) * bounds[name] for name, shape in shapes.items()]
     weights = torch.cat([draw.flatten() for draw in draws])[None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,9 @@ from shipid.errors import ResultError
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import choose_features, group_of
 from shipid.hybrid.mirror import reflection as mirror_of
+from shipid.hybrid.stored import Stored
 
 Array = NDArray[np.float64]
-MADE_OF = ("mean", "std", "weight", "offset")
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Units:
+class Units(Stored):
     """Hidden units tanh(z w + c) of normalised inputs z: `even` ones do not feel the mirror, `odd` ones change sign.
 
     weight : (d, M). offset : (M,). reflection : (d, d), or None: then even and odd are the same, plain units.
@@ -70,36 +70,6 @@ class Units:
             return even, even
         image = np.tanh(z @ (self.reflection @ self.weight) + self.offset) / size
         return np.concatenate([one, (plain + image) / 2], axis=1), (plain - image) / 2
-
-    def header(self) -> dict[str, Any]:
-        """Return the names of the inputs."""
-        return {"names": list(self.normaliser.names), "mirror": self.reflection is not None}
-
-    def arrays(self) -> dict[str, Array]:
-        """Return the arrays by name."""
-        stored = {
-            "mean": self.normaliser.mean,
-            "std": self.normaliser.std,
-            "weight": self.weight,
-            "offset": self.offset,
-        }
-        return stored if self.reflection is None else stored | {"reflection": self.reflection}
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        names, mirror = tuple(header["names"]), bool(header["mirror"])
-        mean, std, weight, offset = (taken(arrays, name) for name in MADE_OF)
-        reflection = taken(arrays, "reflection") if mirror else None
-        d = len(names)
-        if (
-            mean.shape != (d,)
-            or std.shape != (d,)
-            or weight.shape != (d, len(offset))
-            or (reflection is not None and reflection.shape != (d, d))
-        ):
-            raise ResultError("the arrays of the saved method do not fit together", path="weight")
-        return cls(Normaliser(names, mean, std), weight, offset, reflection)
 
 
 def taken(arrays: Mapping[str, Array], name: str) -> Array:
