@@ -160,3 +160,11 @@ def flatten(paths: Array) -> Array:
 def unflatten(outputs: Array) -> Array:
     """Arrange paths or shapes (r, S, 2) of outputs (S, 2 r): the inverse of `flatten`."""
     return np.stack(np.split(outputs.T, 2), axis=-1)
+
+
+def smooth_basis(horizon: int, terms: int) -> Array:
+    """Orthonormal polynomials (T, r) of time without a constant: an error starts from 0. r is at most T."""
+    time_ = np.arange(1, horizon + 1) / horizon
+    powers = np.polynomial.chebyshev.chebvander(2 * time_ - 1, min(terms, horizon) - 1) * time_[:, None]
+    basis: Array = np.linalg.qr(powers)[0]
+    return basis

@@ -9,9 +9,8 @@ nu_(k+1) = physics(nu_k) + step a_k. Dynamic mode decomposition with delays and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -23,21 +22,12 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import MOTIONS, choose_features, feature_table, steps_of
-from shipid.hybrid.method import Index, Task
+from shipid.hybrid.method import Index
 from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.settings import Scale
-from shipid.hybrid.stepping import (
-    Point,
-    Solve,
-    Stepped,
-    Stepper,
-    TrueSteps,
-    free,
-    stepped_paths,
-    true_motion,
-    true_steps,
-)
+from shipid.hybrid.search import Problem
+from shipid.hybrid.settings import Point, Scale
+from shipid.hybrid.stepping import Stepped, Stepper, StepProblem, free, stepped_paths, true_motion
 from shipid.hybrid.stored import Stored
 from shipid.hybrid.units import solve
 
@@ -142,6 +132,59 @@ class HankelCorrector(Stored):
         return stepped_paths(physics, instants, acceleration)
 
 
+class HankelProblem(StepProblem):
+    """A foundation whose missing accelerations are the targets of linear laws."""
+
+    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> HankelCorrector:  # noqa: ARG002
+        """Return the law on the steps of some windows for all ridges; one ridge has no axis in front."""
+        delays = steps_of(point["delays"], self.task.windows.step)
+        chosen, table = self.steps.of(windows), self.table(delays)
+        here = {key: values[chosen] for key, values in table.items()}
+        features = choose_features(here)
+        names = tuple(features)
+        values, missing = np.stack([here[key] for key in names], axis=1), self.steps.missing[chosen]
+        image = reflection(here, features) if self.method.mirror else None
+        if image is not None:
+            values = np.concatenate([values, values @ image])
+            missing = np.concatenate([missing, missing * [1.0, -1.0, -1.0]])
+        normaliser = Normaliser(names, values.mean(axis=0), values.std(axis=0))
+        full = np.concatenate([(values - normaliser.mean) / normaliser.std, np.ones((len(values), 1))], axis=1)
+        size = np.maximum(missing.std(axis=0), 1e-12)
+        penalty = np.r_[np.ones(len(names)), 1e-3]
+        weights = solve(full, missing / size, ridges, penalty) * size
+        law = Law(self.task.commands, delays, normaliser, weights[0] if len(ridges) == 1 else weights)
+        return HankelCorrector(law, point["delays"], point)
+
+    def table(self, delays: int) -> dict[str, Array]:
+        """Return inputs (N,) at the true steps: before them are the past and the horizon of their windows."""
+        task, steps, windows = self.task, self.steps, self.task.windows
+        if windows.num_past < delays:
+            raise DataError(
+                f"the method needs {delays} steps of the past, the windows hold {windows.num_past}", path="past"
+            )
+        first = windows.num_past - delays
+        before: dict[str, Array] = {}
+        for key in MOTIONS:
+            before[key] = np.concatenate([windows.past[key][first:], windows.columns[key][None], windows.states[key]])
+        for key in task.commands:
+            before[key] = np.concatenate([windows.past[key][first:], windows.planned[key]])
+        if self.case.physics.vessel is not None:
+            instants = windows.instants(known=True, hidden=task.hidden.get(self.name))
+            stepper, missed = Stepper(self.case.physics, instants), []
+            for k in range(windows.horizon):
+                after = np.stack([windows.states[key][k] for key in MOTIONS], axis=1)
+                missed.append((after - free(self.case.physics, stepper.at(k, true_motion(windows, k)))) / windows.step)
+            for axis, key in enumerate(MISSED):
+                past = _missed_before(self.case.physics, instants, delays)[axis]
+                before[key] = np.concatenate([past, np.stack([step[:, axis] for step in missed])])
+        at = delays + steps.number
+        chosen = {
+            key: np.stack([values[at - ago, steps.window] for ago in range(delays, 0, -1)])
+            for key, values in before.items()
+        }
+        return delayed(steps.at.columns, chosen, delays, task.commands)
+
+
 class HankelDMD(Stepped):
     """A linear law with delays and control; it needs a past, and works with and without physics.
 
@@ -154,6 +197,7 @@ class HankelDMD(Stepped):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
+    problem: ClassVar[type[Problem]] = HankelProblem
     corrector: ClassVar[type[Any]] = HankelCorrector
 
     delays: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (2.0, 4.0, 8.0)
@@ -186,71 +230,3 @@ class HankelDMD(Stepped):
     def points(self) -> list[Point]:
         """Return the trials: every delay."""
         return [{"delays": delays} for delays in self.delays]
-
-    def trial_of(self, task: Task, name: str) -> Callable[[int, Point], Solve]:
-        """Return how a trial is solved: a law with its delay."""
-        steps = true_steps(task, name)
-
-        def trial(_: int, point: Point) -> Solve:
-            table = _true_table(task, name, steps, steps_of(point["delays"], task.windows.step))
-            return partial(self._solved, task, table, steps, point)
-
-        return trial
-
-    def _solved(
-        self,
-        task: Task,
-        table: Mapping[str, Array],
-        steps: TrueSteps,
-        point: Point,
-        windows: Index,
-        ridges: Sequence[float],
-    ) -> HankelCorrector:
-        """The law on the steps of some windows for all ridges; one ridge has no axis in front."""
-        chosen, seconds = steps.of(windows), point["delays"]
-        here = {key: values[chosen] for key, values in table.items()}
-        features = choose_features(here)
-        names = tuple(features)
-        values, missing = np.stack([here[key] for key in names], axis=1), steps.missing[chosen]
-        image = reflection(here, features) if self.mirror else None
-        if image is not None:
-            values = np.concatenate([values, values @ image])
-            missing = np.concatenate([missing, missing * [1.0, -1.0, -1.0]])
-        normaliser = Normaliser(names, values.mean(axis=0), values.std(axis=0))
-        full = np.concatenate([(values - normaliser.mean) / normaliser.std, np.ones((len(values), 1))], axis=1)
-        size = np.maximum(missing.std(axis=0), 1e-12)
-        penalty = np.r_[np.ones(len(names)), 1e-3]
-        weights = solve(full, missing / size, ridges, penalty) * size
-        weights = weights[0] if len(ridges) == 1 else weights
-        law = Law(task.commands, steps_of(seconds, task.windows.step), normaliser, weights)
-        return HankelCorrector(law, seconds, point)
-
-
-def _true_table(task: Task, name: str, steps: TrueSteps, delays: int) -> dict[str, Array]:
-    """Inputs (N,) of the law at the true steps: what came before them is the past and the horizon of their windows."""
-    windows, case = task.windows, task.cases[name]
-    if windows.num_past < delays:
-        raise DataError(
-            f"the method needs {delays} steps of the past, the windows hold {windows.num_past}", path="past"
-        )
-    first = windows.num_past - delays
-    before: dict[str, Array] = {}
-    for key in MOTIONS:
-        before[key] = np.concatenate([windows.past[key][first:], windows.columns[key][None], windows.states[key]])
-    for key in task.commands:
-        before[key] = np.concatenate([windows.past[key][first:], windows.planned[key]])
-    if case.physics.vessel is not None:
-        instants = windows.instants(known=True, hidden=task.hidden.get(name))
-        stepper, missed = Stepper(case.physics, instants), []
-        for k in range(windows.horizon):
-            after = np.stack([windows.states[key][k] for key in MOTIONS], axis=1)
-            missed.append((after - free(case.physics, stepper.at(k, true_motion(windows, k)))) / windows.step)
-        for axis, key in enumerate(MISSED):
-            past = _missed_before(case.physics, instants, delays)[axis]
-            before[key] = np.concatenate([past, np.stack([step[:, axis] for step in missed])])
-    at = delays + steps.number
-    chosen = {
-        key: np.stack([values[at - ago, steps.window] for ago in range(delays, 0, -1)])
-        for key, values in before.items()
-    }
-    return delayed(steps.at.columns, chosen, delays, task.commands)

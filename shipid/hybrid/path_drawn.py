@@ -161,6 +161,8 @@ class PathDrawn(Searched):
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        from shipid.hybrid.ridge import tune_ridge  # a study is read without PyTorch
+        from shipid.hybrid.ridge import Recipe, tune_ridge  # a study is read without PyTorch
 
-        return tune_ridge(task, self)
+        inputs = self.inputs(task.commands)
+        recipe = Recipe(inputs, self.units, self.terms, self.path(), self.search_windows, self.points, self.left_out)
+        return tune_ridge(task, self, recipe)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.features import Memory
+from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Fitted, Task, Traits
 from shipid.hybrid.settings import Probability, Scale, Searched
 
@@ -73,5 +73,7 @@ class PathTrained(Searched):
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""
         from shipid.hybrid.gradient import tune_gradient  # a study is read without Optuna and PyTorch
+        from shipid.hybrid.training import Length
 
-        return tune_gradient(task, self)
+        length = Length(self.epochs, self.batch, self.patience)
+        return tune_gradient(task, self, Inputs(task.commands, self.memory), length)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import count
 from typing import Annotated, ClassVar, Self
@@ -16,6 +16,8 @@ from shipid.hybrid.method import Method
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Scale = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
+Point = Mapping[str, float]
+"""A trial: values of hyperparameters by name."""
 
 
 @dataclass(frozen=True)
