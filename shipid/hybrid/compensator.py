@@ -6,9 +6,7 @@ library that trained it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -22,7 +20,6 @@ from shipid.hybrid.stored import Stored
 
 Array = NDArray[np.float64]
 Layers = tuple[tuple[Array, Array], ...]
-KEPT = 2**27  # bytes of hidden units that `shared_units` keeps, at most
 
 
 @dataclass(frozen=True)
@@ -70,56 +67,10 @@ class Network(Stored):
     def predict(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] for features (S,)."""
         *hidden, (weight, bias) = self.layers
-        units = _units(hidden, self.normaliser.apply(table))
+        units = self.normaliser.apply(table)
+        for inner, offset in hidden:
+            units = np.tanh(units @ inner + offset)
         return np.tensordot(self.basis, unflatten(units @ weight + bias), 1)
-
-
-class _Kept:
-    """Hidden units (S, M) of layers and inputs (S, d) seen before."""
-
-    def __init__(self) -> None:
-        self.size = 0
-        self.by_layers: dict[tuple[int, ...], list[tuple[Sequence[tuple[Array, Array]], Array, Array]]] = {}
-
-    def units(self, layers: Sequence[tuple[Array, Array]], inputs: Array) -> Array:
-        """Units of the same arrays of weights and of equal inputs are computed once, while there is room."""
-        known = self.by_layers.setdefault(tuple(id(part) for layer in layers for part in layer), [])
-        for _, before, units in known:
-            if np.array_equal(before, inputs):
-                return units
-        units = _of_layers(layers, inputs)
-        if layers and self.size + units.nbytes <= KEPT:
-            self.size += units.nbytes
-            known.append((layers, inputs, units))  # layers, too: an identity is taken again once an array is gone
-        return units
-
-
-_KEPT: ContextVar[_Kept | None] = ContextVar("kept units", default=None)
-
-
-@contextmanager
-def shared_units() -> Iterator[None]:
-    """Compute hidden units once in this block where networks share their hidden layers and have equal inputs.
-
-    The models of one `path-drawn` search have the same hidden layers and differ in their output weights alone.
-    """
-    token = _KEPT.set(_Kept())
-    try:
-        yield
-    finally:
-        _KEPT.reset(token)
-
-
-def _units(layers: Sequence[tuple[Array, Array]], inputs: Array) -> Array:
-    kept = _KEPT.get()
-    return _of_layers(layers, inputs) if kept is None else kept.units(layers, inputs)
-
-
-def _of_layers(layers: Sequence[tuple[Array, Array]], inputs: Array) -> Array:
-    """The last hidden units (S, M) of inputs (S, d); the inputs where there is no hidden layer."""
-    for weight, bias in layers:
-        inputs = np.tanh(inputs @ weight + bias)
-    return inputs
 
 
 @dataclass(frozen=True)
