@@ -7,7 +7,7 @@ form as there. A network that calibrates a model's prediction of ship motion by 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,7 +17,6 @@ from pydantic import PositiveInt
 from shipid.data.windows import Instants
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs
-from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale
@@ -77,14 +76,3 @@ class Calibrator(PathDrawn):
     def inputs(self, commands: tuple[str, ...]) -> Inputs:
         """Return which quantities the networks may take, given the names of the command columns."""
         return TrajectoryInputs(commands, self.memory, self.moments)
-
-    def fit(self, task: Task) -> dict[str, Fitted]:
-        """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        return {name: _calibrated(fitted) for name, fitted in super().fit(task).items()}
-
-
-def _calibrated(fitted: Fitted) -> Fitted:
-    plain = fitted.corrector
-    if not isinstance(plain, Compensator):
-        return fitted
-    return replace(fitted, corrector=Calibrated(plain.inputs, plain.networks, plain.hyperparameters))

@@ -18,13 +18,13 @@ from pydantic import Field, PositiveInt
 from shipid.data.windows import Instants
 from shipid.errors import ShipidError
 from shipid.hybrid.compensator import flatten, smooth_basis, unflatten
-from shipid.hybrid.features import Inputs, Memory, choose_features, rows_of
+from shipid.hybrid.features import Inputs, Memory, rows_of
 from shipid.hybrid.method import Index, Task, Traits
-from shipid.hybrid.mirror import reflection
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Problem, SearchedAlone
 from shipid.hybrid.settings import Point, seed_of
 from shipid.hybrid.stored import Stored
+from shipid.hybrid.units import Seen
 
 Array = NDArray[np.float64]
 Leaf = Annotated[float, Field(ge=1.0)]
@@ -120,15 +120,13 @@ class ForestProblem(Problem):
         """Return a forest grown on some windows."""
         method, seed = self.method, seed_of(self.task.seed, number)
         here = {name: values[windows] for name, values in self.table.items()}
-        features = choose_features(here)
-        seen, outputs = np.stack([here[name] for name in features], axis=1), self.outputs[windows]
-        image = reflection(here, features) if method.mirror else None
-        if image is not None:
-            seen = np.concatenate([seen, seen @ image])
+        seen, outputs = Seen.of(here, method.mirror), self.outputs[windows]
+        if seen.reflection is not None:
             outputs = np.concatenate([outputs, outputs * np.repeat([1.0, -1.0], len(self.basis.T))])
-        forest = _forest(method.trees, round(point["leaf"]), point["share"], seed).fit(seen, outputs)
+        grower = _forest(method.trees, round(point["leaf"]), point["share"], seed)
+        forest = grower.fit(seen.samples(here), outputs)
         trees = Trees.of([tree.tree_ for tree in forest.estimators_])
-        return ForestCorrector(self.inputs, tuple(features), self.basis, trees, dict(point))
+        return ForestCorrector(self.inputs, seen.normaliser.names, self.basis, trees, dict(point))
 
 
 def _forest(trees: int, leaf: int, share: float, seed: int) -> Any:

@@ -46,9 +46,9 @@ class Journal:
     def __init__(self, file: Path, check: Callable[[], object] = lambda: None, study: str = "") -> None:
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         self.file, self.check, self.digest = file, check, study
-        if file.exists():
-            _cut_last_line(file)
         try:
+            for line in _whole_lines(file)[-1:]:
+                json.loads(line)  # Optuna would pass over a last one that it cannot read
             self.storage = JournalStorage(_Lines(str(file)))
         except (ValueError, KeyError, TypeError, AttributeError):
             raise ResultError(f"damaged: no journal of trials; {REMEDY}", file=file) from None
@@ -109,14 +109,13 @@ class _Lines(JournalFileBackend):
             stream.writelines(json.dumps(log, separators=(",", ":")).encode() + b"\n" for log in logs)
 
 
-def _cut_last_line(file: Path) -> None:
-    """Cut off a last line that is not whole, or that Optuna could not read."""
-    lines = file.read_bytes().splitlines(keepends=True)
-    with suppress(ValueError, IndexError):
-        json.loads(lines[-1])
-        if lines[-1].endswith(b"\n"):
-            return
-    os.truncate(file, sum(map(len, lines[:-1])))
+def _whole_lines(file: Path) -> list[bytes]:
+    """Lines of a file, none where there is no file; a last one that is not whole is cut off it."""
+    lines = file.read_bytes().splitlines(keepends=True) if file.exists() else []
+    if lines and not lines[-1].endswith(b"\n"):
+        os.truncate(file, sum(map(len, lines[:-1])))
+        return lines[:-1]
+    return lines
 
 
 def distributions(space: Space) -> dict[str, BaseDistribution]:

@@ -163,6 +163,8 @@ class PathDrawn(Searched):
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
         from shipid.hybrid.ridge import Recipe, tune_ridge  # a study is read without PyTorch
 
-        inputs = self.inputs(task.commands)
-        recipe = Recipe(inputs, self.units, self.terms, self.path(), self.search_windows, self.points, self.left_out)
+        inputs, ridges = self.inputs(task.commands), self.path()
+        recipe = Recipe(
+            self.corrector, inputs, self.units, self.terms, ridges, self.search_windows, self.points, self.left_out
+        )
         return tune_ridge(task, self, recipe)

@@ -50,11 +50,13 @@ ROUNDING = 1e-3  # by which a sum of squares must be greater to be so for sure: 
 class Recipe:
     """How networks are drawn and solved.
 
-    inputs : which quantities they may take. units : hidden units drawn. terms : polynomials of time.
+    corrector : the class of what they make. inputs : which quantities they may take. units : hidden units drawn.
+    terms : polynomials of time.
     ridges : those of which a trial takes one for each model, rising. search_windows : how many judge all trials, about.
     points : gives the trials anew. left_out : trial -> kinds of memory that it does without.
     """
 
+    corrector: type[Compensator]
     inputs: Inputs
     units: int
     terms: int
@@ -185,11 +187,6 @@ class _Best:
         _keep_best(self.networks, self.most, trial.value, lambda: (trial.params, trial.network()))
         _keep_best(self.left_out, self.most + SPARE, trial.value, trial.left_out)
 
-    def fitted(self, inputs: Inputs, rows: list[Row], errors: Array | None) -> Fitted:
-        """Average the best networks; `errors` are those on runs left out, if there are any."""
-        params, networks = zip(*(kept for _, kept in self.networks), strict=True)
-        return Fitted(Compensator(inputs, networks, params[0]), rows, sum(row["seconds"] for row in rows), errors)
-
     def without(self, folds: Sequence[Index]) -> Array:
         """Errors (2, S, r) on the basis where no fold has a part in the choice of the trials that judge it."""
         others = np.stack([kept[0] for _, kept in self.left_out])  # (trials, F)
@@ -284,13 +281,15 @@ class _Tuning:
         """
         if key not in self.best:
             return diverged(self.method, self.recipe.points())
-        best, inputs, errors = self.best[key], self.recipe.inputs, None
+        best, errors = self.best[key], None
         folds = [row.cpu().numpy() for block in self.every.blocks for row in block.rows]
         if len(folds) > 1:
             missed = np.tensordot(self.basis, best.without(folds), (1, 2)).transpose(0, 2, 1)
             errors, targets = np.full_like(self.targets[key], np.nan), self.targets[key][:, self.windows]
             errors[:, self.windows] = targets - np.tensordot(self.basis, self.paths[key], 1) + missed
-        return best.fitted(inputs, self.rows[key], errors)
+        params, networks = zip(*(kept for _, kept in best.networks), strict=True)
+        corrector, rows = self.recipe.corrector(self.recipe.inputs, networks, params[0]), self.rows[key]
+        return Fitted(corrector, rows, sum(row["seconds"] for row in rows), errors)
 
     def _groups(self, number: int, *, whole: bool = False) -> list[_Group]:
         """Foundations with the same inputs in a trial together, with all windows, or with those that judge first."""

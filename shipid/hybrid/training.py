@@ -106,7 +106,8 @@ def train(
 
     Returns
     -------
-    Trained : a member whose loss stopped being a number is `diverged`, with its best weights before; others go on.
+    Trained : a member whose loss stopped being a number is `diverged`, with its best weights before
+        that, which are no numbers where there are none; others go on.
     """
     num_samples = len(train_idx)
     widths = [inputs.shape[1], *[settings.units] * settings.layers, targets.shape[2]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from shipid.errors import ResultError
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.features import choose_features, group_of
+from shipid.hybrid.features import choose_features, group_of, rows_of
 from shipid.hybrid.mirror import reflection as mirror_of
 from shipid.hybrid.stored import Stored
 
@@ -35,10 +35,16 @@ class Seen:
         """Choose inputs and take their statistics from training samples (S,) by name, with their images if mirrored."""
         features = choose_features(table)
         names = tuple(features)
-        values = np.stack([table[name] for name in names], axis=1)
-        reflection = mirror_of(table, features) if mirror else None
-        both = values if reflection is None else np.concatenate([values, values @ reflection])
-        return cls(features, Normaliser(names, both.mean(axis=0), both.std(axis=0)), reflection)
+        plain = cls(
+            features, Normaliser(names, np.zeros(0), np.zeros(0)), mirror_of(table, features) if mirror else None
+        )
+        both = plain.samples(table)
+        return replace(plain, normaliser=Normaliser(names, both.mean(axis=0), both.std(axis=0)))
+
+    def samples(self, table: Mapping[str, Array]) -> Array:
+        """Return inputs (S, d) as they are, and after them their images, (2 S, d), where there is a mirror."""
+        values = rows_of(table, self.normaliser.names)
+        return values if self.reflection is None else np.concatenate([values, values @ self.reflection])
 
     def draw(self, point: Mapping[str, float], count: int, seed: int) -> Units:
         """Draw hidden units with the scales and the offset of a trial."""

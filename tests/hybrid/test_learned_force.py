@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipid.data.windows import Windows, cut_windows
-from shipid.errors import DataError, ResultError
+from shipid.errors import DataError
 from shipid.hybrid.learned_force import (
     BLOCK,
     HIDDEN,
@@ -70,14 +70,6 @@ def test_each_ridge_is_a_trial(given: dict[str, Any], count: int | None) -> None
     assert LearnedForce(**given).num_trials() == count
 
 
-def test_a_stiff_ridge_leaves_the_physics_as_it_is(windows: Windows) -> None:
-    given = task(windows)
-    fit = LearnedForce(**CHEAP, ridge=1e12).fit(given)["wrong"].corrector
-    assert fit is not None
-    paths = given.cases["wrong"].paths
-    np.testing.assert_allclose(fit.predict(WRONG, given.instants("wrong"), paths), paths, atol=1e-4)
-
-
 def test_weights_of_runs_that_do_not_turn_are_0_in_the_vessel() -> None:
     """A force of 1e-110 N m, which rounding leaves of none, was no number of a vessel: the fit ended in an error."""
     block = {name: np.full(3, 0.1) for name in (*HIDDEN, *OUTPUT)} | dict.fromkeys(SCALES + LIMITS, np.ones(1))
@@ -103,25 +95,6 @@ def block(units: int = 3, weight: float = 1.0) -> dict[str, np.ndarray]:
     return numbers | {name: weight * rng.normal(size=units) for name in (*HIDDEN, *OUTPUT)}
 
 
-def test_it_survives_its_header_and_arrays() -> None:
-    corrector = ForceCorrector(block(), {"ridge": 0.1})
-    again = ForceCorrector.from_arrays(corrector.header(), corrector.arrays())
-    assert again.hyperparameters == {"ridge": 0.1}
-    vessel = again.with_force(WRONG).vessel
-    assert vessel is not None
-    assert vessel.document["hull"]["learned"] == plain(corrector.block)
-    assert again.past == 0.0
-
-
-def test_damaged_arrays_are_refused() -> None:
-    corrector = ForceCorrector(block(), {"ridge": 0.1})
-    header, arrays = corrector.header(), corrector.arrays()
-    with pytest.raises(ResultError, match="c_Y: missing in the saved force"):
-        ForceCorrector.from_arrays(header, {name: x for name, x in arrays.items() if name != "c_Y"})
-    with pytest.raises(ResultError, match="differ in length"):
-        ForceCorrector.from_arrays(header, arrays | {"w_0": np.zeros(2)})
-
-
 def test_a_vessel_that_has_one_is_refused(windows: Windows) -> None:
     already = WRONG.with_values({BLOCK: plain(block())})
     with pytest.raises(DataError, match=rf"has a learned force already: take the block {BLOCK} out"):
@@ -131,23 +104,6 @@ def test_a_vessel_that_has_one_is_refused(windows: Windows) -> None:
 def test_a_vessel_in_drawn_waves_is_refused(windows: Windows) -> None:
     with pytest.raises(DataError, match=r"waves\.first_order is a sum over drawn waves, which has no gradient: take"):
         fit_all(LearnedForce(**CHEAP), task(windows, replace(WRONG, vessel=load_vessel("gunnerus-28.9-6dof"))))
-
-
-def test_no_more_windows_than_asked_for(windows: Windows) -> None:
-    """Of many training windows some are drawn by the seed: fewer windows, other numbers, the same bounds."""
-    few = LearnedForce(**{**CHEAP, "iterations": 2}, ridge=0.1, samples=6)
-    one, again, other = (few.fit(task(windows, seed=seed))["wrong"].corrector for seed in (1, 1, 2))
-    assert one is not None
-    assert again is not None
-    assert other is not None
-    for name, values in one.arrays().items():
-        np.testing.assert_array_equal(values, again.arrays()[name])
-    assert not np.array_equal(one.arrays()["c_X"], other.arrays()["c_X"])
-    assert one.arrays()["X_max"] == other.arrays()["X_max"]
-    diverged = replace(task(windows), cases={"wrong": Case(WRONG, np.full((5, len(windows), 2), np.nan))})
-    lost = few.fit(diverged)["wrong"]
-    assert lost.corrector is None
-    assert [row["state"] for row in lost.trials] == ["diverged"]
 
 
 def test_windows_that_the_physics_cannot_follow_do_not_train(windows: Windows) -> None:

@@ -17,12 +17,10 @@ from shipid.hybrid.settings import Scale, Searched
 from shipid.hybrid.trials import (
     diverged,
     fit_each,
-    mean_square,
     points_of,
     ridge_trial,
     ridges_of,
     row_of,
-    some_of,
     sound,
     used,
 )
@@ -79,15 +77,6 @@ def test_trials_fill_their_ranges_and_ridges_go_from_low_to_high():
     assert len(list(fixed)) == 5, "they differ in the hidden units that are drawn"
     np.testing.assert_allclose(ridges_of((1e-4, 1e-1), 4), [1e-4, 1e-3, 1e-2, 1e-1])
     assert ridges_of(0.5, 4) == [0.5]
-
-
-def test_some_windows_are_drawn_by_a_seed_alone():
-    many = np.arange(100) * 2
-    np.testing.assert_array_equal(some_of(many, 100, 0), many)
-    few = some_of(many, 10, 3)
-    np.testing.assert_array_equal(few, some_of(many, 10, 3))
-    assert len(set(few)) == 10
-    assert set(few) <= set(many)
 
 
 def test_every_foundation_is_fitted_or_has_diverged():
@@ -155,13 +144,6 @@ def test_a_trial_that_is_no_number_has_diverged(value, state):
     row = row_of(3, {"ridge": 0.5}, value, 0.0, epochs=7)
     assert (row["number"], row["params"], row["state"], row["epochs"]) == (3, {"ridge": 0.5}, state, 7)
     assert row["seconds"] > 0
-
-
-def test_a_path_that_is_no_number_has_an_infinite_error():
-    paths = np.zeros((2, 3, 2))
-    assert mean_square(paths, paths + 2.0) == 4.0
-    paths[1, 1, 0] = np.nan
-    assert mean_square(paths, np.zeros((2, 3, 2))) == np.inf
 
 
 def test_with_a_budget_there_is_always_another_trial():
