@@ -19,7 +19,7 @@ from shipid.data.windows import Instants
 from shipid.errors import ShipidError
 from shipid.hybrid.compensator import flatten, smooth_basis, unflatten
 from shipid.hybrid.features import Inputs, Memory, rows_of
-from shipid.hybrid.method import Index, Task, Traits
+from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Problem, SearchedAlone
 from shipid.hybrid.settings import Point, seed_of
@@ -163,13 +163,3 @@ class Forest(SearchedAlone):
     terms: PositiveInt = 6
     mirror: bool = True
     memory: Memory = Memory()
-
-    @property
-    def past(self) -> float:
-        """Length of the past that windows must hold [s]."""
-        return self.memory.past
-
-    @property
-    def traits(self) -> Traits:
-        """What a study says of this method and compares it by."""
-        return Traits(mirror=self.mirror, memory=self.memory, terms=self.terms)

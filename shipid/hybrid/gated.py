@@ -20,11 +20,11 @@ outputs (S, 2 r)."""
 
 
 def train_gated(
-    training: Part, validation: Part, units: int, learning_rate: float, decay: float, length: Length, seed: int
+    parts: Sequence[Part], units: int, learning_rate: float, decay: float, length: Length, seed: int
 ) -> tuple[dict[str, Array], int]:
-    """Train on one part of the data, stop by the other; layers by name and the number of epochs."""
+    """Train on the first part of the data, stop by the second; layers by name and the number of epochs."""
     generator = torch.Generator().manual_seed(seed)
-    (seen, outputs), watched = map(_tensors, (training, validation))
+    (seen, outputs), watched = map(_tensors, parts)
     (past, now), *_ = seen
     shapes = {
         "W_i": (3 * units, past.shape[2]),
@@ -47,7 +47,7 @@ def train_gated(
         list(layers.values()),
         [decay],
         length,
-        batches=lambda: torch.randperm(len(outputs), generator=generator).split(length.batch),
+        batches=lambda: torch.split(torch.randperm(len(outputs), generator=generator), length.batch),
         rate=lambda epoch: torch.tensor([[learning_rate * (1 + cos(pi * epoch / length.epochs)) / 2]]),
         loss=loss,
         watched=lambda: _loss(layers, *watched),

@@ -8,7 +8,7 @@ here f(z) = W tanh(V z + c) with V, c drawn and W in closed form.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -99,7 +99,8 @@ class OneStepProblem(StepProblem):
         """Return the mean of the networks of the best trials."""
         every = used(self.task)
         solved = [self.solve(row["number"], row["params"], every) for row in best]
-        return replace(solved[0], heads=tuple(one.heads[0] for one in solved))
+        heads = tuple(one.heads[0] for one in solved)
+        return OneStepCorrector(self.task.commands, heads, solved[0].hyperparameters)
 
 
 class OneStep(Stepped):

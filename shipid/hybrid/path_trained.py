@@ -12,7 +12,7 @@ from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveIn
 
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
-from shipid.hybrid.method import Fitted, Task, Traits
+from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.settings import Probability, Scale, Searched
 
 
@@ -56,19 +56,9 @@ class PathTrained(Searched):
     memory: Memory = Memory()
 
     @property
-    def past(self) -> float:
-        """Length of the past that windows must hold [s]."""
-        return self.memory.past
-
-    @property
     def together(self) -> bool:
         """Networks of one architecture train as one stack; where it is searched, hardly any two are alike."""
         return not any(isinstance(getattr(self, name), tuple) for name in self.COUNTS)
-
-    @property
-    def traits(self) -> Traits:
-        """What a study says of this method and compares it by."""
-        return Traits(memory=self.memory)
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""

@@ -22,7 +22,7 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser, flatten, smooth_basis, unflatten
 from shipid.hybrid.features import Inputs, Memory, feature_table, steps_of
-from shipid.hybrid.method import Index, Row, Task, Traits
+from shipid.hybrid.method import Index, Row, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Judged, Problem, SearchedAlone
 from shipid.hybrid.settings import Point, Scale, seed_of
@@ -185,7 +185,7 @@ class RecurrentProblem(Problem):
             parts.append(([(one.past, one.now) for one in both], flatten(self.weights[:, windows]) / scale))
         seed = seed_of(self.task.seed, self.name, number, fold)
         length = Length(method.epochs, method.batch, method.patience)
-        layers, epochs = train_gated(*parts, method.units, point["learning_rate"], method.weight_decay, length, seed)
+        layers, epochs = train_gated(parts, method.units, point["learning_rate"], method.weight_decay, length, seed)
         scaled = {**layers, "W_2": layers["W_2"] * scale, "c_2": layers["c_2"] * scale}
         return GatedNetwork(reader, scaled, self.basis), epochs
 
@@ -227,9 +227,4 @@ class Recurrent(SearchedAlone):
     @property
     def past(self) -> float:
         """Length of the past that windows must hold [s]."""
-        return max(self.seconds, self.memory.past)
-
-    @property
-    def traits(self) -> Traits:
-        """What a study says of this method and compares it by."""
-        return Traits(mirror=self.mirror, memory=self.memory, terms=self.terms)
+        return max(self.seconds, super().past)

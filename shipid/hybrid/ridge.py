@@ -118,7 +118,8 @@ class _Group:
 
     def of_rows(self, rows: Tensor) -> _Group:
         """The group with some of the windows; means and spreads of inputs stay those of all."""
-        plain, mirrored = ((one[0], one[1][rows]) if one else None for one in (self.plain, self.mirrored))
+        plain = self.plain[0], self.plain[1][rows]
+        mirrored = (self.mirrored[0], self.mirrored[1][rows]) if self.mirrored else None
         return replace(self, outputs=[side[rows] for side in self.outputs], plain=plain, mirrored=mirrored)
 
     def only(self, names: Sequence[str], terms: int) -> _Group:

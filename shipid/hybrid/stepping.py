@@ -22,7 +22,7 @@ from shipid.data.windows import Instants, Windows
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
-from shipid.hybrid.method import Index, Task, Traits
+from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Judged, Problem, SearchedAlone
 from shipid.hybrid.settings import Point, Scale
@@ -223,8 +223,3 @@ class Stepped(SearchedAlone):
     ridge: Scale
     mirror: bool = True
     samples: PositiveInt = 300
-
-    @property
-    def traits(self) -> Traits:
-        """What a study says of this method and compares it by."""
-        return Traits(mirror=self.mirror)

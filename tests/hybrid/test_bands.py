@@ -18,7 +18,6 @@ from shipid.hybrid.bands import (
     factor,
     nearest,
     needed,
-    track,
     traits,
 )
 from tests.hybrid.runs import HORIZON, made
@@ -39,15 +38,6 @@ def test_a_higher_level_holds_all_of_a_lower_one(seed: int) -> None:
         assert (inner.across <= outer.across).all()
     apart = [region.holds(made_.errors).mean() for region in regions]
     assert apart == sorted(apart)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_each_step_alone_needs_less_than_the_whole_path(seed: int) -> None:
-    made_, bands = STRANGE[seed]
-    whole = bands.region(made_.paths, made_.columns, 1.0, 0.9)
-    alone = bands.region(made_.paths, made_.columns, 1.0, 0.9, pointwise=True)
-    assert (alone.radius <= whole.radius * 1.001).mean() > 0.9
-    assert (alone.reach(made_.errors) <= 1).mean() == pytest.approx(0.9, abs=0.06)
 
 
 def test_far_from_training_bands_grow_without_bound() -> None:
@@ -98,14 +88,6 @@ def test_a_predictor_that_never_erred_has_a_band_of_its_path_alone() -> None:
     errors[1, 2] = [0.0, 1e-3]
     assert region.holds(errors).tolist() == [True, True, False]
     assert region.reach(errors)[:, :2].max() == 0
-
-
-def test_tracks_are_unit_vectors_even_at_rest() -> None:
-    paths = np.random.default_rng(0).normal(size=(HORIZON, 5, 2)).cumsum(axis=0)
-    paths[:, 2] = 0.0
-    ahead = track(paths)
-    np.testing.assert_allclose(np.hypot(*np.moveaxis(ahead, -1, 0)), 1.0)
-    np.testing.assert_array_equal(ahead[:, 2], np.tile([1.0, 0.0], (HORIZON, 1)))
 
 
 def test_centres_of_the_same_run_are_passed_over() -> None:

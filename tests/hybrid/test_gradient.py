@@ -72,16 +72,3 @@ def test_the_statistics_are_those_of_the_training_windows(columns, targets):
     np.testing.assert_array_equal(after.normaliser.std, before.normaliser.std)
     assert after.features == before.features
     assert before.normaliser.mean[0] == pytest.approx(columns["u"][40:200].mean())
-
-
-@pytest.mark.parametrize(("method", "epochs"), [(DRAWN, 0), (SMALL, 40)])
-def test_rows_and_seconds(columns, targets, method, epochs):
-    tuned = tune(columns, COMMANDS, targets, [FOLD], method, 1)
-    for one in tuned.values():
-        assert [row["number"] for row in one.trials] == [0, 1, 2]
-        assert {row["state"] for row in one.trials} == {"complete"}
-        assert set(one.trials[0]["params"]) == set(one.corrector.hyperparameters)
-        assert set(one.trials[0]) == {"number", "params", "value", "seconds", "epochs", "state"}
-        assert one.seconds == pytest.approx(sum(row["seconds"] for row in one.trials))
-        assert one.seconds > 0
-        assert {row["epochs"] for row in one.trials} == {epochs}

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shipid.data.windows import cut_windows
-from shipid.errors import DataError, DocumentError, ShipidError
+from shipid.errors import DataError, ShipidError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Case, Fitted, Method, Task, Traits, fit_all, same_table, shared_tables
@@ -84,20 +84,6 @@ def test_a_skeleton_is_no_method(skeleton: type[Method]) -> None:
         skeleton()
 
 
-def test_a_method_is_a_fit_and_its_settings() -> None:
-    class Toy(Method):
-        weight: float = 2.0
-
-        def fit(self, given: Task) -> dict[str, Fitted]:
-            return {name: Fitted(None, [{"value": self.weight}], 0.0) for name in given.cases}
-
-    assert {name: one.trials for name, one in Toy(weight=3.0).fit(task()).items()} == {
-        name: [{"value": 3.0}] for name in ("right", "wrong", "none")
-    }
-    with pytest.raises(DocumentError, match=r"Toy\.wieght: unknown key: did you mean 'weight'"):
-        Toy(wieght=3.0)  # type: ignore[call-arg]
-
-
 ROW = row_of(0, {}, 1.0, 0.0)
 
 
@@ -153,17 +139,6 @@ def test_what_a_method_gives_is_checked(gives: Any, message: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("corrector", [None, Unchanged({})])
-def test_a_trial_that_diverged_needs_no_value(corrector: Unchanged | None) -> None:
-    rows = [row_of(0, {}, np.nan, 0.0), *([ROW] if corrector else [])]
-
-    class Mine(Method):
-        def fit(self, given: Task) -> dict[str, Fitted]:
-            return dict.fromkeys(given.cases, Fitted(corrector, rows, 0.0))
-
-    assert fit_all(Mine(), task())["right"].trials == rows
-
-
 @pytest.mark.parametrize("words", [[], ["no licence"], [3]])
 def test_a_method_that_ends_the_process_is_named(words: list[Any]) -> None:
     """Its worker was said to be killed, perhaps for want of memory; without workers the command ended as if well."""
@@ -175,25 +150,6 @@ def test_a_method_that_ends_the_process_is_named(words: list[Any]) -> None:
     said = r" \(no licence\)" if words == ["no licence"] else ""
     with pytest.raises(ShipidError, match=rf"^Mine\.fit calls sys\.exit{said} in {re.escape(__file__)}, line \d+: a"):
         fit_all(Mine(), task())
-
-
-@pytest.mark.parametrize(
-    ("gives", "message"),
-    [
-        (Unchanged, "the corrector must be an object of Unchanged in .*, not the class"),
-        ({}, "dict lacks `predict`"),
-    ],
-)
-def test_what_lacks_a_part_of_a_corrector_is_named(gives: Any, message: str) -> None:
-    """No data can make it another: the run ends, and cells that are finished stay."""
-
-    class Mine(Method):
-        def fit(self, given: Task) -> dict[str, Fitted]:
-            return dict.fromkeys(given.cases, Fitted(gives, [ROW], 0.0))
-
-    with pytest.raises(ShipidError, match=rf"^Mine\.fit: {message}$") as caught:
-        fit_all(Mine(), task())
-    assert type(caught.value) is ShipidError  # a DataError is a result, of cells that then have none
 
 
 @pytest.mark.parametrize("of", ["fit", "hyperparameters", "past"])

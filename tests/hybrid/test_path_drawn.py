@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -122,21 +121,6 @@ def test_a_mirrored_trial_with_a_memory_answers_mirrored_runs_with_mirrored_path
         instants: Instants = given.instants("one")
         paths.append(corrector.predict(foundation, instants, given.cases["one"].paths))
     np.testing.assert_allclose(paths[1], paths[0] * [1.0, -1.0], rtol=0.0, atol=1e-5)
-
-
-@pytest.mark.parametrize(
-    "taken", [(), *combinations(Memory.model_fields, 1), *combinations(("history", "turned", "error"), 2)], ids=str
-)
-def test_every_kind_of_input_has_its_scale_and_no_other(dataset: Dataset, taken: tuple[str, ...]) -> None:
-    """Whatever is taken from the past: what is searched is the scales of the kinds of inputs that there are."""
-    method = PathDrawn(memory=Memory(**{name: getattr(EVERYTHING, name) for name in taken}))
-    foundation = physics(Observer() if "observer" in taken else None, N_ur=-3e5)
-    few = Dataset(dataset.frame[dataset.frame["run"].isin(dataset.runs[:2])], dataset.metadata)
-    instants = task(few, {"one": foundation}).instants("one")
-    table = method.inputs(tuple(dataset.commands)).table(foundation, instants)
-    scales = {name for name in method.ranges() if name.endswith("_scale")}
-    assert scales == {f"{group_of(name)}_scale" for name in table}
-    assert all(scales <= point.keys() for point in method.points())
 
 
 def test_scales_of_a_memory_that_is_not_taken_are_no_hyperparameters() -> None:

@@ -92,19 +92,6 @@ def test_the_slope_of_the_error_is_that_of_differences(seen: bool) -> None:
         assert each == pytest.approx((losses[1] - losses[0]) / (2 * step), rel=1e-4)
 
 
-def test_a_path_of_an_input_that_is_no_number_is_none(windows: Windows) -> None:
-    """The floor of a shaft speed would hide it: the path would be that of a stopped shaft. Others are unharmed."""
-    instants = windows.instants()
-    for name in dynamics(SHIP).commands:
-        columns = {key: np.array(values) for key, values in instants.columns.items()}
-        columns[name][3] = np.nan
-        paths = RIGHT.paths(Instants(columns))
-        assert np.isnan(paths[:, 3]).all(), name
-        rest = np.arange(len(windows)) != 3
-        np.testing.assert_array_equal(paths[:, rest], RIGHT.paths(instants)[:, rest])
-        assert np.isnan(RIGHT.states(Instants(columns))["x"][:, 3]).all()
-
-
 def test_distances_are_those_of_the_paths(windows: Windows) -> None:
     instants = windows.instants()
     measured = WRONG.distances(instants, windows.future)

@@ -15,7 +15,6 @@ from shipid.hybrid.ridge import (
     _chosen_without,
     _down_to,
     _Errors,
-    _FewRows,
     _left_out,
     _Piece,
     _Verdict,
@@ -90,28 +89,6 @@ def part_of(features, targets):
     """A coordinate as the search holds it."""
     (part,) = _with_axes(torch.tensor(features), [torch.tensor(targets)])
     return part
-
-
-def test_one_unsound_block_is_in_double_precision_and_leaves_the_others_as_they_are():
-    """Three features that only one run has let it nearly fit itself: I - H_bb is almost singular, for it alone."""
-    rng, ridge = np.random.default_rng(2), 1e-3
-    runs = ALL.reshape(6, 20)
-    features = np.concatenate([rng.normal(size=(len(ALL), 12)) / 12**0.5, np.zeros((len(ALL), 3))], axis=1)
-    features[runs[1][:3], [12, 13, 14]] = 3.0
-    wanted = rng.normal(size=(len(ALL), 4))
-    (block,) = _blocks([(np.setdiff1d(ALL, run), run) for run in runs], ALL, "cpu")
-    few = _FewRows(part_of(features, wanted), block)
-    errors = few.without(ridge, few.missed(ridge, EVERY), EVERY)
-    off = np.empty(len(runs))
-    for fold, run in enumerate(runs):
-        others = np.setdiff1d(ALL, run)
-        weights = np.linalg.solve(
-            features[others].T @ features[others] + ridge * np.eye(15), features[others].T @ wanted[others]
-        )
-        off[fold] = np.abs(errors[fold].numpy() - (wanted[run] - features[run] @ weights)).max()
-    assert off[1] < 1e-9
-    assert (np.delete(off, 1) > 1e-9).all()
-    assert off.max() < 1e-5
 
 
 @pytest.mark.parametrize("units", [12, 300])  # fewer and more than windows
@@ -270,24 +247,6 @@ def test_a_part_of_the_windows_chooses_nearly_as_well_as_all(columns, targets):
     assert best[0]["params"] == part.corrector.hyperparameters
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_part_of_strange_windows_judges_too(seed):
-    """Runs of 1 to 60 windows, 1 window to half of them as judges; a fold without any is judged by all windows."""
-    rng = np.random.default_rng(seed)
-    lengths = rng.integers(1, 60, rng.integers(3, 9))
-    count, ends = lengths.sum(), np.cumsum(lengths)
-    runs = [np.arange(end - length, end) for end, length in zip(ends, lengths, strict=True)]
-    folds = [(np.setdiff1d(np.arange(count), run), run) for run in runs]
-    columns = drawn(seed=seed, count=count)
-    targets = {name: scale * rng.normal(size=(STEPS, count, 2)) for name, scale in (("one", 1.0), ("other", 5.0))}
-    most = int(rng.choice([1, max(count // 5, 1), count // 2]))
-    method = recipe(trials=int(rng.integers(1, 20)), averaged=3, search_windows=most)
-    for fitted in tune(columns, TWINS, targets, folds, method, seed=seed).values():
-        assert np.isfinite(fitted.left_out).all()
-        assert len(fitted.corrector.networks) == min(method.trials, 3)
-        assert len(fitted.trials) == method.trials
-
-
 @pytest.mark.parametrize("search_windows", [1000, 40])
 @pytest.mark.parametrize("mirror", [0.0, 1.0])
 def test_errors_left_out_are_those_of_a_model_without_the_run(columns, targets, mirror, search_windows):
@@ -401,39 +360,7 @@ def test_a_mirrored_ship_gets_the_mirrored_compensation(commands):
 # Company, order, luck.
 
 
-def test_nor_the_order_of_runs_windows_or_columns(columns, targets):
-    here = tuned(columns, targets, SMALL)
-    order = np.random.default_rng(5).permutation(ALL)
-    place = np.argsort(order)  # of each window in the new order
-    shuffled = {name: values[order] for name, values in reversed(columns.items())}
-    folds = [(place[training], place[judged]) for training, judged in reversed(FOLDS)]
-    there = tuned(shuffled, {key: paths[:, order] for key, paths in targets.items()}, SMALL, folds=folds)
-    for key in targets:
-        values = [[row["value"] for row in fits[key].trials] for fits in (here, there)]
-        np.testing.assert_allclose(*values, rtol=1e-5)
-        np.testing.assert_allclose(predicted(there, columns)[key], predicted(here, columns)[key], rtol=1e-6, atol=1e-6)
-
-
 # What is learned.
-
-
-def test_what_can_be_solved_is_learned(columns):
-    """A compensation of the same kind, of the same hidden units, is recovered where nothing was seen."""
-    new = drawn(seed=7)
-    setup = recipe(mirror=0.0, trials=1, ridge=1e-9)
-    first = tuned(columns, {"any": missed(columns)}, setup)["any"].corrector
-    second = tuned(columns, {"any": compensation(first, columns)}, setup)["any"]
-    assert second.trials[0]["value"] < 1e-10 * np.square(missed(columns)).mean()
-    np.testing.assert_allclose(compensation(second.corrector, new), compensation(first, new), atol=1e-3)
-
-
-def test_targets_in_other_units_scale_all(columns, targets):
-    one = tuned(columns, {"any": targets["rough"]}, SMALL)["any"]
-    ten = tuned(columns, {"any": 10.0 * targets["rough"]}, SMALL)["any"]
-    assert [row["params"] for row in one.trials] == [row["params"] for row in ten.trials]
-    np.testing.assert_allclose(
-        compensation(ten.corrector, columns), 10.0 * compensation(one.corrector, columns), rtol=1e-7
-    )
 
 
 # Time.

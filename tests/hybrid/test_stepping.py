@@ -8,9 +8,9 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.stepping import TrueSteps, free, stepped_paths, true_steps
+from shipid.hybrid.stepping import free, stepped_paths, true_steps
 from shipid.observer import Observer
-from tests.hybrid.worlds import HORIZON, folds_of, ship, world
+from tests.hybrid.worlds import HORIZON, ship, world
 
 LAG = {"n": {"kind": "first_order", "T": 3.0, "rate": 0.5}, "alpha": {"kind": "first_order", "T": 2.0, "rate": 0.2}}
 
@@ -109,18 +109,3 @@ def test_a_path_that_diverges_is_not_finite_and_harms_no_other(here):
     assert np.isfinite(paths[:2]).all()
     assert np.isnan(paths[2:, 0]).all()
     np.testing.assert_allclose(paths[:, 1:], stepped_paths(here.physics, instants, nothing)[:, 1:], rtol=0, atol=1e-12)
-
-
-def test_folds_choose_steps_by_their_windows(here):
-    steps = true_steps(here.task(), "physics")
-    training, validation = folds_of(here.train)[0]
-    parts = [set(here.train.run[steps.window[steps.of(part)]]) for part in (training, validation)]
-    assert all(parts)
-    assert not parts[0] & parts[1]
-
-
-def test_what_is_missing_is_an_acceleration_whatever_the_step():
-    """0.2 m/s too slow after 2 s is 0.1 m/s^2 too little."""
-    one, after = np.zeros(1, int), np.array([[3.2, 0.0, -0.04]])
-    steps = TrueSteps(Instants({}), np.array([[3.0, 0.1, 0.0]]), after, one, one, step=2.0)
-    np.testing.assert_allclose(steps.missing, [[0.1, -0.05, -0.02]])

@@ -11,7 +11,6 @@ from pydantic import PositiveInt
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Fitted
-from shipid.hybrid.modules import Modules
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.settings import Scale, Searched
 from shipid.hybrid.trials import (
@@ -19,7 +18,6 @@ from shipid.hybrid.trials import (
     fit_each,
     points_of,
     ridge_trial,
-    ridges_of,
     row_of,
     sound,
     used,
@@ -65,18 +63,6 @@ def test_counts_are_whole_and_linear_settings_evenly_spread(tmp_path):
     Journal(tmp_path / "trials.log").add({"a": rows}, method.space())
     kept = Journal(tmp_path / "trials.log").rows("a")
     assert [repr(row["params"]) for row in kept] == [repr(point) for point in points]
-
-
-def test_trials_fill_their_ranges_and_ridges_go_from_low_to_high():
-    points = list(points_of(OneStep(trials=16, offset=1.5)))
-    assert len(points) == 16
-    assert {point["offset"] for point in points} == {1.5}
-    assert all(1 <= point["motion_scale"] <= 16 for point in points)
-    assert len({point["motion_scale"] for point in points}) == 16
-    fixed = points_of(Modules(motion_scale=2.0, command_scale=2.0, offset=1.0, trials=5))
-    assert len(list(fixed)) == 5, "they differ in the hidden units that are drawn"
-    np.testing.assert_allclose(ridges_of((1e-4, 1e-1), 4), [1e-4, 1e-3, 1e-2, 1e-1])
-    assert ridges_of(0.5, 4) == [0.5]
 
 
 def test_every_foundation_is_fitted_or_has_diverged():
