@@ -161,7 +161,7 @@ class Fitted:
 class Traits:
     """What sentences, comparisons and findings of a study know of a method; no number depends on it.
 
-    A method whose settings have other names overrides `Method.traits`.
+    Those of a `Searched` method follow from its settings called `mirror`, `memory` and `terms`.
 
     mirror : whether it may use that port and starboard are mirror images; None where it has no such choice. One that
         may not, on no physics alone, is the plain rival of the others.
@@ -195,7 +195,7 @@ class Method(Checked, BaseModel, ABC):
 
     @property
     def past(self) -> float:
-        """Length of the past that windows must hold for this method [s]: by default that of its memory."""
+        """Length of the past that windows must hold for this method [s]."""
         return self.traits.memory.past
 
     @property
@@ -205,13 +205,8 @@ class Method(Checked, BaseModel, ABC):
 
     @property
     def traits(self) -> Traits:
-        """What a study compares this method by: by default its settings `mirror`, `memory` and `terms`."""
-        mirror, memory, terms = (getattr(self, name, None) for name in ("mirror", "memory", "terms"))
-        return Traits(
-            mirror > 0 if isinstance(mirror, bool | float) else None,
-            memory if isinstance(memory, Memory) else NOTHING,
-            terms if isinstance(terms, int) else None,
-        )
+        """What a study says of this method and compares it by."""
+        return Traits()
 
     def unfit(self, vessel: Vessel) -> str:
         """Why this method cannot work with a vessel, and what to do, in words; empty where it can."""
