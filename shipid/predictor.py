@@ -35,7 +35,7 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel
 
 Array = np.ndarray
-FORMAT = 4
+FORMAT = 5
 DIVISORS = ("std", "spread", "deviation")  # last words of the names of arrays by which inputs or traits are divided
 BANDS = "bands."  # before the names of arrays of a band in a saved predictor
 MOST_STEPS = 100_000  # of a horizon and of a past

@@ -37,6 +37,13 @@ def test_no_module_imports_itself_by_way_of_others() -> None:
     assert cycles(graph) == []
 
 
+def test_no_two_modules_name_each_other() -> None:
+    """Not even for a type: a file can be understood without those that use it."""
+    graph = grimp.build_graph("shipid", cache_dir=None)
+    imports = {(one, other) for one in graph.modules for other in graph.find_modules_directly_imported_by(one)}
+    assert [pair for pair in sorted(imports) if pair[::-1] in imports] == []
+
+
 def test_a_planted_circle_is_seen() -> None:
     graph = grimp.build_graph("shipid", cache_dir=None)
     graph.add_import(importer="shipid.units", imported="shipid.predictor")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from shipid.data.windows import Instants
 from shipid.hybrid.method import Fitted, Method, Task
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.stored import Stored
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Unchanged:
+class Unchanged(Stored):
     """The corrector that leaves the path of the physics as it is."""
 
     hyperparameters: Mapping[str, float]
@@ -26,19 +27,6 @@ class Unchanged:
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
         """Return the paths (T, S, 2) [m] of the physics."""
         return paths
-
-    def header(self) -> dict[str, Any]:
-        """Return nothing: there is nothing to keep."""
-        return {}
-
-    def arrays(self) -> dict[str, Array]:
-        """Return no arrays."""
-        return {}
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:  # noqa: ARG003
-        """Return the corrector, which has neither numbers nor arrays."""
-        return cls({})
 
 
 class Alone(Method):

@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Self
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.errors import DataError, ResultError, choices
+from shipid.errors import DataError, choices
+from shipid.hybrid.stored import Stored
 from shipid.metrics import lengths
 
 Array = NDArray[np.float64]
@@ -71,7 +72,7 @@ class Region:
 
 
 @dataclass(frozen=True, eq=False)
-class Bands:
+class Bands(Stored):
     """Calibrated bands of a predictor.
 
     Parameters
@@ -175,39 +176,6 @@ class Bands:
         """Whether there were enough runs for a level, or enough runs of a kind of manoeuvre."""
         runs = self.runs if kind is None else self.kinds.get(kind, 0)
         return 0 < level <= LEVELS[-1] and runs >= needed(level)
-
-    def header(self) -> dict[str, Any]:
-        """Return all that is not an array."""
-        plain = {"runs": self.runs, "names": list(self.names), "far": self.far, "length": self.length}
-        return {**plain, "kinds": dict(self.kinds)}
-
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by name."""
-        return {one.name: getattr(self, one.name) for one in fields(self) if one.name not in self.header()}
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild what `header` and `arrays` gave; ResultError where a part is missing or has another shape."""
-        names = [one.name for one in fields(cls) if one.name not in ("runs", "names", "far", "length", "kinds")]
-        missing = next((name for name in names if name not in arrays), None)
-        if missing is not None:
-            raise ResultError(f"damaged: the band lacks {missing!r}")
-        steps, columns = np.size(arrays["along"]), len(header["names"])
-        centres = max(len(np.atleast_1d(arrays["centres"])), 1)
-        shapes = {"along": (steps,), "across": (steps,), "whole": LEVELS.shape, "steps": (len(LEVELS), steps)}
-        shapes |= {"centres": (centres, columns), "spread": (columns,), "by_kind": (len(header["kinds"]), len(LEVELS))}
-        shapes |= dict.fromkeys(("middle", "deviation", "low", "high", "slopes"), (len(TRAITS),))
-        for name, shape in shapes.items():
-            if np.shape(arrays[name]) != shape:
-                raise ResultError(f"damaged: {name!r} of the band must be {shape}, not {np.shape(arrays[name])}")
-        return cls(
-            runs=int(header["runs"]),
-            names=tuple(header["names"]),
-            far=float(header["far"]),
-            length=float(header["length"]),
-            kinds={str(kind): int(count) for kind, count in header["kinds"].items()},
-            **{name: np.asarray(arrays[name], dtype=float) for name in names},
-        )
 
 
 def needed(level: float) -> int:

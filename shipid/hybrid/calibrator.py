@@ -7,9 +7,8 @@ form as there. A network that calibrates a model's prediction of ship motion by 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,6 @@ from pydantic import PositiveInt
 from shipid.data.windows import Instants
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs
-from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale
@@ -49,25 +47,12 @@ class TrajectoryInputs(Inputs):
             inputs |= {f"{label}.{name}": np.where(sound, states[name][k - 1], 0.0) for name in SEEN}
         return inputs
 
-    def header(self) -> dict[str, Any]:
-        """Return the inputs as plain JSON."""
-        return {**super().header(), "moments": self.moments}
-
-    @classmethod
-    def from_header(cls, header: Mapping[str, Any]) -> TrajectoryInputs:
-        """Rebuild what `header` gave."""
-        plain = Inputs.from_header(header)
-        return cls(plain.commands, plain.memory, int(header["moments"]))
-
 
 @dataclass(frozen=True)
 class Calibrated(Compensator):
     """A compensator whose inputs hold the trajectory of the physics."""
 
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header()` and `arrays()`; ResultError where a part is missing or shapes do not fit."""
-        return replace(super().from_arrays(header, arrays), inputs=TrajectoryInputs.from_header(header["inputs"]))
+    inputs: TrajectoryInputs
 
 
 class Calibrator(PathDrawn):
@@ -91,14 +76,3 @@ class Calibrator(PathDrawn):
     def inputs(self, commands: tuple[str, ...]) -> Inputs:
         """Return which quantities the networks may take, given the names of the command columns."""
         return TrajectoryInputs(commands, self.memory, self.moments)
-
-    def fit(self, task: Task) -> dict[str, Fitted]:
-        """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        return {name: _calibrated(fitted) for name, fitted in super().fit(task).items()}
-
-
-def _calibrated(fitted: Fitted) -> Fitted:
-    plain = fitted.corrector
-    if not isinstance(plain, Compensator):
-        return fitted
-    return replace(fitted, corrector=Calibrated(plain.inputs, plain.networks, plain.hyperparameters))

@@ -6,29 +6,24 @@ library that trained it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.windows import Instants
-from shipid.errors import ResultError
-from shipid.files import entries_of
 from shipid.hybrid.features import Inputs, rows_of
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.stored import Stored
 
 Array = NDArray[np.float64]
 Layers = tuple[tuple[Array, Array], ...]
-KEPT = 2**27  # bytes of hidden units that `shared_units` keeps, at most
 
 
 @dataclass(frozen=True)
-class Normaliser:
+class Normaliser(Stored):
     """The z-score of the training samples: (value - mean) / std of each named feature.
 
     Parameters
@@ -53,7 +48,7 @@ class Normaliser:
 
 
 @dataclass(frozen=True)
-class Network:
+class Network(Stored):
     """One trained network with what belongs to its data: inputs, statistics, shapes of its outputs.
 
     Parameters
@@ -72,60 +67,14 @@ class Network:
     def predict(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] for features (S,)."""
         *hidden, (weight, bias) = self.layers
-        units = _units(hidden, self.normaliser.apply(table))
+        units = self.normaliser.apply(table)
+        for inner, offset in hidden:
+            units = np.tanh(units @ inner + offset)
         return np.tensordot(self.basis, unflatten(units @ weight + bias), 1)
 
 
-class _Kept:
-    """Hidden units (S, M) of layers and inputs (S, d) seen before."""
-
-    def __init__(self) -> None:
-        self.size = 0
-        self.by_layers: dict[tuple[int, ...], list[tuple[Sequence[tuple[Array, Array]], Array, Array]]] = {}
-
-    def units(self, layers: Sequence[tuple[Array, Array]], inputs: Array) -> Array:
-        """Units of the same arrays of weights and of equal inputs are computed once, while there is room."""
-        known = self.by_layers.setdefault(tuple(id(part) for layer in layers for part in layer), [])
-        for _, before, units in known:
-            if np.array_equal(before, inputs):
-                return units
-        units = _of_layers(layers, inputs)
-        if layers and self.size + units.nbytes <= KEPT:
-            self.size += units.nbytes
-            known.append((layers, inputs, units))  # layers, too: an identity is taken again once an array is gone
-        return units
-
-
-_KEPT: ContextVar[_Kept | None] = ContextVar("kept units", default=None)
-
-
-@contextmanager
-def shared_units() -> Iterator[None]:
-    """Compute hidden units once in this block where networks share their hidden layers and have equal inputs.
-
-    The models of one `path-drawn` search have the same hidden layers and differ in their output weights alone.
-    """
-    token = _KEPT.set(_Kept())
-    try:
-        yield
-    finally:
-        _KEPT.reset(token)
-
-
-def _units(layers: Sequence[tuple[Array, Array]], inputs: Array) -> Array:
-    kept = _KEPT.get()
-    return _of_layers(layers, inputs) if kept is None else kept.units(layers, inputs)
-
-
-def _of_layers(layers: Sequence[tuple[Array, Array]], inputs: Array) -> Array:
-    """The last hidden units (S, M) of inputs (S, d); the inputs where there is no hidden layer."""
-    for weight, bias in layers:
-        inputs = np.tanh(inputs @ weight + bias)
-    return inputs
-
-
 @dataclass(frozen=True)
-class Compensator:
+class Compensator(Stored):
     """The mean of some networks: what is known at an instant -> compensation of the path after it.
 
     Parameters
@@ -153,55 +102,6 @@ class Compensator:
         total = sum((network.predict(table) for network in self.networks), start=np.zeros(()))
         return np.asarray(total / len(self.networks))
 
-    def header(self) -> dict[str, Any]:
-        """Return all that is not an array, as plain JSON."""
-        return {
-            "inputs": self.inputs.header(),
-            "hyperparameters": dict(self.hyperparameters),
-            "networks": [
-                {"features": {k: list(v) for k, v in n.features.items()}, "layers": len(n.layers)}
-                for n in self.networks
-            ],
-        }
-
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by flat names: `0.mean`, `0.std`, `0.basis`, `0.weight.0`, `0.bias.0`, ..."""
-        flat: dict[str, Array] = {}
-        for i, network in enumerate(self.networks):
-            flat |= {
-                f"{i}.mean": network.normaliser.mean,
-                f"{i}.std": network.normaliser.std,
-                f"{i}.basis": network.basis,
-            }
-            for j, (weight, bias) in enumerate(network.layers):
-                flat |= {f"{i}.weight.{j}": weight, f"{i}.bias.{j}": bias}
-        return flat
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header()` and `arrays()`; raises ResultError where a part is missing or shapes do not fit."""
-        try:
-            networks = []
-            for i, entry in enumerate(entries_of(header, "networks")):
-                features = {k: tuple(v) for k, v in entry["features"].items()}
-                layers = tuple((arrays[f"{i}.weight.{j}"], arrays[f"{i}.bias.{j}"]) for j in range(entry["layers"]))
-                normaliser = Normaliser(tuple(features), arrays[f"{i}.mean"], arrays[f"{i}.std"])
-                networks.append(Network(features, normaliser, arrays[f"{i}.basis"], layers))
-                _check(networks[-1], i)
-            return cls(Inputs.from_header(header["inputs"]), tuple(networks), dict(header["hyperparameters"]))
-        except KeyError as error:
-            raise ResultError("missing in the saved compensator", path=str(error.args[0])) from None
-
-
-def _check(network: Network, index: int) -> None:
-    """Refuse a network whose arrays do not fit together."""
-    widths = [len(network.features), *(weight.shape[1] for weight, _ in network.layers)]
-    expected = [((i, o), (o,)) for i, o in pairwise(widths)]
-    shapes = [(weight.shape, bias.shape) for weight, bias in network.layers]
-    statistics = {network.normaliser.mean.shape, network.normaliser.std.shape}
-    if shapes != expected or statistics != {(widths[0],)} or network.basis.shape[1:] != (widths[-1] // 2,):
-        raise ResultError("the arrays of the saved compensator do not fit together", path=f"networks.{index}")
-
 
 def flatten(paths: Array) -> Array:
     """Arrange outputs (S, 2 r) of a network, x_1 ... x_r, y_1 ... y_r as in (12), for paths or shapes (r, S, 2)."""
@@ -211,3 +111,11 @@ def flatten(paths: Array) -> Array:
 def unflatten(outputs: Array) -> Array:
     """Arrange paths or shapes (r, S, 2) of outputs (S, 2 r): the inverse of `flatten`."""
     return np.stack(np.split(outputs.T, 2), axis=-1)
+
+
+def smooth_basis(horizon: int, terms: int) -> Array:
+    """Orthonormal polynomials (T, r) of time without a constant: an error starts from 0. r is at most T."""
+    time_ = np.arange(1, horizon + 1) / horizon
+    powers = np.polynomial.chebyshev.chebvander(2 * time_ - 1, min(terms, horizon) - 1) * time_[:, None]
+    basis: Array = np.linalg.qr(powers)[0]
+    return basis

@@ -10,8 +10,8 @@ from pydantic import BaseModel
 
 from shipid.users import file_of
 
-CALLED = {"predict": ("physics", "instants", "paths"), "header": (), "arrays": ()}  # functions of a corrector
-REBUILT = ("header", "arrays")  # what `from_arrays` takes
+PREDICT = ("physics", "instants", "paths")  # what a corrector is called with
+KEPT = ("header", "arrays", "from_arrays")  # functions of a corrector by which it is saved and read back
 HELD = ("hyperparameters", "past")  # what a corrector has beside them
 SAID = {"validation": "str", "compensates": "bool", "meets_none": "bool", "meets_observer": "bool", "corrector": "type"}
 SPLITS = ("share", "runs")
@@ -39,19 +39,17 @@ def fault_of_method(kind: type[BaseModel]) -> str:
     corrector: Any = kind.corrector
     if not isinstance(corrector, type):
         return f"`corrector` of {named(kind)} must be a class, not {corrector!r}"
-    for name, taken in CALLED.items():
-        if fault := _uncallable(corrector, name, taken):
-            return fault
-    if inspect.isfunction(inspect.getattr_static(corrector, "from_arrays", None)):
-        return f"`from_arrays` of {named(corrector)} needs a line `@classmethod` above it"
-    return _uncallable(corrector, "from_arrays", REBUILT)
+    lacking = next((name for name in KEPT if not callable(getattr(corrector, name, None))), None)
+    if lacking is not None:
+        return f"{named(corrector)} lacks `{lacking}`: a class of `Stored`, shipid.hybrid.stored, has it"
+    return _uncallable(corrector, "predict", PREDICT)
 
 
 def fault_of_corrector(corrector: object) -> str:
     """What an object that a method gives lacks to be a corrector, one sentence; empty where it lacks nothing."""
     if isinstance(corrector, type):
         return f"the corrector must be an object of {named(corrector)}, not the class"
-    for name in (*CALLED, *HELD):
+    for name in ("predict", *KEPT[:2], *HELD):
         if not hasattr(corrector, name):
             return f"{named(type(corrector))} lacks `{name}`"
     return ""

@@ -164,15 +164,6 @@ class Inputs:
             )
         return np.asarray(instants.past[name][-steps])
 
-    def header(self) -> dict[str, Any]:
-        """Return the inputs as plain JSON."""
-        return {"commands": list(self.commands), "memory": self.memory.model_dump(mode="json")}
-
-    @classmethod
-    def from_header(cls, header: Mapping[str, Any]) -> Inputs:
-        """Rebuild what `header` gave."""
-        return cls(tuple(header["commands"]), Memory(**header["memory"]))
-
 
 def group_of(name: str) -> str:
     """Kind of an input by its name: `motion`, `wind`, `command`, `history`, `error`, `observer` or `physics`.

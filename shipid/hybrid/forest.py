@@ -7,7 +7,6 @@ Breiman (2001); for ship manoeuvring models: Mei et al. (2019).
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self
@@ -17,26 +16,24 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveInt
 
 from shipid.data.windows import Instants
-from shipid.errors import ResultError, ShipidError
-from shipid.hybrid.compensator import unflatten
-from shipid.hybrid.features import Inputs, Memory, choose_features, rows_of
-from shipid.hybrid.method import Fitted, Index, Task, Traits, shared_tables
-from shipid.hybrid.mirror import reflection
+from shipid.errors import ShipidError
+from shipid.hybrid.compensator import flatten, smooth_basis, unflatten
+from shipid.hybrid.features import Inputs, Memory, rows_of
+from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Search
-from shipid.hybrid.settings import Searched, seed_of
-from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of, used
-from shipid.hybrid.units import taken
+from shipid.hybrid.search import Problem, SearchedAlone
+from shipid.hybrid.settings import Point, seed_of
+from shipid.hybrid.stored import Stored
+from shipid.hybrid.units import Seen
 
 Array = NDArray[np.float64]
 Leaf = Annotated[float, Field(ge=1.0)]
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 LEAF = -1  # the child of a node that has none
-NODES = ("first", "left", "right", "feature", "threshold", "value")
 
 
 @dataclass(frozen=True)
-class Trees:
+class Trees(Stored):
     """Regression trees as arrays of nodes, one tree after the other.
 
     first : (trees,) root of each tree. left, right : (nodes,) children, -1 for a leaf; a sample goes left where its
@@ -68,20 +65,6 @@ class Trees:
             np.concatenate([tree.value[:, :, 0] for tree in trees]),
         )
 
-    def fit_together(self, inputs: int) -> bool:
-        """Whether each way down a tree ends: children come after their node, and each that is no leaf asks an input."""
-        nodes = np.arange(self.threshold.size)
-        if any(part.shape != nodes.shape for part in (self.left, self.right, self.feature, self.threshold)):
-            return False
-        inner = self.left != LEAF
-        return bool(
-            self.first.size > 0
-            and np.all((self.first >= 0) & (self.first < len(nodes)))
-            and np.array_equal(inner, self.right != LEAF)
-            and all(np.all((nodes < part)[inner] & (part < len(nodes))[inner]) for part in (self.left, self.right))
-            and np.all((self.feature >= 0)[inner] & (self.feature < inputs)[inner])
-        )
-
     def predict(self, inputs: Array) -> Array:
         """Mean over the trees (S, outputs) for inputs (S, d), which scikit-learn compares in single precision."""
         largest = float(np.finfo(np.float32).max)
@@ -98,7 +81,7 @@ class Trees:
 
 
 @dataclass(frozen=True)
-class ForestCorrector:
+class ForestCorrector(Stored):
     """Trees that give the compensation of the path.
 
     inputs : which quantities the trees may take. names : those that they take, in order.
@@ -122,28 +105,40 @@ class ForestCorrector:
         weights = self.trees.predict(rows_of(table, self.names))
         return np.asarray(paths + np.tensordot(self.basis, unflatten(weights), 1))
 
-    def header(self) -> dict[str, Any]:
-        """Return names and hyperparameters."""
-        names, hyperparameters = list(self.names), dict(self.hyperparameters)
-        return {"inputs": self.inputs.header(), "names": names, "hyperparameters": hyperparameters}
 
-    def arrays(self) -> dict[str, Array]:
-        """Return the basis and the nodes of the trees by name."""
-        return {"basis": self.basis} | {name: getattr(self.trees, name).astype(float) for name in NODES}
+class ForestProblem(Problem):
+    """A foundation whose inputs and errors of the path, on the basis, are the samples of forests."""
 
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        first, left, right, feature, threshold, value = (taken(arrays, name) for name in NODES)
-        names, basis = tuple(header["names"]), taken(arrays, "basis")
-        whole = [part.astype(np.int64) for part in (first, left, right, feature)]
-        trees = Trees(whole[0], whole[1], whole[2], whole[3], threshold, value)
-        if not trees.fit_together(len(names)) or value.shape != (len(threshold), 2 * basis.shape[1]):
-            raise ResultError("the arrays of the saved trees do not fit together", path="value")
-        return cls(Inputs.from_header(header["inputs"]), names, basis, trees, dict(header["hyperparameters"]))
+    def __init__(self, method: Forest, task: Task, name: str) -> None:
+        super().__init__(method, task, name)
+        self.inputs = Inputs(task.commands, method.memory)
+        self.table = self.inputs.table(self.case.physics, self.instants)
+        self.basis = smooth_basis(task.windows.horizon, method.terms)
+        self.outputs = flatten(np.tensordot(self.basis.T, self.targets, 1))  # (S, 2 r)
+
+    def solve(self, number: int, point: Point, windows: Index) -> ForestCorrector:
+        """Return a forest grown on some windows."""
+        method, seed = self.method, seed_of(self.task.seed, number)
+        here = {name: values[windows] for name, values in self.table.items()}
+        seen, outputs = Seen.of(here, method.mirror), self.outputs[windows]
+        if seen.reflection is not None:
+            outputs = np.concatenate([outputs, outputs * np.repeat([1.0, -1.0], len(self.basis.T))])
+        grower = _forest(method.trees, round(point["leaf"]), point["share"], seed)
+        forest = grower.fit(seen.samples(here), outputs)
+        trees = Trees.of([tree.tree_ for tree in forest.estimators_])
+        return ForestCorrector(self.inputs, seen.normaliser.names, self.basis, trees, dict(point))
 
 
-class Forest(Searched):
+def _forest(trees: int, leaf: int, share: float, seed: int) -> Any:
+    """A forest of scikit-learn, not grown yet; ShipidError where it is not installed."""
+    try:
+        from sklearn.ensemble import RandomForestRegressor
+    except ImportError:
+        raise ShipidError("the method forest needs scikit-learn: pip install 'shipid[forest]'") from None
+    return RandomForestRegressor(trees, min_samples_leaf=leaf, max_features=share, random_state=seed % 2**32, n_jobs=1)
+
+
+class Forest(SearchedAlone):
     """A random forest on the errors of the path; it needs scikit-learn, `pip install shipid[forest]`.
 
     Parameters
@@ -158,6 +153,7 @@ class Forest(Searched):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("leaf", "share")
+    problem: ClassVar[type[Problem]] = ForestProblem
     corrector: ClassVar[type[Any]] = ForestCorrector
 
     trials: PositiveInt = 6
@@ -167,78 +163,3 @@ class Forest(Searched):
     terms: PositiveInt = 6
     mirror: bool = True
     memory: Memory = Memory()
-
-    @property
-    def past(self) -> float:
-        """Length of the past that windows must hold [s]."""
-        return self.memory.past
-
-    @property
-    def traits(self) -> Traits:
-        """What a study says of this method and compares it by."""
-        return Traits(mirror=self.mirror, memory=self.memory, terms=self.terms)
-
-    def fit(self, task: Task) -> dict[str, Fitted]:
-        """Grow a forest for every foundation; the best trial, grown on all windows, is the corrector."""
-        self._grower(1, 1.0, 0)  # say at once if scikit-learn is missing
-        inputs = Inputs(task.commands, self.memory)
-        tables = shared_tables(task, inputs)
-        return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name, inputs, tables[name]))
-
-    def _fit(self, task: Task, name: str, inputs: Inputs, table: Mapping[str, Array]) -> Fitted:
-        from shipid.hybrid.ridge import smooth_basis  # a study is read without PyTorch
-
-        search = Search(task, [name], self)
-        targets, paths = task.targets[name], task.cases[name].paths
-        basis = smooth_basis(task.windows.horizon, self.terms)
-        weights = np.tensordot(basis.T, targets, 1)  # (r, S, 2)
-        physics = task.cases[name].physics
-        for number, point in search.left(points_of(self)):
-            start, losses = time.process_time(), []
-            seed = seed_of(task.seed, number)
-            for training, validation in task.folds:
-                grown = self._grown(inputs, table, weights, basis, training, point, seed)
-                judged = task.instants(name).select(validation)
-                predicted = grown.predict(physics, judged, paths[:, validation])
-                losses.append(mean_square(predicted, task.windows.future[:, validation]))
-            search.record({name: row_of(number, point, float(np.mean(losses)), start)})
-        rows = search.rows[name]
-        if not best_of(rows):
-            return Fitted(None, rows, search.seconds)
-        best = best_of(rows)[0]
-        seed = seed_of(task.seed, best["number"])
-        grown = self._grown(inputs, table, weights, basis, used(task), best["params"], seed)
-        return Fitted(grown, rows, search.seconds)
-
-    def _grown(
-        self,
-        inputs: Inputs,
-        table: Mapping[str, Array],
-        weights: Array,
-        basis: Array,
-        windows: Index,
-        point: Mapping[str, float],
-        seed: int,
-    ) -> ForestCorrector:
-        """A forest on some windows."""
-        here = {name: values[windows] for name, values in table.items()}
-        features = choose_features(here)
-        seen = np.stack([here[name] for name in features], axis=1)
-        outputs = np.concatenate([weights[:, windows, 0], weights[:, windows, 1]]).T
-        image = reflection(here, features) if self.mirror else None
-        if image is not None:
-            seen = np.concatenate([seen, seen @ image])
-            outputs = np.concatenate([outputs, outputs * np.repeat([1.0, -1.0], len(basis.T))])
-        forest = self._grower(round(point["leaf"]), point["share"], seed).fit(seen, outputs)
-        trees = Trees.of([tree.tree_ for tree in forest.estimators_])
-        return ForestCorrector(inputs, tuple(features), basis, trees, dict(point))
-
-    def _grower(self, leaf: int, share: float, seed: int) -> Any:
-        """A forest of scikit-learn, not grown yet; ShipidError where it is not installed."""
-        try:
-            from sklearn.ensemble import RandomForestRegressor
-        except ImportError:
-            raise ShipidError("the method forest needs scikit-learn: pip install 'shipid[forest]'") from None
-        return RandomForestRegressor(
-            self.trees, min_samples_leaf=leaf, max_features=share, random_state=seed % 2**32, n_jobs=1
-        )

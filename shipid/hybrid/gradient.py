@@ -6,11 +6,11 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
-from math import inf, isfinite, nan
-from typing import TYPE_CHECKING
+from math import inf, nan
 
 import numpy as np
 import optuna
+from optuna.distributions import BaseDistribution
 from optuna.trial import TrialState
 
 from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten
@@ -18,200 +18,143 @@ from shipid.hybrid.features import Inputs, choose_features
 from shipid.hybrid.journal import distributions, frozen
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
 from shipid.hybrid.search import Search
-from shipid.hybrid.settings import seed_of
-from shipid.hybrid.training import Settings, train
-from shipid.hybrid.trials import best_of
+from shipid.hybrid.settings import Searched, seed_of
+from shipid.hybrid.training import Length, Settings, train
+from shipid.hybrid.trials import best_of, row_of
 
-if TYPE_CHECKING:
-    from shipid.hybrid.path_trained import PathTrained
-
-Parameters = dict[str, float]
+Stack = Mapping[str, Mapping[str, float]]
+"""Models that train together: name -> hyperparameters."""
 
 
-def tune_gradient(task: Task, method: PathTrained) -> dict[str, Fitted]:
+def tune_gradient(task: Task, method: Searched, inputs: Inputs, length: Length) -> dict[str, Fitted]:
     """Train networks for each foundation.
 
     The objective is the mean validation loss over the folds; the compensator is the mean of the fold networks of the
     best trial. Foundations with the same inputs and the same architecture in a trial train as one stack. The sampler of
     a trial is seeded by its number, so that a search that goes on after an interruption gives the same digits.
     """
-    trainer = _Trainer(task, method)
-    names = list(task.cases)
-    search = Search(task, names, method)
-    studies = {key: _study(search.rows[key], method) for key in names}
-    best = {key: _Best() for key in names}
+    trainer, search, space = _Trainer(task, method, inputs, length), Search(task, task.cases, method), method.space()
+    studies = {key: _study(rows, distributions(space)) for key, rows in search.rows.items()}
+    best = {key: (inf, _Outcome(-1)) for key in studies}  # value and networks of the best trial that was trained here
     for number, _ in search.left(count()):
-        trials = {}
-        for key, study in studies.items():
-            study.sampler = _sampler(seed_of(task.seed, key, number))
-            trials[key] = study.ask(distributions(method.space()))
+        for key, study in studies.items():  # TPE as the paper's Optuna had it: later defaults differ
+            seed = seed_of(task.seed, key, number)
+            study.sampler = optuna.samplers.TPESampler(multivariate=False, constant_liar=False, seed=seed)
+        trials = {key: study.ask(distributions(space)) for key, study in studies.items()}
         fixed = {name: getattr(method, name) for name in method.SEARCHED}
-        asked: dict[str, Parameters] = {key: fixed | trial.params for key, trial in trials.items()}
         rows: dict[str, Row] = {}
-        for stack in trainer.stacks(asked):
+        for stack in trainer.stacks({key: fixed | trial.params for key, trial in trials.items()}):
             start = time.process_time()
-            results = trainer.train(stack, number)
-            seconds = (time.process_time() - start) / len(stack)
-            for key, parameters in stack.items():
-                rows[key] = _row(number, parameters, results[key], seconds)
-                best[key].consider(rows[key], results[key])
+            outcomes = trainer.train(stack, number)
+            for key, one in outcomes.items():
+                rows[key] = row_of(number, stack[key], one.value, start, one.epochs)
+                best[key] = min(best[key], (rows[key]["value"], one), key=lambda pair: _rank(pair[0]))
+            for key in stack:
+                rows[key]["seconds"] /= len(stack)
         for key, trial in trials.items():
-            if rows[key]["state"] == "complete":
-                studies[key].tell(trial, rows[key]["value"])
-            else:
-                studies[key].tell(trial, state=TrialState.FAIL)
-        search.record({key: rows[key] for key in names})
-    return {key: trainer.fitted(key, search, best[key]) for key in names}
+            complete = rows[key]["state"] == "complete"
+            told = (rows[key]["value"], TrialState.COMPLETE) if complete else (None, TrialState.FAIL)
+            studies[key].tell(trial, *told)
+        search.record({key: rows[key] for key in studies})
+    return {key: trainer.fitted(key, search.rows, best[key][1]) for key in studies}
 
 
-@dataclass
-class _Best:
-    """The networks of the best trial that was trained here; none at first."""
+def _rank(value: float) -> float:
+    """A value by which trials are compared: one that is no number comes last."""
+    return value if value == value else inf
 
-    number: int = -1
-    value: float = inf
+
+def _study(rows: Sequence[Row], space: Mapping[str, BaseDistribution]) -> optuna.Study:
+    """Make a study in memory that knows the trials so far."""
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    study = optuna.create_study(direction="minimize")
+    study.add_trials([frozen(row, space) for row in rows])
+    return study
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """A trial of a model: networks of the folds, mean validation loss [m^2], nan where one diverged, and epochs."""
+
+    number: int
     networks: tuple[Network, ...] = ()
-
-    def consider(self, row: Row, results: Sequence[_Result]) -> None:
-        if row["state"] == "complete" and row["value"] < self.value:
-            self.number, self.value = row["number"], row["value"]
-            self.networks = tuple(result.network for result in results)
+    value: float = nan
+    epochs: int = 0
 
 
 class _Trainer:
     """What all trials share: inputs, targets and folds."""
 
-    def __init__(self, task: Task, method: PathTrained) -> None:
-        self.task, self.method = task, method
-        self.inputs = Inputs(task.commands, method.memory)
-        self.tables = shared_tables(task, self.inputs)
+    def __init__(self, task: Task, method: Searched, inputs: Inputs, length: Length) -> None:
+        self.task, self.method, self.inputs, self.length = task, method, inputs, length
+        self.tables = shared_tables(task, inputs)
         self.outputs = {key: flatten(paths) for key, paths in task.targets.items()}
-        self.data = {
-            key: [_prepare(table, training, validation) for training, validation in task.folds]
-            for key, table in self.tables.items()
-        }
 
-    def stacks(self, asked: Mapping[str, Parameters]) -> list[dict[str, Parameters]]:
+    def stacks(self, asked: Stack) -> list[Stack]:
         """Group models by inputs and architecture, in the order of their first member."""
-        stacks: dict[tuple[object, ...], dict[str, Parameters]] = {}
+        stacks: dict[tuple[object, ...], dict[str, Mapping[str, float]]] = {}
         for key, parameters in asked.items():
             alike = (same_table(self.tables[key]), *(parameters[name] for name in self.method.COUNTS))
             stacks.setdefault(alike, {})[key] = parameters
         return list(stacks.values())
 
-    def train(self, stack: Mapping[str, Parameters], number: int) -> dict[str, list[_Result]]:
-        """Train the networks of a stack in a trial: model -> a result of each fold."""
-        outputs = {key: self.outputs[key] for key in stack}
-        folds = [
-            _fit(fold, outputs, stack, self.method, (self.task.seed, number, i), self.task.device)
-            for i, fold in enumerate(self.data[next(iter(stack))])
-        ]
-        return {key: [results[key] for results in folds] for key in stack}
+    def train(self, stack: Stack, number: int) -> dict[str, _Outcome]:
+        """Train the networks of a stack in a trial, those of each fold together."""
+        table, outputs = self.tables[next(iter(stack))], np.stack([self.outputs[key] for key in stack])
+        made: dict[str, list[tuple[Network, float, int]]] = {key: [] for key in stack}
+        for i, (training, validation) in enumerate(self.task.folds):
+            entropy = self.task.seed, number, i
+            features, normaliser = _inputs_of(table, training)
+            trained = train(
+                normaliser.apply(table),
+                outputs,
+                training,
+                validation,
+                _settings(list(stack.values()), self.length),
+                [seed_of(*entropy, key) for key in stack],
+                order_seed=seed_of(*entropy),
+                device=self.task.device,
+            )
+            for k, key in enumerate(stack):
+                network = Network(features, normaliser, np.eye(outputs.shape[-1] // 2), trained.layers[k])
+                loss = float(trained.loss[k]) if trained.status[k] == "ok" else nan
+                made[key].append((network, loss, int(trained.epochs[k])))
+        return {key: _outcome(number, results) for key, results in made.items()}
 
-    def fitted(self, key: str, search: Search, best: _Best) -> Fitted:
+    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _Outcome) -> Fitted:
         """The networks of the best trial; those of an earlier session are trained once more, in the same stack."""
-        rows = search.rows[key]
-        seconds = sum(row["seconds"] for row in rows)
-        kept = best_of(rows)
+        seconds = sum(row["seconds"] for row in rows[key])
+        kept = best_of(rows[key])
         if not kept:
-            return Fitted(None, rows, seconds)
-        number, networks = kept[0]["number"], best.networks
+            return Fitted(None, rows[key], seconds)
+        number = kept[0]["number"]
         if number != best.number:
-            asked = {name: mine[number]["params"] for name, mine in search.rows.items()}
-            stack = next(stack for stack in self.stacks(asked) if key in stack)
-            networks = tuple(result.network for result in self.train(stack, number)[key])
-        return Fitted(Compensator(self.inputs, networks, kept[0]["params"]), rows, seconds)
+            stacks = self.stacks({name: mine[number]["params"] for name, mine in rows.items()})
+            best = self.train(next(stack for stack in stacks if key in stack), number)[key]
+        return Fitted(Compensator(self.inputs, best.networks, kept[0]["params"]), rows[key], seconds)
 
 
-@dataclass(frozen=True)
-class _Data:
-    """One fold as networks see it."""
-
-    features: dict[str, tuple[str, ...]]
-    normaliser: Normaliser
-    inputs: Array
-    train_idx: Index
-    val_idx: Index
-
-
-@dataclass(frozen=True)
-class _Result:
-    """One trained network, its validation loss [m^2], its epochs and its status."""
-
-    network: Network
-    loss: float
-    epochs: int
-    status: str
-
-
-def _row(number: int, parameters: Parameters, results: Sequence[_Result], seconds: float) -> Row:
-    value = float(np.mean([result.loss for result in results]))
-    complete = isfinite(value) and all(result.status == "ok" for result in results)
-    row = {"number": number, "params": parameters, "value": value if complete else nan, "seconds": seconds}
-    return row | {"epochs": max(r.epochs for r in results), "state": "complete" if complete else "diverged"}
-
-
-def _prepare(table: Mapping[str, Array], training: Index, validation: Index) -> _Data:
-    """Choose and normalise the inputs by the training windows alone."""
+def _inputs_of(table: Mapping[str, Array], training: Index) -> tuple[dict[str, tuple[str, ...]], Normaliser]:
+    """Features and their statistics by the training windows alone."""
     seen = {name: values[training] for name, values in table.items()}
     features = choose_features(seen)
-    normaliser = Normaliser.fit(seen, tuple(features))
-    return _Data(features, normaliser, normaliser.apply(table), training, validation)
+    return features, Normaliser.fit(seen, tuple(features))
 
 
-def _fit(
-    data: _Data,
-    targets: Mapping[str, Array],
-    stack: Mapping[str, Parameters],
-    method: PathTrained,
-    entropy: tuple[int, ...],
-    device: str,
-) -> dict[str, _Result]:
-    """Train one network per model of a stack on one fold."""
-    first = next(iter(stack.values()))
-    settings = Settings(
-        layers=int(first["layers"]),
-        units=int(first["units"]),
-        learning_rate=tuple(p["learning_rate"] for p in stack.values()),
-        weight_decay=tuple(p["weight_decay"] for p in stack.values()),
-        input_dropout=tuple(p["input_dropout"] for p in stack.values()),
-        hidden_dropout=tuple(p["hidden_dropout"] for p in stack.values()),
-        epochs=method.epochs,
-        batch=method.batch,
-        patience=method.patience,
+def _settings(members: Sequence[Mapping[str, float]], length: Length) -> Settings:
+    """Structure and hyperparameters of the members of a stack."""
+    return Settings(
+        layers=int(members[0]["layers"]),
+        units=int(members[0]["units"]),
+        learning_rate=tuple(one["learning_rate"] for one in members),
+        weight_decay=tuple(one["weight_decay"] for one in members),
+        input_dropout=tuple(one["input_dropout"] for one in members),
+        hidden_dropout=tuple(one["hidden_dropout"] for one in members),
+        length=length,
     )
-    outputs = np.stack([targets[key] for key in stack])
-    basis = np.eye(outputs.shape[-1] // 2)
-    trained = train(
-        data.inputs,
-        outputs,
-        data.train_idx,
-        data.val_idx,
-        settings,
-        [seed_of(*entropy, key) for key in stack],
-        order_seed=seed_of(*entropy),
-        device=device,
-    )
-    return {
-        key: _Result(
-            Network(data.features, data.normaliser, basis, trained.layers[k]),
-            float(trained.loss[k]),
-            int(trained.epochs[k]),
-            trained.status[k],
-        )
-        for k, key in enumerate(stack)
-    }
 
 
-def _study(rows: Sequence[Row], method: PathTrained) -> optuna.Study:
-    """Make a study in memory that knows the trials so far."""
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    study = optuna.create_study(direction="minimize")
-    where = distributions(method.space())
-    study.add_trials([frozen(row, where) for row in rows])
-    return study
-
-
-def _sampler(seed: int) -> optuna.samplers.TPESampler:
-    """TPE as the paper's Optuna had it: later defaults differ."""
-    return optuna.samplers.TPESampler(multivariate=False, constant_liar=False, seed=seed)
+def _outcome(number: int, results: Sequence[tuple[Network, float, int]]) -> _Outcome:
+    """A trial by the networks, losses and epochs of its folds."""
+    networks, losses, epochs = zip(*results, strict=True)
+    return _Outcome(number, networks, float(np.mean(losses)), max(epochs))

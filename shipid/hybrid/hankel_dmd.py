@@ -9,9 +9,8 @@ nu_(k+1) = physics(nu_k) + step a_k. Dynamic mode decomposition with delays and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -20,32 +19,23 @@ from pydantic import Field, PositiveFloat
 from pydantic import model_validator as validator
 
 from shipid.data.windows import Instants
-from shipid.errors import DataError, ResultError
+from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.features import MOTIONS, choose_features, feature_table, steps_of
-from shipid.hybrid.method import Index, Task
-from shipid.hybrid.mirror import reflection
+from shipid.hybrid.features import MOTIONS, feature_table, steps_of
+from shipid.hybrid.method import Index
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.settings import Scale
-from shipid.hybrid.stepping import (
-    Point,
-    Solve,
-    Stepped,
-    Stepper,
-    TrueSteps,
-    free,
-    stepped_paths,
-    true_motion,
-    true_steps,
-)
-from shipid.hybrid.units import solve, taken
+from shipid.hybrid.search import Problem
+from shipid.hybrid.settings import Point, Scale
+from shipid.hybrid.stepping import Stepped, Stepper, StepProblem, free, stepped_paths
+from shipid.hybrid.stored import Stored
+from shipid.hybrid.units import Seen, solve
 
 Array = NDArray[np.float64]
 MISSED = ("missed.u", "missed.v", "missed.r")
 
 
 @dataclass(frozen=True)
-class Law:
+class Law(Stored):
     """The linear law, with its inputs.
 
     commands : names of the command columns. delays : number of past steps.
@@ -81,47 +71,36 @@ def delayed(
     return table
 
 
-class _History:
-    """The last steps of a rollout: velocities, commands and what the physics missed, (P, S) by name."""
+def missed_steps(physics: Physics, instants: Instants, motion: Mapping[str, Array]) -> dict[str, Array]:
+    """Accelerations that single steps of the physics miss, `MISSED` -> (T, S), of T steps from the instants on.
 
-    def __init__(self, physics: Physics, instants: Instants, delays: int, commands: tuple[str, ...]) -> None:
-        self.delays, held = delays, len(instants.past.get("u", ()))
-        if held < delays:
-            raise DataError(f"the method needs {delays} steps of the past, there are {held}", path="u")
-        past = {name: instants.past[name][held - delays :] for name in (*MOTIONS, *commands)}
-        self.rows = {name: list(values) for name, values in past.items()}
-        if physics.vessel is not None:
-            for name, values in zip(MISSED, _missed_before(physics, instants, delays), strict=True):
-                self.rows[name] = list(values)
-
-    def move(self, at: Instants, missed: Array) -> None:
-        """Go one step: what held at its start becomes the past."""
-        for name, values in self.rows.items():
-            values.append(missed[:, MISSED.index(name)] if name in MISSED else at.columns[name])
-
-    def before(self) -> dict[str, Array]:
-        """The last steps (P, S) by name, the oldest first."""
-        return {name: np.stack(values[-self.delays :]) for name, values in self.rows.items()}
+    motion : true u, v, r and psi after 0..T steps, (T + 1, S).
+    """
+    stepper, residuals = Stepper(physics, instants), []
+    for k in range(physics.horizon):
+        at = stepper.at(k, {name: values[k] for name, values in motion.items()})
+        after = np.stack([motion[name][k + 1] for name in MOTIONS], axis=1)
+        residuals.append((after - free(physics, at)) / physics.step)
+    return {name: np.stack([step[:, axis] for step in residuals]) for axis, name in enumerate(MISSED)}
 
 
-def _missed_before(physics: Physics, instants: Instants, delays: int) -> list[Array]:
-    """What single steps of the physics missed over the last `delays` steps before the instants, u, v, r (P, S) each."""
-    first = len(instants.past["u"]) - delays
-    past = {name: values[first:] for name, values in instants.past.items()}
+def past_rows(physics: Physics, instants: Instants, delays: int, commands: tuple[str, ...]) -> dict[str, Array]:
+    """Velocities, commands and what the physics missed over the last steps before the instants, (P, S) by name."""
+    held = len(instants.past.get("u", ()))
+    if held < delays:
+        raise DataError(f"the method needs {delays} steps of the past, there are {held}", path="u")
+    past = {name: values[held - delays :] for name, values in instants.past.items()}
+    rows = {name: past[name] for name in (*MOTIONS, *commands)}
+    if physics.vessel is None:
+        return rows
     given = {name: values for name, values in past.items() if "." in name}
     then = Instants({name: values[0] for name, values in past.items()}, planned=given)
-    before = replace(physics, horizon=delays)
-    stepper = Stepper(before, then)
-    residuals = []
-    for k in range(delays):
-        motion = {name: past[name][k] for name in (*MOTIONS, "psi")}
-        after = [past[name][k + 1] if k + 1 < delays else instants.columns[name] for name in MOTIONS]
-        residuals.append((np.stack(after, axis=1) - free(before, stepper.at(k, motion))) / physics.step)
-    return [np.stack([step[:, axis] for step in residuals]) for axis in range(3)]
+    motion = {name: np.concatenate([past[name], instants.columns[name][None]]) for name in (*MOTIONS, "psi")}
+    return rows | missed_steps(replace(physics, horizon=delays), then, motion)
 
 
 @dataclass(frozen=True)
-class HankelCorrector:
+class HankelCorrector(Stored):
     """The law, rolled over the horizon from the past of the instants."""
 
     law: Law
@@ -131,38 +110,51 @@ class HankelCorrector:
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
         """Return paths (T, S, 2) [m] in the frame (11)."""
         law = self.law
-        history = _History(physics, instants, law.delays, law.commands)
+        rows = past_rows(physics, instants, law.delays, law.commands)
 
         def acceleration(at: Instants, _: int, __: Array) -> Array:
-            residual = law(delayed(at.columns, history.before(), law.delays, law.commands))
-            history.move(at, residual)
+            residual = law(delayed(at.columns, rows, law.delays, law.commands))
+            now = {**at.columns, **dict(zip(MISSED, residual.T, strict=True))}
+            for name, values in rows.items():  # what held at the start of the step becomes the past
+                rows[name] = np.concatenate([values[1:], now[name][None]])
             return residual
 
         return stepped_paths(physics, instants, acceleration)
 
-    def header(self) -> dict[str, Any]:
-        """Return names and hyperparameters."""
-        return {
-            "commands": list(self.law.commands),
-            "delays": self.law.delays,
-            "names": list(self.law.normaliser.names),
-            "past": self.past,
-            "hyperparameters": dict(self.hyperparameters),
-        }
 
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by name."""
-        return {"mean": self.law.normaliser.mean, "std": self.law.normaliser.std, "weights": self.law.weights}
+class HankelProblem(StepProblem):
+    """A foundation whose missing accelerations are the targets of linear laws."""
 
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        names = tuple(header["names"])
-        mean, std, weights = (taken(arrays, name) for name in ("mean", "std", "weights"))
-        if mean.shape != (len(names),) or std.shape != mean.shape or weights.shape != (len(names) + 1, 3):
-            raise ResultError("the arrays of the saved method do not fit together", path="weights")
-        law = Law(tuple(header["commands"]), int(header["delays"]), Normaliser(names, mean, std), weights)
-        return cls(law, float(header["past"]), dict(header["hyperparameters"]))
+    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> HankelCorrector:  # noqa: ARG002
+        """Return the law on the steps of some windows for all ridges; one ridge has no axis in front."""
+        delays = steps_of(point["delays"], self.task.windows.step)
+        chosen, table = self.steps.of(windows), self.table(delays)
+        here = {key: values[chosen] for key, values in table.items()}
+        seen, missing = Seen.of(here, self.method.mirror), self.steps.missing[chosen]
+        if seen.reflection is not None:
+            missing = np.concatenate([missing, missing * [1.0, -1.0, -1.0]])
+        values = (seen.samples(here) - seen.normaliser.mean) / seen.normaliser.std
+        full = np.concatenate([values, np.ones((len(values), 1))], axis=1)
+        size = np.maximum(missing.std(axis=0), 1e-12)
+        penalty = np.r_[np.ones(values.shape[1]), 1e-3]
+        weights = solve(full, missing / size, ridges, penalty) * size
+        law = Law(self.task.commands, delays, seen.normaliser, weights[0] if len(ridges) == 1 else weights)
+        return HankelCorrector(law, point["delays"], point)
+
+    def table(self, delays: int) -> dict[str, Array]:
+        """Return inputs (N,) at the true steps: before them are the past and the horizon of their windows."""
+        windows, steps, physics = self.task.windows, self.steps, self.case.physics
+        past = past_rows(physics, self.task.instants(self.name), delays, self.task.commands)
+        motion = {key: np.concatenate([windows.columns[key][None], windows.states[key]]) for key in (*MOTIONS, "psi")}
+        later = {**motion, **windows.planned}
+        if physics.vessel is not None:
+            instants = windows.instants(known=True, hidden=self.task.hidden.get(self.name))
+            later |= missed_steps(physics, instants, motion)
+        at, before = delays + steps.number, {}
+        for key, values in past.items():
+            rows = np.concatenate([values, later[key]])
+            before[key] = np.stack([rows[at - ago, steps.window] for ago in range(delays, 0, -1)])
+        return delayed(steps.at.columns, before, delays, self.task.commands)
 
 
 class HankelDMD(Stepped):
@@ -177,6 +169,7 @@ class HankelDMD(Stepped):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
+    problem: ClassVar[type[Problem]] = HankelProblem
     corrector: ClassVar[type[Any]] = HankelCorrector
 
     delays: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (2.0, 4.0, 8.0)
@@ -209,71 +202,3 @@ class HankelDMD(Stepped):
     def points(self) -> list[Point]:
         """Return the trials: every delay."""
         return [{"delays": delays} for delays in self.delays]
-
-    def trial_of(self, task: Task, name: str) -> Callable[[int, Point], Solve]:
-        """Return how a trial is solved: a law with its delay."""
-        steps = true_steps(task, name)
-
-        def trial(_: int, point: Point) -> Solve:
-            table = _true_table(task, name, steps, steps_of(point["delays"], task.windows.step))
-            return partial(self._solved, task, table, steps, point)
-
-        return trial
-
-    def _solved(
-        self,
-        task: Task,
-        table: Mapping[str, Array],
-        steps: TrueSteps,
-        point: Point,
-        windows: Index,
-        ridges: Sequence[float],
-    ) -> HankelCorrector:
-        """The law on the steps of some windows for all ridges; one ridge has no axis in front."""
-        chosen, seconds = steps.of(windows), point["delays"]
-        here = {key: values[chosen] for key, values in table.items()}
-        features = choose_features(here)
-        names = tuple(features)
-        values, missing = np.stack([here[key] for key in names], axis=1), steps.missing[chosen]
-        image = reflection(here, features) if self.mirror else None
-        if image is not None:
-            values = np.concatenate([values, values @ image])
-            missing = np.concatenate([missing, missing * [1.0, -1.0, -1.0]])
-        normaliser = Normaliser(names, values.mean(axis=0), values.std(axis=0))
-        full = np.concatenate([(values - normaliser.mean) / normaliser.std, np.ones((len(values), 1))], axis=1)
-        size = np.maximum(missing.std(axis=0), 1e-12)
-        penalty = np.r_[np.ones(len(names)), 1e-3]
-        weights = solve(full, missing / size, ridges, penalty) * size
-        weights = weights[0] if len(ridges) == 1 else weights
-        law = Law(task.commands, steps_of(seconds, task.windows.step), normaliser, weights)
-        return HankelCorrector(law, seconds, point)
-
-
-def _true_table(task: Task, name: str, steps: TrueSteps, delays: int) -> dict[str, Array]:
-    """Inputs (N,) of the law at the true steps: what came before them is the past and the horizon of their windows."""
-    windows, case = task.windows, task.cases[name]
-    if windows.num_past < delays:
-        raise DataError(
-            f"the method needs {delays} steps of the past, the windows hold {windows.num_past}", path="past"
-        )
-    first = windows.num_past - delays
-    before: dict[str, Array] = {}
-    for key in MOTIONS:
-        before[key] = np.concatenate([windows.past[key][first:], windows.columns[key][None], windows.states[key]])
-    for key in task.commands:
-        before[key] = np.concatenate([windows.past[key][first:], windows.planned[key]])
-    if case.physics.vessel is not None:
-        instants = windows.instants(known=True, hidden=task.hidden.get(name))
-        stepper, missed = Stepper(case.physics, instants), []
-        for k in range(windows.horizon):
-            after = np.stack([windows.states[key][k] for key in MOTIONS], axis=1)
-            missed.append((after - free(case.physics, stepper.at(k, true_motion(windows, k)))) / windows.step)
-        for axis, key in enumerate(MISSED):
-            past = _missed_before(case.physics, instants, delays)[axis]
-            before[key] = np.concatenate([past, np.stack([step[:, axis] for step in missed])])
-    at = delays + steps.number
-    chosen = {
-        key: np.stack([values[at - ago, steps.window] for ago in range(delays, 0, -1)])
-        for key, values in before.items()
-    }
-    return delayed(steps.at.columns, chosen, delays, task.commands)

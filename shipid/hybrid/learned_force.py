@@ -9,10 +9,9 @@ al. (2007).
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +19,14 @@ from pydantic import PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.document import LEAST_NUMBER
-from shipid.errors import ResultError
-from shipid.hybrid.method import Fitted, Index, Task
+from shipid.hybrid.features import MOTIONS
+from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Search
-from shipid.hybrid.settings import Scale, Searched, seed_of
-from shipid.hybrid.stepping import TrueSteps, true_steps
-from shipid.hybrid.trials import best_of, diverged, ridges_of, row_of, sound, used
+from shipid.hybrid.search import Judged, Problem, SearchedAlone
+from shipid.hybrid.settings import Point, Scale, seed_of
+from shipid.hybrid.stepping import true_steps
+from shipid.hybrid.stored import Stored
+from shipid.hybrid.trials import ridges_of
 from shipid.hybrid.units import solve
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -43,7 +43,7 @@ LEAST_SCALE = 1e-3  # m/s and rad/s: of a motion that does not vary
 
 
 @dataclass(frozen=True)
-class ForceCorrector:
+class ForceCorrector(Stored):
     """A force added to the equations: numbers of the block `hull.learned`, name -> (units,) or (1,)."""
 
     block: Mapping[str, Array]
@@ -58,30 +58,52 @@ class ForceCorrector:
         """Return paths (T, S, 2) [m] in the frame (11) of the physics with the learned force."""
         return self.with_force(physics).paths(instants)
 
-    def header(self) -> dict[str, Any]:
-        """Return the hyperparameters."""
-        return {"hyperparameters": dict(self.hyperparameters)}
 
-    def arrays(self) -> dict[str, Array]:
-        """Return the numbers of the block by name."""
-        return dict(self.block)
+class ForceProblem(Problem):
+    """A foundation whose true steps give the first weights of its force, and whose rollouts the others."""
 
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where a number is missing or lists differ in length."""
-        names = (*SCALES, *LIMITS, *HIDDEN, *OUTPUT)
-        missing = next((name for name in names if name not in arrays), None)
-        if missing is not None:
-            raise ResultError("missing in the saved force", path=missing)
-        if len({arrays[name].shape for name in (*HIDDEN, *OUTPUT)}) != 1:
-            raise ResultError("the lists of the saved force differ in length", path=BLOCK)
-        several = next((name for name in (*SCALES, *LIMITS) if arrays[name].shape != (1,)), None)
-        if several is not None:
-            raise ResultError("must be one number in a list", path=several)
-        return cls({name: arrays[name] for name in names}, dict(header["hyperparameters"]))
+    def __init__(self, method: LearnedForce, task: Task, name: str) -> None:
+        super().__init__(method, task, name)
+        measured = replace(self.case, physics=replace(self.case.physics, observer=None))
+        self.steps = true_steps(replace(task, cases={name: measured}), name)  # they start from measured states
+        self.starts: dict[int, Array] = {}  # fold -> weights of the trial before
+
+    def judge(self, number: int, point: Point) -> Judged:  # noqa: ARG002
+        """Return the error on the validation windows of a force that starts from that of the trial before."""
+        losses, most = [], 0
+        for fold, (training, validation) in enumerate(self.task.folds):
+            trainer = self._trainer(training, seed_of(self.task.seed, self.name, fold))
+            weights, count = trainer.solve(point["ridge"], self.starts.get(fold))
+            self.starts[fold], most = weights, max(most, count)
+            losses.append(trainer.error(weights, self.instants.select(validation), self.future[:, validation]))
+        return Judged(float(np.mean(losses)) / 2, point, most)  # per coordinate, as the other methods
+
+    def solve(self, number: int, point: Point, windows: Index) -> ForceCorrector:  # noqa: ARG002
+        """Return the force of a ridge, learned from some windows."""
+        trainer = self._trainer(windows, seed_of(self.task.seed, self.name))
+        weights, _ = trainer.solve(point["ridge"], None)
+        return ForceCorrector(trainer.block(weights), dict(point))
+
+    def _trainer(self, windows: Index, seed: int) -> _Trainer:
+        """The loss on some windows: of a physics with the block, on at most `samples` of the windows."""
+        generator, method, some = np.random.default_rng(seed), self.method, windows
+        if len(windows) > method.samples:
+            some = np.sort(generator.choice(windows, method.samples, replace=False))
+        physics = self.case.physics
+        columns = {motion: self.instants.columns[motion][windows] for motion in MOTIONS}
+        block: dict[str, Array] = {
+            scale: np.array([max(float(columns[motion].std()), LEAST_SCALE)])
+            for scale, motion in zip(SCALES, MOTIONS, strict=True)
+        }
+        block |= limits(physics.ship, float(np.hypot(columns["u"], columns["v"]).max()), method.limit)
+        block |= {key: generator.standard_normal(method.units) for key in HIDDEN}
+        block |= {key: np.zeros(method.units) for key in OUTPUT}
+        here = self.steps.of(windows)
+        block = started(block, physics, self.steps.at.select(here), self.steps.missing[here])
+        return _Trainer(physics, block, self.instants.select(some), self.future[:, some], method.iterations)
 
 
-class LearnedForce(Searched):
+class LearnedForce(SearchedAlone):
     """A bounded tanh network of u, v, r as a force in the equations, trained on the errors of the path.
 
     Parameters
@@ -97,7 +119,9 @@ class LearnedForce(Searched):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
+    CHAINED: ClassVar[bool] = True
     meets_none: ClassVar[bool] = False
+    problem: ClassVar[type[Problem]] = ForceProblem
     corrector: ClassVar[type[Any]] = ForceCorrector
 
     trials: PositiveInt = 3
@@ -106,10 +130,6 @@ class LearnedForce(Searched):
     limit: PositiveFloat = 1.0
     iterations: PositiveInt = 60
     samples: PositiveInt = 1500
-
-    def fit(self, task: Task) -> dict[str, Fitted]:
-        """Train a force for every foundation: the ridge that validates best, then all windows with it."""
-        return {name: self._fit(task, name) for name in task.cases}
 
     def unfit(self, vessel: Vessel) -> str:
         """Return why there is no scale of the force, no place for it or no gradient; empty where all is there."""
@@ -130,72 +150,16 @@ class LearnedForce(Searched):
         """Return the values of the ridge that are tried."""
         return ridges_of(self.ridge, self.trials)
 
-    def _fit(self, task: Task, name: str) -> Fitted:
-        case, instants, future = task.cases[name], task.instants(name), task.windows.future
-        if not sound(task, name):
-            return diverged(self, ({"ridge": ridge} for ridge in self.ridges()))
-        search = Search(task, [name], self, again=True)  # a trial starts from the one before
-        assert case.physics.vessel is not None
-        measured = replace(
-            case, physics=replace(case.physics, observer=None)
-        )  # single steps start from measured states
-        everything, steps = used(task), true_steps(replace(task, cases={name: measured}), name)
-        starts: dict[int, Array | None] = {}
-        for number, ridge in search.left(self.ridges()[::-1]):  # from stiff to soft: each starts from the one before
-            start, losses, most = time.process_time(), [], 0
-            for fold, (training, validation) in enumerate(task.folds):
-                seed = seed_of(task.seed, name, fold)
-                trainer = self._trainer(task, name, instants, future, training, steps, seed)
-                weights, count = trainer.solve(ridge, starts.get(fold))
-                starts[fold], most = weights, max(most, count)
-                losses.append(trainer.error(weights, instants.select(validation), future[:, validation]))
-            value = float(np.mean(losses)) / 2  # per coordinate, as the other methods
-            search.record({name: row_of(number, {"ridge": ridge}, value, start, most)})
-        rows = search.rows[name]
-        if not best_of(rows):
-            return Fitted(None, rows, search.seconds)
-        ridge = min((row["value"], row["params"]["ridge"]) for row in best_of(rows))[1]
-        trainer = self._trainer(task, name, instants, future, everything, steps, seed_of(task.seed, name))
-        weights, _ = trainer.solve(ridge, None)
-        corrector = ForceCorrector(trainer.block(weights), {"ridge": ridge})
-        return Fitted(corrector, rows, search.seconds)
-
-    def _trainer(
-        self,
-        task: Task,
-        name: str,
-        instants: Instants,
-        future: Array,
-        windows: Index,
-        steps: TrueSteps,
-        seed: int,
-    ) -> _Trainer:
-        """The problem of one fold: a physics with the block, and at most `samples` of the training windows."""
-        generator = np.random.default_rng(seed)
-        some = windows
-        if len(windows) > self.samples:
-            some = np.sort(generator.choice(windows, self.samples, replace=False))
-        physics = task.cases[name].physics
-        assert physics.vessel is not None
-        columns = {motion: instants.columns[motion][windows] for motion in ("u", "v", "r")}
-        block: dict[str, Array] = {
-            scale: np.array([max(float(columns[motion].std()), LEAST_SCALE)])
-            for scale, motion in zip(SCALES, ("u", "v", "r"), strict=True)
-        }
-        block |= limits(physics.vessel, float(np.hypot(columns["u"], columns["v"]).max()), self.limit)
-        block |= {key: generator.standard_normal(self.units) for key in HIDDEN}
-        block |= {key: np.zeros(self.units) for key in OUTPUT}
-        here = steps.of(windows)
-        block = started(block, physics, steps.at.select(here), steps.missing[here])
-        return _Trainer(physics, block, instants.select(some), future[:, some], self.iterations)
+    def points(self) -> list[Point]:
+        """Return the trials: from stiff to soft, for each starts from the one before."""
+        return [{"ridge": ridge} for ridge in self.ridges()[::-1]]
 
 
 def started(block: Mapping[str, Array], physics: Physics, at: Instants, missing: Array) -> dict[str, Array]:
     """The block with output weights from the accelerations (N, 3) that single steps of the physics miss at `at`."""
-    assert physics.vessel is not None
-    force = missing @ mass(physics.vessel).T
+    force = missing @ mass(physics.ship).T
     weights = [block[key][:, None] for key in ("w_u", "w_v", "w_r")]
-    u, v, r = (at.columns[motion] / block[scale] for motion, scale in zip(("u", "v", "r"), SCALES, strict=True))
+    u, v, r = (at.columns[motion] / block[scale] for motion, scale in zip(MOTIONS, SCALES, strict=True))
     along = weights[0] * u + block["w_0"][:, None]
     across = weights[1] * v + weights[2] * r
     one, other = np.tanh(along + across).T, np.tanh(along - across).T
@@ -235,15 +199,14 @@ class _Trainer:
         self, physics: Physics, block: Mapping[str, Array], instants: Instants, future: Array, iterations: int
     ) -> None:
         self.physics = physics.with_values({BLOCK: plain(block)})
-        assert self.physics.vessel is not None
         lost = self.physics.variant_paths(instants)[1][0]
         sound = np.flatnonzero(~lost | lost.all())  # where all are lost, no force makes the error finite
         self.instants, self.future = instants.select(sound), future[:, sound]
         self.first, self.iterations = dict(block), iterations
         self.names = [f"{BLOCK}.{key}.{unit}" for key in (*HIDDEN, *OUTPUT) for unit in range(len(block["w_0"]))]
-        paths = list(self.physics.vessel.parameters)
+        paths = list(self.physics.ship.parameters)
         self.places = np.array([paths.index(name) for name in self.names])
-        self.values = np.array(list(self.physics.vessel.parameters.values()))
+        self.values = np.array(list(self.physics.ship.parameters.values()))
         self.start = np.concatenate([block[key] for key in (*HIDDEN, *OUTPUT)])
         self.num_hidden = len(HIDDEN) * len(block["w_0"])
 

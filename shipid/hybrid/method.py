@@ -5,17 +5,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, NonNegativeInt, model_validator
 
-from shipid.arguments import by_name, number, one_of, whole_number
+from shipid.arguments import by_name, number, numbers
 from shipid.checked import Checked
 from shipid.data.windows import Instants, Windows, locked
-from shipid.errors import DataError, ShipidError
-from shipid.files import json_text
+from shipid.document import parse
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.contract import fault_of_corrector
 from shipid.hybrid.features import NOTHING, Inputs, Memory
 from shipid.hybrid.physics import Physics
@@ -161,7 +161,7 @@ class Fitted:
 class Traits:
     """What sentences, comparisons and findings of a study know of a method; no number depends on it.
 
-    A study reads no setting by its name, so a method may call its settings as it likes.
+    Those of a `Searched` method follow from its settings called `mirror`, `memory` and `terms`.
 
     mirror : whether it may use that port and starboard are mirror images; None where it has no such choice. One that
         may not, on no physics alone, is the plain rival of the others.
@@ -196,7 +196,7 @@ class Method(Checked, BaseModel, ABC):
     @property
     def past(self) -> float:
         """Length of the past that windows must hold for this method [s]."""
-        return 0.0
+        return self.traits.memory.past
 
     @property
     def together(self) -> bool:
@@ -230,9 +230,29 @@ class Method(Checked, BaseModel, ABC):
         """Fit every foundation of a task; name of the foundation -> result."""
 
 
-TRIAL = ("number", "params", "value", "epochs", "seconds", "state")  # keys of the row of a trial
-TRIAL_STATES = ("complete", "stopped", "diverged")
-TAKEN = ("cell", "model", "N_D", "seed", "chosen", *TRIAL)  # columns of a table of trials beside their params
+TAKEN = ("cell", "model", "N_D", "seed", "chosen", "number", "value", "epochs", "seconds", "state")
+"""Columns of a table of trials beside their params."""
+
+
+class TrialRow(BaseModel):
+    """What the row of a trial holds, see `Fitted`."""
+
+    model_config = ConfigDict(extra="forbid")
+    number: NonNegativeInt
+    params: dict[str, float]
+    value: float
+    epochs: NonNegativeInt
+    seconds: float
+    state: Literal["complete", "stopped", "diverged"]
+
+    @model_validator(mode="after")
+    def _can_be_stored(self) -> Self:
+        """Refuse a name of a column that there is already, and a value that is none."""
+        if taken := sorted({*self.params} & {*TAKEN}):
+            raise ValueError(f"params: {taken[0]!r} is a name that is taken: use another")
+        if self.state != "diverged" and not np.isfinite(self.value):
+            raise ValueError(f"value must be finite, not {self.value}, unless the state is 'diverged'")
+        return self
 
 
 def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
@@ -259,42 +279,19 @@ def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
 
 def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...], learns: bool) -> None:
     """DataError where the parts of a result are not what a study stores: it could not be read back."""
-    if not isinstance(one.trials, list | tuple) or not all(isinstance(row, Mapping) for row in one.trials):
-        raise DataError(f"{where}: trials must be a list of rows: make each by shipid.hybrid.trials.row_of")
-    for row in one.trials:
-        lacking = next((key for key in TRIAL if key not in row), None)
-        if lacking is not None:
-            raise DataError(f"{where}: a trial lacks {lacking!r}: make it by shipid.hybrid.trials.row_of")
-        by_name(f"{where}: params of a trial", row["params"], "a name to a number", DataError)
-        taken = next((key for key in row["params"] if key in TAKEN), None)
-        if taken is not None:
-            raise DataError(f"{where}: params of a trial: {taken!r} is a name that is taken: use another")
-        for key in ("value", "seconds"):
-            number(f"{where}: {key} of a trial", row[key], DataError)
-        for key in ("number", "epochs"):
-            whole_number(f"{where}: {key} of a trial", row[key], 0, DataError)
-        one_of(f"{where}: state of a trial", row["state"], TRIAL_STATES, DataError)
-        if row["state"] != "diverged" and not np.isfinite(row["value"]):
-            words = f"must be finite, not {row['value']}, unless its state is 'diverged'"
-            raise DataError(f"{where}: value of a trial {words}")
-        for key, value in row.items():
-            try:
-                json_text(value)
-            except (TypeError, ValueError, RecursionError) as error:
-                words = f"must be plain data, numbers, texts or lists of them ({error})"
-                raise DataError(f"{where}: {key} of a trial {words}") from None
+    try:
+        rows: list[TrialRow] = [parse(TrialRow, row, None, f"trial {place}") for place, row in enumerate(one.trials)]
+    except (DocumentError, TypeError) as error:
+        raise DataError(f"{where}: {error}: make trials by shipid.hybrid.trials.row_of") from None
     number(f"{where}: seconds", one.seconds, DataError)
     if not isinstance(one.sentence, str):
         raise DataError(f"{where}: sentence must be a text, not {type(one.sentence).__name__}")
-    if one.left_out is not None and np.shape(one.left_out) != shape:
+    if one.left_out is not None and np.shape(numbers(f"{where}: left_out", one.left_out, DataError)) != shape:
         raise DataError(f"{where}: left_out must be {shape}, not {np.shape(one.left_out)}")
-    if one.left_out is not None and np.asarray(one.left_out).dtype.kind not in "fiu":
-        raise DataError(f"{where}: left_out must be real numbers, not {np.asarray(one.left_out).dtype}")
     if one.corrector is None:
         return
-    if learns and not any(row["state"] == "complete" for row in one.trials):
-        remedy = "make it by shipid.hybrid.trials.row_of, or give Fitted(None, ...) where all failed"
-        raise DataError(f"{where}: a corrector needs a trial that is complete: {remedy}")
+    if learns and not any(row.state == "complete" for row in rows):
+        raise DataError(f"{where}: a corrector needs a trial that is complete, or give Fitted(None, ...)")
     _check_corrector(where, one.corrector)
 
 

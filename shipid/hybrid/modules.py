@@ -11,9 +11,8 @@ the closed form is ours.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -22,15 +21,16 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
-from shipid.files import part_of
 from shipid.hybrid.bands import nearest
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.settings import Scale, seed_of
-from shipid.hybrid.stepping import Point, Solve, Stepped, TrueSteps, free, stepped_paths, true_steps
-from shipid.hybrid.units import Seen, Units, solve, taken
+from shipid.hybrid.search import Problem
+from shipid.hybrid.settings import Point, Scale, seed_of
+from shipid.hybrid.stepping import Stepped, StepProblem, free, stepped_paths
+from shipid.hybrid.stored import Stored
+from shipid.hybrid.units import Seen, Units, solve
 from shipid.physics import TERMS
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import behind, term_blocks
@@ -69,7 +69,7 @@ def shares(reduced: list[Physics], at: Instants, whole: Array, step: float) -> A
 
 
 @dataclass(frozen=True)
-class Alarm:
+class Alarm(Stored):
     """How far a moment is from the training data: the distance to the nearest of some of its moments.
 
     centres : (C, d) normalised inputs. radius : how far the moments of one run of training are from the other runs, at
@@ -108,7 +108,7 @@ def _away(z: Array, centres: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class ModulesCorrector:
+class ModulesCorrector(Stored):
     """Factors of the modules of the physics.
 
     commands : names of the command columns. modules : names, in order.
@@ -149,43 +149,32 @@ class ModulesCorrector:
         scale: Array = 1 + self.alarm.weight(table, self.fade)[:, None] * np.clip(raw, -self.limit, self.limit)
         return scale
 
-    def header(self) -> dict[str, Any]:
-        """Return names, limits and hyperparameters."""
-        return {
-            "commands": list(self.commands),
-            "modules": list(self.modules),
-            "units": self.units.header(),
-            "limit": self.limit,
-            "fade": self.fade,
-            "radius": self.alarm.radius,
-            "hyperparameters": dict(self.hyperparameters),
-        }
 
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by name."""
-        units = {f"units.{name}": values for name, values in self.units.arrays().items()}
-        return {**units, "weights": self.weights, "centres": self.alarm.centres}
+class ModulesProblem(StepProblem):
+    """A foundation whose missing accelerations are shared among its modules, by what each adds to the true steps."""
 
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        units = Units.from_arrays(header["units"], part_of(arrays, "units."))
-        weights, centres = taken(arrays, "weights"), taken(arrays, "centres")
-        if (
-            weights.shape != (len(header["modules"]), len(units.offset) + 1)
-            or centres.shape[1:] != units.weight.shape[:1]
-        ):
-            raise ResultError("the arrays of the saved method do not fit together", path="weights")
-        return cls(
-            tuple(header["commands"]),
-            tuple(header["modules"]),
-            units,
-            weights,
-            Alarm(units.normaliser, centres, float(header["radius"])),
-            float(header["limit"]),
-            float(header["fade"]),
-            dict(header["hyperparameters"]),
-        )
+    def __init__(self, method: Modules, task: Task, name: str) -> None:
+        super().__init__(method, task, name)
+        self.modules = tuple(modules_of(self.case.physics.vessel))
+        self.parts = shares(without(self.case.physics), self.steps.at, self.steps.free, self.steps.step)
+
+    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> ModulesCorrector:
+        """Return factors on the steps of some windows for all ridges; one ridge has no axis in front."""
+        task, method, steps, modules = self.task, self.method, self.steps, self.modules
+        chosen = steps.of(windows)
+        table = {key: values[chosen] for key, values in feature_table(steps.at.columns, task.commands).items()}
+        table = {key: values for key, values in table.items() if not key.endswith("_rw")}  # factors are of the ship
+        units = Seen.of(table, method.mirror).draw(point, method.units, seed_of(task.seed, number))
+        even, _ = units.parts(table)
+        missing, acting = steps.missing[chosen], self.parts[chosen]
+        size = np.maximum(acting.std(axis=0).max(axis=0), 1e-12)  # of each axis
+        rows = np.einsum("skj,sm->sjkm", acting / size, even).reshape(missing.size, -1)
+        penalty = np.tile(np.r_[0.1, np.ones(method.units)], len(modules))
+        weights = solve(rows, (missing / size).reshape(-1, 1), ridges, penalty)
+        weights = weights.reshape(len(ridges), len(modules), -1)
+        alarm = Alarm.fit(table, units.normaliser, method.centres, task.windows.run[steps.window[chosen]])
+        weights = weights[0] if len(ridges) == 1 else weights
+        return ModulesCorrector(task.commands, modules, units, weights, alarm, method.limit, method.fade, dict(point))
 
 
 class Modules(Stepped):
@@ -206,6 +195,7 @@ class Modules(Stepped):
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "offset", "ridge")
     RIDGES: ClassVar[int] = 6
     meets_none: ClassVar[bool] = False
+    problem: ClassVar[type[Problem]] = ModulesProblem
     corrector: ClassVar[type[Any]] = ModulesCorrector
 
     trials: PositiveInt = 6
@@ -222,37 +212,3 @@ class Modules(Stepped):
         """Return why there is no factor to learn; empty where there is."""
         lacks = "the vessel has no hull, thruster or rudder whose factor could be learned: give one"
         return "" if modules_of(vessel) else lacks
-
-    def trial_of(self, task: Task, name: str) -> Callable[[int, Point], Solve]:
-        """Return how a trial is solved: factors of all modules, from what each adds to the true steps."""
-        steps, physics = true_steps(task, name), task.cases[name].physics
-        modules = tuple(modules_of(physics.vessel))
-        parts = shares(without(physics), steps.at, steps.free, steps.step)
-        return lambda number, point: partial(self._solved, task, modules, steps, parts, number, point)
-
-    def _solved(
-        self,
-        task: Task,
-        modules: tuple[str, ...],
-        steps: TrueSteps,
-        parts: Array,
-        number: int,
-        point: Point,
-        windows: Index,
-        ridges: Sequence[float],
-    ) -> ModulesCorrector:
-        """Factors on the steps of some windows for all ridges; one ridge has no axis in front."""
-        chosen = steps.of(windows)
-        table = {key: values[chosen] for key, values in feature_table(steps.at.columns, task.commands).items()}
-        table = {key: values for key, values in table.items() if not key.endswith("_rw")}  # factors are of the ship
-        units = Seen.of(table, self.mirror).draw(point, self.units, seed_of(task.seed, number))
-        even, _ = units.parts(table)
-        missing, acting = steps.missing[chosen], parts[chosen]
-        size = np.maximum(acting.std(axis=0).max(axis=0), 1e-12)  # of each axis
-        rows = np.einsum("skj,sm->sjkm", acting / size, even).reshape(missing.size, -1)
-        penalty = np.tile(np.r_[0.1, np.ones(self.units)], len(modules))
-        weights = solve(rows, (missing / size).reshape(-1, 1), ridges, penalty)
-        weights = weights.reshape(len(ridges), len(modules), -1)
-        alarm = Alarm.fit(table, units.normaliser, self.centres, task.windows.run[steps.window[chosen]])
-        weights = weights[0] if len(ridges) == 1 else weights
-        return ModulesCorrector(task.commands, modules, units, weights, alarm, self.limit, self.fade, dict(point))

@@ -7,30 +7,30 @@ here f(z) = W tanh(V z + c) with V, c drawn and W in closed form.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, ClassVar, Self
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import PositiveInt
 
 from shipid.data.windows import Instants
-from shipid.errors import ResultError
-from shipid.files import entries_of, part_of
 from shipid.hybrid.features import feature_table
-from shipid.hybrid.method import Index, Task
+from shipid.hybrid.method import Index, Row, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.settings import Scale, seed_of
-from shipid.hybrid.stepping import Point, Solve, Stepped, TrueSteps, stepped_paths, true_steps
-from shipid.hybrid.units import Seen, Units, solve, taken
+from shipid.hybrid.search import Problem
+from shipid.hybrid.settings import Point, Scale, seed_of
+from shipid.hybrid.stepping import Stepped, StepProblem, stepped_paths
+from shipid.hybrid.stored import Stored
+from shipid.hybrid.trials import used
+from shipid.hybrid.units import Seen, Units, solve
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Head:
+class Head(Stored):
     """One network: hidden units and their output weights, (M + 1, 1) for surge and (M or M + 1, 2) for sway and yaw.
 
     Weights may have R more in front, (R, M + 1, 1) and (R, M, 2), for R networks on the same units.
@@ -54,7 +54,7 @@ class Head:
 
 
 @dataclass(frozen=True)
-class OneStepCorrector:
+class OneStepCorrector(Stored):
     """The mean of some networks, applied at every step of the rollout.
 
     commands : names of the command columns.
@@ -74,31 +74,33 @@ class OneStepCorrector:
 
         return stepped_paths(physics, instants, acceleration)
 
-    def header(self) -> dict[str, Any]:
-        """Return names and hyperparameters."""
-        units = [head.units.header() for head in self.heads]
-        return {"commands": list(self.commands), "units": units, "hyperparameters": dict(self.hyperparameters)}
 
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by flat names: `0.weight`, `0.surge`, ..."""
-        stored: dict[str, Array] = {}
-        for i, head in enumerate(self.heads):
-            parts = {**head.units.arrays(), "surge": head.surge, "sway_yaw": head.sway_yaw}
-            stored |= {f"{i}.{name}": values for name, values in parts.items()}
-        return stored
+class OneStepProblem(StepProblem):
+    """A foundation whose missing accelerations are the targets of drawn networks."""
 
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        heads = []
-        for i, entry in enumerate(entries_of(header, "units")):
-            parts = part_of(arrays, f"{i}.")
-            head = Head(Units.from_arrays(entry, parts), taken(parts, "surge"), taken(parts, "sway_yaw"))
-            count = len(head.units.offset)
-            if head.surge.shape != (count + 1, 1) or head.sway_yaw.shape != (count + (not entry["mirror"]), 2):
-                raise ResultError("the arrays of the saved method do not fit together", path=f"{i}.surge")
-            heads.append(head)
-        return cls(tuple(header["commands"]), tuple(heads), dict(header["hyperparameters"]))
+    def __init__(self, method: OneStep, task: Task, name: str) -> None:
+        super().__init__(method, task, name)
+        self.table = feature_table(self.steps.at.columns, task.commands)
+
+    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> OneStepCorrector:
+        """Return networks on the steps of some windows for all ridges; one ridge has no axis in front."""
+        chosen = self.steps.of(windows)
+        here = {key: values[chosen] for key, values in self.table.items()}
+        units = Seen.of(here, self.method.mirror).draw(point, self.method.units, seed_of(self.task.seed, number))
+        missing = self.steps.missing[chosen]
+        size = np.maximum(missing.std(axis=0), 1e-12)
+        even, odd = units.parts(here)
+        surge = solve(even, missing[:, :1] / size[:1], ridges) * size[:1]
+        sway_yaw = solve(odd, missing[:, 1:] / size[1:], ridges) * size[1:]
+        head = Head(units, surge, sway_yaw) if len(ridges) > 1 else Head(units, surge[0], sway_yaw[0])
+        return OneStepCorrector(self.task.commands, (head,), point)
+
+    def corrector(self, best: Sequence[Row]) -> OneStepCorrector:
+        """Return the mean of the networks of the best trials."""
+        every = used(self.task)
+        solved = [self.solve(row["number"], row["params"], every) for row in best]
+        heads = tuple(one.heads[0] for one in solved)
+        return OneStepCorrector(self.task.commands, heads, solved[0].hyperparameters)
 
 
 class OneStep(Stepped):
@@ -119,6 +121,7 @@ class OneStep(Stepped):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "wind_scale", "offset", "ridge")
+    problem: ClassVar[type[Problem]] = OneStepProblem
     corrector: ClassVar[type[Any]] = OneStepCorrector
 
     trials: PositiveInt = 12
@@ -133,35 +136,3 @@ class OneStep(Stepped):
     def num_chosen(self) -> int:
         """Return how many of the best trials make the corrector, at most."""
         return self.averaged
-
-    def trial_of(self, task: Task, name: str) -> Callable[[int, Point], Solve]:
-        """Return how a trial is solved: a network on drawn hidden units."""
-        steps = true_steps(task, name)
-        table = feature_table(steps.at.columns, task.commands)
-        return lambda number, point: partial(self._solved, task, steps, table, number, point)
-
-    def joined(self, best: Sequence[OneStepCorrector]) -> OneStepCorrector:
-        """Return the mean of the networks of the best trials."""
-        return replace(best[0], heads=tuple(one.heads[0] for one in best))
-
-    def _solved(
-        self,
-        task: Task,
-        steps: TrueSteps,
-        table: Mapping[str, Array],
-        number: int,
-        point: Point,
-        windows: Index,
-        ridges: Sequence[float],
-    ) -> OneStepCorrector:
-        """Networks on the steps of some windows for all ridges; one ridge has no axis in front."""
-        chosen = steps.of(windows)
-        here = {key: values[chosen] for key, values in table.items()}
-        units = Seen.of(here, self.mirror).draw(point, self.units, seed_of(task.seed, number))
-        missing = steps.missing[chosen]
-        size = np.maximum(missing.std(axis=0), 1e-12)
-        even, odd = units.parts(here)
-        surge = solve(even, missing[:, :1] / size[:1], ridges) * size[:1]
-        sway_yaw = solve(odd, missing[:, 1:] / size[1:], ridges) * size[1:]
-        head = Head(units, surge, sway_yaw) if len(ridges) > 1 else Head(units, surge[0], sway_yaw[0])
-        return OneStepCorrector(task.commands, (head,), point)

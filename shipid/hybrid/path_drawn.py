@@ -15,7 +15,7 @@ from pydantic import model_validator as validator
 
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
-from shipid.hybrid.method import Fitted, Task, Traits
+from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.settings import Probability, Scale, Searched, spread
 from shipid.hybrid.trials import ridges_of, value_at
 
@@ -85,19 +85,9 @@ class PathDrawn(Searched):
     choose: bool = False
 
     @property
-    def past(self) -> float:
-        """Length of the past that windows must hold [s]."""
-        return self.memory.past
-
-    @property
     def together(self) -> bool:
         """One decomposition a trial serves all foundations."""
         return True
-
-    @property
-    def traits(self) -> Traits:
-        """What a study says of this method and compares it by."""
-        return Traits(mirror=self.mirror > 0, memory=self.memory, terms=self.terms)
 
     def inputs(self, commands: tuple[str, ...]) -> Inputs:
         """Return which quantities the networks may take, given the names of the command columns."""
@@ -161,6 +151,10 @@ class PathDrawn(Searched):
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        from shipid.hybrid.ridge import tune_ridge  # a study is read without PyTorch
+        from shipid.hybrid.ridge import Recipe, tune_ridge  # a study is read without PyTorch
 
-        return tune_ridge(task, self)
+        inputs, ridges = self.inputs(task.commands), self.path()
+        recipe = Recipe(
+            self.corrector, inputs, self.units, self.terms, ridges, self.search_windows, self.points, self.left_out
+        )
+        return tune_ridge(task, self, recipe)

@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.features import Memory
-from shipid.hybrid.method import Fitted, Task, Traits
+from shipid.hybrid.features import Inputs, Memory
+from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.settings import Probability, Scale, Searched
 
 
@@ -56,22 +56,14 @@ class PathTrained(Searched):
     memory: Memory = Memory()
 
     @property
-    def past(self) -> float:
-        """Length of the past that windows must hold [s]."""
-        return self.memory.past
-
-    @property
     def together(self) -> bool:
         """Networks of one architecture train as one stack; where it is searched, hardly any two are alike."""
         return not any(isinstance(getattr(self, name), tuple) for name in self.COUNTS)
 
-    @property
-    def traits(self) -> Traits:
-        """What a study says of this method and compares it by."""
-        return Traits(memory=self.memory)
-
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""
         from shipid.hybrid.gradient import tune_gradient  # a study is read without Optuna and PyTorch
+        from shipid.hybrid.training import Length
 
-        return tune_gradient(task, self)
+        length = Length(self.epochs, self.batch, self.patience)
+        return tune_gradient(task, self, Inputs(task.commands, self.memory), length)

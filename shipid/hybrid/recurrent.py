@@ -10,33 +10,27 @@ PyTorch trains it, plain arrays predict.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import cos, pi
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
-from shipid.errors import DataError, ResultError
-from shipid.files import entries_of, part_of
-from shipid.hybrid.compensator import Normaliser, unflatten
+from shipid.errors import DataError
+from shipid.hybrid.compensator import Normaliser, flatten, smooth_basis, unflatten
 from shipid.hybrid.features import Inputs, Memory, feature_table, steps_of
-from shipid.hybrid.method import Fitted, Index, Task, Traits, shared_tables
+from shipid.hybrid.method import Index, Row, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Search
-from shipid.hybrid.settings import Scale, Searched, seed_of
-from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of
-from shipid.hybrid.units import Seen, taken
-
-if TYPE_CHECKING:
-    import torch
+from shipid.hybrid.search import Judged, Problem, SearchedAlone
+from shipid.hybrid.settings import Point, Scale, seed_of
+from shipid.hybrid.stored import Stored
+from shipid.hybrid.trials import mean_square
+from shipid.hybrid.units import Seen
 
 Array = NDArray[np.float64]
-LAYERS = ("W_i", "W_h", "b_i", "b_h", "W_1", "c_1", "W_2", "c_2")
 
 
 @dataclass(frozen=True)
@@ -48,7 +42,7 @@ class Sequences:
 
 
 @dataclass(frozen=True)
-class Reader:
+class Reader(Stored):
     """Names, statistics and mirrors of what a network reads.
 
     past, now : z-scores of the signals of the past, the instant among them, and of the inputs at the instant.
@@ -83,7 +77,7 @@ def signals_of(instants: Instants, steps: int, commands: tuple[str, ...]) -> lis
 
 
 @dataclass(frozen=True)
-class GatedNetwork:
+class GatedNetwork(Stored):
     """One trained network: what it reads, its layers by name, and its basis (T, r) [m]."""
 
     reader: Reader
@@ -98,18 +92,6 @@ class GatedNetwork:
             half = np.repeat([1.0, -1.0], outputs.shape[1] // 2)
             outputs = (outputs + half * self._outputs(self.reader.mirrored(seen))) / 2
         return np.tensordot(self.basis, unflatten(outputs), 1)
-
-    def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Shape of each array, by those of `W_h` and `W_2`, the names and the basis."""
-        units, hidden = self.layers["W_h"].shape[-1], self.layers["W_2"].shape[-1]
-        d, e, outputs = len(self.reader.past.names), len(self.reader.now.names), 2 * self.basis.shape[-1]
-        shapes: dict[str, tuple[int, ...]] = {
-            "W_i": (3 * units, d), "b_i": (3 * units,), "W_h": (3 * units, units), "b_h": (3 * units,),
-            "W_1": (hidden, units + e), "c_1": (hidden,), "W_2": (outputs, hidden), "c_2": (outputs,),
-            "basis": (len(self.basis), outputs // 2),
-            **{f"past.{name}": (d,) for name in ("mean", "std")}, **{f"now.{name}": (e,) for name in ("mean", "std")},
-        }  # fmt: skip
-        return shapes if self.reader.mirrors is None else shapes | {"past.mirror": (d, d), "now.mirror": (e, e)}
 
     def _outputs(self, seen: Sequences) -> Array:
         layers = self.layers
@@ -131,7 +113,7 @@ def _sigmoid(values: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class RecurrentCorrector:
+class RecurrentCorrector(Stored):
     """The mean of the networks of the folds."""
 
     inputs: Inputs
@@ -145,60 +127,70 @@ class RecurrentCorrector:
         corrections = [network.predict(table, instants, self.inputs.commands) for network in self.networks]
         return np.asarray(paths + np.mean(corrections, axis=0))
 
-    def header(self) -> dict[str, Any]:
-        """Return names and hyperparameters."""
-        readers = [network.reader for network in self.networks]
-        return {
-            "inputs": self.inputs.header(),
-            "past": self.past,
-            "networks": [
-                {
-                    "past": list(r.past.names),
-                    "now": list(r.now.names),
-                    "steps": r.steps,
-                    "mirror": r.mirrors is not None,
-                }
-                for r in readers
-            ],
-            "hyperparameters": dict(self.hyperparameters),
-        }
 
-    def arrays(self) -> dict[str, Array]:
-        """Return all arrays by flat names: `0.W_i`, `0.past.mean`, ..."""
-        stored: dict[str, Array] = {}
-        for i, network in enumerate(self.networks):
-            parts = {**network.layers, "basis": network.basis}
-            for name, normaliser in (("past", network.reader.past), ("now", network.reader.now)):
-                parts |= {f"{name}.mean": normaliser.mean, f"{name}.std": normaliser.std}
-            if network.reader.mirrors is not None:
-                parts |= dict(zip(("past.mirror", "now.mirror"), network.reader.mirrors, strict=True))
-            stored |= {f"{i}.{name}": values for name, values in parts.items()}
-        return stored
+class RecurrentProblem(Problem):
+    """A foundation whose past is read by networks, one for each fold, that give the error of the path on the basis."""
 
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        networks = []
-        for i, entry in enumerate(entries_of(header, "networks")):
-            parts = part_of(arrays, f"{i}.")
-            if not all(isinstance(name, str) for name in (*entry["past"], *entry["now"])):
-                raise ResultError("past and now must be lists of texts", path=f"networks.{i}")
-            past, now = (
-                Normaliser(tuple(entry[key]), taken(parts, f"{key}.mean"), taken(parts, f"{key}.std"))
-                for key in ("past", "now")
-            )
-            mirrors = (taken(parts, "past.mirror"), taken(parts, "now.mirror")) if entry["mirror"] else None
-            layers = {name: taken(parts, name) for name in LAYERS}
-            network = GatedNetwork(Reader(past, now, mirrors, int(entry["steps"])), layers, taken(parts, "basis"))
-            wrong = next((name for name, shape in network.shapes().items() if parts[name].shape != shape), None)
-            if wrong is not None:
-                raise ResultError("the arrays of the saved network do not fit together", path=f"{i}.{wrong}")
-            networks.append(network)
-        inputs, hyperparameters = Inputs.from_header(header["inputs"]), dict(header["hyperparameters"])
-        return cls(inputs, float(header["past"]), tuple(networks), hyperparameters)
+    def __init__(self, method: Recurrent, task: Task, name: str) -> None:
+        super().__init__(method, task, name)
+        self.inputs = Inputs(task.commands, method.memory)
+        self.table = self.inputs.table(self.case.physics, self.instants)
+        self.basis = smooth_basis(task.windows.horizon, method.terms)
+        self.weights = np.tensordot(self.basis.T, self.targets, 1)  # (r, S, 2)
+        self.trained: dict[int, tuple[GatedNetwork, ...]] = {}  # trial -> networks of the folds
+
+    def judge(self, number: int, point: Point) -> Judged:
+        """Return the error of the networks of the folds on their validation windows, and the most epochs of one."""
+        networks = [self._train(number, point, fold) for fold in range(len(self.task.folds))]
+        self.trained[number] = tuple(network for network, _ in networks)
+        losses = []
+        for network, (_, validation) in zip(self.trained[number], self.task.folds, strict=True):
+            here, instants = self._rows(validation), self.instants.select(validation)
+            predicted = network.predict(here, instants, self.task.commands)
+            losses.append(mean_square(predicted, self.targets[:, validation]))
+        return Judged(float(np.mean(losses)), point, max(epochs for _, epochs in networks))
+
+    def corrector(self, best: Sequence[Row]) -> RecurrentCorrector:
+        """Return the mean of the networks of the best trial; those of an earlier session are trained once more."""
+        number, params = best[0]["number"], best[0]["params"]
+        if number not in self.trained:
+            self.judge(number, params)
+        return RecurrentCorrector(self.inputs, self.method.past, self.trained[number], params)
+
+    def _rows(self, windows: Index) -> dict[str, Array]:
+        """Inputs of some windows at their instants."""
+        return {key: values[windows] for key, values in self.table.items()}
+
+    def _reader(self, training: Index) -> Reader:
+        """Statistics of the training windows alone."""
+        steps = steps_of(self.method.seconds, self.task.windows.step)
+        rows = signals_of(self.task.windows.select(training).instants(), steps, self.task.commands)
+        along = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+        past, now = (Seen.of(part, self.method.mirror) for part in (along, self._rows(training)))
+        if past.reflection is None or now.reflection is None:
+            return Reader(past.normaliser, now.normaliser, None, steps)
+        return Reader(past.normaliser, now.normaliser, (past.reflection, now.reflection), steps)
+
+    def _train(self, number: int, point: Point, fold: int) -> tuple[GatedNetwork, int]:
+        """The network of the best epoch of a fold, and the number of epochs."""
+        from shipid.hybrid.gated import train_gated  # a study is read without PyTorch
+        from shipid.hybrid.training import Length
+
+        method, training = self.method, self.task.folds[fold][0]
+        reader, parts = self._reader(training), []
+        scale = max(float(np.sqrt(np.square(self.weights[:, training]).mean())), 1e-9)
+        for windows in self.task.folds[fold]:
+            seen = reader.read(self._rows(windows), self.instants.select(windows), self.task.commands)
+            both = [seen] if reader.mirrors is None else [seen, reader.mirrored(seen)]
+            parts.append(([(one.past, one.now) for one in both], flatten(self.weights[:, windows]) / scale))
+        seed = seed_of(self.task.seed, self.name, number, fold)
+        length = Length(method.epochs, method.batch, method.patience)
+        layers, epochs = train_gated(parts, method.units, point["learning_rate"], method.weight_decay, length, seed)
+        scaled = {**layers, "W_2": layers["W_2"] * scale, "c_2": layers["c_2"] * scale}
+        return GatedNetwork(reader, scaled, self.basis), epochs
 
 
-class Recurrent(Searched):
+class Recurrent(SearchedAlone):
     """A gated recurrent unit on the past, trained on the errors of the path.
 
     Parameters
@@ -217,6 +209,7 @@ class Recurrent(Searched):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("learning_rate",)
+    problem: ClassVar[type[Problem]] = RecurrentProblem
     corrector: ClassVar[type[Any]] = RecurrentCorrector
 
     trials: PositiveInt = 3
@@ -234,194 +227,4 @@ class Recurrent(Searched):
     @property
     def past(self) -> float:
         """Length of the past that windows must hold [s]."""
-        return max(self.seconds, self.memory.past)
-
-    @property
-    def traits(self) -> Traits:
-        """What a study says of this method and compares it by."""
-        return Traits(mirror=self.mirror, memory=self.memory, terms=self.terms)
-
-    def fit(self, task: Task) -> dict[str, Fitted]:
-        """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""
-        inputs = Inputs(task.commands, self.memory)
-        tables = shared_tables(task, inputs)
-        return fit_each(task, self, lambda: points_of(self), lambda name: self._fit(task, name, inputs, tables[name]))
-
-    def _fit(self, task: Task, name: str, inputs: Inputs, table: Mapping[str, Array]) -> Fitted:
-        from shipid.hybrid.ridge import smooth_basis  # a study is read without PyTorch
-
-        search, trained = Search(task, [name], self), dict[int, tuple[GatedNetwork, ...]]()
-        basis = smooth_basis(task.windows.horizon, self.terms)
-        targets = task.targets[name]
-
-        def networks_of(number: int, point: Mapping[str, float]) -> tuple[tuple[GatedNetwork, ...], int]:
-            """A network of each fold, and the most epochs that one took."""
-            trained = []
-            for fold, (training, validation) in enumerate(task.folds):
-                seed = seed_of(task.seed, name, number, fold)
-                trained.append(self._trained(task, name, table, targets, basis, training, validation, point, seed))
-            return tuple(network for network, _ in trained), max(epochs for _, epochs in trained)
-
-        for number, point in search.left(points_of(self)):
-            start, losses = time.process_time(), []
-            trained[number], most = networks_of(number, point)
-            for network, (_, validation) in zip(trained[number], task.folds, strict=True):
-                here = {key: values[validation] for key, values in table.items()}
-                predicted = network.predict(here, task.instants(name).select(validation), task.commands)
-                losses.append(mean_square(predicted, targets[:, validation]))
-            search.record({name: row_of(number, point, float(np.mean(losses)), start, most)})
-        rows = search.rows[name]
-        if not best_of(rows):
-            return Fitted(None, rows, search.seconds)
-        best = best_of(rows)[0]
-        number, params = best["number"], best["params"]
-        networks = trained[number] if number in trained else networks_of(number, params)[0]  # of an earlier session
-        return Fitted(RecurrentCorrector(inputs, self.past, networks, params), rows, search.seconds)
-
-    def _reader(self, task: Task, table: Mapping[str, Array], training: Index) -> Reader:
-        """Statistics of the training windows alone."""
-        steps = steps_of(self.seconds, task.windows.step)
-        rows = signals_of(task.windows.select(training).instants(), steps, task.commands)
-        along = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-        at = {name: values[training] for name, values in table.items()}
-        past, now = (Seen.of(part, self.mirror) for part in (along, at))
-        if past.reflection is None or now.reflection is None:
-            return Reader(past.normaliser, now.normaliser, None, steps)
-        return Reader(past.normaliser, now.normaliser, (past.reflection, now.reflection), steps)
-
-    def _trained(
-        self,
-        task: Task,
-        name: str,
-        table: Mapping[str, Array],
-        targets: Array,
-        basis: Array,
-        training: Index,
-        validation: Index,
-        point: Mapping[str, float],
-        seed: int,
-    ) -> tuple[GatedNetwork, int]:
-        """Train a network on one fold; the network of the best epoch, and the number of epochs."""
-        reader = self._reader(task, table, training)
-        weights = np.tensordot(basis.T, targets, 1)
-        data = []
-        scale = max(float(np.sqrt(np.square(weights[:, training]).mean())), 1e-9)
-        for part in (training, validation):
-            here = {key: values[part] for key, values in table.items()}
-            seen = reader.read(here, task.instants(name).select(part), task.commands)
-            image = None if reader.mirrors is None else reader.mirrored(seen)
-            outputs = np.concatenate([weights[:, part, 0], weights[:, part, 1]]).T / scale
-            data.append((seen, image, outputs))
-        layers, epochs = train(data, self.units, point["learning_rate"], self, seed)
-        scaled = {**layers, "W_2": layers["W_2"] * scale, "c_2": layers["c_2"] * scale}
-        return GatedNetwork(reader, scaled, basis), epochs
-
-
-Part = tuple[Sequences, Sequences | None, Array]
-Read = tuple["torch.Tensor", "torch.Tensor"]
-"""The past (P + 1, S, d) and the inputs at the instant (S, e)."""
-
-
-def train(
-    data: list[Part], units: int, learning_rate: float, method: Recurrent, seed: int
-) -> tuple[dict[str, Array], int]:
-    """Train on the first part of the data, stop by the second; layers by name and the number of epochs.
-
-    Each part is what is read, its mirror image or None, and the outputs (S, 2 r). On one thread, for the same digits.
-    """
-    import torch
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        return _train(data, units, learning_rate, method, seed)
-    finally:
-        torch.set_num_threads(threads)
-
-
-def _train(
-    data: list[Part], units: int, learning_rate: float, method: Recurrent, seed: int
-) -> tuple[dict[str, Array], int]:
-    import torch
-
-    from shipid.hybrid.training import Adam
-
-    generator = torch.Generator().manual_seed(seed)
-    weights, layers = _begun(data[0], units, generator)
-    (seen, outputs), watched = map(_tensors, data)
-    adam = Adam(weights, [method.weight_decay])
-    best, kept, since, epoch = float("inf"), {}, 0, 0
-    for epoch in range(1, method.epochs + 1):
-        rate = torch.tensor([[learning_rate * (1 + cos(pi * (epoch - 1) / method.epochs)) / 2]])
-        order = torch.randperm(len(outputs), generator=generator)
-        for rows in (order[first : first + method.batch] for first in range(0, len(order), method.batch)):
-            loss = _loss(layers, [(past[:, rows], now[rows]) for past, now in seen], outputs[rows])
-            gradients = torch.autograd.grad(loss, list(layers.values()))
-            with torch.no_grad():
-                adam.step(torch.cat([gradient.flatten() for gradient in gradients])[None], rate)
-        with torch.no_grad():
-            value = float(_loss(layers, *watched))
-        since += 1
-        if value < best:
-            best, since, kept = value, 0, _numbers(layers)
-        if since >= method.patience:
-            break
-    return kept or _numbers(layers), epoch  # where no loss was a number, nor are the weights
-
-
-def _begun(part: Part, units: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-    """Initial weights (1, P) drawn as PyTorch draws them, and the layers by name, which are leaves in their memory."""
-    import torch
-
-    read, _, outputs = part
-    shapes = {
-        "W_i": (3 * units, read.past.shape[2]),
-        "W_h": (3 * units, units),
-        "b_i": (3 * units,),
-        "b_h": (3 * units,),
-        "W_1": (units, units + read.now.shape[1]),
-        "c_1": (units,),
-        "W_2": (outputs.shape[1], units),
-        "c_2": (outputs.shape[1],),
-    }
-    bounds = {name: (units if name[2] in "ih" else shape[-1]) ** -0.5 for name, shape in shapes.items()}
-    draws = [(torch.rand(shape, generator=generator) * 2 - 1) * bounds[name] for name, shape in shapes.items()]
-    weights = torch.cat([draw.flatten() for draw in draws])[None]
-    pieces = torch.split(weights[0], [draw.numel() for draw in draws])
-    return weights, {
-        name: piece.view(shape).requires_grad_() for (name, shape), piece in zip(shapes.items(), pieces, strict=True)
-    }
-
-
-def _tensors(part: Part) -> tuple[list[Read], torch.Tensor]:
-    """What is read, and then its mirror image if there is one, and the outputs (S, 2 r)."""
-    import torch
-
-    def tensor(values: Array) -> torch.Tensor:
-        return torch.as_tensor(values, dtype=torch.float32)
-
-    seen, image, outputs = part
-    return [(tensor(one.past), tensor(one.now)) for one in (seen, image) if one is not None], tensor(outputs)
-
-
-def _loss(layers: Mapping[str, torch.Tensor], seen: list[Read], outputs: torch.Tensor) -> torch.Tensor:
-    """Mean squared error of the network on outputs (S, 2 r); with an image, x is made even and y odd."""
-    import torch
-
-    past, now = (torch.cat(arrays, dim=-2) for arrays in zip(*seen, strict=True))
-    flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]
-    start = torch.zeros(1, len(now), layers["W_h"].shape[1])
-    _, hidden = torch.gru(past, start, flat, True, 1, 0.0, False, False, False)
-    full = torch.cat([hidden[0], now], dim=1)
-    made = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
-    if len(seen) == 2:
-        sign = torch.ones(made.shape[1])
-        sign[len(sign) // 2 :] = -1.0
-        plain, image = made.chunk(2)
-        made = (plain + sign * image) / 2
-    loss: torch.Tensor = (made - outputs).square().mean()
-    return loss
-
-
-def _numbers(layers: Mapping[str, torch.Tensor]) -> dict[str, Array]:
-    return {name: layer.detach().double().numpy().copy() for name, layer in layers.items()}
+        return max(self.seconds, super().past)

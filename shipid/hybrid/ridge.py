@@ -15,10 +15,10 @@ The best ones are judged once more, and solved, with all of them: successive hal
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -26,19 +26,18 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from shipid.data.windows import evenly
-from shipid.hybrid.compensator import Compensator, Network
+from shipid.hybrid.compensator import Compensator, Network, smooth_basis
 from shipid.hybrid.features import Inputs, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
 from shipid.hybrid.products import gram, hidden, matmul, sums_of_squares
 from shipid.hybrid.search import CLOSING, Search
-from shipid.hybrid.settings import seed_of
-from shipid.hybrid.trials import diverged, used
+from shipid.hybrid.settings import Point, Searched, seed_of
+from shipid.hybrid.trials import diverged, row_of, used
 from shipid.hybrid.units import Seen, Units
 
 Mask = NDArray[np.bool_]
-
-if TYPE_CHECKING:
-    from shipid.hybrid.path_drawn import PathDrawn
+Seeing = tuple[Seen, Tensor]
+"""Windows as hidden units see them: what is seen, and its values (S, d), normalised."""
 
 GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
 FINAL = 2  # trials by a part of the windows that one by all costs, about
@@ -48,15 +47,36 @@ ROUNDING = 1e-3  # by which a sum of squares must be greater to be so for sure: 
 
 
 @dataclass(frozen=True)
-class _Inputs:
-    """Windows as hidden units see them: `values` are (S, d) normalised."""
+class Recipe:
+    """How networks are drawn and solved.
 
-    seen: Seen
-    values: Tensor
+    corrector : the class of what they make. inputs : which quantities they may take. units : hidden units drawn.
+    terms : polynomials of time.
+    ridges : those of which a trial takes one for each model, rising. search_windows : how many judge all trials, about.
+    points : gives the trials anew. left_out : trial -> kinds of memory that it does without.
+    """
 
-    def part(self, rows: Tensor) -> _Inputs:
-        """The inputs of some of the windows."""
-        return replace(self, values=self.values[rows])
+    corrector: type[Compensator]
+    inputs: Inputs
+    units: int
+    terms: int
+    ridges: Sequence[float]
+    search_windows: int
+    points: Callable[[], Iterable[Point]]
+    left_out: Callable[[Point], frozenset[str]]
+
+
+def tune_ridge(task: Task, method: Searched, recipe: Recipe) -> dict[str, Fitted]:
+    """Solve networks for each foundation.
+
+    The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
+    predicted by the solution without any window outside its training part. The compensator is the mean of the networks
+    of the best trials, solved with all windows of the folds. With more than `search_windows` windows, a part of them
+    chooses the trials that are judged by all, and of these the best make the compensator.
+    """
+    tuning = _Tuning(task, method, recipe)
+    tuning.search()
+    return {key: tuning.fitted(key) for key in task.cases}
 
 
 @dataclass(frozen=True)
@@ -84,51 +104,6 @@ class _Part:
 
 
 @dataclass(frozen=True)
-class _LeftOut:
-    """A trial for one foundation without each fold in turn, its ridge chosen by the other folds.
-
-    others : (F,) sums of squared errors [m^2] over the judged windows of all folds but that one.
-    errors : (2, S, r) of x and y on the basis; not numbers for windows that no fold judges.
-    """
-
-    others: Array
-    errors: Tensor
-
-
-class _Best:
-    """The networks of the best trials of one model so far."""
-
-    def __init__(self, most: int) -> None:
-        self.most = most
-        self.kept: list[tuple[float, dict[str, float], Network]] = []
-        self.left_out: list[tuple[float, _LeftOut]] = []  # of some more trials: without a fold, others may be the best
-
-    def consider(self, trial: _Verdict) -> None:
-        """Solve the network if the trial is among the best."""
-        if len(self.kept) < self.most or trial.value < self.kept[-1][0]:
-            new = trial.value, trial.params, trial.network()
-            self.kept = sorted([*self.kept, new], key=lambda kept: kept[0])[: self.most]
-        most = self.most + SPARE
-        if len(self.left_out) < most or trial.value < self.left_out[-1][0]:
-            self.left_out = sorted([*self.left_out, (trial.value, trial.left_out())], key=lambda kept: kept[0])[:most]
-
-    def fitted(self, inputs: Inputs, rows: list[Row], errors: Array | None) -> Fitted:
-        """Average the best networks; `errors` are those on runs left out, if there are any."""
-        compensator = Compensator(inputs, tuple(kept[2] for kept in self.kept), self.kept[0][1])
-        return Fitted(compensator, rows, sum(row["seconds"] for row in rows), errors)
-
-    def without(self, folds: Sequence[Index]) -> Array:
-        """Errors (2, S, r) on the basis where no fold has a part in the choice of the trials that judge it."""
-        others = np.stack([one.others for _, one in self.left_out])  # (trials, F)
-        tried = np.stack([np.asarray(one.errors) for _, one in self.left_out])  # (trials, 2, S, r)
-        errors: Array = np.full_like(tried[0], np.nan)
-        best = np.argsort(others, axis=0, kind="stable")[: self.most]
-        for fold, rows in enumerate(folds):
-            errors[:, rows] = tried[best[:, fold, None], :, rows].mean(axis=0).swapaxes(0, 1)
-        return errors
-
-
-@dataclass(frozen=True)
 class _Group:
     """Foundations whose inputs are the same arrays in a trial: one decomposition serves them all.
 
@@ -138,17 +113,14 @@ class _Group:
 
     names: tuple[str, ...]
     outputs: list[Tensor]
-    plain: _Inputs
-    mirrored: _Inputs | None
+    plain: Seeing
+    mirrored: Seeing | None
 
-    def inputs(self, point: Mapping[str, float]) -> _Inputs:
-        """The inputs of a trial."""
-        return self.mirrored if point["mirror"] and self.mirrored is not None else self.plain
-
-    def part(self, rows: Tensor) -> _Group:
+    def of_rows(self, rows: Tensor) -> _Group:
         """The group with some of the windows; means and spreads of inputs stay those of all."""
-        mirrored = None if self.mirrored is None else self.mirrored.part(rows)
-        return _Group(self.names, [side[rows] for side in self.outputs], self.plain.part(rows), mirrored)
+        plain = self.plain[0], self.plain[1][rows]
+        mirrored = (self.mirrored[0], self.mirrored[1][rows]) if self.mirrored else None
+        return replace(self, outputs=[side[rows] for side in self.outputs], plain=plain, mirrored=mirrored)
 
     def only(self, names: Sequence[str], terms: int) -> _Group:
         """The group for some of the foundations; `terms` is r."""
@@ -175,11 +147,12 @@ class _Judges:
     def of(cls, task: Task, windows: Index, rows: Index, targets: Mapping[str, Array], basis: Array) -> _Judges:
         """Take some rows (S,) of the windows, numbered as in the task; targets (T, S, 2) [m] of each foundation."""
         taken = windows[rows]
-        folds = [tuple(part[np.isin(part, taken)] for part in fold) for fold in task.folds]
+        folds = [
+            (training[np.isin(training, taken)], judged[np.isin(judged, taken)]) for training, judged in task.folds
+        ]
         judged = np.concatenate([validation for _, validation in folds])
         faster = {key: _faster(paths[:, judged], basis) for key, paths in targets.items()}
-        blocks = _blocks([(training, validation) for training, validation in folds], taken, task.device)
-        return cls(rows, len(rows) / len(windows), blocks, faster, len(judged))
+        return cls(rows, len(rows) / len(windows), _blocks(folds, taken, task.device), faster, len(judged))
 
 
 @dataclass(frozen=True)
@@ -187,99 +160,115 @@ class _Verdict:
     """One trial for one foundation.
 
     value : mean squared error [m^2] on runs left out. ridges : numbers of the ridges that all folds, or all but one,
-    choose. network : solves the network. left_out : the errors without each fold.
+    choose. network : solves the network. left_out : the errors without each fold, its ridge chosen by the others: sums
+    of squares (F,) [m^2] over the judged windows of all folds but that one, and errors (2, S, r) of x and y on the
+    basis, not numbers for windows that no fold judges.
     """
 
     value: float
     ridges: Index
     params: dict[str, float]
     network: Callable[[], Network]
-    left_out: Callable[[], _LeftOut]
+    left_out: Callable[[], tuple[Array, Tensor]]
 
 
-def tune_ridge(task: Task, method: PathDrawn) -> dict[str, Fitted]:
-    """Solve networks for each foundation.
+class _Best:
+    """The networks of the best trials of one model so far, and the errors without each fold of some more.
 
-    The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
-    predicted by the solution without any window outside its training part. The compensator is the mean of the networks
-    of the best trials, solved with all windows of the folds. With more than `search_windows` windows, a part of them
-    chooses the trials that are judged by all, and of these the best make the compensator.
+    Without a fold, other trials may be the best.
     """
-    tuning = _Tuning(task, method)
-    tuning.search()
-    tuning.judge_finalists()
-    return {key: tuning.fitted(key) for key in task.cases}
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self.networks: list[tuple[float, tuple[dict[str, float], Network]]] = []
+        self.left_out: list[tuple[float, tuple[Array, Tensor]]] = []
+
+    def consider(self, trial: _Verdict) -> None:
+        """Solve the network if the trial is among the best."""
+        _keep_best(self.networks, self.most, trial.value, lambda: (trial.params, trial.network()))
+        _keep_best(self.left_out, self.most + SPARE, trial.value, trial.left_out)
+
+    def without(self, folds: Sequence[Index]) -> Array:
+        """Errors (2, S, r) on the basis where no fold has a part in the choice of the trials that judge it."""
+        others = np.stack([kept[0] for _, kept in self.left_out])  # (trials, F)
+        tried = np.stack([np.asarray(kept[1]) for _, kept in self.left_out])  # (trials, 2, S, r)
+        errors: Array = np.full_like(tried[0], np.nan)
+        best = np.argsort(others, axis=0, kind="stable")[: self.most]
+        for fold, rows in enumerate(folds):
+            errors[:, rows] = tried[best[:, fold, None], :, rows].mean(axis=0).swapaxes(0, 1)
+        return errors
+
+
+def _keep_best(kept: list[tuple[float, Any]], most: int, value: float, make: Callable[[], Any]) -> None:
+    """Add what `make` gives to the best so far, in order of their values, if it is one of so many."""
+    if len(kept) < most or value < kept[-1][0]:
+        kept[:] = sorted([*kept, (value, make())], key=lambda pair: pair[0])[:most]
 
 
 class _Tuning:
     """What the trials of a task share, and the best of them so far.
 
-    windows : those of all folds. names : foundations whose targets are numbers. every : all windows as judges; first :
-    those that judge all trials. promising : of each foundation value, number and ridges of its trials by a part of the
-    windows. rows : of each foundation, its trials.
+    windows : those of all folds. paths : foundation -> targets on the basis, where they are numbers. every : all
+    windows as judges; first : those that judge all trials. rows : of each foundation, its trials.
     """
 
-    def __init__(self, task: Task, method: PathDrawn) -> None:
-        self.task, self.method, self.inputs = task, method, method.inputs(task.commands)
-        self.windows = used(task)
-        self.targets = task.targets
+    def __init__(self, task: Task, method: Searched, recipe: Recipe) -> None:
+        self.task, self.method, self.recipe = task, method, recipe
+        self.windows, self.targets = used(task), task.targets
         sound = {key: paths for key, paths in self.targets.items() if np.isfinite(paths[:, self.windows]).all()}
-        self.names = list(sound)
-        tables = _of_windows(shared_tables(task, self.inputs), self.windows)
-        self.tables = {key: tables[key] for key in self.names}
-        self.basis = smooth_basis(task.windows.horizon, method.terms)
-        self.terms = self.basis.shape[1]
+        tables = _of_windows(shared_tables(task, recipe.inputs), self.windows)
+        self.tables = {key: tables[key] for key in sound}
+        self.basis = smooth_basis(task.windows.horizon, recipe.terms)
         self.paths = {key: np.tensordot(self.basis.T, paths[:, self.windows], 1) for key, paths in sound.items()}
         self.every = _Judges.of(task, self.windows, np.arange(len(self.windows)), sound, self.basis)
-        rows = part_of_runs(task.windows.run[self.windows], method.search_windows)
-        whole = len(rows) == len(self.windows) or _lacks_a_part(task.folds, self.windows[rows])
-        self.first = self.every if whole else _Judges.of(task, self.windows, rows, sound, self.basis)
+        rows = part_of_runs(task.windows.run[self.windows], recipe.search_windows)
+        self.whole = len(rows) == len(self.windows) or _lacks_a_part(task.folds, self.windows[rows])
+        self.first = self.every if self.whole else _Judges.of(task, self.windows, rows, sound, self.basis)
         self.finalists = method.num_chosen() + SPARE
-        self.best = {key: _Best(method.num_chosen()) for key in self.names}
-        self.promising: dict[str, list[tuple[float, int, Index]]] = {key: [] for key in self.names}
-        self.points: dict[int, dict[str, float]] = {}
-        self.groups: dict[frozenset[str], tuple[list[_Group], list[_Group]]] = {}  # with all windows, and the first
+        self.best = {key: _Best(method.num_chosen()) for key in sound}
+        self.points: dict[int, Point] = {}
+        self.groups: dict[frozenset[str], list[_Group]] = {}
         self.rows: dict[str, list[Row]] = {}
 
     def search(self) -> None:
         """Judge all trials, by a part of the windows where they are many."""
-        task, whole = self.task, self.first is self.every
         # networks are solved again after a break: it costs less than to keep them
-        closing = CLOSING if whole else FINAL * self.finalists
-        search = Search(task, self.names, self.method, again=True, closing=closing)
-        for number, point in search.left(self.method.points() if self.names else ()):
+        closing = CLOSING if self.whole else FINAL * self.finalists
+        search = Search(self.task, self.paths, self.method, again=True, closing=closing)
+        promising: dict[str, list[tuple[float, int, Index]]] = {key: [] for key in self.paths}
+        for number, point in search.left(self.recipe.points() if self.paths else ()):
             self.points[number] = point
             made: dict[str, Row] = {}
-            for group in self._groups(point)[1]:
+            for group in self._groups(number):
                 start = time.process_time()
-                for key, verdict in self._judged(group, number, self.first).items():
-                    if whole:
+                for key, verdict in self._judge(group, number, self.first).items():
+                    if self.whole:
                         self.best[key].consider(verdict)
-                    else:
-                        self.promising[key].append((verdict.value, number, verdict.ridges))
-                    value = {"value": verdict.value, "state": "complete"}
-                    made[key] = {"number": number, "params": verdict.params, **value}
-                seconds = (time.process_time() - start) / len(group.names)
+                    promising[key].append((verdict.value, number, verdict.ridges))
+                    made[key] = row_of(number, verdict.params, verdict.value, start)
                 for key in group.names:
-                    made[key] |= {"seconds": seconds, "epochs": 0}
-            search.keep(made)
-        search.write()
+                    made[key]["seconds"] = (time.process_time() - start) / len(group.names)
+            search.record(made)
         self.rows = search.rows
+        if not self.whole:
+            self._judge_finalists(promising)
 
-    def judge_finalists(self) -> None:
-        """Judge the best trials of a search by a part of the windows once more, by all windows; the others stopped."""
-        if self.first is self.every:
-            return
+    def _judge_finalists(self, promising: Mapping[str, list[tuple[float, int, Index]]]) -> None:
+        """Judge the best trials by a part of the windows once more, by all windows; the others stopped.
+
+        promising : of each foundation value, number and ridges of its trials.
+        """
         finals: dict[int, dict[str, Index]] = {}  # trial -> foundation -> numbers of ridges
         self.rows = {key: [{**row, "state": "stopped"} for row in rows] for key, rows in self.rows.items()}
-        for key, tried in self.promising.items():
+        for key, tried in promising.items():
             for _, number, ridges in sorted(tried, key=lambda trial: trial[:2])[: self.finalists]:
                 finals.setdefault(number, {})[key] = ridges
         for number, wanted in sorted(finals.items()):
-            for group in self._groups(self.points[number])[0]:
+            for group in self._groups(number, whole=True):
                 names = [key for key in group.names if key in wanted]
                 start = time.process_time()
-                for key, verdict in self._judged(group.only(names, self.terms), number, self.every, wanted).items():
+                few = group.only(names, self.basis.shape[1])
+                for key, verdict in self._judge(few, number, self.every, wanted).items() if names else ():
                     self.best[key].consider(verdict)
                     value = {"value": verdict.value, "params": verdict.params, "state": "complete"}
                     self.rows[key][number] |= value
@@ -292,36 +281,37 @@ class _Tuning:
         With a single fold there are none: nothing but that fold can choose the trials that judge it.
         """
         if key not in self.best:
-            return diverged(self.method, self.method.points())
+            return diverged(self.method, self.recipe.points())
+        best, errors = self.best[key], None
         folds = [row.cpu().numpy() for block in self.every.blocks for row in block.rows]
-        if len(folds) == 1:
-            return self.best[key].fitted(self.inputs, self.rows[key], None)
-        missed = np.tensordot(self.basis, self.best[key].without(folds), (1, 2)).transpose(0, 2, 1)
-        errors, targets = np.full_like(self.targets[key], np.nan), self.targets[key][:, self.windows]
-        errors[:, self.windows] = targets - np.tensordot(self.basis, self.paths[key], 1) + missed
-        return self.best[key].fitted(self.inputs, self.rows[key], errors)
+        if len(folds) > 1:
+            missed = np.tensordot(self.basis, best.without(folds), (1, 2)).transpose(0, 2, 1)
+            errors, targets = np.full_like(self.targets[key], np.nan), self.targets[key][:, self.windows]
+            errors[:, self.windows] = targets - np.tensordot(self.basis, self.paths[key], 1) + missed
+        params, networks = zip(*(kept for _, kept in best.networks), strict=True)
+        corrector, rows = self.recipe.corrector(self.recipe.inputs, networks, params[0]), self.rows[key]
+        return Fitted(corrector, rows, sum(row["seconds"] for row in rows), errors)
 
-    def _groups(self, point: Mapping[str, float]) -> tuple[list[_Group], list[_Group]]:
-        """Foundations with the same inputs in a trial together, with all windows, and with those that judge first."""
-        left_out = self.method.left_out(point)
+    def _groups(self, number: int, *, whole: bool = False) -> list[_Group]:
+        """Foundations with the same inputs in a trial together, with all windows, or with those that judge first."""
+        left_out = self.recipe.left_out(self.points[number])
         if left_out not in self.groups:
-            groups = _groups(self.tables, self.paths, left_out, len(self.windows), self.task.device)
-            rows = torch.as_tensor(self.first.rows, device=self.task.device)
-            first = groups if self.first is self.every else [group.part(rows) for group in groups]
-            self.groups[left_out] = groups, first
-        return self.groups[left_out]
+            self.groups[left_out] = _groups(self.tables, self.paths, left_out, len(self.windows), self.task.device)
+        if whole or self.whole:
+            return self.groups[left_out]
+        rows = torch.as_tensor(self.first.rows, device=self.task.device)
+        return [group.of_rows(rows) for group in self.groups[left_out]]
 
-    def _judged(
+    def _judge(
         self, group: _Group, number: int, judges: _Judges, wanted: Mapping[str, Index] | None = None
     ) -> dict[str, _Verdict]:
         """One trial for some foundations; `wanted` are the numbers of the ridges of each, else it descends."""
-        if not group.names:
-            return {}
-        point, terms, ridges = self.points[number], self.terms, self.method.path()
-        inputs = group.inputs(point)
-        units = inputs.seen.draw(point, self.method.units, seed_of(self.task.seed, number))
+        point, terms, ridges = self.points[number], self.basis.shape[1], self.recipe.ridges
+        mirrored = bool(point["mirror"]) and group.mirrored is not None
+        seen, values = group.mirrored if mirrored and group.mirrored is not None else group.plain
+        units = seen.draw(point, self.recipe.units, seed_of(self.task.seed, number))
         layer = _layer(units)  # the same array for all foundations
-        parts = _parts(inputs.values, units, group.outputs, self.task.device)
+        parts = _parts(values, units, group.outputs, self.task.device)
         asked = None
         if wanted is not None:
             asked = np.stack([np.isin(range(len(ridges)), wanted[key]) for key in group.names], axis=1)
@@ -334,8 +324,8 @@ class _Tuning:
             verdicts[key] = _Verdict(
                 value=float(errors[place, k] + judges.faster[key]) / (2 * len(self.basis) * judges.count),
                 ridges=_down_to(ridges, judges.share, chosen),
-                params={**point, "mirror": float(inputs is group.mirrored), "ridge": ridges[place]},
-                network=partial(_network, inputs.seen, layer, parts, columns, scaled[place], self.basis),
+                params={**point, "mirror": float(mirrored), "ridge": ridges[place]},
+                network=partial(_network, seen, layer, parts, columns, scaled[place], self.basis),
                 left_out=partial(_chosen_without, others[:, :, k], kept, k),
             )
         return verdicts
@@ -399,17 +389,9 @@ def _groups(
     groups = []
     for table_key, keys in alike.items():
         outputs = [_side([paths[key] for key in keys], axis, num_windows, device) for axis in (0, 1)]
-        table = seen[table_key]
-        groups.append(_Group(tuple(keys), outputs, _inputs(table, device), _mirrored(table, device)))
+        plain, mirrored = (_seeing(seen[table_key], device, mirror=mirror) for mirror in (False, True))
+        groups.append(_Group(tuple(keys), outputs, plain, mirrored if mirrored[0].reflection is not None else None))
     return groups
-
-
-def smooth_basis(horizon: int, terms: int) -> Array:
-    """Orthonormal polynomials (T, r) of time without a constant: an error starts from 0. r is at most T."""
-    time_ = np.arange(1, horizon + 1) / horizon
-    powers = np.polynomial.chebyshev.chebvander(2 * time_ - 1, min(terms, horizon) - 1) * time_[:, None]
-    basis: Array = np.linalg.qr(powers)[0]
-    return basis
 
 
 def _faster(paths: Array, basis: Array) -> float:
@@ -454,16 +436,10 @@ def _blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -
     ]
 
 
-def _inputs(table: Mapping[str, Array], device: str, mirror: bool = False) -> _Inputs:
+def _seeing(table: Mapping[str, Array], device: str, *, mirror: bool) -> Seeing:
     """Choose and normalise the inputs; with a mirror, by the windows and their images."""
     seen = Seen.of(table, mirror)
-    return _Inputs(seen, _tensor(seen.normaliser.apply(table), device))
-
-
-def _mirrored(table: Mapping[str, Array], device: str) -> _Inputs | None:
-    """The inputs with their mirror; None where a column has no image in it."""
-    inputs = _inputs(table, device, mirror=True)
-    return None if inputs.seen.reflection is None else inputs
+    return seen, _tensor(seen.normaliser.apply(table), device)
 
 
 def _parts(values: Tensor, units: Units, outputs: Sequence[Tensor], device: str) -> list[_Part]:
@@ -618,9 +594,9 @@ def _solver(part: _Part, block: _Block) -> _FewRows | _ManyRows:
     return (_FewRows if block.out.shape[1] <= part.features.shape[1] else _ManyRows)(part, block)
 
 
-def _chosen_without(others: Array, errors: _Errors, model: int) -> _LeftOut:
+def _chosen_without(others: Array, errors: _Errors, model: int) -> tuple[Array, Tensor]:
     """A trial without each fold in turn, for one model: others (ridges, F) [m^2] over all folds but that one."""
-    return _LeftOut(others.min(axis=0), errors.of(others.argmin(axis=0), model))
+    return others.min(axis=0), errors.of(others.argmin(axis=0), model)
 
 
 class _FewRows:

@@ -1,4 +1,4 @@
-"""The search of a method: which trials are left, how many fit into a budget, and what has been tried before.
+"""The search of a method: which trials are left, how many fit into a budget, and the skeleton of most methods.
 
 Trials are numbered, and whatever is random in one is seeded by its number. So a search that was interrupted goes on
 from its journal and gives the digits of one that was not. A budget becomes a number of trials by the time of the first
@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from statistics import fmean
-from typing import TypeVar
+from typing import Any, ClassVar, TypeVar
 
-from shipid.hybrid.method import Row, Task
-from shipid.hybrid.settings import Searched
+import numpy as np
 
-Point = TypeVar("Point")
+from shipid.hybrid.method import Fitted, Index, Row, Task
+from shipid.hybrid.settings import Point, Searched
+from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of, used
+
+Any_ = TypeVar("Any_")
 TIMED = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
-TOGETHER = 5.0  # s for which quick trials are kept, to be written together
 CLOSING = 1  # trials that the last fit costs, about
 
 
@@ -60,19 +63,18 @@ class Search:
         self.method, self.journal = method, task.journal
         self.cells = {name: task.cells.get(name, name) for name in names}
         self.rows: dict[str, list[Row]] = {name: [] for name in self.cells}
-        self.written = dict.fromkeys(self.cells, 0)
+        self.known = dict.fromkeys(self.cells, 0)  # trials that the journal holds
         self.count = method.num_trials()
         self.before: float | None = None
         self._earlier = 0.0
-        self._wrote = time.monotonic()
         if self.journal is None:
             return
         known = {name: self.journal.rows(cell) for name, cell in self.cells.items()}
-        self.written = {name: len(rows) for name, rows in known.items()}
+        self.known = {name: len(rows) for name, rows in known.items()}
         if method.budget:
             self.count = next(filter(None, map(self.journal.count, self.cells.values())), None)
         if not again:
-            done = min(self.written.values(), default=0)
+            done = min(self.known.values(), default=0)
             self.rows = {name: rows[:done] for name, rows in known.items()}
             self._earlier = sum(row["seconds"] for rows in self.rows.values() for row in rows)
 
@@ -86,7 +88,7 @@ class Search:
         """Core-seconds [s] of the search so far, those of an interrupted one included, for all foundations."""
         return time.process_time() - self.begun + self._earlier
 
-    def left(self, points: Iterable[Point]) -> Iterator[tuple[int, Point]]:
+    def left(self, points: Iterable[Any_]) -> Iterator[tuple[int, Any_]]:
         """Number and point of each trial that has not been made; its rows must be recorded before the next."""
         for number, point in enumerate(points):
             if self.count is not None and number >= self.count:
@@ -99,26 +101,12 @@ class Search:
                 self._decide(number + 1)
 
     def record(self, rows: Mapping[str, Row]) -> None:
-        """Keep a trial of every foundation, and write it to the journal."""
-        self.keep(rows)
-        self.write()
-
-    def keep(self, rows: Mapping[str, Row]) -> None:
-        """Keep a trial of every foundation; written with others, at most so often that a search can be followed."""
+        """Keep a trial of every foundation, and write to the journal what it does not hold yet."""
         for name, row in rows.items():
             self.rows[name].append(row)
-        if time.monotonic() - self._wrote > TOGETHER:
-            self.write()
-
-    def write(self) -> None:
-        """Write what is kept and not in the journal yet, all at once."""
-        self._wrote = time.monotonic()
-        if self.journal is None:
-            return
-        new = {name: rows[self.written[name] :] for name, rows in self.rows.items()}
-        self.written = {name: max(self.written[name], len(rows)) for name, rows in self.rows.items()}
-        if any(new.values()):
-            self.journal.add({self.cells[name]: rows for name, rows in new.items()}, self.method.space())
+        new = {self.cells[name]: [row] for name, row in rows.items() if len(self.rows[name]) > self.known[name]}
+        if self.journal is not None and new:
+            self.journal.add(new, self.method.space())
 
     def _decide(self, done: int) -> None:
         """Turn the budget into a number of trials, as soon as enough are timed, and write it down."""
@@ -128,3 +116,71 @@ class Search:
         self.count = affordable(self.method.budget * len(self.rows), before, seconds, self.closing)
         if self.count is not None and self.journal is not None:
             self.journal.decide(list(self.cells.values()), self.count)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a trial is worth: mean squared validation error [m^2] per coordinate, all its settings, and its epochs."""
+
+    value: float
+    params: Mapping[str, float]
+    epochs: int = 0
+
+
+class Problem:
+    """A foundation of a task as a method sees it: what its trials share, and how one is solved and judged.
+
+    method : with its settings. task, name : the task and the name of the foundation.
+    """
+
+    def __init__(self, method: Any, task: Task, name: str) -> None:
+        self.method, self.task, self.name = method, task, name
+        self.case, self.instants = task.cases[name], task.instants(name)
+        self.future, self.targets = task.windows.future, task.targets[name]
+
+    def solve(self, number: int, point: Point, windows: Index) -> Any:
+        """Return the corrector of a trial, learned from these windows alone; unless `judge` and `corrector` do it."""
+        raise NotImplementedError
+
+    def judge(self, number: int, point: Point) -> Judged:
+        """Return the mean over the folds of the error on validation windows of what the training windows taught."""
+        losses = []
+        for training, validation in self.task.folds:
+            corrector, instants = self.solve(number, point, training), self.instants.select(validation)
+            paths = corrector.predict(self.case.physics, instants, self.case.paths[:, validation])
+            losses.append(mean_square(paths, self.future[:, validation]))
+        return Judged(float(np.mean(losses)), point)
+
+    def corrector(self, best: Sequence[Row]) -> Any:
+        """Return the corrector that the best trials make, of which there are `num_chosen` at most."""
+        return self.solve(best[0]["number"], best[0]["params"], used(self.task))
+
+
+class SearchedAlone(Searched):
+    """A method that searches for one foundation after the other: its formula is its `problem`.
+
+    IDLE : settings that a trial chooses by itself, so that they differ in no point.
+    CHAINED : whether a trial begins with what the one before left behind.
+    """
+
+    problem: ClassVar[type[Problem]]
+    IDLE: ClassVar[frozenset[str]] = frozenset()
+    CHAINED: ClassVar[bool] = False
+
+    def points(self) -> Iterable[Point]:
+        """Return the trials: a value of everything searched, evenly spread."""
+        return points_of(self, self.IDLE)
+
+    def fit(self, task: Task) -> dict[str, Fitted]:
+        """Search for every foundation; the best trials make its corrector."""
+        return fit_each(task, self, self.points, lambda name: self._fit(task, name))
+
+    def _fit(self, task: Task, name: str) -> Fitted:
+        search, problem = Search(task, [name], self, again=self.CHAINED), self.problem(self, task, name)
+        for number, point in search.left(self.points()):
+            start = time.process_time()
+            judged = problem.judge(number, point)
+            search.record({name: row_of(number, judged.params, judged.value, start, judged.epochs)})
+        rows = search.rows[name]
+        best = best_of(rows)[: self.num_chosen()]
+        return Fitted(problem.corrector(best) if best else None, rows, search.seconds)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import count
 from typing import Annotated, ClassVar, Self
@@ -12,10 +12,13 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from pydantic import model_validator as validator
 
-from shipid.hybrid.method import Method
+from shipid.hybrid.features import NOTHING, Memory
+from shipid.hybrid.method import Method, Traits
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Scale = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
+Point = Mapping[str, float]
+"""A trial: values of hyperparameters by name."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,16 @@ class Searched(Method):
             if low >= high:
                 raise ValueError(f"{name}: a range goes from low to high, got [{low}, {high}]")
         return self
+
+    @property
+    def traits(self) -> Traits:
+        """What a study compares this method by: its settings `mirror`, `memory` and `terms`, where it has such."""
+        mirror, memory, terms = (getattr(self, name, None) for name in ("mirror", "memory", "terms"))
+        return Traits(
+            mirror > 0 if isinstance(mirror, bool | float) else None,
+            memory if isinstance(memory, Memory) else NOTHING,
+            terms if isinstance(terms, int) else None,
+        )
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Return what is to be searched: name -> (low, high)."""

@@ -8,10 +8,10 @@ Steps start from measured states: physics with an observer are refused.
 
 from __future__ import annotations
 
-import time
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,18 +22,15 @@ from shipid.data.windows import Instants, Windows
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
-from shipid.hybrid.method import Fitted, Index, Task, Traits
+from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Search
-from shipid.hybrid.settings import Scale, Searched
-from shipid.hybrid.trials import best_of, fit_each, points_of, ridge_trial, ridges_of, row_of, used
+from shipid.hybrid.search import Judged, Problem, SearchedAlone
+from shipid.hybrid.settings import Point, Scale
+from shipid.hybrid.trials import ridge_trial, ridges_of
 from shipid.physics.signals import measurable
 
 Array = NDArray[np.float64]
 Acceleration = Callable[[Instants, int, Array], Array]
-Point = Mapping[str, float]
-Solve = Callable[[Index, Sequence[float]], Any]
-"""Indices of training windows and R ridges -> a corrector; of several ridges R in one, which takes R S instants."""
 STEPWISE_FROM = 2000  # steps of paths, asked for one by one: below it compiling C costs more than it saves
 LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
 
@@ -184,7 +181,30 @@ def joined(parts: Sequence[Instants]) -> Instants:
     return Instants(columns, hidden=hidden or None)
 
 
-class Stepped(Searched):
+class StepProblem(Problem):
+    """A foundation whose true steps are solved for all ridges; a trial takes the ridge that predicts the path best."""
+
+    def __init__(self, method: Stepped, task: Task, name: str) -> None:
+        super().__init__(method, task, name)
+        self.steps = true_steps(task, name)
+
+    @abstractmethod
+    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> Any:
+        """Return the corrector of some windows for R ridges: of several R in one, which takes R S instants."""
+
+    def solve(self, number: int, point: Point, windows: Index) -> Any:
+        """Return the corrector of a trial for the ridge that it took."""
+        return self.solve_ridges(number, point, windows, [point["ridge"]])
+
+    def judge(self, number: int, point: Point) -> Judged:
+        """Return the least error over the ridges, on `samples` of the validation windows of each fold at most."""
+        method, solve = self.method, partial(self.solve_ridges, number, point)
+        ridges = ridges_of(method.ridge, method.RIDGES)
+        ridge, value = ridge_trial(self.task, self.name, ridges, method.samples, solve)
+        return Judged(value, {**point, "ridge": ridge})
+
+
+class Stepped(SearchedAlone):
     """A method that adds to each step: a trial is solved on true steps for all ridges, and judged by the path.
 
     RIDGES : how many ridges are solved where `ridge` is a range.
@@ -197,41 +217,9 @@ class Stepped(Searched):
     """
 
     RIDGES: ClassVar[int] = 8
+    IDLE: ClassVar[frozenset[str]] = frozenset({"ridge"})
     meets_observer: ClassVar[bool] = False
 
     ridge: Scale
     mirror: bool = True
     samples: PositiveInt = 300
-
-    @property
-    def traits(self) -> Traits:
-        """What a study says of this method and compares it by."""
-        return Traits(mirror=self.mirror)
-
-    def points(self) -> Iterable[Point]:
-        """Return the trials: a value of everything searched but the ridge."""
-        return points_of(self)
-
-    @abstractmethod
-    def trial_of(self, task: Task, name: str) -> Callable[[int, Point], Solve]:
-        """Prepare what the trials of a foundation share; return (number, point) of one -> how it is solved."""
-
-    def joined(self, best: Sequence[Any]) -> Any:
-        """Return the corrector that the best trials make, solved with all windows and one ridge each."""
-        return best[0]
-
-    def fit(self, task: Task) -> dict[str, Fitted]:
-        """Solve every foundation; the best trials, solved with all windows of the folds, are the corrector."""
-        return fit_each(task, self, self.points, lambda name: self._fit(task, name))
-
-    def _fit(self, task: Task, name: str) -> Fitted:
-        search, ridges = Search(task, [name], self), ridges_of(self.ridge, self.RIDGES)
-        trial = self.trial_of(task, name)
-        for number, point in search.left(self.points()):
-            start = time.process_time()
-            ridge, value = ridge_trial(task, name, ridges, self.samples, trial(number, point))
-            search.record({name: row_of(number, {**point, "ridge": ridge}, value, start)})
-        rows, every = search.rows[name], used(task)
-        kept = best_of(rows)[: self.num_chosen()]
-        best = [trial(row["number"], row["params"])(every, [row["params"]["ridge"]]) for row in kept]
-        return Fitted(self.joined(best) if best else None, rows, search.seconds)

@@ -1,4 +1,4 @@
-"""The one training loop: K small networks of one architecture, trained at once on the same inputs.
+"""The one training loop, `descend`, and K small networks of one architecture, trained at once on the same inputs.
 
 The members share inputs, batches and structure; each has separate targets, initial weights, learning rate, weight decay
 and drop-out, and nothing it computes depends on who else is in the stack. One small network leaves a core waiting;
@@ -7,13 +7,14 @@ nineteen of them as one batched product do not.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 from torch import Tensor
 
 Array = NDArray[np.float64]
@@ -22,6 +23,22 @@ Stack = Sequence[tuple[Tensor, Tensor]]
 Masks = Sequence[Tensor | None]
 
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Kingma & Ba (2015), as PyTorch's defaults
+
+
+@dataclass(frozen=True)
+class Length:
+    """How long networks are trained.
+
+    Parameters
+    ----------
+    epochs : at most so many passes over the training samples.
+    batch : samples per optimiser step; 0 = all of them.
+    patience : epochs without a better validation loss after which a member stops; 0 = it never does.
+    """
+
+    epochs: int
+    batch: int = 0
+    patience: int = 0
 
 
 @dataclass(frozen=True)
@@ -34,9 +51,7 @@ class Settings:
     learning_rate : (K,) rate of each member.
     weight_decay : (K,) decoupled decay (AdamW); 0 is Adam.
     input_dropout, hidden_dropout : (K,) probability in [0, 1] that an input or a hidden unit is dropped.
-    epochs : at most so many passes over the training samples.
-    batch : samples per optimiser step; 0 = all of them.
-    patience : epochs without a better validation loss after which a member stops; 0 = it never does.
+    length : of the training.
     """
 
     layers: int
@@ -45,9 +60,7 @@ class Settings:
     weight_decay: tuple[float, ...]
     input_dropout: tuple[float, ...]
     hidden_dropout: tuple[float, ...]
-    epochs: int
-    batch: int = 0
-    patience: int = 0
+    length: Length
 
 
 @dataclass(frozen=True)
@@ -93,9 +106,10 @@ def train(
 
     Returns
     -------
-    Trained : a member whose loss stopped being a number is `diverged`, with its best weights before; others go on.
+    Trained : a member whose loss stopped being a number is `diverged`, with its best weights before
+        that, which are no numbers where there are none; others go on.
     """
-    num_members, num_samples = len(targets), len(train_idx)
+    num_samples = len(train_idx)
     widths = [inputs.shape[1], *[settings.units] * settings.layers, targets.shape[2]]
     x, y = _tensor(inputs[train_idx], device), _tensor(targets[:, train_idx], device)
     x_val, y_val = _tensor(inputs[val_idx], device), _tensor(targets[:, val_idx], device)
@@ -104,31 +118,62 @@ def train(
     order = torch.Generator().manual_seed(order_seed)
     weights = initial_weights(widths, generators).to(device)
     layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _views(weights, widths)]  # leaves, same memory
-    adam = Adam(weights, settings.weight_decay)
-    rate = _tensor(settings.learning_rate, device)[:, None]
-    watch = _Watch(weights, settings.patience)
+    rates = _tensor(settings.learning_rate, device)[:, None]
 
-    batch = min(settings.batch or num_samples, num_samples)
-    for _ in range(settings.epochs):
-        total = torch.zeros(num_members, device=device)
-        for rows in _batches(num_samples, batch, order):
-            x_batch, y_batch = x[rows], y[:, rows]
-            masks = _masks(len(x_batch), widths, settings, generators, device)
-            total += _step(x_batch, y_batch, layers, masks, adam, rate)
-        with torch.no_grad():
-            watch.compare(total, (forward(x_val, layers) - y_val).square().mean(dim=(1, 2)))
-        if not watch.running.any():
-            break
-    return watch.result(widths)
+    def loss(rows: Tensor | slice) -> Tensor:
+        x_batch, y_batch = x[rows], y[:, rows]
+        masks = _masks(len(x_batch), widths, settings, generators, device)
+        return (forward(x_batch, layers, masks) - y_batch).square().mean(dim=(1, 2))
+
+    batch = min(settings.length.batch or num_samples, num_samples)
+    best = descend(
+        weights,
+        [leaf for layer in layers for leaf in layer],
+        settings.weight_decay,
+        settings.length,
+        batches=lambda: _batches(num_samples, batch, order),
+        rate=lambda _: rates,
+        loss=loss,
+        watched=lambda: (forward(x_val, layers) - y_val).square().mean(dim=(1, 2)),
+    )
+    return _trained(best, widths)
 
 
-def _step(x: Tensor, y: Tensor, layers: Stack, masks: Masks, adam: Adam, rate: Tensor) -> Tensor:
-    """Take one optimiser step on a batch; returns the losses (K,) before it."""
-    losses = (forward(x, layers, masks) - y).square().mean(dim=(1, 2))
-    gradients = torch.autograd.grad(losses.sum(), [leaf for layer in layers for leaf in layer])
-    with torch.no_grad():
-        adam.step(torch.cat([gradient.flatten(1) for gradient in gradients], dim=1), rate)
-    return losses.detach()
+def descend(
+    weights: Tensor,
+    leaves: Sequence[Tensor],
+    decay: Sequence[float],
+    length: Length,
+    *,
+    batches: Callable[[], Iterable[Tensor | slice]],
+    rate: Callable[[int], Tensor],
+    loss: Callable[[Tensor | slice], Tensor],
+    watched: Callable[[], Tensor],
+) -> Watch:
+    """Minimise the losses of K members by AdamW, and keep the weights of the best epoch of each.
+
+    Parameters
+    ----------
+    weights : (K, P), changed in place. leaves : parts of the same memory that have gradients, in order.
+    decay : (K,) of the weights.
+    batches : rows of the batches of the next epoch. rate : epoch, from 0 -> learning rates (K, 1).
+    loss : rows -> losses (K,). watched : validation losses (K,) now.
+    """
+    adam, watch = Adam(weights, decay), Watch(weights, length.patience)
+    with threadpool_limits(1):  # for the same digits anywhere; networks as small as these are slower on more
+        for epoch in range(length.epochs):
+            total = torch.zeros(len(weights), device=weights.device)
+            for rows in batches():
+                losses = loss(rows)
+                gradients = torch.autograd.grad(losses.sum(), leaves)
+                with torch.no_grad():
+                    adam.step(torch.cat([one.reshape(len(weights), -1) for one in gradients], dim=1), rate(epoch))
+                total += losses.detach()
+            with torch.no_grad():
+                watch.compare(total, watched())
+            if not watch.running.any():
+                break
+    return watch
 
 
 def _batches(num_samples: int, batch: int, order: torch.Generator) -> Sequence[Tensor | slice]:
@@ -178,12 +223,12 @@ class Adam:
         self.weights.addcdiv_(self.first * rate, spread, value=-1 / (1 - BETA_1**self.count))
 
 
-class _Watch:
+class Watch:
     """Keeps the best weights of each member and decides who is still running."""
 
     def __init__(self, weights: Tensor, patience: int) -> None:
         num_members, device = len(weights), weights.device
-        self.weights, self.kept, self.patience = weights, weights.clone(), patience
+        self.weights, self.kept, self.patience = weights, torch.full_like(weights, torch.nan), patience
         self.best = torch.full((num_members,), float("inf"), device=device)
         self.waited = torch.zeros(num_members, dtype=torch.long, device=device)
         self.epochs = torch.zeros(num_members, dtype=torch.long, device=device)
@@ -202,17 +247,19 @@ class _Watch:
         if self.patience:
             self.running &= self.waited < self.patience
 
-    def result(self, widths: Sequence[int]) -> Trained:
-        layers = [
-            (w.cpu().numpy().astype(float), b[:, 0].cpu().numpy().astype(float)) for w, b in _views(self.kept, widths)
-        ]
-        best = self.best.cpu().numpy().astype(float)
-        return Trained(
-            layers=tuple(tuple((w[k], b[k]) for w, b in layers) for k in range(len(best))),
-            loss=np.where(np.isfinite(best), best, np.nan),
-            epochs=self.epochs.cpu().numpy(),
-            status=tuple("ok" if finite else "diverged" for finite in self.finite.tolist()),
-        )
+
+def _trained(best: Watch, widths: Sequence[int]) -> Trained:
+    """What was kept, as arrays."""
+    layers = [
+        (w.cpu().numpy().astype(float), b[:, 0].cpu().numpy().astype(float)) for w, b in _views(best.kept, widths)
+    ]
+    losses = best.best.cpu().numpy().astype(float)
+    return Trained(
+        layers=tuple(tuple((w[k], b[k]) for w, b in layers) for k in range(len(losses))),
+        loss=np.where(np.isfinite(losses), losses, np.nan),
+        epochs=best.epochs.cpu().numpy(),
+        status=tuple("ok" if finite else "diverged" for finite in best.finite.tolist()),
+    )
 
 
 def _views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tensor]]:

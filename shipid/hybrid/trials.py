@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.hybrid.method import Corrector, Fitted, Index, Task
+from shipid.hybrid.method import Corrector, Fitted, Index, Row, Task
 from shipid.hybrid.settings import Searched, seed_of, spread
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ def row_of(number: int, params: Mapping[str, float], value: float, start: float,
     }
 
 
-def best_of(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def best_of(rows: Iterable[Row]) -> list[Row]:
     """Trials that ended with a value, the best first; of equal ones the earlier."""
     return sorted((row for row in rows if row["state"] == "complete"), key=lambda row: float(row["value"]))
 

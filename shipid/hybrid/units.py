@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Self
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipid.errors import ResultError
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.features import choose_features, group_of
+from shipid.hybrid.features import choose_features, group_of, rows_of
 from shipid.hybrid.mirror import reflection as mirror_of
+from shipid.hybrid.stored import Stored
 
 Array = NDArray[np.float64]
-MADE_OF = ("mean", "std", "weight", "offset")
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,16 @@ class Seen:
         """Choose inputs and take their statistics from training samples (S,) by name, with their images if mirrored."""
         features = choose_features(table)
         names = tuple(features)
-        values = np.stack([table[name] for name in names], axis=1)
-        reflection = mirror_of(table, features) if mirror else None
-        both = values if reflection is None else np.concatenate([values, values @ reflection])
-        return cls(features, Normaliser(names, both.mean(axis=0), both.std(axis=0)), reflection)
+        plain = cls(
+            features, Normaliser(names, np.zeros(0), np.zeros(0)), mirror_of(table, features) if mirror else None
+        )
+        both = plain.samples(table)
+        return replace(plain, normaliser=Normaliser(names, both.mean(axis=0), both.std(axis=0)))
+
+    def samples(self, table: Mapping[str, Array]) -> Array:
+        """Return inputs (S, d) as they are, and after them their images, (2 S, d), where there is a mirror."""
+        values = rows_of(table, self.normaliser.names)
+        return values if self.reflection is None else np.concatenate([values, values @ self.reflection])
 
     def draw(self, point: Mapping[str, float], count: int, seed: int) -> Units:
         """Draw hidden units with the scales and the offset of a trial."""
@@ -48,7 +54,7 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Units:
+class Units(Stored):
     """Hidden units tanh(z w + c) of normalised inputs z: `even` ones do not feel the mirror, `odd` ones change sign.
 
     weight : (d, M). offset : (M,). reflection : (d, d), or None: then even and odd are the same, plain units.
@@ -70,36 +76,6 @@ class Units:
             return even, even
         image = np.tanh(z @ (self.reflection @ self.weight) + self.offset) / size
         return np.concatenate([one, (plain + image) / 2], axis=1), (plain - image) / 2
-
-    def header(self) -> dict[str, Any]:
-        """Return the names of the inputs."""
-        return {"names": list(self.normaliser.names), "mirror": self.reflection is not None}
-
-    def arrays(self) -> dict[str, Array]:
-        """Return the arrays by name."""
-        stored = {
-            "mean": self.normaliser.mean,
-            "std": self.normaliser.std,
-            "weight": self.weight,
-            "offset": self.offset,
-        }
-        return stored if self.reflection is None else stored | {"reflection": self.reflection}
-
-    @classmethod
-    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
-        """Rebuild from `header` and `arrays`; ResultError where an array is missing or does not fit."""
-        names, mirror = tuple(header["names"]), bool(header["mirror"])
-        mean, std, weight, offset = (taken(arrays, name) for name in MADE_OF)
-        reflection = taken(arrays, "reflection") if mirror else None
-        d = len(names)
-        if (
-            mean.shape != (d,)
-            or std.shape != (d,)
-            or weight.shape != (d, len(offset))
-            or (reflection is not None and reflection.shape != (d, d))
-        ):
-            raise ResultError("the arrays of the saved method do not fit together", path="weight")
-        return cls(Normaliser(names, mean, std), weight, offset, reflection)
 
 
 def taken(arrays: Mapping[str, Array], name: str) -> Array:

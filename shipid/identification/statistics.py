@@ -32,7 +32,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +43,6 @@ from shipid.errors import ShipidError
 from shipid.identification.collinearity import Combination, combinations
 from shipid.identification.covariance import inverted
 from shipid.units import digits, listed
-
-if TYPE_CHECKING:
-    from shipid.identification.solve import Solution
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -100,8 +97,8 @@ class LinearFit:
     centre: Array | None = None
 
     @classmethod
-    def of(cls, solution: Solution) -> LinearFit:
-        """The linearisation in a solution of `identify`."""
+    def of(cls, solution: Any) -> LinearFit:
+        """The linearisation in what has attributes of these names, such as a solution of `identify`."""
         return cls(**{name: getattr(solution, name) for name in cls.__dataclass_fields__})
 
     def __post_init__(self) -> None:

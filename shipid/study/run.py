@@ -27,7 +27,6 @@ from shipid.engine.native import engine, engine_so_far
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, ShipidError, legible
 from shipid.files import make_folder, write_json
-from shipid.hybrid.compensator import shared_units
 from shipid.hybrid.device import use_threads, vectors
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Case, Corrector, Fitted, Task, fit_all
@@ -411,11 +410,10 @@ def run_unit(
         if way.foundations
     }
     left_out = refitted(plan, prepared, batch, windows, fitted, device)
-    with shared_units():
-        return [
-            _cell(plan, prepared, batch, windows, known[name], ways[method], fitted[method][name], left_out)
-            for name, method in unit.pairs
-        ]
+    return [
+        _cell(plan, prepared, batch, windows, known[name], ways[method], fitted[method][name], left_out)
+        for name, method in unit.pairs
+    ]
 
 
 def _cell(

@@ -22,7 +22,7 @@ def test_it_learns_nothing_and_needs_physics() -> None:
     assert not Alone.meets_none
     assert Alone().varied() == ()
     assert Alone().past == 0.0
-    assert Unchanged.from_arrays({}, {}) == Unchanged({})
+    assert Unchanged.from_arrays(Unchanged({}).header(), {}) == Unchanged({})
 
 
 def test_it_has_no_settings() -> None:

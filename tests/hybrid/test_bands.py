@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.errors import DataError, ResultError
+from shipid.errors import DataError
 from shipid.hybrid.bands import (
     LEVELS,
-    Bands,
     Region,
     adapted,
     adaptive,
@@ -19,7 +18,6 @@ from shipid.hybrid.bands import (
     factor,
     nearest,
     needed,
-    track,
     traits,
 )
 from tests.hybrid.runs import HORIZON, made
@@ -40,26 +38,6 @@ def test_a_higher_level_holds_all_of_a_lower_one(seed: int) -> None:
         assert (inner.across <= outer.across).all()
     apart = [region.holds(made_.errors).mean() for region in regions]
     assert apart == sorted(apart)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_each_step_alone_needs_less_than_the_whole_path(seed: int) -> None:
-    made_, bands = STRANGE[seed]
-    whole = bands.region(made_.paths, made_.columns, 1.0, 0.9)
-    alone = bands.region(made_.paths, made_.columns, 1.0, 0.9, pointwise=True)
-    assert (alone.radius <= whole.radius * 1.001).mean() > 0.9
-    assert (alone.reach(made_.errors) <= 1).mean() == pytest.approx(0.9, abs=0.06)
-
-
-def test_regions_of_several_levels_are_those_of_each() -> None:
-    made_, bands = STRANGE[1]
-    few = replace(bands, runs=4)  # too few for 0.9
-    found = few.regions(made_.paths, made_.columns, 1.0, [0.5, 0.8, 0.9])
-    assert list(found) == [0.5, 0.8]
-    for level, region in found.items():
-        alone = few.region(made_.paths, made_.columns, 1.0, level)
-        np.testing.assert_array_equal(region.along, alone.along)
-        np.testing.assert_array_equal(region.holds(made_.errors), alone.holds(made_.errors))
 
 
 def test_far_from_training_bands_grow_without_bound() -> None:
@@ -92,21 +70,6 @@ def test_too_few_runs_are_one_sentence() -> None:
             mixed.region(made_.paths, made_.columns, 1.0, 0.8, kind=kind)
 
 
-def test_arrays_rebuild_it() -> None:
-    made_, bands = STRANGE[1]
-    again = Bands.from_arrays(bands.header(), bands.arrays())
-    for one, other in zip(_both(bands, made_), _both(again, made_), strict=True):
-        np.testing.assert_array_equal(one, other)
-    parts = {name: values for name, values in bands.arrays().items() if name != "slopes"}
-    with pytest.raises(ResultError, match="'slopes'"):
-        Bands.from_arrays(bands.header(), parts)
-
-
-def _both(bands: Bands, made_: object) -> list[np.ndarray]:
-    region = bands.region(made_.paths, made_.columns, 1.0, 0.9)  # type: ignore[attr-defined]
-    return [region.ahead, region.along, region.across]
-
-
 def test_a_region_is_an_ellipse_along_the_track() -> None:
     course = 0.7
     ahead = np.array([np.cos(course), np.sin(course)])
@@ -125,27 +88,6 @@ def test_a_predictor_that_never_erred_has_a_band_of_its_path_alone() -> None:
     errors[1, 2] = [0.0, 1e-3]
     assert region.holds(errors).tolist() == [True, True, False]
     assert region.reach(errors)[:, :2].max() == 0
-
-
-def test_tracks_are_unit_vectors_even_at_rest() -> None:
-    paths = np.random.default_rng(0).normal(size=(HORIZON, 5, 2)).cumsum(axis=0)
-    paths[:, 2] = 0.0
-    ahead = track(paths)
-    np.testing.assert_allclose(np.hypot(*np.moveaxis(ahead, -1, 0)), 1.0)
-    np.testing.assert_array_equal(ahead[:, 2], np.tile([1.0, 0.0], (HORIZON, 1)))
-
-
-def test_a_track_at_a_step_leads_from_the_position_before_to_the_one_after() -> None:
-    """And at the end from the last but one to the last."""
-    corner = np.array([[3.0, 0.0], [3.0, 4.0], [0.0, 4.0]])[:, None]
-    np.testing.assert_allclose(track(corner)[:, 0], [[0.6, 0.8], [-0.6, 0.8], [-1.0, 0.0]], atol=1e-12)
-
-
-def test_the_nearest_point_is_the_nearest() -> None:
-    rng = np.random.default_rng(3)
-    points, centres = rng.normal(1e4, 1.0, (40, 3)), rng.normal(1e4, 1.0, (7, 3))
-    by_hand = np.sqrt(((points[:, None] - centres) ** 2).mean(axis=2)).min(axis=1)
-    np.testing.assert_allclose(nearest(points, centres), by_hand, rtol=1e-6)
 
 
 def test_centres_of_the_same_run_are_passed_over() -> None:
@@ -201,20 +143,6 @@ def test_the_factor_of_an_adaptive_band_grows_with_misses_and_begins_at_one() ->
     for _ in range(2000):
         state = adapted(state, False)
     assert factor(state, table) == 0.0
-
-
-def test_a_band_of_one_instant_does_not_know_the_others() -> None:
-    """A ship that hardly moves beside one that goes fast; and one that comes to rest does not turn."""
-    made_, bands = STRANGE[0]
-    paths = made_.paths * np.where(np.arange(made_.paths.shape[1]) == 0, 1e-14, 1.0)[:, None]
-    whole = bands.region(paths, made_.columns, 1.0, 0.8)
-    alone = bands.region(paths[:, :1], {name: values[:1] for name, values in made_.columns.items()}, 1.0, 0.8)
-    np.testing.assert_allclose(whole.ahead[:, :1], alone.ahead, rtol=1e-12)
-    np.testing.assert_allclose(whole.along[:, :1], alone.along, rtol=1e-12)
-    stops = np.full((9, 2, 2), -1.0)
-    stops[:, 1] *= np.linspace(1, 1.01, 9)[:, None]
-    turns = traits(stops, {"r": np.zeros(2)}, 1.0, np.zeros(2), 1.0)[:, 1:3]
-    np.testing.assert_allclose(turns, 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("step", [0.25, 2.0])

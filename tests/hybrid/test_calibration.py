@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.stats import f_oneway
 
-from shipid.errors import DataError
-from shipid.hybrid.bands import Bands
 from shipid.hybrid.calibration import (
     CENTRES,
     PRIOR,
     _alike,
     _fitted,
-    _floored,
     _from_training,
-    _rising,
     _runs,
     _slopes,
     calibrated,
@@ -41,12 +35,6 @@ def test_radii_hold_their_share_of_new_runs(count: int, alike: float) -> None:
         held.append([(scores[count:] <= one).mean() for one in radius])
     np.testing.assert_allclose(np.mean(held, axis=0), [0.5, 0.8, 0.9], atol=0.03)
     assert np.mean(held, axis=0)[2] > 0.885  # rather more than less
-
-
-@pytest.mark.parametrize("digits", [0, 1, 3, 16])
-def test_equal_scores_keep_their_order(digits: int) -> None:
-    scores = np.random.default_rng(digits).random(500).round(digits)
-    np.testing.assert_array_equal(_rising(scores), np.argsort(scores, kind="stable"))
 
 
 @pytest.mark.parametrize(("count", "windows"), [(3, 2), (4, 12), (9, 5)])
@@ -117,21 +105,6 @@ def test_each_kind_has_its_radii() -> None:
     assert max(np.mean(shares) for shares in held.values()) < 0.96
 
 
-@pytest.mark.parametrize("few", [1, 2, 3])
-def test_a_kind_of_few_runs_is_known_and_has_no_band(few: int) -> None:
-    """Of one or two runs nothing was kept, and reports said that there were none."""
-    drawn = runs(1, count=12)
-    names = np.unique(drawn.run)
-    kinds = {str(name): "spiral" if place < few else "turning" for place, name in enumerate(names)}
-    bands = replace(drawn, kinds=kinds).bands()
-    assert bands.kinds == {"spiral": few, "turning": 12 - few}
-    assert bands.promises(0.7, "spiral") == (few >= 3)
-    with pytest.raises(DataError, match=f"of the kind 'spiral' to calibrate it: there are {few}$"):
-        bands.check(0.8, "spiral")
-    again = Bands.from_arrays(bands.header(), bands.arrays())
-    np.testing.assert_array_equal(again.table("turning"), bands.table("turning"))
-
-
 def test_runs_without_errors_do_not_calibrate() -> None:
     drawn = runs(0, count=6)
     errors = drawn.errors.copy()
@@ -141,31 +114,6 @@ def test_runs_without_errors_do_not_calibrate() -> None:
     bands = calibrated(errors, drawn.paths, drawn.run, drawn.columns, NAMES, 1.0)
     assert bands is not None
     assert bands.runs == 4
-
-
-@pytest.mark.parametrize("error", [0.0, 1e-12, 1e6])
-def test_strange_errors_give_finite_bands(error: float) -> None:
-    """Nothing missed at all, a ship that never moves, columns that are constant: still numbers."""
-    drawn = runs(1, count=5)
-    still = {name: np.zeros_like(values) for name, values in drawn.columns.items()}
-    errors = np.full_like(drawn.errors, error)
-    bands = calibrated(errors, errors, drawn.run, still, NAMES, 1.0)
-    assert bands is not None
-    region = bands.region(np.zeros_like(errors), still, 1.0, 0.7)
-    assert np.isfinite(region.radius).all()
-
-
-def test_small_errors_early_in_the_horizon_do_not_decide() -> None:
-    """No scale is below 5 % of the greatest one, along and across each for itself."""
-    scale = np.array([[0.0, 0.001], [0.01, 0.05], [0.5, 0.2], [2.0, 0.1]])
-    np.testing.assert_allclose(_floored(scale), [[0.1, 0.01], [0.1, 0.05], [0.5, 0.2], [2.0, 0.1]])
-
-
-def test_the_length_of_an_average_path_is_by_runs() -> None:
-    drawn, bands = made(2)
-    ends = np.concatenate([np.zeros((1, len(drawn.run), 2)), drawn.paths[[2, 5, 7]]])  # thirds of 8 steps
-    long = np.hypot(*np.diff(ends, axis=0).transpose(2, 0, 1)).sum(axis=0)
-    assert bands.length == pytest.approx(np.mean([long[drawn.run == one].mean() for one in np.unique(drawn.run)]))
 
 
 @pytest.mark.parametrize("circle", [True, False])

@@ -36,4 +36,3 @@ def test_the_trajectory_is_seen_at_even_moments_and_zero_where_it_diverged():
     assert spoilt["physics-15.y"][2] == 0.0
     np.testing.assert_array_equal(np.delete(spoilt["physics-15.y"], 2), np.delete(columns["physics-15.y"], 2))
     assert inputs.of_physics(replace(here.physics, vessel=None), instants) == {}
-    assert TrajectoryInputs.from_header(inputs.header()) == inputs

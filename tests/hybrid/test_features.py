@@ -20,7 +20,6 @@ from shipid.hybrid.features import (
 )
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
-from shipid.physics.signals import mirror_sign
 from shipid.vessel.load import load_vessel
 from tests.study.test_commands import weaving
 
@@ -34,11 +33,6 @@ def columns():
     columns = {name: rng.normal(size=50) for name in ("north", "east", "psi", "u", "v", "r", "V_w", "beta_w")}
     columns["port.n"], columns["port.alpha"] = rng.uniform(1, 3, 50), rng.uniform(-1, 1, 50)
     return columns | {"starboard.n": columns["port.n"].copy(), "starboard.alpha": columns["port.alpha"].copy()}
-
-
-def test_columns_of_which_none_varies_are_refused():
-    with pytest.raises(DataError, match="none of u, v varies"):
-        choose_features({"u": np.full(9, 2.0), "v": np.zeros(9)})
 
 
 def test_equal_azimuths_leave_the_seven_inputs_of_13(columns):
@@ -55,12 +49,6 @@ def test_columns_that_differ_by_rounding_are_one_and_vary_by_more(columns):
     chosen = choose_features(feature_table(columns, COMMANDS))
     assert chosen["port.n"] == ("port.n", "starboard.n")
     assert "u" not in chosen
-
-
-def test_different_azimuths_leave_the_nine_inputs_of_12(columns):
-    columns["starboard.n"][3] += 0.01
-    columns["starboard.alpha"][7] -= 0.01
-    assert len(choose_features(feature_table(columns, COMMANDS))) == 9
 
 
 def test_constant_columns_are_dropped_and_motions_never_merged(columns):
@@ -107,13 +95,6 @@ def test_history_and_turned_by_hand(past):
     assert memory.past == 8.0
 
 
-def test_exact_physics_has_no_past_error(past):
-    errors = past_error(Physics(SHIP, 5, 1.0), past.instants(), 8.0)
-    assert set(errors) == {"x", "y", "u", "v", "r"}
-    for values in errors.values():
-        np.testing.assert_allclose(values, 0.0, atol=1e-9)
-
-
 def test_a_past_that_is_too_short_is_said_in_seconds(past):
     held = len(past.past["x"])
     with pytest.raises(DataError, match=rf"needs 1000 s of the past, there are {2 * held} s"):
@@ -134,22 +115,6 @@ def test_past_error_of_wrong_physics_grows_and_is_the_rollout_by_hand(past):
     np.testing.assert_allclose(errors[8.0]["x"], -x, atol=1e-9)
     np.testing.assert_allclose(errors[8.0]["y"], -y, atol=1e-9)
     np.testing.assert_allclose(errors[8.0]["u"], past.columns["u"] - states["u"][-1], atol=1e-12)
-
-
-def test_a_mirrored_past_has_the_mirrored_error(past):
-    """A ship that is alike on both sides: what lies across or turns changes its sign, sides change places."""
-    wrong, instants = Physics(SHIP.with_values({"hull.derivatives.N_uv": 9e4}), 5, 1.0), past.instants()
-
-    def image(values):
-        sides = {"port": "starboard", "starboard": "port"}
-        names = {name: ".".join(sides.get(word, word) for word in name.split(".")) for name in values}
-        return {names[name]: column * mirror_sign(name) for name, column in values.items() if name != "flags"}
-
-    one = past_error(wrong, instants, 4.0)
-    other = past_error(wrong, Instants(image(instants.columns), image(instants.past)), 4.0)
-    assert np.abs(one["y"]).max() > 1e-3
-    for name, values in one.items():
-        np.testing.assert_allclose(other[name], mirror_sign(f"error-4.{name}") * values, atol=1e-9, err_msg=name)
 
 
 def test_estimates_of_the_observer_are_in_body_axes():
@@ -177,22 +142,10 @@ def test_estimates_are_inputs_where_method_and_physics_both_have_the_observer(co
     assert Inputs(COMMANDS, Memory(observer=True)).of_physics(observed, instants).keys() == estimates(instants).keys()
 
 
-def test_a_past_that_is_missing_is_one_line(past):
-    for memory in (Memory(history=(9.0,)), Memory(error=9.0)):
-        with pytest.raises(DataError, match="needs 9 s of the past") as caught:
-            Inputs(COMMANDS, memory).table(Physics(SHIP, 5, 1.0), past.instants())
-        assert "\n" not in str(caught.value)
-
-
 def test_groups_follow_from_names():
     names = {"u": "motion", "v_rw": "wind", "port.n": "command", "port.planned-1.n": "command"}
     names |= {"past-4.u": "history", "port.past-4.n": "history", "turned-8.psi": "history", "error-8.x": "error"}
     assert {name: group_of(name) for name in names} == names
-
-
-def test_inputs_survive_their_header():
-    inputs = Inputs(COMMANDS, Memory(history=(2.0, 4.0), error=8.0))
-    assert Inputs.from_header(inputs.header()) == inputs
 
 
 def test_planned_means_by_hand() -> None:

@@ -5,8 +5,8 @@ import sys
 import numpy as np
 import pytest
 
-from shipid.errors import DocumentError, ResultError, ShipidError
-from shipid.hybrid.forest import Forest, ForestCorrector, Trees
+from shipid.errors import DocumentError, ShipidError
+from shipid.hybrid.forest import Forest, Trees
 from tests.hybrid.worlds import HORIZON, fitted, missed, ship, world
 
 
@@ -35,38 +35,6 @@ def test_the_arrays_say_what_scikit_learn_says():
     np.testing.assert_allclose(mine, forest.predict(fresh), rtol=0, atol=1e-12)
 
 
-#: of a tree with the nodes 0 -> 1, 2 and 2 -> 3, 4: an array of it, and what it is not
-DAMAGED = {
-    "first": ([5.0], [-1.0], []),
-    "left": ([0.0, -1, 3, -1, -1], [1.0, -1, 1, -1, -1], [1.0, -1, 5, -1, -1], [-1.0, -1, 3, -1, -1], [1.0, -1, 3, -1]),
-    "right": ([0.0, -1, 4, -1, -1], [2.0, -1, -1, -1, -1], [2.0, -1, -2, -1, -1], [2.0, 1, 4, -1, -1], [2.0, -1, 4]),
-    "feature": ([2.0, -2, 1, -2, -2], [-2.0, -2, 1, -2, -2], [0.0, -2, 1]),
-    "threshold": ([0.0, 0, 0, 0], np.zeros((5, 1))),
-    "value": (np.zeros((4, 4)), np.zeros((5, 2))),
-}
-
-
-def one_tree(set_aside, **changes):
-    arrays = {
-        "first": [0.0],
-        "left": [1.0, -1, 3, -1, -1],
-        "right": [2.0, -1, 4, -1, -1],
-        "feature": [0.0, -2, 1, -2, -2],
-    }
-    arrays |= {"threshold": np.zeros(5), "value": np.zeros((5, 4)), "basis": np.ones((HORIZON, 2))}
-    header = grown(set_aside).header() | {"names": ["u", "r"]}
-    return ForestCorrector.from_arrays(header, {name: np.array(part) for name, part in (arrays | changes).items()})
-
-
-@pytest.mark.parametrize("name", DAMAGED)
-def test_saved_trees_that_do_not_end_are_refused(name, set_aside):
-    """A node that is its own child was gone down for ever."""
-    assert one_tree(set_aside).trees.predict(np.zeros((3, 2))).shape == (3, 4)
-    for wrong in DAMAGED[name]:
-        with pytest.raises(ResultError, match="the saved trees do not fit together"):
-            one_tree(set_aside, **{name: wrong})
-
-
 @pytest.fixture(scope="module")
 def set_aside():
     """Every path is set to starboard, and ahead where the ship is fast."""
@@ -93,20 +61,6 @@ def test_one_leaf_is_the_mean_and_its_mirror_has_no_side(set_aside):
         paths = one.predict(set_aside.physics, instants, np.zeros((HORIZON, len(set_aside.test), 2)))
         np.testing.assert_allclose(np.ptp(paths, axis=1), 0.0, atol=1e-9)
         assert paths[-1, 0, 1] == pytest.approx(side, abs=0.05)
-
-
-def test_leaf_and_share_shape_the_trees(set_aside):
-    """A leaf holds so many windows; of all inputs the speed splits first, of one at random it seldom does."""
-    windows = len(set_aside.train)
-    fine, coarse = (grown(set_aside, leaf=leaf, share=1.0, mirror=False) for leaf in (1, windows // 4))
-    assert len(fine.trees.left) > len(coarse.trees.left)
-    assert (coarse.trees.left == -1).sum() <= 4 * 25
-    first = [
-        {one.names[i] for i in one.trees.feature[one.trees.first]}
-        for one in (fine, grown(set_aside, leaf=1, share=0.01))
-    ]
-    assert first[0] == {"u"}
-    assert len(first[1]) > 3
 
 
 def test_without_scikit_learn_one_line_says_what_to_install(monkeypatch):

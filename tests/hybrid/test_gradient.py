@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import torch
 
-from shipid.errors import DataError
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
@@ -33,38 +32,6 @@ def targets(columns):
     x = steps * columns["u"] + 0.1 * steps**2 * np.tanh(columns["port.n"])
     y = steps * columns["v"] + 0.2 * steps**2 * columns["r"] * columns["port.delta"]
     return {"high-1": np.stack([x, y], axis=-1), "none": np.stack([5.0 * x, -3.0 * y], axis=-1)}
-
-
-def same(a, b):
-    return a.header() == b.header() and all(np.array_equal(v, b.arrays()[k]) for k, v in a.arrays().items())
-
-
-@pytest.mark.parametrize("method", [DRAWN, SEARCHED])
-def test_the_same_seed_gives_the_same_numbers(columns, targets, method):
-    first, again = (tune(columns, COMMANDS, targets, [FOLD], method, seed=4) for _ in range(2))
-    other = tune(columns, COMMANDS, targets, [FOLD], method, seed=5)
-    for key in targets:
-        assert same(first[key].corrector, again[key].corrector)
-        assert not same(first[key].corrector, other[key].corrector)
-        assert [row["value"] for row in first[key].trials] == [row["value"] for row in again[key].trials]
-
-
-@pytest.mark.parametrize("method", [DRAWN, SEARCHED])
-def test_a_model_does_not_notice_its_company(columns, targets, method):
-    together = tune(columns, COMMANDS, targets, [FOLD], method, seed=4)
-    alone = tune(columns, COMMANDS, {"none": targets["none"]}, [FOLD], method, seed=4)
-    np.testing.assert_allclose(
-        compensation(alone["none"].corrector, columns), compensation(together["none"].corrector, columns), atol=0.05
-    )
-
-
-def test_the_residual_is_learned(columns, targets):
-    kept = {"trials": 1, "input_dropout": 0.0, "hidden_dropout": 0.0, "learning_rate": 0.03, "epochs": 400}
-    for key, tuned in tune(columns, COMMANDS, targets, [FOLD], SMALL.model_copy(update=kept), seed=0).items():
-        unseen = np.arange(200, 240)
-        predicted = compensation(tuned.corrector, {name: values[unseen] for name, values in columns.items()})
-        left = np.square(predicted - targets[key][:, unseen]).mean()
-        assert left < 0.5 * np.square(targets[key][:, unseen]).mean()
 
 
 def test_equal_architectures_train_as_one_stack_and_others_alone(columns, targets, monkeypatch):
@@ -105,41 +72,3 @@ def test_the_statistics_are_those_of_the_training_windows(columns, targets):
     np.testing.assert_array_equal(after.normaliser.std, before.normaliser.std)
     assert after.features == before.features
     assert before.normaliser.mean[0] == pytest.approx(columns["u"][40:200].mean())
-
-
-@pytest.mark.parametrize("method", [DRAWN, SMALL])
-def test_a_model_that_diverged_is_a_value_and_harms_nobody(columns, targets, method):
-    good = tune(columns, COMMANDS, targets, [FOLD], method, seed=1)
-    targets["high-1"] = np.full_like(targets["high-1"], np.nan)
-    bad = tune(columns, COMMANDS, targets, [FOLD], method, seed=1)
-    assert bad["high-1"].corrector is None
-    assert [row["state"] for row in bad["high-1"].trials] == ["diverged"] * 3
-    np.testing.assert_allclose(
-        compensation(bad["none"].corrector, columns), compensation(good["none"].corrector, columns), atol=0.05
-    )
-
-
-@pytest.mark.parametrize(("method", "epochs"), [(DRAWN, 0), (SMALL, 40)])
-def test_rows_and_seconds(columns, targets, method, epochs):
-    tuned = tune(columns, COMMANDS, targets, [FOLD], method, 1)
-    for one in tuned.values():
-        assert [row["number"] for row in one.trials] == [0, 1, 2]
-        assert {row["state"] for row in one.trials} == {"complete"}
-        assert set(one.trials[0]["params"]) == set(one.corrector.hyperparameters)
-        assert set(one.trials[0]) == {"number", "params", "value", "seconds", "epochs", "state"}
-        assert one.seconds == pytest.approx(sum(row["seconds"] for row in one.trials))
-        assert one.seconds > 0
-        assert {row["epochs"] for row in one.trials} == {epochs}
-
-
-def test_a_trained_path_keeps_metres(columns, targets):
-    method = PathTrained(trials=1, epochs=2)
-    (network,) = tune(columns, COMMANDS, targets, [FOLD], method, seed=1)["none"].corrector.networks
-    np.testing.assert_array_equal(network.basis, np.eye(6))  # an output per step
-    assert list(network.features) == ["u", "v", "r", "port.n", "port.delta", "u_rw", "v_rw"]  # (13)
-
-
-@pytest.mark.parametrize("method", [PathDrawn(), PathTrained()])
-def test_a_fold_without_windows_is_refused(columns, targets, method):
-    with pytest.raises(DataError, match="manoeuvres"):
-        tune(columns, COMMANDS, targets, [(np.arange(9), np.arange(0))], method, seed=1)

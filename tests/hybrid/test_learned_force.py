@@ -9,14 +9,11 @@ import numpy as np
 import pytest
 
 from shipid.data.windows import Windows, cut_windows
-from shipid.errors import DataError, ResultError
+from shipid.errors import DataError
 from shipid.hybrid.learned_force import (
     BLOCK,
     HIDDEN,
-    LIMITS,
     OUTPUT,
-    SCALES,
-    ForceCorrector,
     LearnedForce,
     _Trainer,
     limits,
@@ -26,7 +23,6 @@ from shipid.hybrid.method import Case, Task, fit_all
 from shipid.hybrid.physics import Physics
 from shipid.vessel.load import load_vessel
 from tests.study.test_commands import weaving
-from tests.test_predictor_fit import HORIZON, turns
 
 SHIP = load_vessel("gunnerus-28.9")
 WRONG = Physics(SHIP.with_values({"hull.derivatives.X_u|u|": 2 * SHIP.parameters["hull.derivatives.X_u|u|"]}), 5, 1.0)
@@ -70,23 +66,6 @@ def test_each_ridge_is_a_trial(given: dict[str, Any], count: int | None) -> None
     assert LearnedForce(**given).num_trials() == count
 
 
-def test_a_stiff_ridge_leaves_the_physics_as_it_is(windows: Windows) -> None:
-    given = task(windows)
-    fit = LearnedForce(**CHEAP, ridge=1e12).fit(given)["wrong"].corrector
-    assert fit is not None
-    paths = given.cases["wrong"].paths
-    np.testing.assert_allclose(fit.predict(WRONG, given.instants("wrong"), paths), paths, atol=1e-4)
-
-
-def test_weights_of_runs_that_do_not_turn_are_0_in_the_vessel() -> None:
-    """A force of 1e-110 N m, which rounding leaves of none, was no number of a vessel: the fit ended in an error."""
-    block = {name: np.full(3, 0.1) for name in (*HIDDEN, *OUTPUT)} | dict.fromkeys(SCALES + LIMITS, np.ones(1))
-    block["c_N"] = np.array([1e-109, -1e-109, 0.2])
-    vessel = ForceCorrector(block, {}).with_force(WRONG).vessel
-    assert vessel is not None
-    assert vessel.document["hull"]["learned"]["c_N"] == [0.0, 0.0, 0.2]
-
-
 def test_the_force_is_bounded_by_what_the_ship_is() -> None:
     document = SHIP.document
     m, I_z, length = document["inertia"]["m"], document["inertia"]["I_z"], document["particulars"]["L_pp"]
@@ -103,25 +82,6 @@ def block(units: int = 3, weight: float = 1.0) -> dict[str, np.ndarray]:
     return numbers | {name: weight * rng.normal(size=units) for name in (*HIDDEN, *OUTPUT)}
 
 
-def test_it_survives_its_header_and_arrays() -> None:
-    corrector = ForceCorrector(block(), {"ridge": 0.1})
-    again = ForceCorrector.from_arrays(corrector.header(), corrector.arrays())
-    assert again.hyperparameters == {"ridge": 0.1}
-    vessel = again.with_force(WRONG).vessel
-    assert vessel is not None
-    assert vessel.document["hull"]["learned"] == plain(corrector.block)
-    assert again.past == 0.0
-
-
-def test_damaged_arrays_are_refused() -> None:
-    corrector = ForceCorrector(block(), {"ridge": 0.1})
-    header, arrays = corrector.header(), corrector.arrays()
-    with pytest.raises(ResultError, match="c_Y: missing in the saved force"):
-        ForceCorrector.from_arrays(header, {name: x for name, x in arrays.items() if name != "c_Y"})
-    with pytest.raises(ResultError, match="differ in length"):
-        ForceCorrector.from_arrays(header, arrays | {"w_0": np.zeros(2)})
-
-
 def test_a_vessel_that_has_one_is_refused(windows: Windows) -> None:
     already = WRONG.with_values({BLOCK: plain(block())})
     with pytest.raises(DataError, match=rf"has a learned force already: take the block {BLOCK} out"):
@@ -131,23 +91,6 @@ def test_a_vessel_that_has_one_is_refused(windows: Windows) -> None:
 def test_a_vessel_in_drawn_waves_is_refused(windows: Windows) -> None:
     with pytest.raises(DataError, match=r"waves\.first_order is a sum over drawn waves, which has no gradient: take"):
         fit_all(LearnedForce(**CHEAP), task(windows, replace(WRONG, vessel=load_vessel("gunnerus-28.9-6dof"))))
-
-
-def test_no_more_windows_than_asked_for(windows: Windows) -> None:
-    """Of many training windows some are drawn by the seed: fewer windows, other numbers, the same bounds."""
-    few = LearnedForce(**{**CHEAP, "iterations": 2}, ridge=0.1, samples=6)
-    one, again, other = (few.fit(task(windows, seed=seed))["wrong"].corrector for seed in (1, 1, 2))
-    assert one is not None
-    assert again is not None
-    assert other is not None
-    for name, values in one.arrays().items():
-        np.testing.assert_array_equal(values, again.arrays()[name])
-    assert not np.array_equal(one.arrays()["c_X"], other.arrays()["c_X"])
-    assert one.arrays()["X_max"] == other.arrays()["X_max"]
-    diverged = replace(task(windows), cases={"wrong": Case(WRONG, np.full((5, len(windows), 2), np.nan))})
-    lost = few.fit(diverged)["wrong"]
-    assert lost.corrector is None
-    assert [row["state"] for row in lost.trials] == ["diverged"]
 
 
 def test_windows_that_the_physics_cannot_follow_do_not_train(windows: Windows) -> None:
@@ -164,35 +107,3 @@ def test_windows_that_the_physics_cannot_follow_do_not_train(windows: Windows) -
     assert not np.isfinite(hopeless.error(hopeless.start, none, windows.future))
     alone = _Trainer(WRONG, block(weight=0.0), instants.select(every[every != 4]), windows.future[:, every != 4], 5)
     np.testing.assert_array_equal(trainer.solve(0.1, None)[0], alone.solve(0.1, None)[0])
-
-
-def test_a_trial_is_judged_by_windows_that_its_force_has_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing of a validation window, not even its scale, reaches the training; the last fit takes all windows."""
-    windows = turns(count=3, rows=15)
-    future = windows.future
-    names = np.array(list(windows.spans))
-    folds = [(np.flatnonzero(windows.run != name), np.flatnonzero(windows.run == name)) for name in names]
-    trained: list[_Trainer] = []
-    judged: list[tuple[Any, Any]] = []
-
-    def solve(trainer: _Trainer, *_: Any) -> tuple[Any, int]:
-        trained.append(trainer)
-        return trainer.start, 1
-
-    def error(_: _Trainer, __: Any, instants: Any, paths: Any) -> float:
-        judged.append((instants.columns["u"], paths))
-        return 1.0
-
-    monkeypatch.setattr(_Trainer, "solve", solve)
-    monkeypatch.setattr(_Trainer, "error", error)
-    physics = Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0)
-    task = Task({"one": Case(physics, np.zeros_like(future))}, windows, folds, tuple(windows.planned))
-    LearnedForce(trials=1, ridge=0.1, units=2).fit(task)
-    assert len(trained) == len(folds) + 1
-    for trainer, part in zip(trained, [*(training for training, _ in folds), np.arange(len(windows))], strict=True):
-        np.testing.assert_array_equal(trainer.instants.columns["u"], windows.columns["u"][part])
-        np.testing.assert_array_equal(trainer.future, future[:, part])
-        assert trainer.first["u_scale"] == pytest.approx(windows.columns["u"][part].std())
-    for (speeds, paths), (_, validation) in zip(judged, folds, strict=True):
-        np.testing.assert_array_equal(speeds, windows.columns["u"][validation])
-        np.testing.assert_array_equal(paths, future[:, validation])

@@ -30,9 +30,3 @@ def test_the_mass_is_what_unit_forces_feel_in_one_step(name):
     after = rollout(vessel, *begun, step=1.0, num_steps=1, tau_extra=forces, engine="casadi")
     moved = np.stack([after[motion][-1, 0] for motion in ("u", "v", "r")])
     np.testing.assert_allclose(mass(vessel) @ (moved[:, :3] - moved[:, 3:]), 1e3 * np.eye(3), atol=1e-4)
-
-
-def test_the_start_in_closed_form_is_better_than_no_force():
-    truth = load_vessel("gunnerus-33.9")
-    here = world(truth, truth.with_values({"hull.crossflow.off": True}), runs=8, seconds=40, known=True)
-    assert here.removed(fitted(LearnedForce(trials=1, ridge=1e-3, iterations=1), here)) > 0.2

@@ -82,13 +82,3 @@ def test_the_alarm_is_silent_on_its_data_and_between_runs():
     edge = {"u": np.array([alarm.radius / 2, 100.0, np.nan]), "v": np.zeros(3)}
     np.testing.assert_array_equal(alarm.weight(edge, 1.0), [1.0, 0.0, 0.0])
     assert len(alarm.centres) == 40
-
-
-def test_what_one_run_is_to_the_others_a_new_run_may_be():
-    """Each run at another speed: the alarm stays silent as far as the runs lie apart."""
-    speed = np.repeat([0.0, 4.0, 8.0], 30)
-    table = {"u": speed + np.tile(np.linspace(-0.5, 0.5, 30), 3), "v": np.random.default_rng(1).normal(size=90)}
-    alarm = Alarm.fit(table, Normaliser.fit(table, ("u", "v")), 90, np.repeat(["a", "b", "c"], 30))
-    between = {"u": np.array([2.0, 6.0]), "v": np.zeros(2)}
-    np.testing.assert_array_equal(alarm.weight(between, 1.0), 1.0)
-    assert alarm.radius >= 3.0 / table["u"].std()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,8 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows, cut_windows
 from shipid.errors import DocumentError
-from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.features import Inputs, Memory, choose_features, group_of
+from shipid.hybrid.features import Inputs, Memory, group_of
 from shipid.hybrid.method import Case, Task
-from shipid.hybrid.mirror import reflection
 from shipid.hybrid.path_drawn import KINDS, MEMORIES, PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer, observe
@@ -60,34 +57,6 @@ def task(dataset: Dataset, foundations: dict[str, Physics], future: Array | None
 def dataset() -> Dataset:
     """Runs in wind that the physics of no foundation explains."""
     return windy()
-
-
-@pytest.mark.slow
-def test_a_foundation_with_a_memory_does_not_notice_its_company(dataset: Dataset) -> None:
-    """Inputs that come from the physics are of each foundation, those that do not are shared; results are the same."""
-    foundations = {
-        "slow": physics(N_ur=-3e5),
-        "other": physics(N_uv=-2e5),
-        "seen": physics(Observer(), N_ur=-3e5),
-        "none": Physics(None, 5, 1.0),
-    }
-    method = PathDrawn(**SMALL)
-    together = method.fit(task(dataset, foundations))
-    reordered = method.fit(task(dataset, dict(reversed(foundations.items()))))
-    for name, one in foundations.items():
-        alone = method.fit(task(dataset, {name: one}))[name]
-        for fit in (together[name], reordered[name]):
-            assert [row["params"] for row in fit.trials] == [row["params"] for row in alone.trials]
-            values = [[row["value"] for row in each.trials] for each in (fit, alone)]
-            np.testing.assert_allclose(*values, rtol=1e-9)
-            assert isinstance(fit.corrector, Compensator)
-            assert isinstance(alone.corrector, Compensator)
-            both = [each.corrector for each in (fit, alone)]
-            assert both[0].header() == both[1].header()
-            given = task(dataset, {name: one})
-            instants = given.instants(name)
-            paths = [each.predict(one, instants, given.cases[name].paths) for each in both]
-            np.testing.assert_allclose(paths[0], paths[1], rtol=0.0, atol=1e-8)
 
 
 def kinds(corrector: Any) -> set[str]:
@@ -140,29 +109,6 @@ def test_choose_chooses_between_what_the_memory_has(history: float, error: float
     assert max(map(taken.count, taken)) - min(map(taken.count, taken)) <= 1
 
 
-@pytest.mark.parametrize("known", [False, True])
-def test_a_mirrored_run_gives_mirrored_inputs(dataset: Dataset, known: bool) -> None:
-    """Past, turned, error and observer inputs of the mirrored runs are the image under the mirror of the search."""
-    foundation = physics(Observer(), N_ur=-3e5)
-    inputs = Inputs(tuple(dataset.commands), EVERYTHING)
-
-    def table(data: Dataset) -> dict[str, Array]:
-        windows = cut_windows(data, horizon=5, past=6)
-        instants = windows.instants(known=known, estimates=known_at(data, windows, foundation))
-        return inputs.table(foundation, instants)
-
-    here, there = table(dataset), table(mirrored(dataset))
-    assert {group_of(name) for name in here} == {"motion", "wind", "command", "history", "error", "observer"}
-    features = choose_features(here)
-    mirror = reflection(here, features)
-    assert mirror is not None
-    np.testing.assert_array_equal(mirror @ mirror, np.eye(len(features)))
-    image = np.stack([here[name] for name in features], axis=1) @ mirror
-    for column, name in enumerate(features):
-        np.testing.assert_allclose(there[name], image[:, column], rtol=0.0, atol=1e-6, err_msg=name)
-        assert np.abs(there[name]).max() > 0, name
-
-
 def test_a_mirrored_trial_with_a_memory_answers_mirrored_runs_with_mirrored_paths(dataset: Dataset) -> None:
     foundation = physics(Observer(), N_ur=-3e5)
     method = PathDrawn(**{**SMALL, "mirror": 1.0})
@@ -175,21 +121,6 @@ def test_a_mirrored_trial_with_a_memory_answers_mirrored_runs_with_mirrored_path
         instants: Instants = given.instants("one")
         paths.append(corrector.predict(foundation, instants, given.cases["one"].paths))
     np.testing.assert_allclose(paths[1], paths[0] * [1.0, -1.0], rtol=0.0, atol=1e-5)
-
-
-@pytest.mark.parametrize(
-    "taken", [(), *combinations(Memory.model_fields, 1), *combinations(("history", "turned", "error"), 2)], ids=str
-)
-def test_every_kind_of_input_has_its_scale_and_no_other(dataset: Dataset, taken: tuple[str, ...]) -> None:
-    """Whatever is taken from the past: what is searched is the scales of the kinds of inputs that there are."""
-    method = PathDrawn(memory=Memory(**{name: getattr(EVERYTHING, name) for name in taken}))
-    foundation = physics(Observer() if "observer" in taken else None, N_ur=-3e5)
-    few = Dataset(dataset.frame[dataset.frame["run"].isin(dataset.runs[:2])], dataset.metadata)
-    instants = task(few, {"one": foundation}).instants("one")
-    table = method.inputs(tuple(dataset.commands)).table(foundation, instants)
-    scales = {name for name in method.ranges() if name.endswith("_scale")}
-    assert scales == {f"{group_of(name)}_scale" for name in table}
-    assert all(scales <= point.keys() for point in method.points())
 
 
 def test_scales_of_a_memory_that_is_not_taken_are_no_hyperparameters() -> None:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import shipid.hybrid.physics as physics_module
 from shipid.data.windows import Instants, Windows, cut_windows, to_frame
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, ShipidError
@@ -19,7 +18,6 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
 from tests.identification.trials import trials
-from tests.study.test_commands import weaving
 from tests.study.test_whole import windy
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -42,12 +40,6 @@ def test_paths_are_the_rollout_seen_from_the_instant(windows: Windows) -> None:
     north, east = (path[name][1:, 0] for name in ("north", "east"))
     x, y = to_frame(north, east, columns["north"], columns["east"], columns["psi"])
     np.testing.assert_allclose(RIGHT.paths(windows.instants()), np.stack([x, y], axis=-1), atol=1e-9)
-
-
-def test_known_commands_lead_the_ship_along_its_run() -> None:
-    windows = cut_windows(weaving("ab"), horizon=5)
-    np.testing.assert_allclose(RIGHT.paths(windows.instants(known=True)), windows.future, atol=1e-9)
-    assert np.abs(RIGHT.paths(windows.instants()) - windows.future).max() > 0.1
 
 
 def test_states_are_those_of_the_paths(windows: Windows) -> None:
@@ -100,27 +92,6 @@ def test_the_slope_of_the_error_is_that_of_differences(seen: bool) -> None:
         assert each == pytest.approx((losses[1] - losses[0]) / (2 * step), rel=1e-4)
 
 
-def test_a_path_of_an_input_that_is_no_number_is_none(windows: Windows) -> None:
-    """The floor of a shaft speed would hide it: the path would be that of a stopped shaft. Others are unharmed."""
-    instants = windows.instants()
-    for name in dynamics(SHIP).commands:
-        columns = {key: np.array(values) for key, values in instants.columns.items()}
-        columns[name][3] = np.nan
-        paths = RIGHT.paths(Instants(columns))
-        assert np.isnan(paths[:, 3]).all(), name
-        rest = np.arange(len(windows)) != 3
-        np.testing.assert_array_equal(paths[:, rest], RIGHT.paths(instants)[:, rest])
-        assert np.isnan(RIGHT.states(Instants(columns))["x"][:, 3]).all()
-
-
-def test_a_path_faster_than_any_ship_is_none(windows: Windows) -> None:
-    """It is finite for a while before it overflows."""
-    wild = SHIP.with_values({"hull.derivatives.X_u|u|": 1e7})
-    paths, diverged = Physics(wild, 2, 1.0).variant_paths(windows.instants())
-    assert diverged.all()
-    assert np.isnan(paths).all()
-
-
 def test_distances_are_those_of_the_paths(windows: Windows) -> None:
     instants = windows.instants()
     measured = WRONG.distances(instants, windows.future)
@@ -136,15 +107,6 @@ def test_an_observer_needs_its_estimates_and_takes_no_screening(windows: Windows
         physics.paths(windows.instants())
     with pytest.raises(ShipidError, match="screening takes no observer"):
         physics.distances(windows.instants(), windows.future)
-
-
-def test_still_water_and_a_right_start_leave_the_physics_as_it_is(windows: Windows) -> None:
-    """An observer that has seen no force, no current and no waves changes nothing."""
-    zero = np.zeros(len(windows))
-    known = {f"observer.{name}": windows.columns[name] for name in ("north", "east", "psi", "u", "v", "r")}
-    known |= {f"observer.{name}": zero for name in ("X", "Y", "N", "current_north", "current_east")}
-    seen = replace(RIGHT, observer=Observer()).paths(windows.instants(estimates=known))
-    np.testing.assert_allclose(seen, RIGHT.paths(windows.instants()), atol=1e-9)
 
 
 def test_what_is_not_measured_is_zero_and_reported() -> None:
@@ -192,17 +154,6 @@ def test_the_error_does_not_fall_where_a_window_diverges(windows: Windows) -> No
     assert np.isfinite(WRONG.gradient(columns.select(rest), windows.future[:, rest], [])[0])
 
 
-@pytest.mark.parametrize("observer", [None, Observer()])
-def test_the_error_of_a_gradient_is_that_of_the_paths(observer: Observer | None) -> None:
-    physics, here = Physics(GUNNERUS, 6, 1.0, "euler", observer), afloat()
-    future = physics.paths(here) + np.random.default_rng(1).normal(size=(6, len(here), 2))
-    value, slope = physics.gradient(here, future, [DRAG])
-    assert value == pytest.approx(np.square(physics.paths(here) - future).sum(axis=-1).mean(), rel=1e-9)
-    number, step = GUNNERUS.parameters[DRAG], 1e-4 * GUNNERUS.parameters[DRAG]
-    moved = [physics.with_values({DRAG: number + sign * step}).gradient(here, future, [])[0] for sign in (1, -1)]
-    assert slope[0] == pytest.approx((moved[0] - moved[1]) / (2 * step), rel=1e-5)
-
-
 def test_water_and_air_that_move_together_carry_the_path_along() -> None:
     """Heading north in still water and air, or in a stream to the east with its air: the stream's way apart."""
     here, zero = afloat(1), np.zeros(1)
@@ -215,25 +166,6 @@ def test_water_and_air_that_move_together_carry_the_path_along() -> None:
     one = physics.paths(Instants(calm, estimates=still))
     other = physics.paths(Instants(windy, estimates=stream))
     np.testing.assert_allclose((other - one)[:, 0], 0.4 * np.arange(1, 7)[:, None] * [0.0, 1.0], atol=1e-9)
-
-
-@pytest.mark.parametrize(("count", "engine"), [(10, "auto"), (21, "repeated")])
-def test_many_steps_at_once_run_as_c(count: int, engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    taken: list[str] = []
-
-    def noted(*arguments: Any, engine: str, **more: Any) -> Any:
-        taken.append(engine)
-        return rollout(*arguments, engine="casadi", **more)
-
-    monkeypatch.setattr(physics_module, "REPEATED_FROM", 100)
-    monkeypatch.setattr(physics_module, "rollout", noted)
-    vessel = load_vessel("gunnerus-28.9")
-    zero = np.zeros(count)
-    names = ("north", "east", "psi", "u", "v", "r", *dynamics(vessel).commands)
-    physics = Physics(vessel, 5, 1.0)
-    physics.paths(Instants(dict.fromkeys(names, zero)))
-    physics.states(Instants(dict.fromkeys(names, zero)), engine="casadi")
-    assert taken == [engine, "casadi"]
 
 
 @pytest.mark.parametrize(

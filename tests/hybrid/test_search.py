@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -16,8 +16,9 @@ from shipid.hybrid.method import Task
 from shipid.hybrid.methods import METHODS, method_of
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import CLOSING, TIMED, Search, affordable
+from shipid.hybrid.search import CLOSING, TIMED, Problem, Search, SearchedAlone, affordable
 from shipid.hybrid.settings import Searched
+from shipid.hybrid.stored import Stored
 from tests.documented import module
 from tests.hybrid.worlds import HORIZON, World, ship, world
 
@@ -148,7 +149,7 @@ def test_a_price_is_that_of_the_trials_after_the_first() -> None:
     assert affordable(100.0, 0.0, [0.0] * TIMED) > 1000  # a clock that does not tick
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_budget_is_kept_by_trials_of_any_price(seed: int) -> None:
     """Drawn prices: the trials after the first cost about the same; what all cost is the budget, give or take one."""
     rng = np.random.default_rng(seed)
@@ -164,9 +165,45 @@ def test_foundations_that_go_together_share_a_budget(here: World) -> None:
     search = Search(here.task(cases_of(here, "path-drawn")), ["a", "none"], method)
     for number, _ in search.left(count()):
         row = {"number": number, "params": {}, "value": 1.0, "seconds": 1.0, "epochs": 0, "state": "complete"}
-        search.keep({"a": row, "none": row})
+        search.record({"a": dict(row), "none": dict(row)})
         if number > 200:
             break
     assert search.count is not None
     assert abs(search.count - 50) <= 2  # 2 x 50 s at 2 s a trial of both
     assert search.done == search.count
+
+
+class CountingProblem(Problem):
+    """What is solved from windows is a path with as many metres as there are windows and trials before."""
+
+    def solve(self, number: int, point: Any, windows: Any) -> Any:
+        return Moved(dict(point), 0.0, float(len(windows) + number))
+
+
+@dataclass(frozen=True)
+class Moved(Stored):
+    hyperparameters: Any
+    past: float
+    metres: float
+
+    def predict(self, physics: Any, instants: Any, paths: Any) -> Any:  # noqa: ARG002
+        return paths + self.metres
+
+
+class CountingMethod(SearchedAlone):
+    SEARCHED: ClassVar[tuple[str, ...]] = ("width",)
+    problem: ClassVar[Any] = CountingProblem
+    corrector: ClassVar[Any] = Moved
+    trials: int = 3
+    width: Any = (1.0, 4.0)
+
+
+def test_a_method_of_ones_own_is_how_a_trial_is_solved(here: World) -> None:
+    """It is judged on the validation windows of what the training windows gave, and solved with all of them."""
+    task, (fit, *_) = here.task(), CountingMethod().fit(here.task()).values()
+    ((training, validation),) = task.folds
+    missed = task.targets["physics"][:, validation] - len(training)
+    for number, row in enumerate(fit.trials):
+        assert row["value"] == pytest.approx(np.square(missed - number).mean(), rel=1e-9)
+    best = min(fit.trials, key=lambda row: row["value"])
+    assert fit.corrector == Moved(best["params"], 0.0, len(training) + len(validation) + best["number"])

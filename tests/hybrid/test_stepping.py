@@ -1,8 +1,6 @@
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, ClassVar
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,10 +8,9 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.settings import Scale
-from shipid.hybrid.stepping import Stepped, TrueSteps, free, stepped_paths, true_steps
+from shipid.hybrid.stepping import free, stepped_paths, true_steps
 from shipid.observer import Observer
-from tests.hybrid.worlds import HORIZON, folds_of, ship, world
+from tests.hybrid.worlds import HORIZON, ship, world
 
 LAG = {"n": {"kind": "first_order", "T": 3.0, "rate": 0.5}, "alpha": {"kind": "first_order", "T": 2.0, "rate": 0.2}}
 
@@ -112,79 +109,3 @@ def test_a_path_that_diverges_is_not_finite_and_harms_no_other(here):
     assert np.isfinite(paths[:2]).all()
     assert np.isnan(paths[2:, 0]).all()
     np.testing.assert_allclose(paths[:, 1:], stepped_paths(here.physics, instants, nothing)[:, 1:], rtol=0, atol=1e-12)
-
-
-def test_folds_choose_steps_by_their_windows(here):
-    steps = true_steps(here.task(), "physics")
-    training, validation = folds_of(here.train)[0]
-    parts = [set(here.train.run[steps.window[steps.of(part)]]) for part in (training, validation)]
-    assert all(parts)
-    assert not parts[0] & parts[1]
-
-
-def test_what_is_missing_is_an_acceleration_whatever_the_step():
-    """0.2 m/s too slow after 2 s is 0.1 m/s^2 too little."""
-    one, after = np.zeros(1, int), np.array([[3.2, 0.0, -0.04]])
-    steps = TrueSteps(Instants({}), np.array([[3.0, 0.1, 0.0]]), after, one, one, step=2.0)
-    np.testing.assert_allclose(steps.missing, [[0.1, -0.05, -0.02]])
-
-
-@dataclass(frozen=True)
-class Pushed:
-    """The physics, pushed ahead by R accelerations [m/s^2] for R S instants."""
-
-    ahead: np.ndarray
-    hyperparameters: dict[str, float]
-
-    def predict(self, physics, instants, _):
-        each = np.repeat(self.ahead, len(instants) // len(self.ahead))
-        return stepped_paths(physics, instants, lambda *_: each[:, None] * [1.0, 0.0, 0.0])
-
-
-class Pushing(Stepped):
-    """A push that each trial names, held back by the ridge; it notes what it is asked for."""
-
-    RIDGES: ClassVar[int] = 3
-    asked: ClassVar[list[Any]] = []
-
-    ridge: Scale = (0.1, 10.0)
-
-    def points(self):
-        return [{"ahead": ahead} for ahead in (0.4, 0.0, 0.2)]
-
-    def trial_of(self, task, name):  # noqa: ARG002
-        def solve(point, windows, ridges):
-            self.asked.append((point["ahead"], windows.tolist(), [round(ridge, 9) for ridge in ridges]))
-            return Pushed(np.array([point["ahead"] / (1 + ridge) for ridge in ridges]), dict(point))
-
-        return lambda _, point: partial(solve, point)
-
-    def num_chosen(self):
-        return 2
-
-    def joined(self, best):
-        return Pushed(np.mean([one.ahead for one in best], axis=0), best[0].hyperparameters)
-
-
-def test_the_best_trials_are_solved_with_all_windows_and_their_own_ridge(here):
-    """Nothing is missing: no push is best, and then the smallest at the stiffest ridge."""
-    task, method = here.task(), Pushing(trials=3)
-    Pushing.asked.clear()
-    fit = method.fit(task)["physics"]
-    training, validation = (part.tolist() for part in task.folds[0])
-    tried = [(ahead, training, [0.1, 1.0, 10.0]) for ahead in (0.4, 0.0, 0.2)]
-    every = sorted({*training, *validation})
-    assert Pushing.asked == [*tried, (0.0, every, [fit.trials[1]["params"]["ridge"]]), (0.2, every, [10.0])]
-    assert [row["params"]["ahead"] for row in fit.trials] == [0.4, 0.0, 0.2]
-    assert fit.corrector.ahead == pytest.approx([0.1 / 11])
-    assert fit.corrector.hyperparameters == fit.trials[1]["params"]
-
-
-def test_nothing_is_made_of_trials_that_all_diverged(here):
-    class Wild(Pushing):
-        def points(self):
-            return [{"ahead": 1e6}]
-
-    fit = Wild(trials=1).fit(here.task())["physics"]
-    assert fit.corrector is None
-    assert [row["state"] for row in fit.trials] == ["diverged"]

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from shipid.hybrid import training
-from shipid.hybrid.training import Settings, train
+from shipid.hybrid.training import Length, Settings, Watch, train
 
 torch.set_num_threads(1)
 TRAIN, VAL = np.arange(96), np.arange(96, 128)
@@ -14,11 +14,12 @@ TRAIN, VAL = np.arange(96), np.arange(96, 128)
 def settings(num_members=1, **changes):
     """Plain full-batch Adam, one set of hyperparameters for all members."""
     common = {"learning_rate": 1e-2, "weight_decay": 0.0, "input_dropout": 0.0, "hidden_dropout": 0.0}
-    shared = {"layers": 2, "units": 8, "epochs": 30}
+    shared = {"layers": 2, "units": 8}
+    length = {"epochs": 30}
     for name, value in changes.items():
-        (common if name in common else shared)[name] = value
+        (common if name in common else shared if name in shared else length)[name] = value
     wide = {k: v if isinstance(v, tuple) else (v,) * num_members for k, v in common.items()}
-    return Settings(**shared, **wide)
+    return Settings(**shared, **wide, length=Length(**length))
 
 
 @pytest.fixture(scope="module")
@@ -89,22 +90,6 @@ def test_a_member_does_not_notice_its_company(problem):
             np.testing.assert_allclose(mine[0], theirs[0], atol=2e-4)
 
 
-def test_a_tiny_linear_problem_is_learned_to_almost_nothing():
-    rng = np.random.default_rng(0)
-    x = rng.uniform(-1, 1, size=(96, 3))
-    y = (x @ rng.normal(size=(3, 4)) + 2.0)[None]
-    trained = train(x, y, TRAIN, TRAIN, settings(units=32, layers=1, learning_rate=0.01, batch=16, epochs=300), [0])
-    assert trained.loss[0] < 1e-3 * y.var()
-
-
-def test_the_validation_loss_is_in_metres_and_of_the_weights_kept(problem):
-    x, y = problem
-    trained = train(x, 100.0 * y[:1], TRAIN, VAL, settings(epochs=50), [0])
-    (w1, b1), (w2, b2), (w3, b3) = trained.layers[0]
-    predicted = np.tanh(np.tanh(x[VAL] @ w1 + b1) @ w2 + b2) @ w3 + b3
-    assert trained.loss[0] == pytest.approx(np.mean((predicted - 100.0 * y[0, VAL]) ** 2), rel=1e-4)
-
-
 def test_early_stopping_keeps_the_best_epoch(problem):
     x, y = problem
     y = np.random.default_rng(1).normal(size=y.shape)  # nothing to learn: the validation loss soon rises
@@ -117,16 +102,6 @@ def test_early_stopping_keeps_the_best_epoch(problem):
     assert stopped.loss[0] == losses[best - 1]
     kept = train(x, y[:1], TRAIN, VAL, settings(**run, epochs=best), [4])
     np.testing.assert_array_equal(stopped.layers[0][0][0], kept.layers[0][0][0])
-
-
-def test_the_seed_decides(problem):
-    x, y = problem
-    config = settings(2, batch=32, hidden_dropout=0.3, epochs=5)
-    first, again = (train(x, y[:2], TRAIN, VAL, config, [1, 2], order_seed=9) for _ in range(2))
-    np.testing.assert_array_equal(first.loss, again.loss)
-    np.testing.assert_array_equal(first.layers[1][2][0], again.layers[1][2][0])
-    assert train(x, y[:2], TRAIN, VAL, config, [3, 2], order_seed=9).loss[0] != first.loss[0]
-    assert train(x, y[:2], TRAIN, VAL, config, [1, 2], order_seed=8).loss[0] != first.loss[0]
 
 
 @pytest.mark.parametrize("rate", [0.1, 0.5, 0.9])
@@ -156,12 +131,11 @@ def test_a_diverged_member_harms_nobody(problem):
     assert bad.status == ("ok", "diverged", "ok")
     assert np.isnan(bad.loss[1])
     np.testing.assert_array_equal(bad.loss[[0, 2]], good.loss[[0, 2]])
-    assert all(np.isfinite(weight).all() for layers in bad.layers for pair in layers for weight in pair)
 
 
 def test_who_has_stopped_does_not_start_again():
     weights = torch.zeros(2, 3)
-    watch = training._Watch(weights, patience=2)
+    watch = Watch(weights, patience=2)
     for epoch, losses in enumerate([[3.0, 9.0], [4.0, 8.0], [5.0, 7.0], [1.0, 6.0]], start=1):
         weights.fill_(epoch)
         watch.compare(torch.zeros(2), torch.tensor(losses))

@@ -11,18 +11,14 @@ from pydantic import PositiveInt
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Fitted
-from shipid.hybrid.modules import Modules
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.settings import Scale, Searched
 from shipid.hybrid.trials import (
     diverged,
     fit_each,
-    mean_square,
     points_of,
     ridge_trial,
-    ridges_of,
     row_of,
-    some_of,
     sound,
     used,
 )
@@ -67,27 +63,6 @@ def test_counts_are_whole_and_linear_settings_evenly_spread(tmp_path):
     Journal(tmp_path / "trials.log").add({"a": rows}, method.space())
     kept = Journal(tmp_path / "trials.log").rows("a")
     assert [repr(row["params"]) for row in kept] == [repr(point) for point in points]
-
-
-def test_trials_fill_their_ranges_and_ridges_go_from_low_to_high():
-    points = list(points_of(OneStep(trials=16, offset=1.5)))
-    assert len(points) == 16
-    assert {point["offset"] for point in points} == {1.5}
-    assert all(1 <= point["motion_scale"] <= 16 for point in points)
-    assert len({point["motion_scale"] for point in points}) == 16
-    fixed = points_of(Modules(motion_scale=2.0, command_scale=2.0, offset=1.0, trials=5))
-    assert len(list(fixed)) == 5, "they differ in the hidden units that are drawn"
-    np.testing.assert_allclose(ridges_of((1e-4, 1e-1), 4), [1e-4, 1e-3, 1e-2, 1e-1])
-    assert ridges_of(0.5, 4) == [0.5]
-
-
-def test_some_windows_are_drawn_by_a_seed_alone():
-    many = np.arange(100) * 2
-    np.testing.assert_array_equal(some_of(many, 100, 0), many)
-    few = some_of(many, 10, 3)
-    np.testing.assert_array_equal(few, some_of(many, 10, 3))
-    assert len(set(few)) == 10
-    assert set(few) <= set(many)
 
 
 def test_every_foundation_is_fitted_or_has_diverged():
@@ -155,13 +130,6 @@ def test_a_trial_that_is_no_number_has_diverged(value, state):
     row = row_of(3, {"ridge": 0.5}, value, 0.0, epochs=7)
     assert (row["number"], row["params"], row["state"], row["epochs"]) == (3, {"ridge": 0.5}, state, 7)
     assert row["seconds"] > 0
-
-
-def test_a_path_that_is_no_number_has_an_infinite_error():
-    paths = np.zeros((2, 3, 2))
-    assert mean_square(paths, paths + 2.0) == 4.0
-    paths[1, 1, 0] = np.nan
-    assert mean_square(paths, np.zeros((2, 3, 2))) == np.inf
 
 
 def test_with_a_budget_there_is_always_another_trial():

@@ -5,13 +5,9 @@ from __future__ import annotations
 import json
 from math import inf
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-import pytest
-
 from shipid.files import write_json
-from shipid.hybrid import search as searches
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.settings import Span
 from shipid.study import seals
@@ -98,29 +94,3 @@ def test_a_finished_run_searches_no_more(tiny_run: Path, tmp_path: Path) -> None
     assert Watch(tiny_plan(tmp_path), tiny_run).look() == []
     entries = [json.loads(line) for line in (tiny_run / TRIALS).read_text().splitlines()]
     assert sum(entry["op_code"] == 4 for entry in entries) == 8, "the law above would be empty without trials"
-
-
-def test_quick_trials_are_written_while_the_search_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Trials that are kept to be written together are not kept for long."""
-    from shipid.hybrid.method import Task
-    from shipid.hybrid.path_drawn import PathDrawn
-
-    written: list[int] = []
-
-    class Here:
-        def rows(self, cell: str) -> list[Any]:  # noqa: ARG002
-            return []
-
-        def add(self, rows: Any, space: Any) -> None:  # noqa: ARG002
-            written.append(len(rows["a"]))
-
-    clock = [0.0]
-    monkeypatch.setattr(searches.time, "monotonic", lambda: clock[0])
-    windows = SimpleNamespace(locked=lambda: None)  # not looked at
-    task = Task({}, windows, (), (), journal=Here())  # type: ignore[arg-type]
-    search = searches.Search(task, ["a"], PathDrawn(trials=5), again=True)
-    for number in range(5):
-        clock[0] += 0.6 * searches.TOGETHER
-        search.keep({"a": row(number, 1.0)})
-    search.write()
-    assert written == [2, 2, 1]

@@ -851,8 +851,8 @@ def test_a_mistake_of_a_user_is_one_line_and_loses_no_cell(
     ("mistake", "sentence"),
     [
         ("few runs", "too few runs: make more"),
-        ("no trial", "Faulty.fit: a corrector needs a trial that is complete: "),
-        ("NaN", "Faulty.fit: value of a trial must be finite, not nan, unless its state is 'diverged'"),
+        ("no trial", "Faulty.fit: a corrector needs a trial that is complete"),
+        ("NaN", "Faulty.fit: trial 0: value must be finite, not nan, unless the state is 'diverged'"),
     ],
 )
 def test_what_a_method_gives_and_no_study_can_store_is_a_cell_without_a_result(
