@@ -54,7 +54,7 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.perturb import Rule
 from tests import test_laws
-from tests.documented import code, module
+from tests.documented import entries, module
 from tests.logs.conftest import PLAIN, as_dataset, as_log, turning
 from tests.logs.simulated import as_bridge, si_log
 
@@ -182,10 +182,16 @@ def test_a_correction_mirrors_it() -> None:
     np.testing.assert_array_equal(image, np.diag([1, -1, -1, 1, -1]))
 
 
+def rows_of_the_page() -> dict[str, Signal]:
+    """The rows that docs/extending.md adds to the table of signals."""
+    rows: dict[str, Signal] = eval("{" + entries("A signal", "SIGNALS") + "}", {"Signal": Signal})
+    return rows
+
+
 @pytest.fixture
 def jet(monkeypatch: pytest.MonkeyPatch) -> None:
     """The water jet of docs/extending.md: a signal and its term."""
-    row = eval("{" + code("A signal")[0] + "}", {"Signal": Signal})
+    row = rows_of_the_page()
     monkeypatch.setitem(signals.SIGNALS, "throttle", row["throttle"])
     monkeypatch.setitem(TERMS, "thruster.jet", Term(module("A term", "jet_of_the_page", monkeypatch).jet))
     monkeypatch.setitem(test_laws.RANGES, "throttle", row["throttle"].reach)
@@ -276,7 +282,7 @@ ALIKE = {"kind": "turning", "n_rpm": 120.0, "alpha_deg": 5.0, "start_speed": 4.0
 @pytest.fixture
 def depth(monkeypatch: pytest.MonkeyPatch) -> Vessel:
     """The depth of docs/extending.md with a term that takes it, and a ship that feels it."""
-    row = eval("{" + code("A signal")[1] + "}", {"Signal": Signal})["depth"]
+    row = rows_of_the_page()["depth"]
     monkeypatch.setitem(signals.SIGNALS, "depth", row)
     monkeypatch.setitem(TERMS, "hull.shallow", Term(shallow_drag))
     monkeypatch.setitem(test_laws.RANGES, "depth", row.reach)
