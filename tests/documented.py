@@ -1,4 +1,4 @@
-"""The code of docs/extending.md, as its reader would write it down: as a module, or as a commit in a copy of the tree."""
+"""The code of docs/extending.md as its reader would write it: as a module, or as a commit in a copy of the tree."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def commit(tree: Path, heading: str) -> list[Path]:
 
 
 def add(file: Path, block: str) -> None:
-    """Add a block to a file: imports after its imports, entries at the end of their tables, definitions before these."""
+    """Add a block to a file: imports after its imports, entries at the end of tables, definitions before these."""
     imports, definitions, tables = parse_addition(block)
     text = file.read_text(encoding="utf-8")
     own = f"from {dotted('/'.join(file.parts[file.parts.index('shipid') :]))} import"
@@ -89,7 +89,7 @@ def add(file: Path, block: str) -> None:
         first = re.search(r"^[A-Z]+: dict\[[^\n]*= \{$", text, re.MULTILINE)
         place = first.start() if first else len(text)
         text = text[:place] + "\n\n\n".join(definitions) + "\n\n\n" + text[place:]
-    if imports := [line for line in imports if not line.startswith(own)]:
+    if imports := [line for line in imports if file.name == "__init__.py" or not line.startswith(own)]:
         body = ast.parse(text).body
         last = max(node.end_lineno or 0 for node in body if isinstance(node, ast.Import | ast.ImportFrom))
         lines = text.splitlines(keepends=True)
