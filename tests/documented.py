@@ -33,6 +33,15 @@ def module(heading: str, name: str, monkeypatch: pytest.MonkeyPatch, number: int
     return made
 
 
+def new_module(heading: str, name: str, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The new file that a section writes first, as a module."""
+    block = next(block for _, block in additions(heading) if block.startswith('"""'))
+    made = ModuleType(name)
+    monkeypatch.setitem(sys.modules, name, made)
+    exec(compile(block, str(PAGE), "exec"), made.__dict__)
+    return made
+
+
 def additions(heading: str) -> list[tuple[str, str]]:
     """Path and code of each block of a section that belongs into a file of shipid."""
     blocks = BLOCK.findall(section(heading))
