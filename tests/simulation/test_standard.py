@@ -16,7 +16,7 @@ from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import PullOut, ReverseSpiral, Spiral, Zigzag
 from shipid.simulation.measured import measure_standard
 from shipid.simulation.perform import perform
-from shipid.simulation.standard import shaft_speed, standard, standards
+from shipid.simulation.standard import shaft_speed, standard
 from shipid.vessel.load import load_vessel
 from shipid.vessel.template import Particulars, first_guess
 from tests.measures.test_laws import SIGNED, TOLERANCE
