@@ -8,7 +8,7 @@ from __future__ import annotations
 import inspect
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import typer
@@ -152,9 +152,19 @@ def vessel_page() -> str:
     for key, term in TERMS.items():
         group, kind = key.split(".")
         path, shown_kind = (key, None) if group in FIXED else ("thruster.NAME" if group == "thruster" else group, kind)
-        words = inspect.getdoc(term.function) or ""
+        words = "\n\n".join([inspect.getdoc(term.function) or "", *helpers(term.function, seen)])
         lines += blocks(path, {**schema_of(term_model(key)), "description": words}, seen, shown_kind)
     return "\n".join(lines)
+
+
+def helpers(function: Callable[..., Any], seen: Seen) -> Iterator[str]:
+    """Words of the functions of its module that a docstring refers to, each once a page."""
+    module = inspect.getmodule(function)
+    for name in re.findall(r"`(\w+)`", inspect.getdoc(function) or ""):
+        helper = getattr(module, name, None)
+        if inspect.isfunction(helper) and helper is not function and name not in seen:
+            seen.add(name)
+            yield f"`{name}`: {inspect.getdoc(helper)}"
 
 
 def mapping_page() -> str:
@@ -226,6 +236,7 @@ def entries(docstring: str) -> dict[str, str]:
 
 def escaped(text: str) -> str:
     """Return text in which signs of Markdown and HTML are signs."""
+    text = re.sub(r"(?<![`\w-])(--[a-z][a-z-]*)", r"`\1`", text)
     return re.sub(r"(?<![`\\])([<*|$])", r"\\\1", text)
 
 
