@@ -15,7 +15,8 @@ from sphinx.util import logging
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
-from pages import documents_page, python_page  # noqa: E402
+from pages import commands_page, mapping_page, python_page, study_page, vessel_page  # noqa: E402
+from records import unsupported  # noqa: E402
 
 from shipid import __version__  # noqa: E402
 
@@ -23,6 +24,14 @@ project = "shipid"
 author = "The shipid developers"
 release = version = __version__
 copyright = author
+
+MADE = {
+    "reference-python": python_page,
+    "keys-study": study_page,
+    "keys-vessel": vessel_page,
+    "keys-mapping": mapping_page,
+    "options": commands_page,
+}
 
 extensions = ["myst_nb"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
@@ -62,13 +71,20 @@ def write_pages(_: Sphinx) -> None:
     """Write the pages that are made from the code; a page that is the same is not written again."""
     folder = HERE / "generated"
     folder.mkdir(exist_ok=True)
-    for name, text in (("reference-python", python_page()), ("reference-keys", documents_page())):
-        file = folder / f"{name}.md"
+    for name, page in MADE.items():
+        file, text = folder / f"{name}.md", page()
         if not file.is_file() or file.read_text(encoding="utf-8") != text:
             file.write_text(text, encoding="utf-8")
+
+
+def check_numbers(_: Sphinx, page: str, source: list[str]) -> None:
+    """Warn of each number that a page quotes from a record which does not hold it."""
+    for fault in unsupported(source[0]):
+        logging.getLogger(__name__).warning(fault, location=page)
 
 
 def setup(app: Sphinx) -> None:
     """Register what this site adds to Sphinx."""
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
     app.connect("builder-inited", write_pages)
+    app.connect("source-read", check_numbers)

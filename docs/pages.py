@@ -1,4 +1,4 @@
-"""The pages of the site that are made from the code: public names of Python, and keys of the documents.
+"""The pages of the site that are made from the code: public names of Python, keys of documents, options of commands.
 
 `docs/conf.py` writes them to `docs/generated/` whenever the site is built.
 """
@@ -8,13 +8,15 @@ from __future__ import annotations
 import inspect
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+import typer
 from pydantic import BaseModel
 from sphinx.util.inspect import signature, stringify_signature
 
 import shipid
+from shipid.cli import app
 from shipid.hybrid.features import Memory
 from shipid.hybrid.methods import METHODS
 from shipid.identification.settings import Identify
@@ -28,6 +30,8 @@ from shipid.study.schema import Study
 from shipid.vessel.schema import FIXED, term_model, vessel_model
 
 Schema = Mapping[str, Any]
+Seen = set[str]
+"""Blocks that a page has already: equal blocks of several kinds are listed once."""
 ENTRY = re.compile(r"^(\*{0,2}\w[\w, ]*?) : (.*)$")  # `name : text` and `one, other : text` of a docstring
 
 
@@ -127,39 +131,63 @@ def settings_table(model: type[BaseModel]) -> list[str]:
 # documents
 
 
-def documents_page() -> str:
-    """Every key of every document, with what it takes and its default, from the models that check them."""
-    lines = [
-        "# Keys of the documents",
-        "",
-        "Made from the models that check the documents. For what a key means, and for examples,",
-        "read the [study](../reference-study-document.md), [vessel](../reference-vessel-document.md) and",
-        "[mapping](../reference-mapping-document.md) documents.",
-        "",
-        "## Study document",
-        "",
-        *blocks("", Study.model_json_schema(), 3),
-    ]
+def study_page() -> str:
+    """Every key of a study document, of its methods and of its manoeuvres."""
+    seen: Seen = set()
+    lines = [*title("Keys of the study document", "reference-study-document"), *blocks("", schema_of(Study), seen)]
     for path, model in (("family.identify", Identify), ("family.observer", Observer), ("method.memory", Memory)):
-        lines += blocks(path, model.model_json_schema(), 3)
-    lines += ["## Methods of a study", ""]
+        lines += blocks(path, schema_of(model), seen)
     for kind, method in METHODS.items():
-        lines += blocks("method", method.model_json_schema(), 3, kind)
-    lines += ["## Manoeuvres of a study", ""]
+        lines += blocks("method", schema_of(method), seen, kind)
     for kind, manoeuvre in KINDS.items():
-        lines += blocks("truth.manoeuvre", manoeuvre.model_json_schema(), 3, kind)
-    lines += ["## Vessel document", ""]
-    lines += blocks("", without(vessel_model().model_json_schema(), {*FIXED, "wind", "thruster"}), 3)
-    for key in TERMS:
-        group, kind = key.split(".")
-        path, shown = (key, None) if group in FIXED else ("thruster.NAME" if group == "thruster" else group, kind)
-        lines += blocks(path, term_model(key).model_json_schema(), 3, shown)
-    lines += ["## Mapping document", "", *blocks("", LogMapping.model_json_schema(), 3)]
-    for kind, reader in READERS.items():
-        lines += blocks("format", reader.options.model_json_schema(), 3, kind)
-    for kind, (repair, *_) in REPAIRS.items():
-        lines += blocks("repair", repair.model_json_schema(), 3, kind)
+        lines += blocks("truth.manoeuvre", schema_of(manoeuvre), seen, kind)
     return "\n".join(lines)
+
+
+def vessel_page() -> str:
+    """Every key of a vessel document: its blocks, then a block for each term."""
+    seen: Seen = set()
+    lines = title("Keys of the vessel document", "reference-vessel-document")
+    lines += blocks("", without(schema_of(vessel_model()), {*FIXED, "wind", "thruster"}), seen)
+    for key, term in TERMS.items():
+        group, kind = key.split(".")
+        path, shown_kind = (key, None) if group in FIXED else ("thruster.NAME" if group == "thruster" else group, kind)
+        words = "\n\n".join([inspect.getdoc(term.function) or "", *helpers(term.function, seen)])
+        lines += blocks(path, {**schema_of(term_model(key)), "description": words}, seen, shown_kind)
+    return "\n".join(lines)
+
+
+def helpers(function: Callable[..., Any], seen: Seen) -> Iterator[str]:
+    """Words of the functions of its module that a docstring refers to, each once a page."""
+    module = inspect.getmodule(function)
+    for name in re.findall(r"`(\w+)`", inspect.getdoc(function) or ""):
+        helper = getattr(module, name, None)
+        if inspect.isfunction(helper) and helper is not function and name not in seen:
+            seen.add(name)
+            yield f"`{name}`: {inspect.getdoc(helper)}"
+
+
+def mapping_page() -> str:
+    """Every key of a mapping document, of its formats and of its repairs."""
+    seen: Seen = set()
+    lines = title("Keys of the mapping document", "reference-mapping-document")
+    lines += blocks("", without(schema_of(LogMapping), {"digest"}), seen)
+    for kind, reader in READERS.items():
+        lines += blocks("format", schema_of(reader.options), seen, kind)
+    for kind, (repair, *_) in REPAIRS.items():
+        lines += blocks("repair", schema_of(repair), seen, kind)
+    return "\n".join(lines)
+
+
+def title(words: str, page: str) -> list[str]:
+    """Return the first lines of a page of keys."""
+    made = f"Made from the models that check the documents. [What the keys mean](../{page}.md) has examples."
+    return [f"# {words}", "", f"{made} A block that several kinds share is listed once.", ""]
+
+
+def schema_of(model: type[BaseModel]) -> Schema:
+    """Return the JSON Schema of a model, with the keys that a document writes."""
+    return model.model_json_schema(by_alias=True)
 
 
 def without(schema: Schema, names: set[str]) -> Schema:
@@ -167,19 +195,49 @@ def without(schema: Schema, names: set[str]) -> Schema:
     return {**schema, "properties": {name: own for name, own in schema["properties"].items() if name not in names}}
 
 
-def blocks(path: str, schema: Schema, level: int, kind: str | None = None) -> list[str]:
+def blocks(path: str, schema: Schema, seen: Seen, kind: str | None = None) -> list[str]:
     """Lines of a block of a document and of the blocks inside it: heading, words, table."""
-    defs = schema.get("$defs", {})
+    defs, text = schema.get("$defs", {}), str(schema.get("description", ""))
     name = f"`[{path}]`" if path else "Top level"
-    lines = [f"{'#' * level} {name}" + (f', `kind = "{kind}"`' if kind else ""), ""]
-    words = str(schema.get("description", "")).split("\n\n")[0]
-    lines += [words, ""] if path and words else []
+    content = json.dumps([name, schema.get("properties"), text if kind else ""], sort_keys=True)
+    if content in seen:
+        return []
+    seen.add(content)
+    lines = [f"## {name}" + (f', `kind = "{kind}"`' if kind else ""), ""]
+    lines += [escaped(prose(text)), ""] if path and text else []
     lines += [*table(schema, defs), ""]
     for key, own in schema.get("properties", {}).items():
         for inner in inside(own, defs):
             if inner.get("properties"):
-                lines += blocks(f"{path}.{key}" if path else key, {**inner, "$defs": defs}, level)
+                lines += blocks(f"{path}.{key}" if path else key, {**inner, "$defs": defs}, seen)
     return lines
+
+
+def prose(docstring: str) -> str:
+    """Return a docstring without its list of parameters, which is in the table."""
+    text = docstring.partition("\nParameters\n")[0]
+    return "\n\n".join(part for part in re.split(r"\n\s*\n", text) if not ENTRY.match(part.strip())).strip()
+
+
+def entries(docstring: str) -> dict[str, str]:
+    """Return name -> words of the list `name : words` or `one, other : words` of a docstring."""
+    words: dict[str, str] = {}
+    names: list[str] = []
+    for line in docstring.splitlines():
+        if match := ENTRY.match(line.strip() if not names else line):
+            names = [name.strip() for name in match[1].split(",")]
+            words |= dict.fromkeys(names, match[2])
+        elif line.strip() and line.startswith(" "):
+            words |= {name: f"{words[name]} {line.strip()}" for name in names}
+        else:
+            names = []
+    return words
+
+
+def escaped(text: str) -> str:
+    """Return text in which signs of Markdown and HTML are signs."""
+    text = re.sub(r"(?<![`\w-])(--[a-z][a-z-]*)", r"`\1`", text)
+    return re.sub(r"(?<![`\\])([<*|$])", r"\\\1", text)
 
 
 def inside(schema: Schema, defs: Schema) -> Iterator[Schema]:
@@ -196,10 +254,10 @@ def inside(schema: Schema, defs: Schema) -> Iterator[Schema]:
 
 def table(schema: Schema, defs: Schema) -> list[str]:
     """Lines of the table of a block's keys."""
-    rows = []
+    rows, listed = [], entries(str(schema.get("description", "")))
     for key, own in schema.get("properties", {}).items():
         default = "required" if key in schema.get("required", ()) else shown(own.get("default"))
-        words = str(own.get("description", "")).replace("\n", " ")
+        words = str(own.get("description") or listed.get(key, "")).replace("\n", " ")
         rows.append(f"| `{key}` | {cell(takes(own, defs))} | {cell(default)} | {cell(words)} |")
     if isinstance(more := schema.get("additionalProperties"), dict):
         rows.append(f"| any name | {cell(takes(more, defs))} | | |")
@@ -242,5 +300,34 @@ def takes(schema: Schema, defs: Schema) -> str:
         return "table" + (f" of {takes(more, defs)}" if isinstance(more, dict) and more else "")
     words = {"number": "number", "integer": "whole number", "string": "text", "boolean": "`true` or `false`"}
     limits = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}
-    told = [f"{sign} {schema[name]:g}" for name, sign in limits.items() if name in schema]
-    return words.get(str(kind), "any value") + (" " + ", ".join(told) if told else "")
+    within = [f"{sign} {schema[name]:g}" for name, sign in limits.items() if name in schema]
+    return words.get(str(kind), "any value") + (" " + ", ".join(within) if within else "")
+
+
+# commands
+
+
+def commands_page() -> str:
+    """Every command with its arguments and options, from the declarations that the command line uses."""
+    lines = ["# Options of the commands", "", "Made from the commands. [What they do](../reference-commands.md).", ""]
+    for path, command in every_command(typer.main.get_command(app)):
+        given = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
+        arguments = [one.metavar or str(one.name).upper() for one in given if one.param_type_name == "argument"]
+        lines += [f"## `{' '.join(('shipid', *path, *arguments))}`", "", escaped(str(command.help or "")), ""]
+        rows = []
+        for parameter in given:
+            names = ", ".join(f"`{name}`" for name in (*parameter.opts, *parameter.secondary_opts))
+            words = " ".join(str(getattr(parameter, "help", None) or "").split())
+            default = "required" if parameter.required else shown(parameter.default or None)
+            rows.append(f"| {names} | {cell(default)} | {cell(escaped(words))} |")
+        lines += ["| argument or option | default | |", "| --- | --- | --- |", *rows, ""] if rows else []
+    return "\n".join(lines)
+
+
+def every_command(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Words and object of every command that does something, groups left out."""
+    inner = getattr(command, "commands", None)
+    if inner is None:
+        yield path, command
+    for name, one in (inner or {}).items():
+        yield from every_command(one, (*path, name))

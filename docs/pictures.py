@@ -66,7 +66,7 @@ def pictures(run: Path) -> Iterator[tuple[str, go.Figure]]:
     results = shipid.figures.content_of(shipid.read_results(run))
     question = shipid.figures.prediction(results, N_D=10)
     words = "The true path of one turn, and what each model says. Each had 10 runs of data."
-    title = f"Where will she be in 30 s?<br><sup>{words}</sup>"
+    title = f"Where will the ship be in 30 s?<br><sup>{words}</sup>"
     yield "question", question.update_layout(title_text=title)
     yield "answer", shipid.figures.error_map(results)
     yield "gain", shipid.figures.gain(results)

@@ -32,7 +32,6 @@ from shipid.hybrid.stepping import Stepper, free
 from shipid.logs import readers
 from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.measuring import measure_dataset
 from shipid.physics import TERMS, Term, helm, signals
 from shipid.physics.frames import force_at
 from shipid.physics.signals import Signal
@@ -41,10 +40,8 @@ from shipid.report.wording import number
 from shipid.schemas import schema as schema_of
 from shipid.simulation import manoeuvre
 from shipid.simulation.approach import Controls
-from shipid.simulation.measured import measure_standard
-from shipid.simulation.scripted import simulated
 from shipid.simulation.standard import standard
-from shipid.simulation.truth import Truth, check_truth, simulate
+from shipid.simulation.truth import Truth, simulate
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import Plan, build_plan
 from shipid.study.schema import Published
@@ -54,8 +51,8 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.perturb import Rule
 from tests import test_laws
-from tests.documented import code, module
-from tests.logs.conftest import PLAIN, as_dataset, as_log, turning
+from tests.documented import entries, module, new_module
+from tests.logs.conftest import PLAIN, as_log, turning
 from tests.logs.simulated import as_bridge, si_log
 
 FLAP = Signal(
@@ -117,13 +114,6 @@ def flap_log(folder: Path, largest: float = 0.2) -> Dataset:
     return import_log(read_mapping(mapping), log)
 
 
-def test_without_the_row_nobody_knows_the_signal(tmp_path: Path) -> None:
-    with pytest.raises(DocumentError, match=r"with a signal of n, alpha, delta, (?!.*flap)"):
-        flap_log(tmp_path)
-    with pytest.raises(DocumentError, match="flap"):
-        with_flap()
-
-
 @pytest.mark.usefixtures("flap")
 def test_a_term_takes_it_and_its_actuator_lags() -> None:
     model = dynamics(with_flap())
@@ -182,10 +172,16 @@ def test_a_correction_mirrors_it() -> None:
     np.testing.assert_array_equal(image, np.diag([1, -1, -1, 1, -1]))
 
 
+def rows_of_the_page() -> dict[str, Signal]:
+    """The rows that docs/extending.md adds to the table of signals."""
+    rows: dict[str, Signal] = eval("{" + entries("A signal", "SIGNALS") + "}", {"Signal": Signal})
+    return rows
+
+
 @pytest.fixture
 def jet(monkeypatch: pytest.MonkeyPatch) -> None:
     """The water jet of docs/extending.md: a signal and its term."""
-    row = eval("{" + code("A signal")[0] + "}", {"Signal": Signal})
+    row = rows_of_the_page()
     monkeypatch.setitem(signals.SIGNALS, "throttle", row["throttle"])
     monkeypatch.setitem(TERMS, "thruster.jet", Term(module("A term", "jet_of_the_page", monkeypatch).jet))
     monkeypatch.setitem(test_laws.RANGES, "throttle", row["throttle"].reach)
@@ -199,16 +195,6 @@ def test_the_jet_of_the_page_obeys_the_laws() -> None:
     test_laws.test_finite_at_rest("thruster.jet")
     test_laws.test_derivative_is_finite_difference("thruster.jet", 0)
     test_laws.test_forces_follow_the_units("thruster.jet", test_laws.FROUDE)
-
-
-@pytest.mark.usefixtures("jet")
-def test_a_guess_proposes_the_component_of_the_row_beside_azimuth_units(tmp_path: Path) -> None:
-    log = as_bridge(si_log()).rename(columns={"rudder": "azimuth", "rpm": "shaft rpm"})
-    log.assign(throttle=0.5 + 0.1 * np.sin(log["time"])).to_csv(tmp_path / "log.csv", index=False)
-    names = {column.source: column.name for column in guess(tmp_path / "log.csv").columns}
-    assert names["throttle"] == "jet.throttle"
-    assert names["azimuth"] == "thruster.alpha"
-    assert names["shaft rpm"] == "thruster.n"
 
 
 def with_jets(*names: str) -> Vessel:
@@ -244,31 +230,6 @@ def test_a_manoeuvre_by_shaft_and_helm_names_those_that_a_vessel_without_a_shaft
     assert simulate(truth, with_jets("main"))["main.throttle"].between(0.2, 0.8).all()
 
 
-def kite(
-    nu_r: Any, *, x_aft: Annotated[Any, "m"], x_fwd: Annotated[Any, "m"], k: Annotated[Any, "-"],
-    U_0: Annotated[Any, "m s^-1"], rho_a: Annotated[Any, "kg m^-3"],
-) -> Any:  # fmt: skip
-    """X = -k 1/2 rho_a (x_fwd - x_aft)^2 U_0 u: numbers that the first bundled vessel lacks, or that have an order."""
-    return ca.vertcat(-k * 0.5 * rho_a * (x_fwd - x_aft) ** 2 * U_0 * nu_r[0], ca.SX(5, 1))
-
-
-def test_the_laws_make_up_a_vessel_for_any_numbers_of_a_term(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(TERMS, "thruster.kite", Term(kite))
-    test_laws.test_mirror_port_starboard("thruster.kite", 0)
-    test_laws.test_zero_at_rest("thruster.kite")
-    test_laws.test_forces_follow_the_units("thruster.kite", test_laws.FROUDE)
-    monkeypatch.undo()
-
-
-def shallow_drag(
-    nu_r: Any, depth: Any, *, c: Annotated[Any, "-"], L_pp: Annotated[Any, "m"], T: Annotated[Any, "m"],
-    rho: Annotated[Any, "kg m^-3"],
-) -> Any:  # fmt: skip
-    """X = -c 1/2 rho L_pp T (T / depth)^2 u|u|: none where the depth is not given."""
-    near = (T / ca.if_else(depth > 0, depth, 1e6)) ** 2
-    return ca.vertcat(-c * 0.5 * rho * L_pp * T * near * nu_r[0] * ca.fabs(nu_r[0]), ca.SX(5, 1))
-
-
 SHALLOWS = {"vessel": "shallow", "manoeuvres": 3, "duration": 40.0, "step": 0.2, "wind_speed": (0.0, 0.0), "seed": 2}
 ALIKE = {"kind": "turning", "n_rpm": 120.0, "alpha_deg": 5.0, "start_speed": 4.0}
 
@@ -276,9 +237,10 @@ ALIKE = {"kind": "turning", "n_rpm": 120.0, "alpha_deg": 5.0, "start_speed": 4.0
 @pytest.fixture
 def depth(monkeypatch: pytest.MonkeyPatch) -> Vessel:
     """The depth of docs/extending.md with a term that takes it, and a ship that feels it."""
-    row = eval("{" + code("A signal")[1] + "}", {"Signal": Signal})["depth"]
+    row = rows_of_the_page()["depth"]
     monkeypatch.setitem(signals.SIGNALS, "depth", row)
-    monkeypatch.setitem(TERMS, "hull.shallow", Term(shallow_drag))
+    shallow = new_module("A signal", "shallow_of_the_page", monkeypatch)
+    monkeypatch.setitem(TERMS, "hull.shallow", Term(shallow.shallow_drag))
     monkeypatch.setitem(test_laws.RANGES, "depth", row.reach)
     monkeypatch.setitem(test_laws.MIRROR, "depth", row.mirror)
     document = load_vessel("gunnerus-28.9").document
@@ -306,29 +268,6 @@ def test_a_truth_draws_the_depth_of_each_run_and_logs_it(depth: Vessel) -> None:
     assert ends["u"].is_monotonic_increasing
     assert ends["u"].iloc[0] < 0.98 * ends["u"].iloc[-1]
     assert check_dataset(Dataset(log, {"clock": "run"})).set_index("check").loc["range depth", "ok"].all()
-
-
-def test_a_truth_takes_the_environment_in_the_unit_of_its_key(depth: Vessel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(signals.SIGNALS, "depth", replace(signals.SIGNALS["depth"], shown="km", factor=1000.0))
-    short = SHALLOWS | {"duration": 2.0}
-    log = simulate(Truth(**short, environment={"depth_km": (0.003, 0.02)}, manoeuvre=[ALIKE]), depth)
-    assert log["depth"].between(3, 20).all(), "metres in the log"
-
-
-def test_a_truth_says_what_its_environment_lacks_or_nobody_takes(depth: Vessel) -> None:
-    def check(vessel: Vessel = depth, **environment: Any) -> None:
-        check_truth(Truth(**SHALLOWS, environment=environment, manoeuvre=[ALIKE]), vessel)
-
-    with pytest.raises(DocumentError, match=r"truth.environment.depth: missing: .* give depth = \[low, high\]"):
-        check()
-    with pytest.raises(DocumentError, match=r"truth.environment.dept: .* did you mean 'depth'"):
-        check(dept=4.0)
-    with pytest.raises(DocumentError, match=r"truth.environment.V_w: .* another key of \[truth\] gives it"):
-        check(V_w=4.0, depth=4.0)
-    with pytest.raises(DocumentError, match=r"truth.environment.depth: no term .* remove it"):
-        check(load_vessel("gunnerus-28.9"), depth=4.0)
-    with pytest.raises(DocumentError, match=r"environment.depth has low > high"):
-        check(depth=(5.0, 4.0))
 
 
 @pytest.mark.usefixtures("depth")
@@ -397,14 +336,6 @@ def toy_mapping(folder: Path) -> Path:
     return mapping
 
 
-@pytest.mark.slow
-def test_without_the_reader_a_mapping_names_those_there_are(tmp_path: Path) -> None:
-    with pytest.raises(DocumentError, match=r"unknown kind 'toy'.*text, parquet, mat, nmea|unknown kind 'toy'"):
-        read_mapping(toy_mapping(tmp_path))
-    with pytest.raises(DataError):
-        guess(as_toy(as_bridge(si_log()), tmp_path / "log.toy"))
-
-
 @pytest.mark.usefixtures("toy")
 def test_a_mapping_names_the_reader(tmp_path: Path) -> None:
     table = pd.read_csv(as_log(turning(T), tmp_path / "plain.csv"))
@@ -448,12 +379,6 @@ def shifted(folder: Path, block: Mapping[str, Any]) -> list[float]:
     base = load_vessel("gunnerus-28.9").parameters["inertia.x_G"]
     variants = [one.variant for one in build_plan(document, folder / "study.toml").foundations]
     return [variant.values["inertia.x_G"] - base for variant in variants if variant and variant.family == "wrong"]
-
-
-def test_without_the_rule_a_study_names_those_there_are(tmp_path: Path) -> None:
-    with pytest.raises(DocumentError, match=r"unknown key: .*factor") as caught:
-        shifted(tmp_path, {"shift": 0.5})
-    assert caught.value.path == "family.wrong.perturb.0.shift"
 
 
 def test_a_study_uses_the_rule(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -502,18 +427,6 @@ def coasting_study(folder: Path, kind: str = "coast_down") -> Plan:
     head = {"question": "How far does she run?", "truth": truth, "split": {"test": 2}, "prediction": known}
     family = [{"name": "exact", "base": "kvlcc2-l7"}]
     return build_plan({**head, "grid": {"N_D": [4]}, "family": family}, folder / "study.toml")
-
-
-def test_without_the_line_nobody_knows_the_manoeuvre(tmp_path: Path) -> None:
-    file = as_document(tmp_path)
-    for ask in (
-        lambda: simulated(load_vessel("kvlcc2-l7"), str(file)),
-        lambda: coasting_study(tmp_path),
-        lambda: measure_standard(load_vessel("kvlcc2-l7"), "coast-down"),
-        lambda: measure_dataset(as_dataset(turning(T)), "coast-down"),
-    ):
-        with pytest.raises(ShipidError, match=r"coast.down"):
-            ask()
 
 
 @pytest.mark.usefixtures("coast_down")

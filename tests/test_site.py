@@ -1,10 +1,11 @@
-"""The site builds without a warning, its links lead somewhere, it fetches nothing; notebooks run as they are stored."""
+"""The site builds without a warning and fetches nothing; pages quote what records hold; notebooks run as stored."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
+import re
 import subprocess
 import sys
 from html.parser import HTMLParser
@@ -104,6 +105,43 @@ def test_a_notebook_is_stored_with_its_figures_and_light(file: Path) -> None:
     outputs = [output for cell in code for output in cell["outputs"]]
     assert not [one for one in outputs if one["output_type"] == "error" or one.get("name") == "stderr"]
     assert file.stat().st_size < 300_000
+
+
+@pytest.fixture
+def records() -> ModuleType:
+    return load(DOCS / "records.py")
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted(DOCS.glob("*.md"))], ids=lambda file: file.stem)
+def test_a_page_quotes_what_its_records_hold(page: Path, records: ModuleType) -> None:
+    assert not records.unsupported(page.read_text(encoding="utf-8"))
+
+
+def test_a_wrong_number_is_seen(records: ModuleType, tmp_path: Path) -> None:
+    (tmp_path / "sea.md").write_text("H is 0.68 m with 1,000 windows, A 2.43 m.")
+    right = "With 1000 windows H is 0.68 m ([record](records/sea.md)).\n\nElsewhere 9 of `quick-99`."
+    assert not records.unsupported(right, tmp_path)
+    (fault,) = records.unsupported(right.replace("0.68", "0.67"), tmp_path)
+    assert "0.67 is not in the record sea" in fault
+    table = "| a ([record](records/sea.md)) | b |\n| --- | --- |\n| 2.43 | 2.44 |"
+    assert len(records.unsupported(table, tmp_path)) == 1
+    assert records.unsupported("([record](records/land.md))", tmp_path) == ["there is no record land"]
+
+
+def test_every_record_says_its_origin(records: ModuleType) -> None:
+    for file in set((DOCS / "records").glob("*.md")) - {DOCS / "records" / "index.md"}:
+        text = file.read_text(encoding="utf-8")
+        assert [line.partition(":")[0] for line in re.findall(r"^- (.*)$", text, re.MULTILINE)[:4]] == [*records.HEAD]
+
+
+def test_a_command_writes_its_record(records: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(records, "RECORDS", tmp_path)
+    assert records.main("sum", sys.executable, "-c", "print(20 + 22)") == 0
+    text = (tmp_path / "sum.md").read_text(encoding="utf-8")
+    assert "\n42\n" in text
+    assert all(f"\n- {key}: " in text for key in records.HEAD)
+    assert records.main("none", sys.executable, "-c", "raise SystemExit(3)") == 3
+    assert not (tmp_path / "none.md").exists()
 
 
 def test_numbers_that_a_picture_shows_are_not_cut() -> None:

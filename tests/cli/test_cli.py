@@ -135,28 +135,6 @@ def every_command(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tu
 COMMANDS = dict(every_command(typer.main.get_command(app)))
 
 
-def documented() -> dict[str, set[str]]:
-    """Command -> options that the table of docs/reference-commands.md has for it."""
-    page = (Path(__file__).parents[2] / "docs" / "reference-commands.md").read_text(encoding="utf-8")
-    found: dict[str, set[str]] = {}
-    names: list[str] = []
-    for row in re.findall(r"^\| (.*)$", page.partition("\n## Options\n")[2].partition("\n## ")[0], re.MULTILINE):
-        cells = row.split("|")
-        names = re.findall(r"`([^`]+)`", cells[0]) or names
-        for name in names:
-            command = {"resume": "study resume"}.get(name, name).partition(" --")[0]
-            found.setdefault(command, set()).update(re.findall(r"--[a-z-]+", f"{name} {cells[1]}"))
-    return found
-
-
-@pytest.mark.parametrize("path", [path for path in COMMANDS if not hasattr(COMMANDS[path], "commands")], ids=" ".join)
-def test_every_option_is_in_the_table_of_the_reference(path: tuple[str, ...]) -> None:
-    listed = documented().get(" ".join(path), set()) | {"--json", "--help"}  # these two are those of all commands
-    options = [one for one in COMMANDS[path].params if any(name.startswith("--") for name in one.opts)]
-    missing = [one.opts[0] for one in options if not listed & {*one.opts, *one.secondary_opts}]
-    assert not missing, f"docs/reference-commands.md, Options, {' '.join(path)}: {', '.join(missing)}"
-
-
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
 def test_help_keeps_every_word(path: tuple[str, ...]) -> None:
     """Square brackets are no markup: what a help text says is on the page, word for word."""
