@@ -86,7 +86,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     check_output(file, plan.inputs, "--out")
     dataset = obtain(plan)
     pool, test, _ = partition(plan, dataset)
-    rows_of_sets = envelope(pool, test, runs_by_amount(plan, pool), dataset.commands)
+    rows_of_sets = envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands)
     ranges = envelope_table(rows_of_sets, plan.published)
     units = dict(zip(ranges["quantity"], ranges["unit"], strict=True))
     rows = [

@@ -12,7 +12,7 @@ import typer
 
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import bundled_or_file, files
-from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyName, Workers, parsed, stem
+from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, parsed, stem
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import counted, digits, draw, ended_by, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
@@ -281,7 +281,9 @@ def study_run(
     out: Annotated[Path | None, typer.Option(help="folder; default results/<study>-<digest>")] = None,
     changes: Changes = None,
     device: Device = "cpu",
-    leave: Leave = False,
+    shard: Annotated[
+        str | None, typer.Option(help="i/n: every n-th unit of work from the i-th on, after `study prepare`")
+    ] = None,
 ) -> None:
     """Run a study and write its report; an interrupted run resumes when started again."""
     from shipid.study.workers import import_for_workers
@@ -291,7 +293,33 @@ def study_run(
     from shipid.study.plan import read_plan
 
     plan = read_plan(study, parsed(changes))
-    _run(plan, out or plan.folder, workers, scheduler, device, leave)
+    _run(plan, out or plan.folder, workers, scheduler, device, _shard(shard))
+
+
+def _shard(text: str | None) -> tuple[int, int] | None:
+    """The numbers of `--shard i/n`."""
+    if text is None:
+        return None
+    number, _, count = text.partition("/")
+    if not (number.isdecimal() and count.isdecimal()):
+        raise ShipidError(f"{text!r}: write i/n, such as 3/20", path="--shard")
+    return int(number), int(count)
+
+
+@app.command("prepare")
+def study_prepare(
+    study: StudyName,
+    out: Annotated[Path | None, typer.Option(help="folder; default results/<study>-<digest>")] = None,
+    changes: Changes = None,
+    device: Device = "cpu",
+) -> None:
+    """Make the folder of a study with its runs, so that the tasks of a job array can work there with --shard."""
+    from shipid.study.plan import read_plan
+    from shipid.study.run import prepare_study
+
+    plan = read_plan(study, parsed(changes))
+    for event in prepare_study(plan, out or plan.folder, device=device):
+        typer.echo(event.text)
 
 
 @app.command("resume")
@@ -300,12 +328,11 @@ def study_resume(
     workers: Workers = None,
     scheduler: Scheduler = None,
     device: Device = "cpu",
-    leave: Leave = False,
 ) -> None:
     """Continue an interrupted run."""
     from shipid.study.store import stored_plan
 
-    _run(stored_plan(folder), folder, workers, scheduler, device, leave)
+    _run(stored_plan(folder), folder, workers, scheduler, device)
 
 
 @app.command("report")
@@ -494,7 +521,14 @@ def _before_work(
     return plan, file
 
 
-def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool) -> None:
+def _run(
+    plan: Plan,
+    folder: Path,
+    workers: int | None,
+    scheduler: str | None,
+    device: str,
+    shard: tuple[int, int] | None = None,
+) -> None:
     from shipid.files import as_argument
     from shipid.study import run, store
     from shipid.study.contents import ANSWER, share_pages
@@ -502,12 +536,11 @@ def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, d
 
     resume = f"{plan.program} study resume {as_argument(folder)}"
     with ended_by(f"interrupted; what is finished is kept. Continue with: {resume}"):
-        events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, leave=leave)
-        with closing(events):  # where a line cannot be printed, claims are given back before the process ends
-            end = draw(events, Watch(plan, folder))
-    if end is not None and end.done < end.total:
-        left = f"{end.total - end.done} of {end.total} cells"
-        typer.echo(f"others work on the last {left}: the one that ends last writes the report. If they die: {resume}")
+        events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, shard=shard)
+        with closing(events):  # where a line cannot be printed, the lock is given back before the process ends
+            draw(events, Watch(plan, folder))
+    if shard is not None:
+        typer.echo(f"shard {shard[0]} of {shard[1]} is finished. When all are: {resume}")
         return
     with store.in_place(folder, plan), steps() as say:
         report = share_pages(folder, say)

@@ -18,17 +18,16 @@ from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent, verdicts
 from shipid.study import advise, bands, memory, methods, seals, store
 from shipid.study import results as parts
-from shipid.study.claims import UnitClaims
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import intervals_frame
 from shipid.study.findings import findings
+from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan
 from shipid.study.results import Results, read_results
 
 log = logging.getLogger(__name__)
 
 Say = Callable[[str], object]
-PAGES = "report"  # name of the claim on the pages
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "observer": memory.observer_frame,
@@ -99,7 +98,7 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
     folder = path_of("folder", folder)
     store.stored_plan(folder)
     store.check_writable(folder)
-    with UnitClaims(folder) as claims, claims.alone(PAGES):
+    with sole_writer(folder, PAGES, wait=True):
         return _write(folder, say)
 
 
@@ -117,9 +116,8 @@ def _write(folder: Path, say: Say | None) -> Path:
 
 def _write_one(folder: Path, say: Say | None) -> tuple[Path, bool]:
     """The pages of one run, and whether all of its cells are in them."""
-    with UnitClaims(folder) as claims, claims.alone(store.RESULTS):  # tables are those of the page, or of the whole run
-        results = read_results(folder, say)
-        store.write_results(folder, results.plan, results.cells, whole=results.complete)
+    results = read_results(folder, say)
+    store.write_results(folder, results.plan, results.cells, whole=results.complete)
     content = report_content(results, say)
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     write_summary(content, folder / SUMMARY)
@@ -129,7 +127,7 @@ def _write_one(folder: Path, say: Say | None) -> tuple[Path, bool]:
 
 
 def share_pages(folder: Path, say: Say | None = None) -> Path:
-    """Write the pages where several processes may end together: one writes, the others wait for it.
+    """Write the pages of a run that has ended, unless they are newer than its tables.
 
     say : called with a few words on how far it is.
     """
@@ -138,16 +136,12 @@ def share_pages(folder: Path, say: Say | None = None) -> Path:
     pages = [place / name for place in places for name in (ANSWER, SUMMARY, REPORT)]
     pages += [folder / name for name in (ANSWER, METHODS, REPORT)] if parts else []
 
-    def is_done() -> bool:
-        try:
-            tables = max(seals.seal_file(place, store.RESULTS).stat().st_mtime for place in places)
-            return report.stat().st_mtime >= tables and all(page.stat().st_size for page in pages)
-        except FileNotFoundError:
-            return False
-
-    with UnitClaims(folder) as claims:
-        claims.once(PAGES, is_done, lambda: _write(folder, say))
-    return report
+    try:
+        tables = max(seals.seal_file(place, store.RESULTS).stat().st_mtime for place in places)
+        done = report.stat().st_mtime >= tables and all(page.stat().st_size for page in pages)
+    except FileNotFoundError:
+        done = False
+    return report if done else write_pages(folder, say)
 
 
 def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]:

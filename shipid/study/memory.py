@@ -230,7 +230,7 @@ def observer_frame(results: Results) -> pd.DataFrame:
         return pd.DataFrame()
     name, vessel, settings = predictor[0], predictor[1].vessel, predictor[1].physics.observer
     part = results.dataset.select(shown_runs(results))
-    known = observe(vessel, known_by_then(results.plan, part), settings)
+    known = observe(vessel, known_by_then(results.plan.study, part), settings)
     begins = np.isnan(known.innovation).all(axis=1)
     table = pd.DataFrame({**part.frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *ALONG]]
     table["observer.test"] = np.where(begins, np.nan, table["observer.test"])

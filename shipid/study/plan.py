@@ -37,7 +37,7 @@ from shipid.study.declared import (
     named_vessel,
     same_file,
 )
-from shipid.study.ranges import LONGEST_NAME, Cut, check_memory, check_ranges, check_seeds
+from shipid.study.ranges import LONGEST_NAME, check_memory, check_ranges, check_seeds, window_numbers
 from shipid.study.schema import Claims, Data, Published, Study, check_version
 from shipid.users import of_users
 from shipid.vessel.load import Vessel
@@ -395,12 +395,6 @@ class Plan:
         order = {(name, way.name): place for place, (name, way) in enumerate(self.pairs)}
         return sorted((tuple(sorted(pairs, key=order.__getitem__)) for _, pairs in groups), key=lambda g: order[g[0]])
 
-    def cut(self, columns: int) -> Cut:
-        """The numbers that decide the memory of the windows, for a dataset of so many columns."""
-        prediction = self.study.prediction
-        rolled = len(self.foundations)
-        return Cut(prediction.horizon, self.past, prediction.step, prediction.interval, columns, rolled)
-
     def label(self, foundation: str, method: str) -> str:
         """Name of a model for people: the foundation, with the method where that is not the one judged."""
         return foundation if method == self.judged else f"{foundation} {WITH} {method}"
@@ -580,7 +574,9 @@ def _check_memory(plan: Plan) -> None:
         words = f"{between:g} s: {truth.manoeuvres} runs of {truth.length:g} s"
         check_memory(numbers, words, path, plan.file)
     words = f"{plan.study.prediction.interval:g} s: {truth.manoeuvres} runs cut into windows at this interval"
-    numbers = truth.manoeuvres * plan.cut(columns).numbers(truth.length)
+    numbers = truth.manoeuvres * window_numbers(
+        plan.study.prediction, plan.past, columns, len(plan.foundations), truth.length
+    )
     check_memory(numbers, words, "prediction.interval", plan.file)
 
 

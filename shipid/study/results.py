@@ -214,8 +214,8 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         else:  # of an earlier version
             predictor = Predictor.load(file)
             alone = physics.get(row["foundation"])  # None where its numbers depend on the cell
-            estimates = _observed(predictor, known_by_then(plan, dataset), known)
-            kept[cell] = predictor.predict(instants_of(plan, predictor.vessel, dataset, test, estimates), alone)
+            estimates = _observed(predictor, known_by_then(plan.study, dataset), known)
+            kept[cell] = predictor.predict(instants_of(plan.study, predictor.vessel, dataset, test, estimates), alone)
             band, reason = predictor.bands, predictor.no_band
         if band is not None:
             bands[cell] = band

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +16,13 @@ from shipid.data.checks import repeated
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, choices
 from shipid.files import make_folder, read_table, sweep, write_table, write_text
+from shipid.hybrid.journal import Journal
 from shipid.logs.importing import sha256_of
-from shipid.study.claims import UnitClaims
 from shipid.study.code import code_digest
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings import CLAIMS, Rivals, judged
+from shipid.study.lock import sole_writer
 from shipid.study.plan import Batch, Plan
 from shipid.study.prepare import all_windows, partition, prepare
 from shipid.study.run import run_unit
@@ -69,63 +69,49 @@ def rotate(
     Parameters
     ----------
     kept : folder for what is finished, seed by seed, and for the trials of searches; made where it is not there. The
-        same call with the same folder goes on after an interruption, and yields the same digits; two at a time compute
-        each seed once. None: nothing is kept.
+        same call with the same folder goes on after an interruption, and yields the same digits. None: nothing is kept.
     """
-    with nullcontext() if kept is None else _sharing(kept) as claims:
+    with nullcontext() if kept is None else _alone_in(kept):
         for test in tests:
             rest, _, _ = partition(plan.turn(test, 2), dataset)
             turn = plan.turn(test, len(rest.spans))
             done = {} if kept is None else {batch: _read(_file(kept, test, batch)) for batch in turn.batches}
             if any(done.get(batch) is None for batch in turn.batches):
-                yield from _computed(turn, dataset, test, device, kept, claims)
+                yield from _computed(turn, dataset, test, device, kept)
             else:
                 yield from (frame for frame in done.values() if frame is not None)
 
 
 @contextmanager
-def _sharing(kept: Path) -> Iterator[UnitClaims]:
-    """The claims of this process in a folder of kept turns."""
+def _alone_in(kept: Path) -> Iterator[None]:
+    """Keep other processes out of a folder of kept turns."""
     make_folder(kept)
-    sweep(kept)
-    with UnitClaims(kept) as claims:
-        yield claims
+    with sole_writer(kept):
+        sweep(kept)
+        yield
 
 
-def _computed(
-    turn: Plan, dataset: Dataset, test: str, device: str, kept: Path | None, claims: UnitClaims | None
-) -> Iterator[pd.DataFrame]:
+def _computed(turn: Plan, dataset: Dataset, test: str, device: str, kept: Path | None) -> Iterator[pd.DataFrame]:
     """Cells of a turn, batch by batch; those of batches that nobody has computed are, and kept."""
     prepared = prepare(turn, dataset, device)
     floor = float(prepared.naive.mean())
 
-    def computed(batch: Batch, *journal: Any) -> pd.DataFrame:
-        rows = [cell.row for cell in run_unit(turn, prepared, turn.whole(batch), device, *journal)]
+    def computed(batch: Batch, journal: Journal | None = None) -> pd.DataFrame:
+        rows = [cell.row for cell in run_unit(turn, prepared, turn.whole(batch), device, journal)]
         return pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
 
-    if kept is None or claims is None:
+    if kept is None:
         yield from (computed(batch) for batch in turn.batches)
         return
     trials = kept / documents.digest(test)
     make_folder(trials)
-    frames: dict[Batch, pd.DataFrame | None] = {}
     for batch in turn.batches:
         file = _file(kept, test, batch)
-        check = partial(claims.holder.check, file.stem)
-
-        def is_done(batch: Batch = batch, file: Path = file) -> bool:
-            frames[batch] = _read(file)
-            return frames[batch] is not None
-
-        def keep(batch: Batch = batch, file: Path = file, check: Callable[[], None] = check) -> None:
-            frames[batch] = frame = computed(batch, trials, check)
-            check()
+        frame = _read(file)
+        if frame is None:
+            frame = computed(batch, Journal(trials / f"{batch.key}.log", study=turn.digest))
             write_table(file, frame)
             write_text(_seal(file), sha256_of(file))
-
-        claims.once(file.stem, is_done, keep)
-        frame = frames[batch]
-        assert frame is not None
         yield frame
 
 
@@ -137,10 +123,7 @@ def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -
 
 
 def forget(kept: Path) -> None:
-    """Remove the folder of kept turns, whose table is written; the last one of several processes does."""
-    with UnitClaims(kept) as claims:
-        if claims.others():
-            return
+    """Remove the folder of kept turns, whose table is written."""
     shutil.rmtree(kept, ignore_errors=True)
     with suppress(OSError):  # of another rotation to the same file
         kept.parent.rmdir()

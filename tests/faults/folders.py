@@ -28,7 +28,7 @@ from shipid.data.dataset import read_dataset
 from shipid.errors import ShipidError
 from shipid.files import TEMPORARY
 from shipid.predictor import Predictor
-from shipid.study import claims, seals
+from shipid.study import seals
 from shipid.study.check import check_folder
 from shipid.study.results import read_results
 from tests.faults.trials import Failure

@@ -61,10 +61,10 @@ def run_here(plan: Plan, folder: Path) -> list[run.Event]:
     return list(events_here(plan, folder))
 
 
-def events_here(plan: Plan, folder: Path, leave: bool = False) -> Iterator[run.Event]:
+def events_here(plan: Plan, folder: Path) -> Iterator[run.Event]:
     """The same, event by event."""
     with without_workers():
-        yield from run.run_study(plan, folder, leave=leave)
+        yield from run.run_study(plan, folder)
 
 
 @contextmanager
