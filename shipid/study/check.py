@@ -29,28 +29,30 @@ def check_folder(folder: Path) -> Checked:
     that this shipid does not take the files are checked, and a line says why nothing else is.
     """
     lines: list[str] = []
-    faults: list[Fault] = []
+    faults: dict[Path, list[Fault]] = {}
     for place in (*sorted((folder / store.PARTS).glob("*/")), folder):
-        found = seals.faults(place)
-        lines += [f"{place / fault.file}: {fault.words}" for fault in found]
-        faults += found
-    counted = f"{len(faults)} {plural(len(faults), 'fault')}"
+        faults[place] = seals.faults(place)
+        lines += [f"{place / fault.file}: {fault.words}" for fault in faults[place]]
+    every = [fault for found in faults.values() for fault in found]
     try:
         plan = store.stored_plan(folder)
     except store.NotTaken as error:
-        return Checked([*lines, f"{counted}; how far the run is cannot be said: {error}"], faults)
+        return Checked([*lines, f"{_count_words(every)}; how far the run is cannot be said: {error}"], every)
     for name, part in plan.parts.items():
         place = store.check_part(folder, name, part.plan)
-        lines += _state(place, part.plan, f"{name}: ") if place.is_dir() else [f"{name}: not begun"]
-    lines += _state(folder, plan, "")
-    return Checked([*lines, counted], faults)
+        lines += _state(place, part.plan, faults[place], f"{name}: ") if place in faults else [f"{name}: not begun"]
+    return Checked([*lines, *_state(folder, plan, faults[folder])], every)
 
 
-def _state(folder: Path, plan: Plan, name: str) -> list[str]:
+def _count_words(faults: list[Fault]) -> str:
+    return f"{len(faults)} {plural(len(faults), 'fault')}"
+
+
+def _state(folder: Path, plan: Plan, faults: list[Fault], name: str = "") -> list[str]:
     """Lines on how far one folder is, who works in it, what killed runs left, and by what it was computed."""
-    store.stored_plan(folder)  # says what was edited
+    store.stored_plan(folder)  # reports what was edited
     done = sum(len(unit.pairs) for unit in store.finished(folder, plan.units))
-    lines = [] if plan.parts else [f"{name}{done} of {plan.cells} cells finished"]
+    lines = [] if plan.parts else [f"{name}{done} of {plan.cells} cells finished, {_count_words(faults)}"]
     if writer := current_writer(folder):
         lines.append(f"{name}at work: {writer}")
     left = [place for place in folder.rglob(f"{TEMPORARY}*") if place.is_dir()]

@@ -23,11 +23,10 @@ STUDY = "# study "  # begins the comment
 FIRST = {"dataset": "dataset.parquet", "common": "test.npz", "results": "results.parquet"}
 """Name of a seal that is not of a unit of work -> the first file in it."""
 WORDS = {
-    "missing": "missing: `shipid study resume` computes it again",
-    "damaged": "damaged: `shipid study resume` computes it again",
-    "edited": "changed after it was written: put it back, or delete it and resume",
-    "foreign": "is of another study: delete it and {}, and resume",
-    "unreadable": "cannot be read ({}): let this user read it, or delete it and resume",
+    **dict.fromkeys(("missing", "damaged"), "missing or damaged: continue with `shipid study resume`"),
+    "edited": "was changed after it was written: put it back, or delete it and continue with `shipid study resume`",
+    "foreign": "is of another study: delete it and {}, and continue with `shipid study resume`",
+    "unreadable": "cannot be read ({}): let this user read it, or delete it and continue with `shipid study resume`",
 }
 
 

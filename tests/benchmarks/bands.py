@@ -261,7 +261,7 @@ def recorded(folder: Path, commands: str) -> pd.DataFrame:
         prepared = prepare(turn, dataset)
         for row, predictor, _ in run_unit(turn, prepared, turn.whole(turn.batches[0]), "cpu"):
             assert predictor is not None
-            instants = instants_of(turn, predictor.vessel, dataset, prepared.test)
+            instants = instants_of(turn.study, predictor.vessel, dataset, prepared.test)
             frame = pd.DataFrame({"test": test, "model": plan.label(row["foundation"], row["method"]), "H": row["H"]},
                                  index=range(len(prepared.test)))  # fmt: skip
             for level in (0.8, 0.9):

@@ -51,7 +51,7 @@ def study(recorded: Recorded, families: list[dict[str, Any]], **changes: Any) ->
 def test_a_wrong_model_finds_the_right_numbers(recorded: Recorded) -> None:
     plan, dataset = study(recorded, BOTH)
     prepared = prepare(plan, dataset)
-    foundations = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
+    foundations = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")
     assert list(foundations) == ["wrong", "fitted", "none"]
     assert foundations["wrong"].accuracy(prepared.test)["mean"] > 0.01
     assert foundations["fitted"].accuracy(prepared.test)["mean"] < 1e-4
@@ -73,13 +73,11 @@ def test_other_runs_teach_nothing(recorded: Recorded, families: list[dict[str, A
     plan, dataset = study(recorded, families)
     prepared = prepare(plan, dataset)
     batch = plan.batches[0]
-    seen = set(prepared.runs(plan, batch))
+    seen = set(prepared.runs(batch))
     frame = dataset.frame.copy()
     frame.loc[~frame["run"].isin(seen), "u"] += 0.3
     other = prepare(plan, Dataset(frame, dataset.metadata))
-    pair = [
-        predictions(plan, each, each.runs(plan, batch), "cpu", {name})[name].foundation for each in (prepared, other)
-    ]
+    pair = [predictions(each, each.runs(batch), "cpu", {name})[name].foundation for each in (prepared, other)]
     assert pair[0].variant == pair[1].variant
     assert pair[0].observer == pair[1].observer
     assert pair[0].observer is None or not pair[0].observer.choose
@@ -96,7 +94,7 @@ def test_what_cannot_be_fitted_says_what_it_was(
     monkeypatch.setattr(solve, "identify", fails)
     plan, dataset = study(recorded, [WRONG, family])
     prepared = prepare(plan, dataset)
-    known = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")[family["name"]]
+    known = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")[family["name"]]
     assert known.sentence == f"{words}no"
     assert np.isnan(known.paths).all()
 
@@ -115,8 +113,8 @@ def test_the_observer_of_a_log_with_causal_columns_is_judged_by_the_true_paths(
 
     monkeypatch.setattr(preparing, "tune_observer", tune)
     prepared = prepare(plan, dataset)
-    runs = prepared.runs(plan, plan.batches[0])
-    predictions(plan, prepared, runs, "cpu", {"seen"})
+    runs = prepared.runs(plan.batches[0])
+    predictions(prepared, runs, "cpu", {"seen"})
     ((data, windows),) = given
     expected = prepared.pool.select(np.isin(prepared.pool.run, runs))
     np.testing.assert_array_equal(windows.future, expected.future)
@@ -180,8 +178,8 @@ def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(rec
     plan, dataset = study(recorded, [WRONG, SEEN])
     assert plan.fitted == {"seen"}
     prepared = prepare(plan, dataset)
-    runs = prepared.runs(plan, plan.batches[0])
-    known = predictions(plan, prepared, runs, "cpu")["seen"]
+    runs = prepared.runs(plan.batches[0])
+    known = predictions(prepared, runs, "cpu")["seen"]
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
     chosen = position_error(known.paths, windows.future).mean()
     for waves, fade in product(([0.0], [0.01], [0.0, 0.01]), (0.0, 12.0, 40.0)):
@@ -218,9 +216,9 @@ def test_what_is_identified_sees_no_moment_of_the_test(recorded: Recorded, monke
         return SimpleNamespace(status="failed", sentence="", seconds=0.0, values={})
 
     monkeypatch.setattr(solve, "identify", identify)
-    predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
+    predictions(prepared, prepared.runs(plan.batches[0]), "cpu")
     ((data, runs),) = given
-    assert runs == prepared.runs(plan, plan.batches[0])
+    assert runs == prepared.runs(plan.batches[0])
     ((first, last),) = prepared.test.spans.values()
     overlapping = frame["t"].between(first, last) & (frame["run"] != "f")
     assert overlapping.any()
@@ -239,7 +237,7 @@ def test_what_is_not_identified_stays_as_it_was(recorded: Recorded, monkeypatch:
         return SimpleNamespace(status="ok", sentence="", seconds=0.0, values=values)
 
     monkeypatch.setattr(solve, "identify", identify)
-    found = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
+    found = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")
     for name, factors in {"wrong": [1.3, 1.3, 1.3], "fitted": [1, 1, 1], "some": [1, 1.3, 1.3]}.items():
         variant = found[name].foundation.variant
         assert variant is not None
@@ -260,7 +258,7 @@ def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
     dataset, test = results.dataset, results.test
     for row in rows.itertuples():
         predictor = Predictor.load(store.cell_file(tmp_path / "run", str(row.cell)))
-        paths = predictor.predict(instants_of(plan, predictor.vessel, dataset, test))
+        paths = predictor.predict(instants_of(plan.study, predictor.vessel, dataset, test))
         np.testing.assert_allclose(results.paths[str(row.cell)], paths, atol=1e-9)
     assert "fitted" not in results.physics  # its numbers depend on the cell
     assert not any("alone" in text and "+" in text for text, _ in answer(results))
@@ -311,7 +309,7 @@ def test_values_that_the_vessel_refuses_fail_in_their_cells(
     prepared = prepare(plan, dataset)
     solution = SimpleNamespace(status="ok", sentence="", seconds=1.0, values={"inertia.m": -1.0})
     monkeypatch.setattr(solve, "identify", lambda *_: solution)
-    both = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")["fitted"]
+    both = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")["fitted"]
     assert np.isnan(both.paths).all()
     assert both.sentence.startswith("identification: ")
 

@@ -16,7 +16,7 @@ from shipid.study.check import check_folder
 from shipid.study.contents import write_pages
 from shipid.study.plan import Plan, read_plan
 from shipid.study.results import read_cells, read_results
-from tests.study.tiny import events_here, run_here, tiny_plan, without_figures
+from tests.study.tiny import events_here, make_run, run_here, tiny_plan, without_figures
 
 pytestmark = pytest.mark.slow
 
@@ -129,7 +129,7 @@ def test_results_of_several_parts_are_read_one_by_one(four: tuple[Plan, Path], t
     with pytest.raises(ShipidError, match="several parts"):
         shipid.run(tmp_path / "tiny.toml", set=FOUR)
     empty = tmp_path / "run"
-    store.open_folder(empty, plan)
+    make_run(empty, plan)
     for read in (write_pages, read_cells):
         with pytest.raises(ResultError, match="no cell is finished"):
             read(empty)

@@ -14,7 +14,7 @@ import pandas as pd
 from shipid.data.dataset import Dataset
 from shipid.report import page
 from shipid.report.sections import SECTIONS
-from shipid.study import run
+from shipid.study import run, store
 from shipid.study.plan import Plan, Unit, build_plan, read_plan
 
 TINY = Path(__file__).parents[1] / "bad" / "studies" / "plain.toml"
@@ -54,6 +54,12 @@ def mixed_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
     document = tiny_plan(folder).document
     document |= {"method": MIXED, "grid": {"N_D": [4]}, "family": [*document["family"], FITTED], **(changes or {})}
     return build_plan(document, folder / "tiny.toml")
+
+
+def make_run(folder: Path, plan: Plan) -> None:
+    """Make the folder of a run, or open it again."""
+    with store.open_folder(folder, plan):
+        pass
 
 
 def run_here(plan: Plan, folder: Path) -> list[run.Event]:
