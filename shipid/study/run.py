@@ -265,23 +265,24 @@ def _run_parts(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
     A shard goes on counting units from part to part.
     """
     with store.open_folder(folder, plan) if means.shard is None else nullcontext():
-        works, done, total, before = [], 0, 0, 0
+        works, done, total, before = {}, dict[str, int](), 0, 0
         for name, part in plan.parts.items():
             where, shard = store.check_part(folder, name, part.plan), means.shard
             if shard is not None:
                 shard = (shard[0] - 1 - before) % shard[1] + 1, shard[1]
             mine, left = _units(part.plan, where, shard)
-            works.append((name, part.plan, where, replace(means, shard=shard)))
-            total, done = total + _cells(mine), done + _cells(mine) - _cells(left)
+            works[name] = part.plan, where, replace(means, shard=shard)
+            total, done[name] = total + _cells(mine), _cells(mine) - _cells(left)
             before += len(part.plan.units)
-        yield Event("start", done=done, total=total)
-        for name, part_plan, where, part_means in works:
+        yield Event("start", done=sum(done.values()), total=total)
+        for name, work in works.items():
             yield Event("note", f"{name}:")
-            for event in _run_one(part_plan, where, part_means):
-                done += event.kind == "cell"
+            for event in _run_one(*work):
+                if event.kind != "note":
+                    done[name] = event.done  # of shards that were taken in, too
                 if event.kind in ("note", "cell"):
-                    yield replace(event, done=done, total=total)
-    yield Event("end", text=str(folder), done=done, total=total)
+                    yield replace(event, done=sum(done.values()), total=total)
+    yield Event("end", text=str(folder), done=sum(done.values()), total=total)
 
 
 def _units(plan: Plan, folder: Path, shard: tuple[int, int] | None) -> tuple[Sequence[Unit], list[Unit]]:

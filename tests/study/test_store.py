@@ -70,7 +70,7 @@ def test_a_file_that_this_user_may_not_read_is_named_and_never_replaced(
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "open", closed)
-        for look in (partial(store.open_folder, plan=plan), check_folder, write_pages):
+        for look in (partial(make_run, plan=plan), check_folder, write_pages):
             with pytest.raises(ResultError, match=rf"{name}: cannot be read \(Permission denied\): let this user"):
                 look(folder)
     assert {file: file.read_bytes() for file in folder.iterdir()} == held
