@@ -234,7 +234,9 @@ def study_rotate(
     plan, file = _before_work(study, changes, device, out, "rotate")
     dataset = obtain(plan)
     wanted = rotate.turns(plan, dataset, tests)
-    cells = len(wanted) * len(plan.pairs) * len(plan.seeds)
+    from shipid.study.plan import grid_seeds
+
+    cells = len(wanted) * len(plan.pairs) * len(grid_seeds(plan))
     import pandas as pd
 
     kept = rotate.kept_folder(file, plan, dataset, device)
@@ -245,22 +247,26 @@ def study_rotate(
     rotate.forget(kept)
     columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
     over = rotate.spread(frame)
+    from shipid.study.plan import model_label
+
     for row in over.to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
-        name = plan.label(row["foundation"], row["method"])
+        name = model_label(plan, row["foundation"], row["method"])
         inside = "-" if row["coverage"] != row["coverage"] else percent(row["coverage"])
         rows.append([name, *(digits(row[column]) for column in columns), inside, better])
-    band = f"in band of {level_text(plan.level)}"
+    band = f"in band of {level_text(plan.study.bands.level)}"
     heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
     verdicts = rotate.turn_findings(frame, plan)
     naive = frame.groupby("test")["naive"].first().mean()
+    from shipid.study.plan import families_set_from
+
     with answering(as_json) as answer:
         answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
         answer.rows("turns", over, table(heads, rows))
         answer.say(f"constant u, v, r: {digits(naive)} m", naive=naive)
         if words := rotate.copied(plan, dataset):
             answer.say(words, copied=words)
-        if saw := plan.saw(wanted):
+        if saw := families_set_from(plan, wanted):
             answer.say(
                 f"{', '.join(saw)}: numbers set from runs that test here, A and H are not those of new runs", saw=saw
             )
@@ -293,7 +299,9 @@ def study_run(
     from shipid.study.plan import read_plan
 
     plan = read_plan(study, parsed(changes))
-    _run(plan, out or plan.folder, workers, scheduler, device, _shard(shard))
+    from shipid.study.plan import default_folder
+
+    _run(plan, out or default_folder(plan), workers, scheduler, device, _shard(shard))
 
 
 def _shard(text: str | None) -> tuple[int, int] | None:
@@ -318,7 +326,9 @@ def study_prepare(
     from shipid.study.run import prepare_study
 
     plan = read_plan(study, parsed(changes))
-    for event in prepare_study(plan, out or plan.folder, device=device):
+    from shipid.study.plan import default_folder
+
+    for event in prepare_study(plan, out or default_folder(plan), device=device):
         typer.echo(event.text)
 
 
@@ -517,7 +527,9 @@ def _before_work(
     plan = read_plan(study, parsed(changes))
     file = out or Path(f"{plan.name}-{command}.csv")
     check_table(file)
-    check_output(file, plan.inputs, "--out")
+    from shipid.study.plan import input_files
+
+    check_output(file, input_files(plan), "--out")
     return plan, file
 
 
@@ -532,9 +544,10 @@ def _run(
     from shipid.files import as_argument
     from shipid.study import run, store
     from shipid.study.contents import ANSWER, share_pages
+    from shipid.study.plan import program_of
     from shipid.study.progress import Watch
 
-    resume = f"{plan.program} study resume {as_argument(folder)}"
+    resume = f"{program_of(plan)} study resume {as_argument(folder)}"
     with ended_by(f"interrupted; what is finished is kept. Continue with: {resume}"):
         events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, shard=shard)
         with closing(events):  # where a line cannot be printed, the lock is given back before the process ends

@@ -17,7 +17,15 @@ from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, PLAIN, ErrorTable, error_table
 from shipid.study.evidence import Contrasts, contrasts
-from shipid.study.plan import Plan
+from shipid.study.plan import (
+    Plan,
+    disturbances_of,
+    families_set_from,
+    fitted_families,
+    judged_method,
+    learning_methods,
+    orders_may_react,
+)
 from shipid.study.results import Results, judged_cells, naive_summary
 from shipid.study.verdict import interval, manoeuvres, metres, named, runs, shown, span, too_few
 from shipid.study.worth import Estimate, break_even, runs_without_physics
@@ -61,7 +69,7 @@ def best_model(results: Results) -> str | None:
     table = by_model(results)
     table = table[~table["family"].isin(results.aside)]
     top = table[(table["N_D"] == table["N_D"].max()) & (table["family"] != NO_MODEL)]
-    fair = top[~top["family"].isin(results.plan.fitted)]
+    fair = top[~top["family"].isin(fitted_families(results.plan))]
     chosen = top if fair.empty else fair
     return None if chosen["loss"].isna().all() else str(chosen.iloc[int(chosen["loss"].argmin())]["model"])
 
@@ -143,13 +151,13 @@ class Case:
     def fixed(self) -> list[str]:
         """Physics models whose numbers do not depend on the cell and that have a result in every one."""
         names = self.at(self.largest)
-        names = names[~names["family"].isin(self.results.plan.fitted)]
+        names = names[~names["family"].isin(fitted_families(self.results.plan))]
         return [str(m) for m in names["model"] if m in self.table.H and m in self.table.A]
 
     @property
     def whole(self) -> str:
         """What `fixed` models have, where other models were tried too: the worst of these may be worse."""
-        tried = self.rows[~self.rows["family"].isin([NO_MODEL, *self.results.plan.fitted])]
+        tried = self.rows[~self.rows["family"].isin([NO_MODEL, *fitted_families(self.results.plan)])]
         return "" if set(tried["model"]) <= set(self.fixed) else " with a result in every cell"
 
 
@@ -158,22 +166,22 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
 
     methods : sentences that compare the methods; of a study of many methods they come first.
     """
-    claims, every_model = results.plan.claims, by_model(results)
+    claims, every_model = results.plan.study.claims, by_model(results)
     rows = every_model[~every_model["family"].isin(results.aside)]
     caveats = _caveats(results)
     sentences = [(f"{'; '.join(caveats)}.", "cells")] if caveats else []
     not_judged = [(text, "models") for text in _not_judged(results)]
     largest = int(rows["N_D"].max()) if len(rows) else 0
     best = best_model(results)
-    meets = {name for name, way in results.plan.pairs if way.name == results.plan.judged}
-    judged_by = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
+    meets = {name for name, way in results.plan.pairs if way.name == judged_method(results.plan)}
+    judged_by = next(way.method for way in results.plan.methods if way.name == judged_method(results.plan))
     if len(rows) and not judged_by.compensates:
         return [*sentences, (_nothing_learns(results, rows[rows["N_D"] == largest]), "cells"), *not_judged]
     if len(rows) and meets == {NO_MODEL}:
         return [*sentences, (_apart(results, largest), "cells"), *not_judged]
     if rows[(rows["N_D"] == largest) & (rows["family"] != NO_MODEL)].empty:
         where = f" at {runs(largest)}" if largest else ""
-        of = f" of the method {results.plan.judged!r}" if len(results.plan.methods) > 1 else ""
+        of = f" of the method {judged_method(results.plan)!r}" if len(results.plan.methods) > 1 else ""
         counts = " that counts" if not_judged else ""
         text = f"No cell{of} with physics{counts} has a result{where}, so there is no conclusion yet."
         return [*sentences, (text, "cells"), *not_judged]
@@ -181,7 +189,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     chart = "map" if _has_map(rows) else "gain"
     pure = rows[rows["family"] == NO_MODEL]
     judged = NO_MODEL in case.table.H
-    learning = results.plan.learning
+    learning = learning_methods(results.plan)
     which = [(text, "methods") for text in methods]
     sentences += which if len(learning) >= MANY else []
     if judged and (good := _good_enough(case)):
@@ -191,7 +199,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     sentences.append((_headline(case, any(BEST in text for text, _ in sentences)), "gain"))
     if len(learning) > 1:
         spoken = f"The study has {len(learning)} methods that learn from data; the other sentences speak of "
-        sentences.append((f"{spoken}{results.plan.judged!r}, the one that the study judges by.", "cells"))
+        sentences.append((f"{spoken}{judged_method(results.plan)!r}, the one that the study judges by.", "cells"))
         sentences += which if len(learning) < MANY else []
     sentences += [(text, chart) for text in _physics_or_none(case, judged, NO_MODEL in meets)]
     known = case.at(largest)
@@ -212,7 +220,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
 
 def _not_judged(results: Results) -> list[str]:
     """Which families saw the test runs, so that no other sentence counts them; nothing where none did."""
-    saw = results.plan.saw(results.test.spans)
+    saw = families_set_from(results.plan, results.test.spans)
     it, them = plural(len(saw), "it is", "they are"), plural(len(saw), "it", "them")
     text = f"The numbers of {named(saw)} were set from runs that test: {it} shown, and no other sentence counts {them}."
     return [text] if saw else []
@@ -220,7 +228,7 @@ def _not_judged(results: Results) -> list[str]:
 
 def _nothing_learns(results: Results, rows: pd.DataFrame) -> str:
     """What physics alone reaches, where the method that the study judges by learns nothing from data."""
-    begins = f"The method {results.plan.judged!r} learns nothing from data. Mean errors of physics alone"
+    begins = f"The method {judged_method(results.plan)!r} learns nothing from data. Mean errors of physics alone"
     return f"{begins}, {_ahead(results)} ahead{_least(rows.set_index('model')['H'])}."
 
 
@@ -390,7 +398,7 @@ def _headline(case: Case, introduced: bool) -> str:
     """
     rows = case.at(case.largest).set_index("model")
     if case.best is None:
-        method, errors = case.results.plan.judged, _least(rows["H"])
+        method, errors = judged_method(case.results.plan), _least(rows["H"])
         text = f"With {runs(case.largest)} no trial of the method {method!r} has a value, so no model is {BEST}. "
         text += f"Mean errors {_ahead(case.results)} ahead{errors}"
     else:
@@ -425,7 +433,7 @@ def _physics_or_none(case: Case, judged: bool, planned: bool) -> list[str]:
     judged, planned : whether every cell without physics has a result, and whether the study has such cells.
     """
     if not planned:
-        method = repr(case.results.plan.judged)
+        method = repr(judged_method(case.results.plan))
         return [f"The method {method} has no cell without physics, so it is unknown whether physics harms."]
     if not judged:
         where = runs(case.largest)
@@ -521,9 +529,9 @@ def _floor(case: Case) -> str:
 
 def _nominal(nominal: pd.DataFrame, largest: int, plan: Plan) -> list[str]:
     """The error that exact coefficients leave, alone and compensated with the largest amount of data."""
-    causes = [*plan.disturbances]
-    causes += ["Euler steps"] if plan.euler else []
-    causes += [] if plan.known else ["held commands"]
+    causes = [*disturbances_of(plan)]
+    causes += ["Euler steps"] if (plan.study.prediction.integrator == "euler") else []
+    causes += [] if plan.study.prediction.known else ["held commands"]
     such = f", such as {listed(causes)}," if causes else ","
     return [
         f"Exact coefficients ({row['model']}) leave {metres(row['A'])} alone, the floor set by what is no coefficient"
@@ -535,7 +543,7 @@ def _nominal(nominal: pd.DataFrame, largest: int, plan: Plan) -> list[str]:
 def _how_to_read(case: Case) -> list[str]:
     """What "no physics" is, what identified models, models set from the runs and known commands mean, and brackets."""
     plan, table, sentences = case.results.plan, case.table, []
-    judged = next(way.method for way in plan.methods if way.name == plan.judged)
+    judged = next(way.method for way in plan.methods if way.name == judged_method(plan))
     if NO_MODEL in table.H and judged.traits.mirror:
         text = '"No physics" may use that port and starboard are mirror images, which is a little physics'
         if PLAIN in table.H:
@@ -547,7 +555,7 @@ def _how_to_read(case: Case) -> list[str]:
             text += f", and {metres(last)} at {runs(case.largest)}" if case.largest > case.smallest else ""
         sentences.append(f"{text}.")
     top = case.at(case.largest)
-    fitted = top[top["family"].isin(plan.fitted)]
+    fitted = top[top["family"].isin(fitted_families(plan))]
     if fitted["loss"].notna().any() and case.best not in set(fitted["model"]):
         lowest = fitted.iloc[int(fitted["loss"].argmin())]
         sentences.append(
@@ -556,13 +564,13 @@ def _how_to_read(case: Case) -> list[str]:
             f"{lowest['model']} has {case.H(str(lowest['model']), case.largest)} with {runs(case.largest)}."
         )
     trained = set(case.results.dataset.runs) - set(case.results.test.spans)
-    saw = [name for name in plan.saw(trained) if name in set(top["family"])]
+    saw = [name for name in families_set_from(plan, trained) if name in set(top["family"])]
     if saw and case.smallest < case.largest:
         sentences.append(
             f"The numbers of {named(saw)} were set from runs that train, whatever the amount of data: the errors with "
             "few runs rest on the other runs, too."
         )
-    if plan.known and plan.reacting:
+    if plan.study.prediction.known and orders_may_react(plan):
         sentences.append(
             "The orders of the next seconds were known. In a zigzag they reveal when the heading will reach its limit, "
             "so these errors show at best what knowing the plan can give: an upper bound of its worth."

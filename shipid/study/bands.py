@@ -71,7 +71,7 @@ def regions(
 
 def _largest(results: Results) -> Iterator[tuple[Mapping[str, Any], Region, Array]]:
     """Row, region at the level of the study and errors (T, S, 2) [m] of the cells of the largest N_D and first seed."""
-    level, cells = results.plan.level, results.cells
+    level, cells = results.plan.study.bands.level, results.cells
     largest, seed = cells["N_D"].max(), cells["seed"].min()
     rows = [row for row in results.rows if row["N_D"] == largest and row["seed"] == seed]
     for row, by_level, errors in regions(results, [level], rows):
@@ -86,7 +86,7 @@ def coverage_frame(results: Results) -> pd.DataFrame:
     over the horizon), end [m] (at its end), lengths (the same end in ship lengths), runs (test runs), seeds.
     """
     length, run, rows = ship_length(results), results.test.run, list[dict[str, Any]]()
-    levels = sorted({*SHOWN, results.plan.level})
+    levels = sorted({*SHOWN, results.plan.study.bands.level})
     held: dict[float, dict[tuple[str, str, int], list[Array]]] = {level: {} for level in levels}
     sizes: dict[tuple[float, str, str, int], list[tuple[float, float]]] = {}
     for row, by_level, errors in regions(results, levels):
@@ -115,7 +115,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
     note (a kind that too few runs calibrated). The band is the one for all kinds: the coverage is that
     of a ship whose kind of manoeuvre is not given. By time ahead: share of the positions at that step alone.
     """
-    level, test, rows = results.plan.level, results.test, []
+    level, test, rows = results.plan.study.bands.level, results.test, []
     kind = np.array([results.kinds[str(run)] for run in test.run])
     speed = np.hypot(test.columns["u"], test.columns["v"])
     edges = np.quantile(speed, np.linspace(0, 1, SPEEDS + 1))
@@ -154,7 +154,7 @@ def answer(results: Results) -> list[tuple[str, str]]:
 
     Means over the models at the largest N_D that has bands, without families whose numbers were set from test runs.
     """
-    level, frame = results.plan.level, coverage_frame(results)
+    level, frame = results.plan.study.bands.level, coverage_frame(results)
     mine = frame[frame["level"].eq(level) & ~frame["family"].isin(results.saw_test)]
     if mine.empty:
         refused = refused_frame(results).groupby("reason", sort=False)["model"]
@@ -211,7 +211,7 @@ def worst_frame(results: Results) -> pd.DataFrame:
 
 def refused_frame(results: Results) -> pd.DataFrame:
     """Models without a band of the study's level at the largest N_D, and why: model, N_D, reason."""
-    level, rows = results.plan.level, []
+    level, rows = results.plan.study.bands.level, []
     done = [row for row in results.rows if row["status"] == "ok"]
     most = max((row["N_D"] for row in done), default=0)
     for row in done:

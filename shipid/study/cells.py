@@ -157,7 +157,7 @@ def evaluate_cell(
     one, way, result = work.known[name], work.ways[method], fitted[method][name]
     foundation, prepared, batch = one.foundation, work.prepared, work.batch
     errors, seconds = left_out.get(pair, (None, 0.0))
-    row = {"cell": batch.cell(name, method), "foundation": name, "family": foundation.family}
+    row: dict[str, Any] = {"cell": batch.cell(name, method), "foundation": name, "family": foundation.family}
     row |= {"member": foundation.member, "method": method}
     row |= accuracy_of(one.test_paths, prepared.test) if foundation.base is not None else NO_ACCURACY
     row |= {"N_D": batch.N_D, "seed": batch.seed, "runs": len(prepared.runs(batch))}

@@ -14,6 +14,7 @@ from shipid.files import as_argument
 from shipid.study.declared import NO_METHOD, NO_MODEL
 from shipid.study.evidence import over_worlds
 from shipid.study.findings import findings
+from shipid.study.plan import digest_without_seed, fitted_families
 from shipid.study.results import Results, read_results
 from shipid.study.store import stored_plan
 
@@ -28,8 +29,8 @@ POSSIBLE = {
 def are_worlds(folders: Sequence[Path]) -> bool:
     """Whether folders hold one study in different worlds, so that they are repetitions of one another."""
     plans = [stored_plan(folder) for folder in folders]
-    same = len({plan.digest_in_any_world for plan in plans}) == 1
-    return same and len(plans) > 1 and len({plan.seed for plan in plans}) == len(plans)
+    same = len({digest_without_seed(plan) for plan in plans}) == 1
+    return same and len(plans) > 1 and len({plan.study.seed for plan in plans}) == len(plans)
 
 
 def read_worlds(folders: Sequence[Path]) -> list[Results]:
@@ -39,9 +40,9 @@ def read_worlds(folders: Sequence[Path]) -> list[Results]:
     plans = {folder: stored_plan(folder) for folder in folders}
     first, known = plans[folders[0]], dict[int, Path]()
     for folder, plan in plans.items():
-        if plan.digest_in_any_world != first.digest_in_any_world:
+        if digest_without_seed(plan) != digest_without_seed(first):
             raise ResultError(f"holds another study than {folders[0]}: only `seed` may differ", file=folder)
-        seed = plan.seed
+        seed = plan.study.seed
         if seed in known:
             raise ResultError(f"has seed = {seed}, as {known[seed]} has: nothing is repeated", file=folder, path="seed")
         known[seed] = folder
@@ -85,7 +86,7 @@ def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
     parts = []
     for world, results in enumerate(worlds):
         good = results.cells[results.cells["status"] == "ok"]
-        known = ~good["family"].isin([NO_MODEL, *results.plan.fitted])
+        known = ~good["family"].isin([NO_MODEL, *fitted_families(results.plan)])
         alone = good[known].drop_duplicates("foundation").assign(N_D=0, H=lambda rows: rows["A"], method=NO_METHOD)
         means = pd.concat([alone, good]).groupby(["family", "method", "N_D"], sort=False)["H"].mean()
         parts.append(means.reset_index().assign(world=world))

@@ -22,7 +22,7 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import intervals_frame
 from shipid.study.findings import findings
 from shipid.study.lock import PAGES, sole_writer
-from shipid.study.plan import Plan
+from shipid.study.plan import Plan, judged_method, model_label, plan_text, run_command
 from shipid.study.results import Results, read_results
 
 log = logging.getLogger(__name__)
@@ -56,7 +56,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         say(f"{results.plan.name}: answer, findings and errors of {len(results.cells)} cells")
     answer = advise.answer(results, verdicts(frames["methods"])), bands.answer(results)
     return ReportContent(
-        title=results.plan.question,
+        title=results.plan.study.question,
         name=results.plan.name,
         answer=[Sentence(text, figure) for part in answer for text, figure in part],
         findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
@@ -73,9 +73,11 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         envelope=parts.envelope_frame(results),
         repairs=parts.repairs_frame(results),
         provenance=parts.provenance_words(results),
-        study_document=results.plan.text(),
-        command=results.plan.command,
-        best=results.plan.label(best, results.plan.judged) if (best := advise.best_model(results)) else "",
+        study_document=plan_text(results.plan),
+        command=run_command(results.plan),
+        best=model_label(results.plan, best, judged_method(results.plan))
+        if (best := advise.best_model(results))
+        else "",
         alone=parts.alone_models(results),
         frames=frames,
     )
@@ -83,7 +85,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
 
 def _shown_models(results: Results) -> pd.DataFrame:
     """The models; without `none` where no method that the study judges by meets it: nothing of it can be drawn."""
-    judged = (NO_MODEL, results.plan.judged) in {(name, way.name) for name, way in results.plan.pairs}
+    judged = (NO_MODEL, judged_method(results.plan)) in {(name, way.name) for name, way in results.plan.pairs}
     return results.models if judged else results.models[results.models["model"].ne(NO_MODEL)]
 
 
@@ -161,15 +163,15 @@ def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]
         notes[name] = f"{len(results.cells)} of {part.plan.cells} cells"
     if not cells:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
-    frame = methods.compared(methods.joined(cells), plan.judged)
+    frame = methods.compared(methods.joined(cells), judged_method(plan))
     write_table(folder / METHODS, frame)
     content = MethodsContent(
-        title=plan.question,
+        title=plan.study.question,
         name=plan.name,
         frames={"methods": frame},
         provenance={"study": f"{plan.name}, digest {plan.digest}", **notes},
-        study_document=plan.text(),
-        command=plan.command,
+        study_document=plan_text(plan),
+        command=run_command(plan),
     )
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     return write_comparison(content, folder / REPORT), len(whole) == len(plan.parts) and all(whole)

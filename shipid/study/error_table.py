@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
 from shipid.study.evidence import Contrasts, contrasts, mean_errors, training_noise
+from shipid.study.plan import learns_from_runs, plain_rival
 from shipid.study.results import Results, judged_cells
 
 Array = NDArray[np.float64]
@@ -112,7 +113,7 @@ def error_table(
     amounts = sorted(set(cells["N_D"])) if amounts is None else amounts
     seeds = sorted(set(cells["seed"]))
     wanted = {name: cells[cells["foundation"] == name] for name in (*models, NO_MODEL)}
-    if plain := results.plan.plain:
+    if plain := plain_rival(results.plan):
         every = results.cells
         wanted[PLAIN] = every[(every["foundation"] == NO_MODEL) & (every["method"] == plain)]
     H = {}
@@ -145,7 +146,9 @@ def intervals_frame(results: Results) -> pd.DataFrame:
             for model, same in mine.groupby("model", sort=False)
         }
         means = np.stack([each.mean(axis=0) for each in errors.values()])
-        of_model = {row.model: results.plan.learns(str(row.family), str(row.method)) for row in mine.itertuples()}
+        of_model = {
+            row.model: learns_from_runs(results.plan, str(row.family), str(row.method)) for row in mine.itertuples()
+        }
         trained = np.array([of_model[model] for model in errors])
         noise = training_noise([each @ weights for each, moved in zip(errors.values(), trained, strict=True) if moved])
         seeds = np.array([len(each) for each in errors.values()])

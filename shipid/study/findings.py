@@ -25,6 +25,7 @@ from shipid.study import findings_simulation as simulated
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable, error_table
 from shipid.study.evidence import contrasts
+from shipid.study.plan import unfair_reason
 from shipid.study.results import Results, judged_cells
 from shipid.study.schema import Claims
 from shipid.study.verdict import (
@@ -70,10 +71,10 @@ class Rivals:
 
 def findings(results: Results) -> list[Finding]:
     """Verdicts on what the study claims: R1-R4 (method, section 5), S1-S7 (section 4), both or none; then B1-B2."""
-    claims = results.plan.claims
+    claims = results.plan.study.claims
     if claims is None or not (results.cells["status"] == "ok").any():
         return []
-    unfair = results.plan.unfair(results.test.spans)
+    unfair = unfair_reason(results.plan, results.test.spans)
     verdicts: list[Finding] = []
     if claims.accurate is not None:
         verdicts += undecided(CLAIMS, unfair) if unfair else _full_scale(results, claims)

@@ -26,6 +26,7 @@ from shipid.study.bands import of_methods, regions, share_interval
 from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ALONE, ErrorTable, error_table
 from shipid.study.evidence import FEWEST_MODELS, by_chance, doubling
+from shipid.study.plan import judged_method
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
     SAME_A,
@@ -71,8 +72,8 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     """
     if not results.complete:
         return undecided(CLAIMS, results.missing)
-    level, run = results.plan.level, results.test.run
-    of = of_methods(results, [results.plan.judged])
+    level, run = results.plan.study.bands.level, results.test.run
+    of = of_methods(results, [judged_method(results.plan)])
     bands = {
         str(row["cell"]): (by_level[level].radius.mean(axis=0), by_level[level].holds(errors))
         for row, by_level, errors in regions(results, [level])

@@ -48,6 +48,7 @@ from shipid.study.evidence import (
     contrasts,
     doubling,
 )
+from shipid.study.plan import judged_method
 from shipid.study.results import Results, judged_cells
 from shipid.study.verdict import (
     SAME_A,
@@ -129,12 +130,12 @@ def judged(H: Grid, H_90: Grid) -> list[Finding]:
 
 def read_grid(results: Results, metric: Metric) -> Grid | str:
     """H or H_90 of a finished study as a grid, or the reason why there is none."""
-    claims, cells = results.plan.claims, judged_cells(results)
+    claims, cells = results.plan.study.claims, judged_cells(results)
     assert claims is not None
     if not results.complete:
         return results.missing
     if NO_MODEL not in set(cells["model"]):
-        return f"the method {results.plan.judged!r} is not run without physics"
+        return f"the method {judged_method(results.plan)!r} is not run without physics"
     failed = set(cells["model"][cells["status"] != "ok"])
     if NO_MODEL in failed:
         return f"{words(NO_MODEL)} has no result in every cell"
@@ -411,8 +412,8 @@ def _S7(results: Results, grid: Grid) -> Finding:
         return _without("S7", "physics")
     if results.test.horizon < 3:
         return finding(CLAIMS, "S7", "undecided", "a second difference needs three steps ahead")
-    judged = next(way.method for way in results.plan.methods if way.name == results.plan.judged)
-    if smooth_by_construction(judged, results.plan.horizon):
+    judged = next(way.method for way in results.plan.methods if way.name == judged_method(results.plan))
+    if smooth_by_construction(judged, results.plan.study.prediction.horizon):
         evidence = (
             "the compensation is a polynomial of time, which is smooth whatever it learned; 'path-trained' is not"
         )

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from shipid.metrics import over_time, position_error
 from shipid.study.declared import NO_METHOD, NO_MODEL
 from shipid.study.differences import document_differences
 from shipid.study.evidence import Contrasts, contrasts, contrasts_apart, training_error
-from shipid.study.plan import Plan
+from shipid.study.plan import Plan, drawn_conditions, fitted_families, learns_from_runs
 from shipid.study.results import Results, read_results
 from shipid.study.schema import WORLDS
 from shipid.study.verdict import manoeuvres, shown, too_few
@@ -179,13 +180,13 @@ def _cells(results: Results) -> pd.DataFrame:
     good = results.cells[results.cells["status"] == "ok"].reindex(
         columns=["cell", "foundation", *KEYS, "H", "coverage"]
     )
-    trained = list(map(results.plan.learns, good["family"], good["method"]))
-    good = good.assign(seed=good["seed"] - WORLDS * results.plan.seed, trained=trained)
+    trained = list(map(partial(learns_from_runs, results.plan), good["family"], good["method"]))
+    good = good.assign(seed=good["seed"] - WORLDS * results.plan.study.seed, trained=trained)
     every = results.cells.drop_duplicates("foundation")
     known = every["foundation"].isin([name for name, path in results.physics.items() if np.isfinite(path).all()])
     alone = every[known & (every["family"] != NO_MODEL)].reindex(columns=good.columns)
     alone = alone.assign(cell="", method=NO_METHOD, N_D=0, seed=0, H=every["A"], coverage=np.nan, trained=False)
-    alone = alone[~alone["family"].isin(results.plan.fitted)]
+    alone = alone[~alone["family"].isin(fitted_families(results.plan))]
     return pd.concat([alone, good], ignore_index=True).astype({"coverage": float, "H": float, "trained": bool})
 
 
@@ -257,7 +258,7 @@ def _same_recording(one: Windows, two: Windows, here: Index, there: Index) -> bo
 
 def _same_draws(one: Plan, two: Plan) -> bool:
     """Whether two simulated truths draw the same manoeuvres: then runs of one name are pairs, whatever the ship."""
-    return one.draws is not None and one.draws == two.draws
+    return drawn_conditions(one) is not None and drawn_conditions(one) == drawn_conditions(two)
 
 
 @dataclass(frozen=True)

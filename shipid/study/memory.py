@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.declared import Foundation, Way
 from shipid.study.evidence import contrasts, training_error
+from shipid.study.plan import learns_from_runs, model_label
 from shipid.study.prepare import known_by_then
 from shipid.study.results import Results, shown_runs, with_gaps
 
@@ -130,7 +132,9 @@ def memory_frame(results: Results) -> pd.DataFrame:
     family = {one.name: one.family for one in results.plan.foundations}
     for pair, N_D, first, second in _errors(results):
         before, after, seeds = first.mean(axis=0), second.mean(axis=0), len(first)
-        learns = [results.plan.learns(family[name], method) for name, method in (pair.without, pair.remembering)]
+        learns = [
+            learns_from_runs(results.plan, family[name], method) for name, method in (pair.without, pair.remembering)
+        ]
         apart = (
             training_error([one.mean(axis=1)]) for one, moved in zip((first, second), learns, strict=True) if moved
         )
@@ -138,7 +142,7 @@ def memory_frame(results: Results) -> pd.DataFrame:
         sums = np.bincount(place, after - before)
         differences.append(sums / counts)
         rows.append(
-            _names(pair, results.plan.label)
+            _names(pair, partial(model_label, results.plan))
             | {"N_D": N_D, "A": _accuracy(results, pair.without[0], N_D)}
             | {"H_without": before.mean(), "H_with": after.mean(), "difference": (after - before).mean()}
             | {"low": np.nan, "high": np.nan, "runs": len(runs), "better": int((sums < 0).sum()), "seeds": seeds}
@@ -162,7 +166,9 @@ def memory_time_frame(results: Results) -> pd.DataFrame:
     for pair, N_D, first, second in _errors(results):
         if N_D in (0, largest):
             before, after = first.mean(axis=0), second.mean(axis=0)
-            names = {key: value for key, value in _names(pair, results.plan.label).items() if key != "added"}
+            names = {
+                key: value for key, value in _names(pair, partial(model_label, results.plan)).items() if key != "added"
+            }
             columns = {"run": results.test.run[shown], "t": results.test.t[shown]}
             columns |= {"error_without": before[shown], "error_with": after[shown]}
             parts.append(pd.DataFrame({**names, "N_D": N_D, **columns}))

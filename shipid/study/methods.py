@@ -13,6 +13,7 @@ from shipid.arguments import of_class
 from shipid.metrics import over_time, position_error
 from shipid.study.declared import NO_MODEL
 from shipid.study.evidence import ROUNDING, contrasts, mean_errors, over_worlds, training_error
+from shipid.study.plan import judged_method, learns_from_runs
 from shipid.study.results import Results
 
 EVERY = "with physics"  # all families but `none` and those that saw the test runs
@@ -35,7 +36,7 @@ def compare_methods(results: Results) -> pd.DataFrame:
     Raises ShipidError for results that are none.
     """
     of_class("results", results, Results, "as of `read_results`")
-    return compared(method_cells(results), results.plan.judged)
+    return compared(method_cells(results), judged_method(results.plan))
 
 
 def methods_frame(results: Results) -> pd.DataFrame:
@@ -61,7 +62,7 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
         kept = {name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")}
         kept |= {"condition": condition, "world": world, "end": np.nan, "sums": {}, "counts": counts}
         kept |= {"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw}
-        kept["trained"] = results.plan.learns(row["family"], row["method"])
+        kept["trained"] = learns_from_runs(results.plan, row["family"], row["method"])
         if row["cell"] in results.paths:
             error = position_error(results.paths[row["cell"]], results.test.future)
             sums = np.bincount(place, over_time(error))

@@ -43,7 +43,7 @@ from shipid.simulation.manoeuvre import name_of
 from shipid.simulation.truth import draw_manoeuvres, simulate
 from shipid.study.declared import Foundation
 from shipid.study.kinds import kinds_of
-from shipid.study.plan import Batch, Plan, beside, mapping_of
+from shipid.study.plan import Batch, Plan, beside, mapping_of, past_steps
 from shipid.study.ranges import check_memory, window_numbers
 from shipid.study.schema import Study
 from shipid.units import percent, plural
@@ -187,7 +187,7 @@ def over_gaps(dataset: Dataset, windows: Windows) -> list[str]:
 
 def all_windows(plan: Plan, dataset: Dataset) -> Windows:
     """Every window of a study, test and training; DocumentError where no run is as long as the horizon."""
-    study, prediction, past = plan.study, plan.study.prediction, plan.past
+    study, prediction, past = plan.study, plan.study.prediction, past_steps(plan)
     cut = partial(
         cut_windows,
         horizon=prediction.horizon,

@@ -37,7 +37,16 @@ from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL, Way
 from shipid.study.envelope import envelope_table
 from shipid.study.kinds import kinds_of
-from shipid.study.plan import Plan
+from shipid.study.plan import (
+    Plan,
+    families_aside,
+    families_set_from,
+    grid_seeds,
+    judged_method,
+    learns_from_runs,
+    model_label,
+    vessels_of,
+)
 from shipid.study.prepare import constant_motion, instants_of, known_by_then
 from shipid.vessel.outline import ship_outline
 
@@ -123,13 +132,13 @@ class Results:
     @property
     def aside(self) -> set[str]:
         """Families that are shown, but that no claim and no sentence of the answer counts."""
-        return {*self.plan.aside, *self.saw_test}
+        return {*families_aside(self.plan), *self.saw_test}
 
     @property
     def saw_test(self) -> set[str]:
         """Families whose numbers rest on test runs: those that the claims set aside, or that name such a run."""
-        claims = self.plan.claims
-        return {*(claims.aside if claims else ()), *self.plan.saw(self.test.spans)}
+        claims = self.plan.study.claims
+        return {*(claims.aside if claims else ()), *families_set_from(self.plan, self.test.spans)}
 
     @property
     def missing(self) -> str:
@@ -180,7 +189,9 @@ def _cells(folder: Path, plan: Plan) -> pd.DataFrame:
 
 def _labelled(cells: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     """The cells with the name that figures give their models."""
-    return cells.assign(model=[plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)])
+    return cells.assign(
+        model=[model_label(plan, *pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
+    )
 
 
 def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | None = None) -> Results:
@@ -220,7 +231,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         if band is not None:
             bands[cell] = band
         try:
-            checked_bands(band, reason, plan.level)
+            checked_bands(band, reason, plan.study.bands.level)
         except DataError as error:
             no_band[cell] = error.message
     return Results(
@@ -315,7 +326,7 @@ def kinds_frame(results: Results) -> pd.DataFrame:
             errors[model, "physics", 0] = [position_error(path, results.test.future)]
     largest = int(results.cells["N_D"].max()) if len(results.cells) else 0
     for row in results.rows:
-        with_data = results.plan.learns(row["family"], row["method"])
+        with_data = learns_from_runs(results.plan, row["family"], row["method"])
         if row["cell"] in results.paths and row["N_D"] == largest and with_data:
             one = position_error(results.paths[row["cell"]], results.test.future)
             errors.setdefault((row["model"], "cooperative", largest), []).append(one)
@@ -423,7 +434,7 @@ def snapshots(results: Results) -> list[dict[str, Any]]:
     begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
     seed, test = int(results.cells["seed"].min()), results.test
     rows, naive, cells = [], constant_motion(test), _shown_cells(results)
-    level, edges, alone = results.plan.level, {}, alone_models(results)
+    level, edges, alone = results.plan.study.bands.level, {}, alone_models(results)
     for row in cells:
         bands_of_cell = results.bands.get(row["cell"])
         if bands_of_cell is not None and bands_of_cell.promises(level):
@@ -500,7 +511,7 @@ def tracks_frame(results: Results) -> pd.DataFrame:
 
 def envelope_frame(results: Results) -> pd.DataFrame:
     """Least, mean and greatest input per set, as the paper's Tables 1 and 2; degrees and rpm."""
-    return envelope_table(read_json(results.folder / store.ENVELOPE), results.plan.published)
+    return envelope_table(read_json(results.folder / store.ENVELOPE), results.plan.study.published)
 
 
 def factors_frame(results: Results) -> pd.DataFrame:
@@ -558,7 +569,7 @@ def _method_words(way: Way) -> str:
 
 def judged_cells(results: Results) -> pd.DataFrame:
     """Rows of the cells of the method that findings and the answer speak of; `model` is the foundation."""
-    cells = results.cells[results.cells["method"] == results.plan.judged]
+    cells = results.cells[results.cells["method"] == judged_method(results.plan)]
     return cells.assign(model=cells["foundation"])
 
 
@@ -568,20 +579,20 @@ def provenance_words(results: Results) -> dict[str, str]:
     machine = record.get("machine", {})
     words = {
         "study": f"{results.plan.name}, digest {record['digest']}",
-        "vessels": "; ".join(sorted({f"{v.key} {v.digest}" for v in results.plan.used_vessels})),
+        "vessels": "; ".join(sorted({f"{v.key} {v.digest}" for v in vessels_of(results.plan)})),
         "data": _source_words(results.dataset.metadata.get("source", "")),
         "cells": f"{len(results.cells)} of {results.plan.cells} finished",
-        "seeds": ", ".join(map(str, plan.seeds)),
+        "seeds": ", ".join(map(str, grid_seeds(plan))),
         "methods": "; ".join(_method_words(way) for way in results.plan.methods),
         "computed with": f"Python {machine.get('python', '?')} on {machine.get('system', '?')}, "
         f"{machine.get('cores', '?')} cores",
         "packages": ", ".join(f"{name} {number}" for name, number in machine.get("packages", {}).items()),
         "wall time": f"{record.get('wall_seconds', float('nan')):.0f} s, without interrupted sessions",
     }
-    if plan.seed:
-        words["world"] = f"seed {plan.seed}"
-    if plan.published is not None:
-        words["published envelope"] = plan.published.source
+    if plan.study.seed:
+        words["world"] = f"seed {plan.study.seed}"
+    if plan.study.published is not None:
+        words["published envelope"] = plan.study.published.source
     redrawn = [row for row in results.models.to_dict("records") if (row.get("counter") or 0) > 0]
     if redrawn:
         words["redrawn"] = "; ".join(f"{row['model']}: counter {int(row['counter'])}" for row in redrawn)

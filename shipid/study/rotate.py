@@ -23,7 +23,17 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.error_table import ErrorTable
 from shipid.study.findings import CLAIMS, Rivals, judged
 from shipid.study.lock import sole_writer
-from shipid.study.plan import Batch, Plan
+from shipid.study.plan import (
+    Batch,
+    Plan,
+    families_aside,
+    families_set_from,
+    judged_method,
+    own_code,
+    rotated_plan,
+    unfair_reason,
+    whole_unit,
+)
 from shipid.study.prepare import all_windows, partition, prepare
 from shipid.study.run import run_unit
 from shipid.study.verdict import Finding, undecided
@@ -73,8 +83,8 @@ def rotate(
     """
     with nullcontext() if kept is None else _alone_in(kept):
         for test in tests:
-            rest, _, _ = partition(plan.turn(test, 2), dataset)
-            turn = plan.turn(test, len(rest.spans))
+            rest, _, _ = partition(rotated_plan(plan, test, 2), dataset)
+            turn = rotated_plan(plan, test, len(rest.spans))
             done = {} if kept is None else {batch: _read(_file(kept, test, batch)) for batch in turn.batches}
             if any(done.get(batch) is None for batch in turn.batches):
                 yield from _computed(turn, dataset, test, device, kept)
@@ -97,7 +107,7 @@ def _computed(turn: Plan, dataset: Dataset, test: str, device: str, kept: Path |
     floor = float(prepared.naive.mean())
 
     def computed(batch: Batch, journal: Journal | None = None) -> pd.DataFrame:
-        rows = [cell.row for cell in run_unit(turn, prepared, turn.whole(batch), device, journal)]
+        rows = [cell.row for cell in run_unit(turn, prepared, whole_unit(turn, batch), device, journal)]
         return pd.DataFrame([{**row, "test": test, "naive": floor} for row in rows])[KEYS]
 
     if kept is None:
@@ -118,7 +128,7 @@ def _computed(turn: Plan, dataset: Dataset, test: str, device: str, kept: Path |
 def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:
     """Folder of the finished turns of an interrupted rotation: one for each study, dataset, device and code."""
     vessels = {name: vessel.digest for name, vessel in plan.vessels.items()}  # the digest has them without their names
-    decides = [plan.digest, vessels, dataset.digest, device, code_digest(), plan.code]
+    decides = [plan.digest, vessels, dataset.digest, device, code_digest(), own_code(plan)]
     return file.with_name(f"{file.name}.turns") / documents.digest(decides)
 
 
@@ -174,14 +184,14 @@ def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
     the numbers of either model were set from runs that test. Nothing without `accurate` and `inaccurate`, or where
     fewer than two turns have what they need.
     """
-    claims = plan.claims
+    claims = plan.study.claims
     if claims is None or claims.accurate is None or claims.inaccurate is None:
         return []
     tests = set(frame["test"])
-    if unfair := plan.unfair(tests):
+    if unfair := unfair_reason(plan, tests):
         return undecided(CLAIMS, unfair)
-    aside = {*plan.aside, *plan.saw(tests)}
-    mine = frame[(frame["method"] == plan.judged) & ~frame["family"].isin(aside)]
+    aside = {*families_aside(plan), *families_set_from(plan, tests)}
+    mine = frame[(frame["method"] == judged_method(plan)) & ~frame["family"].isin(aside)]
     good, bad = claims.accurate, claims.inaccurate
     mine = mine.assign(model=mine["family"].where(mine["family"].isin([good, bad]), mine["foundation"]))
     H = mine[mine["status"] == "ok"].pivot_table(index="test", columns=["model", "seed"], values="H")

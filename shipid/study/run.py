@@ -30,7 +30,7 @@ from shipid.study.cells import NO_ACCURACY, accuracy_of, errors_left_out, evalua
 from shipid.study.cluster import Known, Line, SentSearches, on_dask
 from shipid.study.envelope import envelope
 from shipid.study.lock import PAGES, sole_writer
-from shipid.study.plan import Plan, Unit
+from shipid.study.plan import Plan, Unit, own_code
 from shipid.study.prepare import Prepared, describe, obtain, prepare, runs_by_amount
 from shipid.study.sessions import Code, Sessions, check_workers, machine, session_at_worker, session_on
 from shipid.study.shards import check_prepared, shard_folder, take_in
@@ -96,7 +96,7 @@ def run_study(
     check_device(device)
     if scheduler is None:
         import_for_workers()
-        if plan.code and len(store.finished(folder, plan.units)) < len(plan.units):
+        if own_code(plan) and len(store.finished(folder, plan.units)) < len(plan.units):
             check_workers(plan)
     means = Means(workers, scheduler, device, shard)
     yield from (_run_parts if plan.parts else _run_one)(plan, folder, means)
@@ -109,7 +109,7 @@ def prepare_study(plan: Plan, folder: str | os.PathLike[str], *, device: str = "
         for name, part in plan.parts.items():
             yield from prepare_study(part.plan, store.check_part(folder, name, part.plan), device=device)
         if not plan.parts:
-            sessions = Sessions(folder, session_on(device, plan.code))
+            sessions = Sessions(folder, session_on(device, own_code(plan)))
             sessions.note(sessions.now)
             yield Event("note", _obtaining_words(plan))
             prepared = prepare(plan, _dataset(plan, folder, sessions), device)
@@ -126,7 +126,7 @@ def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
     with store.open_folder(place, plan):
         for words in (*seals.mend(place), *(take_in(folder, plan) if shard is None else ())):
             yield Event("note", words)
-        sessions = Sessions(place, session_on(means.device, plan.code))
+        sessions = Sessions(place, session_on(means.device, own_code(plan)))
         if changed := sessions.note(sessions.now):
             yield Event("note", f"earlier results were computed otherwise: {'; '.join(changed)}")
         if not seals.is_sealed(folder, DATA):
@@ -212,7 +212,7 @@ def _compute(
     def write(key: str, name: str, *given: Any) -> None:
         getattr(writer(key), name)(*given)
 
-    shared = plan, prepared, means.device, plan.code
+    shared = plan, prepared, means.device, own_code(plan)
     for (unit, _), (noted, results) in on_dask(means.scheduler, _on_cluster, shared, tasks, plan.digest, own, write):
         sessions.note_others(*noted)
         yield unit, results

@@ -19,7 +19,7 @@ from shipid.errors import ShipidError
 from shipid.hybrid.device import vectors
 from shipid.study import store
 from shipid.study.code import UNKNOWN, code_digest
-from shipid.study.plan import USER_SCRIPT, Plan
+from shipid.study.plan import USER_SCRIPT, Plan, own_code
 from shipid.study.workers import on_workers
 from shipid.units import listed
 from shipid.version import __version__
@@ -98,7 +98,7 @@ def session_at_worker(plan: Plan, device: str, code: Code) -> dict[str, Any]:
     """
     imported = replace(plan, methods=tuple(way for way in plan.methods if type(way.method).__module__ != MAIN))
     try:
-        here = imported.code
+        here = own_code(imported)
     except KeyError as unknown:
         words = f"its workers lack the term {unknown}: start them with --preload and your file that puts it into TERMS"
         raise ShipidError(words) from None
@@ -131,4 +131,6 @@ def check_workers(plan: Plan) -> None:
 
 def _digests(plan: Plan, _: None = None) -> dict[str, str]:
     """What the user wrote, in words, as this process or a worker has it -> digest."""
-    return {f"{what.split()[-1]} {name!r}": digest for what, held in plan.code.items() for name, digest in held.items()}
+    return {
+        f"{what.split()[-1]} {name!r}": digest for what, held in own_code(plan).items() for name, digest in held.items()
+    }

@@ -39,7 +39,7 @@ from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.declared import Foundation
 from shipid.study.lock import sole_writer
-from shipid.study.plan import METHOD_CODE, TERM_CODE, Plan, Unit, build_plan
+from shipid.study.plan import METHOD_CODE, TERM_CODE, Plan, Unit, build_plan, own_code, plan_text, program_of
 from shipid.units import listed, plural
 from shipid.version import __version__
 from shipid.vessel.load import check_vessel
@@ -124,7 +124,7 @@ def _other_study(folder: Path, plan: Plan) -> str:
     changed += [f"the {name}" for name, digest in plan.sources.items() if record["sources"].get(name) != digest]
     what = listed(changed) if changed else f"a default of a method, or of shipid (this is {__version__}),"
     words = f"holds results from before {what} changed: choose another --out"
-    return f"{words}, or go on with it as it was: `{plan.program} study resume {as_argument(folder)}`"
+    return f"{words}, or go on with it as it was: `{program_of(plan)} study resume {as_argument(folder)}`"
 
 
 def check_readable(folder: Path) -> None:
@@ -194,7 +194,7 @@ def _mend(folder: Path, plan: Plan) -> None:
     try:
         changed = documents.digest(documents.read(folder / STUDY)) != documents.digest(plan.document)
     except DocumentError:
-        write_text(folder / STUDY, plan.text())
+        write_text(folder / STUDY, plan_text(plan))
         changed = False
     try:
         stored = read_json(folder / VESSELS)
@@ -231,10 +231,10 @@ def _make(folder: Path, plan: Plan) -> None:
 def _describe(folder: Path, plan: Plan) -> None:
     """Write what a folder is: provenance, vessels and, last, the study."""
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
-    own = {"program": plan.program, **plan.code} if plan.code else {}
+    own = {"program": program_of(plan), **own_code(plan)} if own_code(plan) else {}
     write_json(folder / PROVENANCE, {"digest": plan.digest, **origin, "changes": dict(plan.changes), **own})
     _write_vessels(folder, plan)
-    write_text(folder / STUDY, plan.text())
+    write_text(folder / STUDY, plan_text(plan))
 
 
 def stored_plan(folder: Path) -> Plan:

@@ -23,7 +23,7 @@ from shipid.study import foundations, run, store
 from shipid.study import prepare as preparing
 from shipid.study.advise import answer
 from shipid.study.foundations import predictions
-from shipid.study.plan import Batch, Plan
+from shipid.study.plan import Batch, Plan, fitted_families, judged_method, whole_unit
 from shipid.study.prepare import apart, instants_of, prepare
 from shipid.study.results import read_results
 from tests.study.test_commands import weaving
@@ -167,7 +167,7 @@ def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monk
     errors = []
     for clock in ("run", "shared"):
         data = Dataset(frame, {**dataset.metadata, "clock": clock})
-        run.run_unit(plan, prepare(plan, data), plan.whole(plan.batches[0]), "cpu")
+        run.run_unit(plan, prepare(plan, data), whole_unit(plan, plan.batches[0]), "cpu")
         left_out, _ = kept[-1]["plain", "force"]
         errors.append(float(np.nanmean(np.hypot(left_out[..., 0], left_out[..., 1]))))
     assert errors[1] == pytest.approx(errors[0], rel=0.1)
@@ -176,7 +176,7 @@ def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monk
 def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(recorded: Recorded) -> None:
     """Among its levels and fades none predicts the training runs better; the page says whose A moves with the data."""
     plan, dataset = study(recorded, [WRONG, SEEN])
-    assert plan.fitted == {"seen"}
+    assert fitted_families(plan) == {"seen"}
     prepared = prepare(plan, dataset)
     runs = prepared.runs(plan.batches[0])
     known = predictions(prepared, runs, "cpu")["seen"]
@@ -334,6 +334,6 @@ def test_the_prediction_of_the_study_is_the_default(recorded: Recorded) -> None:
     settings = plan.foundations[1].identify
     assert settings is not None
     assert (settings.horizon, settings.step, settings.method) == (5.0, 1.0, "euler")
-    assert plan.fitted == {"fitted"}
-    assert plan.judged == "drawn"
+    assert fitted_families(plan) == {"fitted"}
+    assert judged_method(plan) == "drawn"
     assert Batch(3, 0) in plan.batches

@@ -13,6 +13,7 @@ import pytest
 import shipid
 from shipid.study.matched import _cells
 from shipid.study.methods import COLUMNS, EVERY, compared, method_cells
+from shipid.study.plan import learns_from_runs
 from shipid.study.results import read_results
 from shipid.study.schema import Claims
 from tests.study.tiny import MIXED, mixed_plan, run_here, without_figures
@@ -178,7 +179,7 @@ def test_what_learns_is_what_other_training_runs_change(tmp_path: Path) -> None:
     results = read_results(tmp_path / "run")
     cells = results.cells[results.cells["status"] == "ok"]
     changes = cells.groupby(["foundation", "family", "method"])["H"].nunique() > 1
-    assert {key: plan.learns(*key[1:]) for key in changes.index} == changes.to_dict()
+    assert {key: learns_from_runs(plan, *key[1:]) for key in changes.index} == changes.to_dict()
     assert changes.xs(("fitted", "alone"), level=("family", "method")).all()
     assert not changes.xs("alone", level="method").all()
     for frame in (method_cells(results), _cells(results)):

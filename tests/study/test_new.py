@@ -38,7 +38,7 @@ from shipid.study.new import (
     step_of,
     wind_for,
 )
-from shipid.study.plan import read_plan
+from shipid.study.plan import families_set_from, read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.survey import helm_sense, separation, survey, typical_runs
 from shipid.vessel.load import Vessel, load_vessel
@@ -187,8 +187,8 @@ def test_what_the_log_corrects_is_a_family(tmp_path: Path, monkeypatch: pytest.M
     assert document["claims"]["accurate"] == f"{SHIP}-corrected"
     seen = {run for run in trial().runs if run not in document["split"]["test"]}
     assert set(document["family"][1]["seen"]) == seen
-    assert draft.plan.saw(document["split"]["test"]) == []
-    assert draft.plan.saw(["no run", min(seen)]) == [f"{SHIP}-corrected"]
+    assert families_set_from(draft.plan, document["split"]["test"]) == []
+    assert families_set_from(draft.plan, ["no run", min(seen)]) == [f"{SHIP}-corrected"]
     assert any(f"{path} = 0.95 in place of" in warning for warning in draft.warnings)
     patch = tmp_path / "patch.toml"
     patch.write_text(draft.looks[SHIP].patch(SHIP))

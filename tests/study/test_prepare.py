@@ -23,7 +23,7 @@ from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor, limits_of
 from shipid.study import prepare as module
 from shipid.study.envelope import envelope
-from shipid.study.plan import Plan, read_plan
+from shipid.study.plan import Plan, read_plan, whole_unit
 from shipid.study.prepare import (
     Prepared,
     all_windows,
@@ -62,7 +62,7 @@ def test_the_order_of_columns_changes_no_digit(tmp_path: Path) -> None:
     turned = Dataset(dataset.frame[["run", *[name for name in dataset.frame if name != "run"][::-1]]], dataset.metadata)
     assert turned.commands == dataset.commands[::-1]
     first, again = (
-        [row["H"] for row, *_ in run_unit(plan, prepare(plan, one), plan.whole(plan.batches[0]), "cpu")]
+        [row["H"] for row, *_ in run_unit(plan, prepare(plan, one), whole_unit(plan, plan.batches[0]), "cpu")]
         for one in (dataset, turned)
     )
     assert first == again
@@ -236,7 +236,7 @@ def test_divergence_on_test_windows_only_is_shown_never_redrawn(
     accuracy = prepared.accuracy("brittle-1")
     assert (accuracy["status"], accuracy["failed_share"]) == ("diverged", 0.5)
     assert np.isnan(accuracy["mean"])
-    rows = {row["foundation"]: row for row, *_ in run_unit(plan, prepared, plan.whole(plan.batches[0]), "cpu")}
+    rows = {row["foundation"]: row for row, *_ in run_unit(plan, prepared, whole_unit(plan, plan.batches[0]), "cpu")}
     assert rows["brittle-1"]["status"] == "diverged"
     assert "50.0 %" in rows["brittle-1"]["sentence"]
     assert np.isnan(rows["brittle-1"]["H"])

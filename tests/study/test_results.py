@@ -20,7 +20,7 @@ from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import results as frames
 from shipid.study import store
 from shipid.study.contents import report_content
-from shipid.study.plan import build_plan, read_plan
+from shipid.study.plan import build_plan, read_plan, run_command
 from shipid.study.results import Results, read_cells, read_results
 from tests.study.byhand import grid
 
@@ -176,7 +176,7 @@ def test_provenance_names_what_was_used(read: Results) -> None:
 
 def test_the_command_reproduces_the_study(read: Results) -> None:
     """A bundled study by its name, any other by its file; with what `--set` changed."""
-    assert read.plan.command == f"shipid study run {read.plan.file}"
+    assert run_command(read.plan) == f"shipid study run {read.plan.file}"
     quick = read_plan("quick")
     assert quick.command == "shipid study run quick"
     changed = read_plan("quick", {"grid.N_D": [10], "question": "How far?"})

@@ -30,7 +30,7 @@ from shipid.predictor import Predictor
 from shipid.study import cells, run, seals, sessions, store
 from shipid.study.check import check_folder
 from shipid.study.contents import write_pages
-from shipid.study.plan import Plan, read_plan
+from shipid.study.plan import Plan, completed_plan, own_code, program_of, read_plan, whole_unit
 from shipid.study.prepare import obtain, prepare
 from shipid.study.results import provenance_words, read_results
 from shipid.study.rotate import kept_folder
@@ -205,9 +205,9 @@ def skeg_plan(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[ModuleType
 
 def test_a_term_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The finished cells are those of the ship as she was; nothing said so, and hints named a command without it."""
-    assert not tiny_plan(tmp_path).code
+    assert not own_code(tiny_plan(tmp_path))
     module, plan = skeg_plan(tmp_path, monkeypatch)
-    assert plan.program == "python my.py"
+    assert program_of(plan) == "python my.py"
     folder = tmp_path / "run"
     run_here(plan, folder)
     (session,) = read_json(folder / store.PROVENANCE)["sessions"]
@@ -264,7 +264,9 @@ def test_a_unit_has_the_digits_of_its_whole_batch(tmp_path: Path) -> None:
     """Every method, an identified family and refits: units of work against all cells at once, bit by bit."""
     plan = mixed_plan(tmp_path, {"bands": {"refits": 2}})
     prepared = prepare(plan, obtain(plan))
-    whole = {row["cell"]: (row, one) for row, one, _ in run_unit(plan, prepared, plan.whole(plan.batches[0]), "cpu")}
+    whole = {
+        row["cell"]: (row, one) for row, one, _ in run_unit(plan, prepared, whole_unit(plan, plan.batches[0]), "cpu")
+    }
     parts = [pair for unit in reversed(plan.units) for pair in run_unit(plan, prepared, unit, "cpu")]
     assert len(parts) == len(whole) == plan.cells
     for row, predictor, _ in parts:
@@ -365,7 +367,7 @@ def test_a_path_that_no_ship_can_follow_is_a_cell_without_a_result(
         return paths
 
     monkeypatch.setattr(Predictor, "predict", wild)
-    rows = [row for row, *_ in run_unit(plan, prepare(plan, obtain(plan)), plan.whole(plan.batches[0]), "cpu")]
+    rows = [row for row, *_ in run_unit(plan, prepare(plan, obtain(plan)), whole_unit(plan, plan.batches[0]), "cpu")]
     assert {row["status"] for row in rows} == {"diverged"}
     assert all("farther than any ship gets, on 50.0" in row["sentence"] for row in rows)
     assert np.isnan([row["H"] for row in rows]).all()
@@ -388,7 +390,7 @@ def test_runs_too_short_to_learn_from_are_a_value(tmp_path: Path) -> None:
 def test_absent_device_is_one_line(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path)
     with pytest.raises(ShipidError, match="no such device") as caught:
-        run_unit(plan, prepare(plan, obtain(plan)), plan.whole(plan.batches[0]), "cuda:99")
+        run_unit(plan, prepare(plan, obtain(plan)), whole_unit(plan, plan.batches[0]), "cuda:99")
     assert caught.value.path == "--device cuda:99"
 
 
@@ -436,11 +438,11 @@ def test_a_folder_of_before_a_vessel_changed_names_the_vessel(tmp_path: Path) ->
 
 def test_a_folder_of_before_a_log_changed_names_the_log(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path)
-    make_run(tmp_path / "run", replace(plan, sources={"mapping": "a", "log": "b"}))
+    make_run(tmp_path / "run", completed_plan(replace(plan, sources={"mapping": "a", "log": "b"})))
     with pytest.raises(
         ResultError, match=r"results from before the log changed: choose another --out, or go on with it as it was"
     ):
-        make_run(tmp_path / "run", replace(plan, sources={"mapping": "a", "log": "c"}))
+        make_run(tmp_path / "run", completed_plan(replace(plan, sources={"mapping": "a", "log": "c"})))
 
 
 def refused(folder: Path, plan: Plan, stored: object = None, **record: object) -> str:
@@ -595,7 +597,7 @@ def test_methods_are_fitted_with_the_seed_of_their_batch(tmp_path: Path, monkeyp
     monkeypatch.setattr(PathDrawn, "fit", fit)
     prepared = prepare(plan, obtain(plan))
     for batch in plan.batches:
-        run_unit(plan, prepared, plan.whole(batch), "cpu")
+        run_unit(plan, prepared, whole_unit(plan, batch), "cpu")
     assert seen == [batch.seed for batch in plan.batches]
     assert sorted(seen) == [3, 8]
 
