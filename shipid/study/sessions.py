@@ -114,7 +114,7 @@ def check_workers(plan: Plan) -> None:
         raise
     except Exception as error:  # of a module as it is imported, of a class or of a name in TERMS that is not there
         why = f" ({type(error).__name__}: {error})".replace(": )", ")")
-    lacking = [what for what, digest in here.items() if there.get(what) != digest or digest == UNKNOWN]
+    lacking = [what for what, digest in here.items() if there.get(what) != digest]
     if not lacking:
         return
     if there.keys() >= here.keys() and UNKNOWN not in here.values():

@@ -22,6 +22,7 @@ from shipid.predictor import Predictor
 from shipid.study import foundations, run, store
 from shipid.study import prepare as preparing
 from shipid.study.advise import answer
+from shipid.study.cells import accuracy_of
 from shipid.study.foundations import predictions
 from shipid.study.plan import Batch, Plan, fitted_families, judged_method, whole_unit
 from shipid.study.prepare import apart, instants_of, prepare
@@ -53,8 +54,8 @@ def test_a_wrong_model_finds_the_right_numbers(recorded: Recorded) -> None:
     prepared = prepare(plan, dataset)
     foundations = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")
     assert list(foundations) == ["wrong", "fitted", "none"]
-    assert foundations["wrong"].accuracy(prepared.test)["mean"] > 0.01
-    assert foundations["fitted"].accuracy(prepared.test)["mean"] < 1e-4
+    assert accuracy_of(foundations["wrong"].test_paths, prepared.test)["A"] > 0.01
+    assert accuracy_of(foundations["fitted"].test_paths, prepared.test)["A"] < 1e-4
     variant = foundations["fitted"].foundation.variant
     assert variant is not None
     right = plan.vessels["gunnerus-28.9"].parameters
@@ -156,8 +157,8 @@ def test_an_observer_along_another_run_sees_no_moment_of_the_test(recorded: Reco
 def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
     """On a shared clock the rows of the test are gone: errors on runs left out are as small as on separate clocks."""
     kept: list[Any] = []
-    refitted = run.refitted
-    monkeypatch.setattr(run, "refitted", lambda *given: kept.append(refitted(*given)) or kept[-1])
+    refitted = run.errors_left_out
+    monkeypatch.setattr(run, "errors_left_out", lambda *given: kept.append(refitted(*given)) or kept[-1])
     method = [{"name": "force", "kind": "learned-force", "units": 3, "iterations": 3, "families": ["wrong", "plain"]}]
     method.append({**METHODS[0], "families": ["none"]})
     changes: dict[str, Any] = {"method": method, "bands": {"refits": 2}, "split": {"test": ["b"]}}
@@ -185,7 +186,7 @@ def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(rec
     for waves, fade in product(([0.0], [0.01], [0.0, 0.01]), (0.0, 12.0, 40.0)):
         block = {**CHOOSING, "choose": False, "waves": waves, "fade": fade}
         other, _ = study(recorded, [WRONG, {**SEEN, "observer": block}])
-        given = predictions(other, prepare(other, dataset), runs, "cpu", {"seen"})["seen"]
+        given = predictions(prepare(other, dataset), runs, "cpu", {"seen"})["seen"]
         assert chosen <= position_error(given.paths, windows.future).mean() * 1.02, (waves, fade)
     assert known.seconds > 0
 

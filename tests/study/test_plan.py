@@ -22,6 +22,7 @@ from shipid.study.plan import (
     _sources,
     build_plan,
     completed_plan,
+    default_folder,
     digest_without_seed,
     drawn_conditions,
     fitted_families,
@@ -181,7 +182,7 @@ def test_another_source_is_another_study(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path)
     logs = [completed_plan(replace(plan, sources={"log": digest})) for digest in ("aa", "bb")]
     assert len({one.digest for one in (plan, *logs)}) == 3
-    assert logs[0].folder != logs[1].folder
+    assert default_folder(logs[0]) != default_folder(logs[1])
 
 
 def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:

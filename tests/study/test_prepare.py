@@ -88,7 +88,7 @@ def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Datase
 def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> None:
     plan, _, prepared = tiny
     split = plan.study.split.model_copy(update={"folds": folds})
-    plan = replace(plan, study=plan.study.model_copy(update={"split": split}))
+    prepared = replace(prepared, study=plan.study.model_copy(update={"split": split}))
     for batch in plan.batches:
         windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
         pairs = prepared.folds(batch, windows, "share")

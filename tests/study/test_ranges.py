@@ -94,7 +94,7 @@ def test_the_numbers_are_those_that_windows_hold(horizon: int, past: int) -> Non
         parts += group.values()
     held = sum(np.size(part) for part in parts)
     wide = len(log.frame.columns)
-    ahead = Prediction(ahead=2.0 * horizon, step=2.0, interval=3.0)
+    ahead = Prediction.model_construct(ahead=2.0 * horizon, step=2.0, interval=3.0)
     numbers = 2 * window_numbers(ahead, past, wide, 0, 60.0)
     assert held <= numbers <= len(windows.t) * ((horizon + 1) * 2 * wide + (past + 1) * wide)
     more = 2 * window_numbers(ahead, past, wide, 2, 60.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import permutations
@@ -16,7 +15,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
 from shipid.study import rotate as rotate_module
-from shipid.study.plan import Plan
+from shipid.study.plan import Plan, whole_unit
 from shipid.study.prepare import prepare
 from shipid.study.rotate import copied, rotate, spread, turn_findings, turns
 from shipid.study.run import run_unit
@@ -62,7 +61,7 @@ def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Pl
     for test in ("a", "b"):
         single, _ = recorded(weaving(), split={"test": [test]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
         prepared = prepare(single, dataset)
-        rows = [row for row, *_ in run_unit(single, prepared, single.whole(single.batches[0]), "cpu")]
+        rows = [row for row, *_ in run_unit(single, prepared, whole_unit(single, single.batches[0]), "cpu")]
         turn = rows_of_turns[rows_of_turns["test"] == test]
         assert list(turn["foundation"]) == [row["foundation"] for row in rows]
         assert (turn["N_D"] == 5).all()
@@ -108,32 +107,6 @@ def test_an_interrupted_rotation_goes_on_to_the_same_digits(
     pd.testing.assert_frame_equal(again, whole, check_exact=True)
     rotate_module.forget(kept)
     assert not (tmp_path / "rows.csv.turns").exists()
-
-
-def test_two_rotations_to_one_file_share_the_work(
-    recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each batch is computed once, the other process waits for it; the one that ends last removes what was kept."""
-    plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
-    kept, begun = rotate_module.kept_folder(tmp_path / "rows.csv", plan, dataset), []
-
-    def counted(*arguments: Any) -> Any:
-        begun.append(arguments)
-        return run_unit(*arguments)
-
-    monkeypatch.setattr(rotate_module, "run_unit", counted)
-    first = rotate(plan, dataset, ["a", "b"], kept=kept)
-    one = [next(first)]
-    second = threading.Thread(target=lambda: frames.extend(rotate(plan, dataset, ["a", "b"], kept=kept)))
-    frames: list[pd.DataFrame] = []
-    second.start()
-    one += list(first)
-    rotate_module.forget(kept)
-    second.join()
-    assert len(begun) == 2
-    pd.testing.assert_frame_equal(pd.concat(frames), pd.concat(one), check_exact=True)
-    rotate_module.forget(kept)
-    assert not kept.exists()
 
 
 def test_what_is_kept_belongs_to_one_question(
@@ -211,8 +184,8 @@ def test_no_finding_is_about_numbers_that_were_set_from_runs_that_test(made: Cal
     plan: Plan = made(cells, claims=claims, alone={"good": 1.0, "bad": 2.0, "tuned": 0.5}).plan
 
     def seen(**runs: list[str]) -> Plan:
-        families = [one.model_copy(update={"seen": runs.get(one.name, [])}) for one in plan.study.family]
-        return replace(plan, study=plan.study.model_copy(update={"family": families}))
+        families = [one.model_copy(update={"seen": runs.get(one.name, [])}) for one in plan.families]
+        return replace(plan, families=tuple(families))
 
     for name in ("good", "bad"):
         unfair = turn_findings(many(), seen(**{name: ["another run", "ZZ 1"]}))
