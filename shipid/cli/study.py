@@ -496,7 +496,7 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]
     answer.rows("errors", errors, table(columns, wide.reset_index().to_numpy().tolist()))
     if len(bands):
-        level = worlds[0].plan.level
+        level = worlds[0].plan.study.bands.level
         answer.say(
             f"bands of {level_text(level)}: share of whole test paths inside, and mean radius [m], "
             "mean [least, greatest]:"

@@ -21,6 +21,13 @@ from tests.study.made_up import Size, table
 LEVEL = 0.9
 
 
+def drawn_plan(methods: list[str]) -> Any:
+    """A plan that judges by the method `drawn`, of several methods."""
+    ways = [SimpleNamespace(name=name, foundations=(), method=SimpleNamespace(compensates=True)) for name in methods]
+    study = SimpleNamespace(claims=None, bands=SimpleNamespace(level=LEVEL))
+    return SimpleNamespace(methods=ways, study=study)
+
+
 def held(rng: np.random.Generator, share: float, runs: int = 20, windows: int = 50) -> Verdict:
     """Verdict on B2 where bands hold a share of the paths, more in some manoeuvres than in others."""
     each = rng.beta(4 * share, 4 * (1 - share), runs)
@@ -162,7 +169,7 @@ def test_widths_are_means_of_each_manoeuvre_where_every_model_has_a_band() -> No
     paths = {str(row["cell"]): np.zeros((2, 3, 2)) for row in rows}
     results: Any = SimpleNamespace(
         cells=pd.DataFrame(rows),
-        plan=SimpleNamespace(judged="drawn", plain=None),
+        plan=drawn_plan(["drawn"]),
         test=SimpleNamespace(run=run, future=np.ones((2, 3, 2))),
         paths=paths,
         physics={"good": np.zeros((2, 3, 2))},
@@ -187,7 +194,7 @@ def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(
     results: Any = SimpleNamespace(
         cells=pd.DataFrame(rows),
         complete=True,
-        plan=SimpleNamespace(judged="drawn", methods=methods, plain=None, level=LEVEL),
+        plan=drawn_plan(methods),
         test=SimpleNamespace(run=run, future=np.ones((2, 10, 2))),
         paths={f"{name}-9": np.zeros((2, 10, 2)) for name in models},
         physics=dict.fromkeys(models, np.zeros((2, 10, 2))),
