@@ -43,7 +43,7 @@ from shipid.simulation.approach import Controls
 from shipid.simulation.standard import standard
 from shipid.simulation.truth import Truth, simulate
 from shipid.study.envelope import envelope_table
-from shipid.study.plan import Plan, build_plan
+from shipid.study.plan import Plan, build_plan, orders_may_react
 from shipid.study.schema import Published
 from shipid.units import DEGREE
 from shipid.vessel import perturb
@@ -451,10 +451,10 @@ def test_a_document_the_measures_of_a_log_and_the_command_take_the_manoeuvre(tmp
 @pytest.mark.usefixtures("coast_down")
 def test_a_study_and_its_schema_take_the_manoeuvre(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = coasting_study(tmp_path)
-    assert not plan.reacting
+    assert not orders_may_react(plan)
     assert simulate(plan.study.truth, plan.truth)["propeller.n"].eq(0).all()
     assert '"coast_down"' in json.dumps(schema_of("study"))
     coasting = manoeuvre.KINDS["coast_down"]
     helmed = {"helmsman": lambda _, controls: helm.course_keeping(controls.commands)}
     monkeypatch.setitem(manoeuvre.KINDS, "coast_on_course", type("CoastOnCourse", (coasting,), helmed))
-    assert coasting_study(tmp_path, "coast_on_course").reacting
+    assert orders_may_react(coasting_study(tmp_path, "coast_on_course"))

@@ -30,7 +30,7 @@ from shipid.evidence import which_significant, world_interval
 from shipid.files import as_argument
 from shipid.metrics import over_time, position_error
 from shipid.study.declared import NO_METHOD, NO_MODEL
-from shipid.study.plan import Plan
+from shipid.study.plan import Plan, digest_without_seed, drawn_conditions, fitted_families, learns_from_runs
 from shipid.study.results import Results, read_results
 from shipid.study.schema import WORLDS, Study
 from shipid.study.store import stored_plan
@@ -174,7 +174,7 @@ def _matching_cells(results: Results) -> pd.DataFrame:
     good = good.assign(seed=good["seed"] - WORLDS * results.plan.study.seed)
     known = [name for name, path in results.physics.items() if name != NO_MODEL and np.isfinite(path).all()]
     alone = results.cells.drop_duplicates("foundation").reindex(columns=columns)
-    alone = alone[alone["foundation"].isin(known) & ~alone["family"].isin(results.plan.fitted)]
+    alone = alone[alone["foundation"].isin(known) & ~alone["family"].isin(fitted_families(results.plan))]
     alone = alone.assign(cell="", method=NO_METHOD, N_D=0, seed=0, coverage=np.nan)
     return pd.concat([alone, good], ignore_index=True).astype({"coverage": float})
 
@@ -198,7 +198,9 @@ def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], 
     here, there = (np.array([of[key] for key in one if key in two], dtype=np.int64) for of in (one, two))
     columns = [(first.test.columns[name][here], other.test.columns[name][there]) for name in MOTION_COLUMNS]
     same = all(np.allclose(a, b, rtol=1e-6, atol=1e-9) for a, b in columns)
-    draws = first.plan.draws is not None and first.plan.draws == other.plan.draws  # the same orders, whatever the ship
+    draws = drawn_conditions(first.plan) is not None and drawn_conditions(first.plan) == drawn_conditions(
+        other.plan
+    )  # the same orders, whatever the ship
     if not (len(here) and (same or draws)):
         raise ShipidError(f"tests on other manoeuvres than {first.folder}: nothing can be paired", file=other.folder)
     return here, there
@@ -213,7 +215,7 @@ def _cell_errors(results: Results, part: pd.DataFrame, side: str, windows: NDArr
         path = results.paths[str(cell)] if cell else results.physics[str(foundation)]
         error = over_time(position_error(path[:, windows], test.future[:, windows]))
         row = results.cells[results.cells["cell"] == cell]
-        learns = bool(cell) and results.plan.learns(*row.iloc[0][["family", "method"]])
+        learns = bool(cell) and learns_from_runs(results.plan, *row.iloc[0][["family", "method"]])
         cells.append(CellErrors(str(foundation), np.bincount(place, error) / counts, counts.astype(float), learns))
     return cells
 
@@ -276,7 +278,7 @@ def _value_in_words(value: Any) -> str:
 def are_worlds(folders: Sequence[Path]) -> bool:
     """Whether folders hold one study in different worlds, so that they are repetitions of one another."""
     plans = [stored_plan(folder) for folder in folders]
-    same = len({plan.digest_in_any_world for plan in plans}) == 1
+    same = len({digest_without_seed(plan) for plan in plans}) == 1
     return same and len(plans) > 1 and len({plan.study.seed for plan in plans}) == len(plans)
 
 
@@ -316,7 +318,7 @@ def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
     parts, keys, numbers = [], ["family", "method", "N_D"], ["H", "coverage", "width"]
     for results in worlds:
         good = results.cells[results.cells["status"] == "ok"].reindex(columns=[*keys, "foundation", "A", *numbers])
-        known = ~good["family"].isin([NO_MODEL, *results.plan.fitted])
+        known = ~good["family"].isin([NO_MODEL, *fitted_families(results.plan)])
         alone = good[known].drop_duplicates("foundation")
         alone = alone.assign(N_D=0, H=alone["A"], method=NO_METHOD, coverage=np.nan, width=np.nan)
         every = pd.concat([alone, good]).astype(dict.fromkeys(numbers, float))

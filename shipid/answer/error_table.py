@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from shipid.evidence import Differences, paired_difference, training_noise
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
+from shipid.study.plan import learns_from_runs
 from shipid.study.results import Results
 
 Array = NDArray[np.float64]
@@ -136,7 +137,9 @@ def intervals_frame(results: Results) -> pd.DataFrame:
     for N_D, mine in results.cells[results.cells["cell"].isin(list(results.errors))].groupby("N_D", sort=True):
         by_model = {str(name): same for name, same in mine.groupby("model", sort=False)}
         errors = [np.stack([results.errors[str(cell)] for cell in same["cell"]]) for same in by_model.values()]
-        trained = np.array([results.plan.learns(*same.iloc[0][["family", "method"]]) for same in by_model.values()])
+        trained = np.array(
+            [learns_from_runs(results.plan, *same.iloc[0][["family", "method"]]) for same in by_model.values()]
+        )
         noise = training_noise([each @ weights for each, moved in zip(errors, trained, strict=True) if moved])
         means = np.stack([each.mean(axis=0) for each in errors])
         training = trained * noise * (means @ weights) / np.sqrt([len(each) for each in errors])

@@ -6,6 +6,7 @@ from shipid.answer.findings_bands import BAND_RULES, band_findings
 from shipid.answer.findings_full_scale import FULL_SCALE_RULES, full_scale_findings
 from shipid.answer.findings_simulation import SIMULATION_RULES, simulation_findings
 from shipid.answer.verdict import Finding, leave_undecided
+from shipid.study.plan import unfair_reason
 from shipid.study.results import Results
 
 
@@ -14,7 +15,7 @@ def findings(results: Results) -> list[Finding]:
     claims = results.plan.study.claims
     if claims is None or not (results.cells["status"] == "ok").any():
         return []
-    unfair = results.plan.unfair(results.test.spans)
+    unfair = unfair_reason(results.plan, results.test.spans)
     rivals, simulated = claims.accurate is not None, claims.moderate is not None
     roles = (claims.moderate, claims.high) if simulated else (claims.accurate, claims.inaccurate)
     physics = [one.name for role in roles for one in results.plan.foundations if one.family == role]

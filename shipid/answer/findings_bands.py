@@ -43,6 +43,7 @@ from shipid.evidence import all_significant, any_significant, share_interval
 from shipid.metrics import rank_correlation, share_of
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
+from shipid.study.plan import judged_method
 from shipid.study.results import Results
 from shipid.units import level_text, percent
 
@@ -92,7 +93,11 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     """
     if not results.complete:
         return leave_undecided(BAND_RULES, results.missing)
-    level, run, of = results.plan.study.bands.level, results.test.run, of_methods(results, [results.plan.judged])
+    level, run, of = (
+        results.plan.study.bands.level,
+        results.test.run,
+        of_methods(results, [judged_method(results.plan)]),
+    )
     widths, held = {}, {}
     for row, by_level, apart in cell_regions(results, [level]):
         region, cell = by_level[level], str(row["cell"])

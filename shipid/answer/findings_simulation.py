@@ -69,6 +69,7 @@ from shipid.evidence import (
 from shipid.metrics import rank_correlation, roughness
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
+from shipid.study.plan import judged_method
 from shipid.study.results import Results
 from shipid.units import percent, plural
 
@@ -133,7 +134,7 @@ def read_grid(results: Results) -> ErrorGrid:
     if not results.complete:
         raise Undecided(results.missing)
     if NO_MODEL not in set(cells["model"]):
-        raise Undecided(f"the method {results.plan.judged!r} is not run without physics")
+        raise Undecided(f"the method {judged_method(results.plan)!r} is not run without physics")
     if NO_MODEL in set(cells["model"][cells["status"] != "ok"]):
         raise Undecided(f"{quoted_model(NO_MODEL)} has no result in every cell")
     if cells["N_D"].nunique() < 2:
@@ -381,7 +382,7 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
     assert results is not None
     if results.test.horizon < 3:
         raise Undecided("a second difference needs three steps ahead")
-    terms = next(way.method.traits.terms for way in results.plan.methods if way.name == results.plan.judged)
+    terms = next(way.method.traits.terms for way in results.plan.methods if way.name == judged_method(results.plan))
     if terms is not None and terms < results.plan.study.prediction.horizon:
         evidence = "the compensation is a polynomial of time, which is smooth whatever it learned"
         return "not testable", f"{evidence}; 'path-trained' is not", {}

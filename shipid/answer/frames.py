@@ -18,6 +18,7 @@ from shipid.report.selection import FEW_RUNS, spread
 from shipid.study import store
 from shipid.study.declared import NO_MODEL, Way
 from shipid.study.envelope import envelope_table
+from shipid.study.plan import grid_seeds, learns_from_runs, vessels_of
 from shipid.study.prepare import constant_motion
 from shipid.study.results import Results
 from shipid.vessel.outline import ship_outline
@@ -104,7 +105,11 @@ def kinds_frame(results: Results) -> pd.DataFrame:
         errors[model, "physics", 0] = [position_error(path, results.test.future)]
     largest = int(results.cells["N_D"].max()) if len(results.cells) else 0
     for row in results.rows:
-        if row["cell"] in results.paths and row["N_D"] == largest and results.plan.learns(row["family"], row["method"]):
+        if (
+            row["cell"] in results.paths
+            and row["N_D"] == largest
+            and learns_from_runs(results.plan, row["family"], row["method"])
+        ):
             error = position_error(results.paths[row["cell"]], results.test.future)
             errors.setdefault((row["model"], "cooperative", largest), []).append(error)
     rows = []
@@ -165,7 +170,7 @@ def window_snapshots(results: Results) -> list[Snapshot]:
         (one.base.document.get("particulars", {}) for one in results.plan.foundations if one.base), {}
     )
     begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
-    test, level, origin = results.test, results.plan.level, np.zeros((1, 2))
+    test, level, origin = results.test, results.plan.study.bands.level, np.zeros((1, 2))
     seed, amounts, alone = int(results.cells["seed"].min()), shown_amounts(results), alone_models(results)
     paths = {(m, "physics", 0): path for m, path in results.physics.items() if m != NO_MODEL and m not in alone}
     edges: dict[tuple[str, str, int], Region] = {}
@@ -232,7 +237,7 @@ def tracks_frame(results: Results) -> pd.DataFrame:
 
 def envelope_frame(results: Results) -> pd.DataFrame:
     """Least, mean and greatest input per set, as the paper's Tables 1 and 2; degrees and rpm."""
-    return envelope_table(read_json(results.folder / store.ENVELOPE), results.plan.published)
+    return envelope_table(read_json(results.folder / store.ENVELOPE), results.plan.study.published)
 
 
 def factors_frame(results: Results) -> pd.DataFrame:
@@ -282,17 +287,17 @@ def provenance_words(results: Results) -> dict[str, str]:
     whole = isinstance(source, Mapping)
     words = {
         "study": f"{plan.name}, digest {record['digest']}",
-        "vessels": "; ".join(sorted({f"{v.key} {v.digest}" for v in plan.used_vessels})),
+        "vessels": "; ".join(sorted({f"{v.key} {v.digest}" for v in vessels_of(plan)})),
         "data": "; ".join(f"{key} {value}" for key, value in source.items()) if whole else str(source),
         "cells": f"{len(results.cells)} of {plan.cells} finished",
-        "seeds": ", ".join(map(str, plan.seeds)),
+        "seeds": ", ".join(map(str, grid_seeds(plan))),
         "methods": "; ".join(map(_method_words, plan.methods)),
         "computed with": f"Python {machine.get('python', '?')} on {machine.get('system', '?')}, "
         f"{machine.get('cores', '?')} cores",
         "packages": ", ".join(f"{name} {number}" for name, number in machine.get("packages", {}).items()),
         "wall time": f"{record.get('wall_seconds', float('nan')):.0f} s, without interrupted sessions",
-        "world": f"seed {plan.seed}" if plan.seed else "",
-        "published envelope": plan.published.source if plan.published else "",
+        "world": f"seed {plan.study.seed}" if plan.study.seed else "",
+        "published envelope": plan.study.published.source if plan.study.published else "",
         "redrawn": "; ".join(f"{row['model']}: counter {int(row['counter'])}" for row in redrawn),
         "computed in parts": "; ".join(w for pair in pairwise(sessions) for w in store.differences(*pair)),
         "notes": "; ".join(record.get("notes", [])),

@@ -15,6 +15,7 @@ from shipid.observer import bank, observe
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.declared import Foundation, Way
+from shipid.study.plan import learns_from_runs, model_label
 from shipid.study.prepare import known_by_then
 from shipid.study.results import Results
 
@@ -114,7 +115,7 @@ def memory_frame(results: Results) -> pd.DataFrame:
     rows, family = list[dict[str, Any]](), {one.name: one.family for one in results.plan.foundations}
 
     def errors(named: CellName, paths: Sequence[Array]) -> list[CellErrors]:
-        learns = results.plan.learns(family[named[0]], named[1])
+        learns = learns_from_runs(results.plan, family[named[0]], named[1])
         return [CellErrors(named[0], results.path_errors(path), results.windows, learns) for path in paths]
 
     for pair, N_D, first, second in _paired_paths(results):
@@ -132,7 +133,7 @@ def memory_frame(results: Results) -> pd.DataFrame:
 
 def _names_of_pair(pair: MemoryPair, results: Results) -> dict[str, Any]:
     without, remembering = (
-        f"{name}, {method}" if method == PHYSICS_ALONE else results.plan.label(name, method)
+        f"{name}, {method}" if method == PHYSICS_ALONE else model_label(results.plan, name, method)
         for name, method in (pair.without, pair.remembering)
     )
     names = {"comparison": pair.comparison, "added": pair.added, "model": pair.without[0]}
@@ -177,7 +178,7 @@ def observer_frame(results: Results) -> pd.DataFrame:
         return pd.DataFrame()
     name, vessel, settings = predictor[0], predictor[1].vessel, predictor[1].physics.observer
     part = results.dataset.select(shown_runs(results))
-    known = observe(vessel, known_by_then(results.plan, part), settings)
+    known = observe(vessel, known_by_then(results.plan.study, part), settings)
     begins = np.isnan(known.innovation).all(axis=1)
     table = pd.DataFrame({**part.frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *OBSERVER_COLUMNS]]
     table["observer.test"] = np.where(begins, np.nan, table["observer.test"])

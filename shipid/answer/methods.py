@@ -15,6 +15,7 @@ from shipid.arguments import of_class
 from shipid.evidence import ROUNDING, world_interval
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
+from shipid.study.plan import judged_method, learns_from_runs
 from shipid.study.results import Results
 
 EVERY = "with physics"  # all families but `none` and those that saw the test runs
@@ -38,7 +39,7 @@ def compare_methods(results: Results) -> pd.DataFrame:
     Raises ShipidError for results that are none.
     """
     of_class("results", results, Results, "as of `read_results`")
-    return method_table(method_cells(results), results.plan.judged)
+    return method_table(method_cells(results), judged_method(results.plan))
 
 
 def methods_frame(results: Results) -> pd.DataFrame:
@@ -62,7 +63,7 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
         kept |= {"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw}
         if (cell := row["cell"]) in results.paths:
             kept["end"] = float(position_error(results.paths[cell][-1:], results.test.future[-1:]).mean())
-            learns = results.plan.learns(row["family"], row["method"])
+            learns = learns_from_runs(results.plan, row["family"], row["method"])
             kept["errors"] = CellErrors(row["foundation"], results.errors[cell], results.windows, learns, world)
         rows.append(kept)
     return pd.DataFrame(rows)

@@ -21,15 +21,14 @@ from shipid.report import Finding, ReportContent, Sentence, write_report, write_
 from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent, verdicts
 from shipid.study import store
-from shipid.study.claims import UnitClaims
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import Plan
+from shipid.study.lock import PAGES, sole_writer
+from shipid.study.plan import Plan, judged_method, model_label, plan_text, run_command
 from shipid.study.results import Results, read_results
 
 log = logging.getLogger(__name__)
 
 Say = Callable[[str], object]
-PAGES = "report"  # name of the claim on the pages
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "observer": memory.observer_frame,
@@ -75,9 +74,9 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         envelope=frames.envelope_frame(results),
         repairs=frames.repairs_frame(results),
         provenance=frames.provenance_words(results),
-        study_document=plan.text(),
-        command=plan.command,
-        best="" if best is None else plan.label(best, plan.judged),
+        study_document=plan_text(plan),
+        command=run_command(plan),
+        best="" if best is None else model_label(plan, best, judged_method(plan)),
         alone=frames.alone_models(results),
         frames=tables,
     )
@@ -85,7 +84,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
 
 def _shown_models(results: Results) -> pd.DataFrame:
     """The models; without `none` where no method that the study judges by meets it: nothing of it can be drawn."""
-    judged = (NO_MODEL, results.plan.judged) in {(name, way.name) for name, way in results.plan.pairs}
+    judged = (NO_MODEL, judged_method(results.plan)) in {(name, way.name) for name, way in results.plan.pairs}
     return results.models if judged else results.models[results.models["model"].ne(NO_MODEL)]
 
 
@@ -100,7 +99,7 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
     folder = path_of("folder", folder)
     store.stored_plan(folder)
     store.check_writable(folder)
-    with UnitClaims(folder) as claims, claims.alone(PAGES):
+    with sole_writer(folder, PAGES, wait=True):
         return _write(folder, say)
 
 
@@ -118,9 +117,8 @@ def _write(folder: Path, say: Say | None) -> Path:
 
 def _write_one(folder: Path, say: Say | None) -> tuple[Path, bool]:
     """The pages of one run, and whether all of its cells are in them."""
-    with UnitClaims(folder) as claims, claims.alone(store.RESULTS):  # tables are those of the page, or of the whole run
-        results = read_results(folder, say)
-        store.write_results(folder, results.plan, results.cells, whole=results.complete)
+    results = read_results(folder, say)
+    store.write_results(folder, results.plan, results.cells, whole=results.complete)
     content = report_content(results, say)
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     write_summary(content, folder / SUMMARY)
@@ -146,15 +144,15 @@ def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]
         notes[name] = f"{len(results.cells)} of {part.plan.cells} cells"
     if not cells:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
-    frame = methods.method_table(pd.concat(cells, ignore_index=True), plan.judged)
+    frame = methods.method_table(pd.concat(cells, ignore_index=True), judged_method(plan))
     write_table(folder / METHODS, frame)
     content = MethodsContent(
         title=plan.study.question,
         name=plan.name,
         frames={"methods": frame},
         provenance={"study": f"{plan.name}, digest {plan.digest}", **notes},
-        study_document=plan.text(),
-        command=plan.command,
+        study_document=plan_text(plan),
+        command=run_command(plan),
     )
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     return write_comparison(content, folder / REPORT), len(whole) == len(plan.parts) and all(whole)

@@ -22,7 +22,16 @@ from shipid.errors import DocumentError, choices
 from shipid.study import store
 from shipid.study.code import code_digest
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import Plan, build_plan
+from shipid.study.plan import (
+    Plan,
+    build_plan,
+    families_aside,
+    families_set_from,
+    judged_method,
+    own_code,
+    rotated_plan,
+    unfair_reason,
+)
 from shipid.study.prepare import all_windows, partition
 from shipid.study.results import read_cells
 from shipid.study.run import run_study
@@ -72,7 +81,7 @@ def rotate(
     """
     with TemporaryDirectory() if kept is None else nullcontext(kept) as place:
         for test in tests:
-            rest, _, _ = partition(plan.turn(test, 2), dataset)
+            rest, _, _ = partition(rotated_plan(plan, test, 2), dataset)
             changes = {"split.test": [test], "grid.N_D": [len(rest.spans)]}
             turn = build_plan(documents.replace(plan.document, changes), Path(plan.file), plan.vessels, plan.sources)
             folder = Path(place) / documents.digest(test)
@@ -85,7 +94,7 @@ def rotate(
 def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:
     """Folder of the turns of an interrupted rotation: one for each study, dataset, device and code."""
     vessels = {name: vessel.digest for name, vessel in plan.vessels.items()}  # the digest has them without their names
-    decides = [plan.digest, vessels, dataset.digest, device, code_digest(), plan.code]
+    decides = [plan.digest, vessels, dataset.digest, device, code_digest(), own_code(plan)]
     return file.with_name(f"{file.name}.turns") / documents.digest(decides)
 
 
@@ -122,10 +131,10 @@ def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
     if claims is None or claims.accurate is None or claims.inaccurate is None:
         return []
     tests = set(frame["test"])
-    if unfair := plan.unfair(tests):
+    if unfair := unfair_reason(plan, tests):
         return leave_undecided(FULL_SCALE_RULES, unfair)
-    aside = {*plan.aside, *plan.saw(tests)}
-    mine = frame[(frame["method"] == plan.judged) & ~frame["family"].isin(aside)]
+    aside = {*families_aside(plan), *families_set_from(plan, tests)}
+    mine = frame[(frame["method"] == judged_method(plan)) & ~frame["family"].isin(aside)]
     good, bad = claims.accurate, claims.inaccurate
     mine = mine.assign(model=mine["family"].where(mine["family"].isin([good, bad]), mine["foundation"]))
     H = mine[mine["status"] == "ok"].pivot_table(index="test", columns=["model", "seed"], values="H")

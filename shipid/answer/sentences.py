@@ -29,6 +29,7 @@ from shipid.evidence import Differences, paired_difference, which_significant
 from shipid.metrics import over_time
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
+from shipid.study.plan import families_set_from, fitted_families, judged_method, learning_methods, orders_may_react
 from shipid.study.results import Results
 from shipid.units import percent, plural
 
@@ -60,7 +61,7 @@ def best_model(results: Results) -> str | None:
     table = errors_by_model(results)
     table = table[~table["family"].isin(results.aside)]
     top = table[(table["N_D"] == table["N_D"].max()) & (table["family"] != NO_MODEL)]
-    fair = top[~top["family"].isin(results.plan.fitted)]
+    fair = top[~top["family"].isin(fitted_families(results.plan))]
     chosen = top if fair.empty else fair
     return None if chosen["loss"].isna().all() else str(chosen.iloc[int(chosen["loss"].argmin())]["model"])
 
@@ -145,7 +146,7 @@ class AnswerCase:
     def fixed(self) -> list[str]:
         """Physics models whose numbers do not depend on the cell and that have a result in every one."""
         top = self.at(self.largest)
-        names = map(str, top["model"][~top["family"].isin(self.results.plan.fitted)])
+        names = map(str, top["model"][~top["family"].isin(fitted_families(self.results.plan))])
         return [name for name in names if name in self.table.H and name in self.table.A]
 
     @property
@@ -166,7 +167,7 @@ def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str
     caveats = [(text, "cells") for text in _missing_cells(results)]
     if reason := _no_comparison(results, rows):
         return [*caveats, (reason, "cells"), *((text, "models") for text in saw_test)]
-    case, learning = AnswerCase(results, rows, best_model(results)), results.plan.learning
+    case, learning = AnswerCase(results, rows, best_model(results)), learning_methods(results.plan)
     chart = "map" if case.smallest < case.largest and case.at(case.largest)["model"].nunique() > 1 else "gain"
     several = len(learning) > 1
     parts: list[tuple[str, Iterable[str]]] = [
@@ -199,7 +200,7 @@ def _missing_cells(results: Results) -> Iterator[str]:
 
 def _families_that_saw_the_test(results: Results) -> Iterator[str]:
     """Which families saw the test runs, so that no other sentence counts them."""
-    if saw := results.plan.saw(results.test.spans):
+    if saw := families_set_from(results.plan, results.test.spans):
         it, them = plural(len(saw), "it is", "they are"), plural(len(saw), "it", "them")
         names = model_list(saw)
         yield f"The numbers of {names} were set from runs that test: {it} shown, and no other sentence counts {them}."
@@ -208,12 +209,12 @@ def _families_that_saw_the_test(results: Results) -> Iterator[str]:
 def _no_comparison(results: Results, rows: pd.DataFrame) -> str:
     """Why physics with data is compared with nothing, and the errors that are known; empty where it is compared."""
     plan, largest = results.plan, int(rows["N_D"].max()) if len(rows) else 0
-    learns = any(way.method.compensates for way in plan.methods if way.name == plan.judged)
+    learns = any(way.method.compensates for way in plan.methods if way.name == judged_method(plan))
     if learns and not rows[(rows["N_D"] == largest) & (rows["family"] != NO_MODEL)].empty:
         return ""
     if not learns:
-        reason = f"The method {plan.judged!r} learns nothing from data"
-    elif {name for name, way in plan.pairs if way.name == plan.judged} == {NO_MODEL}:
+        reason = f"The method {judged_method(plan)!r} learns nothing from data"
+    elif {name for name, way in plan.pairs if way.name == judged_method(plan)} == {NO_MODEL}:
         reason = "No method that learns from data has physics in this study"
     else:
         return "No cell with physics and data that counts has a result yet, so there is no conclusion."
@@ -237,7 +238,9 @@ def _horizon_in_words(results: Results) -> str:
 def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
     """How good physics must be to pay, at the smallest and at the largest amount of data."""
     if NO_MODEL not in case.table.H:
-        planned = (NO_MODEL, case.results.plan.judged) in {(name, way.name) for name, way in case.results.plan.pairs}
+        planned = (NO_MODEL, judged_method(case.results.plan)) in {
+            (name, way.name) for name, way in case.results.plan.pairs
+        }
         reason = "not every cell without physics has a result" if planned else "the study has no cell without physics"
         yield f"It is unknown whether physics harms, since {reason}."
         return
@@ -311,7 +314,7 @@ def _headline(case: AnswerCase) -> Iterator[str]:
     pure = case.rows[(case.rows["family"] == NO_MODEL) & (case.rows["N_D"] == largest)]
     without = f" Without physics: {case.H(NO_MODEL, largest)}." if len(pure) else ""
     if case.best is None:
-        text = f"no trial of the method {case.results.plan.judged!r} has a value, so no model is {BEST}. Mean errors "
+        text = f"no trial of the method {judged_method(case.results.plan)!r} has a value, so no model is {BEST}. Mean errors "
         text += f"{_horizon_in_words(case.results)} ahead{_least_errors(rows['H'])}"
     else:
         alone, worst = (length_in_metres(float(rows[name][case.best])) for name in ("A", "H_90"))
@@ -324,8 +327,8 @@ def _headline(case: AnswerCase) -> Iterator[str]:
 
 def _judged_method(case: AnswerCase) -> Iterator[str]:
     plan = case.results.plan
-    words = f"The study has {len(plan.learning)} methods that learn from data; the other sentences speak of"
-    yield f"{words} {plan.judged!r}, the one that the study judges by."
+    words = f"The study has {len(learning_methods(plan))} methods that learn from data; the other sentences speak of"
+    yield f"{words} {judged_method(plan)!r}, the one that the study judges by."
 
 
 def _sides_in_words(case: AnswerCase, sides: Sides) -> str:
@@ -404,10 +407,10 @@ def _against_constant_motion(case: AnswerCase) -> Iterator[str]:
 def _how_to_read(case: AnswerCase) -> Iterator[str]:
     """What "no physics" is, what identified models, models set from the runs and known commands mean, and brackets."""
     results, plan, top = case.results, case.results.plan, case.at(case.largest)
-    judged = next(way.method for way in plan.methods if way.name == plan.judged)
+    judged = next(way.method for way in plan.methods if way.name == judged_method(plan))
     if NO_MODEL in case.table.H and judged.traits.mirror:
         yield '"No physics" may use that port and starboard are mirror images, which is a little physics.'
-    fitted = top[top["family"].isin(plan.fitted)]
+    fitted = top[top["family"].isin(fitted_families(plan))]
     if fitted["loss"].notna().any() and case.best not in set(fitted["model"]):
         lowest = str(fitted.iloc[int(fitted["loss"].argmin())]["model"])
         yield (
@@ -416,13 +419,13 @@ def _how_to_read(case: AnswerCase) -> Iterator[str]:
             f"{count_runs(case.largest)}."
         )
     trained = set(results.dataset.runs) - set(results.test.spans)
-    saw = [name for name in plan.saw(trained) if name in set(top["family"])]
+    saw = [name for name in families_set_from(plan, trained) if name in set(top["family"])]
     if saw and case.smallest < case.largest:
         yield (
             f"The numbers of {model_list(saw)} were set from runs that train, whatever the amount of data: the errors "
             "with few runs rest on the other runs, too."
         )
-    if plan.study.prediction.commands == "known" and plan.reacting:
+    if plan.study.prediction.commands == "known" and orders_may_react(plan):
         yield (
             "The orders of the next seconds were known. In a zigzag they reveal when the heading will reach its limit, "
             "so these errors show at best what knowing the plan can give: an upper bound of its worth."

@@ -10,7 +10,7 @@ from typing import Any
 from shipid.answer.pages import write_pages
 from shipid.arguments import path_of
 from shipid.errors import ShipidError
-from shipid.study.plan import read_plan
+from shipid.study.plan import default_folder, read_plan
 from shipid.study.results import Results, read_results
 from shipid.study.run import Event, run_study
 from shipid.units import decimals_of
@@ -70,7 +70,7 @@ def events(
     last event is that folder.
     """
     plan = read_plan(study, set)
-    folder = plan.folder if out is None else path_of("out", out)
+    folder = default_folder(plan) if out is None else path_of("out", out)
     log.debug("study %s, digest %s, folder %s", plan.name, plan.digest, folder)
     yield from run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
 

@@ -75,7 +75,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     """The dataset of a study, and its envelope beside the published one."""
     from shipid.data.dataset import write_dataset
     from shipid.study.envelope import envelope, envelope_table
-    from shipid.study.plan import read_plan
+    from shipid.study.plan import input_files, read_plan
     from shipid.study.prepare import obtain, partition, runs_by_amount
 
     check_ending(out, ".parquet")
@@ -83,11 +83,11 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     if plan.truth is None:
         raise DocumentError("has no [truth]: its runs are recorded, so there is nothing to simulate", file=plan.file)
     file = out or Path(f"{plan.name}.parquet")
-    check_output(file, plan.inputs, "--out")
+    check_output(file, input_files(plan), "--out")
     dataset = obtain(plan)
     pool, test, _ = partition(plan, dataset)
-    rows_of_sets = envelope(pool, test, runs_by_amount(plan, pool), dataset.commands)
-    ranges = envelope_table(rows_of_sets, plan.published)
+    rows_of_sets = envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands)
+    ranges = envelope_table(rows_of_sets, plan.study.published)
     units = dict(zip(ranges["quantity"], ranges["unit"], strict=True))
     rows = [
         [str(name), *(_limits(part[part["quantity"] == quantity]) for quantity in units)]

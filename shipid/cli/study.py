@@ -12,7 +12,7 @@ import typer
 
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import bundled_or_file, files
-from shipid.cli.options import Changes, Device, Folder, Leave, Scheduler, StudyName, Workers, parsed, stem
+from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, parsed, stem
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import counted, digits, draw, ended_by, short, show_reasons, steps, table
 from shipid.errors import DocumentError, ShipidError
@@ -229,7 +229,9 @@ def study_rotate(
     plan, file = _before_work(study, changes, device, out, "rotate")
     dataset = obtain(plan)
     wanted = rotate.choose_turns(plan, dataset, tests)
-    cells = len(wanted) * len(plan.pairs) * len(plan.seeds)
+    from shipid.study.plan import grid_seeds
+
+    cells = len(wanted) * len(plan.pairs) * len(grid_seeds(plan))
     import pandas as pd
 
     kept = rotate.kept_folder(file, plan, dataset, device)
@@ -240,22 +242,26 @@ def study_rotate(
     rotate.remove_kept(kept)
     columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
     over = rotate.turns_table(frame)
+    from shipid.study.plan import model_label
+
     for row in over.to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
-        name = plan.label(row["foundation"], row["method"])
+        name = model_label(plan, row["foundation"], row["method"])
         inside = "-" if row["coverage"] != row["coverage"] else percent(row["coverage"])
         rows.append([name, *(digits(row[column]) for column in columns), inside, better])
-    band = f"in band of {level_text(plan.level)}"
+    band = f"in band of {level_text(plan.study.bands.level)}"
     heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
     verdicts = rotate.turn_findings(frame, plan)
     naive = frame.groupby("test")["naive"].first().mean()
+    from shipid.study.plan import families_set_from
+
     with answering(as_json) as answer:
         answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
         answer.rows("turns", over, table(heads, rows))
         answer.say(f"constant u, v, r: {digits(naive)} m", naive=naive)
         if words := rotate.repeated_runs_in_words(plan, dataset):
             answer.say(words, copied=words)
-        if saw := plan.saw(wanted):
+        if saw := families_set_from(plan, wanted):
             answer.say(
                 f"{', '.join(saw)}: numbers set from runs that test here, A and H are not those of new runs", saw=saw
             )
@@ -276,7 +282,9 @@ def study_run(
     out: Annotated[Path | None, typer.Option(help="folder; default results/<study>-<digest>")] = None,
     changes: Changes = None,
     device: Device = "cpu",
-    leave: Leave = False,
+    shard: Annotated[
+        str | None, typer.Option(help="i/n: every n-th unit of work from the i-th on, after `study prepare`")
+    ] = None,
 ) -> None:
     """Run a study and write its report; an interrupted run resumes when started again."""
     from shipid.study.workers import import_for_workers
@@ -286,7 +294,37 @@ def study_run(
     from shipid.study.plan import read_plan
 
     plan = read_plan(study, parsed(changes))
-    _run(plan, out or plan.folder, workers, scheduler, device, leave)
+    from shipid.study.plan import default_folder
+
+    _run(plan, out or default_folder(plan), workers, scheduler, device, _shard(shard))
+
+
+def _shard(text: str | None) -> tuple[int, int] | None:
+    """The numbers of `--shard i/n`."""
+    if text is None:
+        return None
+    number, _, count = text.partition("/")
+    if not (number.isdecimal() and count.isdecimal()):
+        raise ShipidError(f"{text!r}: write i/n, such as 3/20", path="--shard")
+    return int(number), int(count)
+
+
+@app.command("prepare")
+def study_prepare(
+    study: StudyName,
+    out: Annotated[Path | None, typer.Option(help="folder; default results/<study>-<digest>")] = None,
+    changes: Changes = None,
+    device: Device = "cpu",
+) -> None:
+    """Make the folder of a study with its runs, so that the tasks of a job array can work there with --shard."""
+    from shipid.study.plan import read_plan
+    from shipid.study.run import prepare_study
+
+    plan = read_plan(study, parsed(changes))
+    from shipid.study.plan import default_folder
+
+    for event in prepare_study(plan, out or default_folder(plan), device=device):
+        typer.echo(event.text)
 
 
 @app.command("resume")
@@ -295,12 +333,11 @@ def study_resume(
     workers: Workers = None,
     scheduler: Scheduler = None,
     device: Device = "cpu",
-    leave: Leave = False,
 ) -> None:
     """Continue an interrupted run."""
     from shipid.study.store import stored_plan
 
-    _run(stored_plan(folder), folder, workers, scheduler, device, leave)
+    _run(stored_plan(folder), folder, workers, scheduler, device)
 
 
 @app.command("report")
@@ -455,7 +492,7 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]
     answer.rows("errors", errors, table(columns, wide.reset_index().to_numpy().tolist()))
     if len(bands):
-        level = worlds[0].plan.level
+        level = worlds[0].plan.study.bands.level
         answer.say(
             f"bands of {level_text(level)}: share of whole test paths inside, and mean radius [m], "
             "mean [least, greatest]:"
@@ -486,24 +523,33 @@ def _before_work(
     plan = read_plan(study, parsed(changes))
     file = out or Path(f"{plan.name}-{command}.csv")
     check_table(file)
-    check_output(file, plan.inputs, "--out")
+    from shipid.study.plan import input_files
+
+    check_output(file, input_files(plan), "--out")
     return plan, file
 
 
-def _run(plan: Plan, folder: Path, workers: int | None, scheduler: str | None, device: str, leave: bool) -> None:
+def _run(
+    plan: Plan,
+    folder: Path,
+    workers: int | None,
+    scheduler: str | None,
+    device: str,
+    shard: tuple[int, int] | None = None,
+) -> None:
     from shipid.answer.pages import ANSWER, write_pages
     from shipid.files import as_argument
     from shipid.study import run, store
+    from shipid.study.plan import program_of
     from shipid.study.progress import Watch
 
-    resume = f"{plan.program} study resume {as_argument(folder)}"
+    resume = f"{program_of(plan)} study resume {as_argument(folder)}"
     with ended_by(f"interrupted; what is finished is kept. Continue with: {resume}"):
-        events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, leave=leave)
-        with closing(events):  # where a line cannot be printed, claims are given back before the process ends
-            end = draw(events, Watch(plan, folder))
-    if end is not None and end.done < end.total:
-        left = f"{end.total - end.done} of {end.total} cells"
-        typer.echo(f"others work on the last {left}: the one that ends last writes the report. If they die: {resume}")
+        events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, shard=shard)
+        with closing(events):  # where a line cannot be printed, the lock is given back before the process ends
+            draw(events, Watch(plan, folder))
+    if shard is not None:
+        typer.echo(f"shard {shard[0]} of {shard[1]} is finished. When all are: {resume}")
         return
     with store.in_place(folder, plan), steps() as say:
         report = write_pages(folder, say)

@@ -339,8 +339,6 @@ def draw(events: Iterable[Event], watch: Watch) -> Event | None:
                 progress.console.print(visible(event.text), markup=False, highlight=False)
             elif event.kind == "start":
                 progress.update(task, total=event.total, completed=event.done)
-            elif event.kind == "others":
-                progress.update(task, completed=event.done)
             elif event.kind == "cell":
                 row = event.row
                 if row["status"] == "ok":

@@ -7,18 +7,11 @@ from itertools import pairwise
 from pathlib import Path
 
 from shipid.files import TEMPORARY
-from shipid.study import claims, seals, store
+from shipid.study import seals, store
+from shipid.study.lock import current_writer
 from shipid.study.plan import Plan
 from shipid.study.seals import Fault
 from shipid.units import plural
-
-WORDS = {
-    "missing": "missing: `shipid study resume` computes it again",
-    "damaged": "damaged: `shipid study resume` computes it again",
-    "edited": "changed after it was written: put it back, or delete it and resume",
-    "foreign": "is of another study: delete it and {}, and resume",
-    "unreadable": "cannot be read ({}): let this user read it, or delete it and resume",
-}
 
 
 @dataclass(frozen=True)
@@ -35,46 +28,37 @@ def check_folder(folder: Path) -> Checked:
     Raises ResultError if it is not the folder of a run, or if its study, vessels or provenance were edited. Of a study
     that this shipid does not take the files are checked, and a line says why nothing else is.
     """
+    lines: list[str] = []
+    faults: dict[Path, list[Fault]] = {}
+    for place in (*sorted((folder / store.PARTS).glob("*/")), folder):
+        faults[place] = seals.faults(place)
+        lines += [f"{place / fault.file}: {fault.words}" for fault in faults[place]]
+    every = [fault for found in faults.values() for fault in found]
     try:
         plan = store.stored_plan(folder)
     except store.NotTaken as error:
-        faults = [_faults(place) for place in (folder, *sorted((folder / store.PARTS).glob("*/")))]
-        every = [fault for _, found in faults for fault in found]
-        counted = f"{len(every)} {plural(len(every), 'fault')}; how far the run is cannot be said: {error}"
-        return Checked([*(line for lines, _ in faults for line in lines), counted], every)
-    parts = {name: part.plan for name, part in plan.parts.items() if store.part_folder(folder, name).is_dir()}
-    checked = [_checked(store.check_part(folder, name, part), part, name) for name, part in parts.items()]
-    checked.append(_checked(folder, plan))
-    lines = [line for one in checked for line in one.lines]
-    if plan.parts:
-        lines += [f"{name}: not begun" for name in plan.parts if name not in parts]
-    return Checked(lines, [fault for one in checked for fault in one.faults])
+        return Checked([*lines, f"{_count_words(every)}; how far the run is cannot be said: {error}"], every)
+    for name, part in plan.parts.items():
+        place = store.check_part(folder, name, part.plan)
+        lines += _state(place, part.plan, faults[place], f"{name}: ") if place in faults else [f"{name}: not begun"]
+    return Checked([*lines, *_state(folder, plan, faults[folder])], every)
 
 
-def _faults(folder: Path) -> tuple[list[str], list[Fault]]:
-    """Files of one folder that are not as they were written, with a line each."""
-    faults = seals.faults(folder)
-    return [f"{folder / fault.file}: {WORDS[fault.kind].format(fault.reason)}" for fault in faults], faults
+def _count_words(faults: list[Fault]) -> str:
+    return f"{len(faults)} {plural(len(faults), 'fault')}"
 
 
-def _checked(folder: Path, plan: Plan, part: str = "") -> Checked:
-    """Check one folder of cells; `part` is its name in a study of several parts."""
-    if part:
-        store.stored_plan(folder)  # says what was edited
-    lines, faults = _faults(folder)
-    if plan.parts:
-        return Checked(lines, faults)
+def _state(folder: Path, plan: Plan, faults: list[Fault], name: str = "") -> list[str]:
+    """Lines on how far one folder is, who works in it, what killed runs left, and by what it was computed."""
+    store.stored_plan(folder)  # reports what was edited
     done = sum(len(unit.pairs) for unit in store.finished(folder, plan.units))
-    counted = f"{done} of {plan.cells} cells finished, {len(faults)} {plural(len(faults), 'fault')}"
-    lines.append(f"{part}: {counted}" if part else counted)
-    keys = {unit.key for unit in plan.units}
-    if held := [name for name in claims.held(folder) if name in keys]:  # other claims are no work of a user's
-        lines.append(f"at work, or ended without giving back: {', '.join(held)}")
+    lines = [] if plan.parts else [f"{name}{done} of {plan.cells} cells finished, {_count_words(faults)}"]
+    if writer := current_writer(folder):
+        lines.append(f"{name}at work: {writer}")
     left = [place for place in folder.rglob(f"{TEMPORARY}*") if place.is_dir()]
     if left:
         folders = f"{len(left)} {plural(len(left), 'temporary folder')}"
         lines.append(f"{folders} of killed runs: the next run removes {plural(len(left), 'it', 'them')}")
-    sessions = store.provenance(folder).get("sessions", [])
-    for before, after in pairwise(sessions):
-        lines.append(f"computed in parts: {'; '.join(store.differences(before, after))}")
-    return Checked(lines, faults)
+    for before, after in pairwise(store.provenance(folder).get("sessions", [])):
+        lines.append(f"{name}computed in parts: {'; '.join(store.differences(before, after))}")
+    return lines

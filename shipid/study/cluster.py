@@ -1,19 +1,24 @@
-"""Units of work on the cluster of a Dask scheduler: what is left when it, or a worker, dies is reported in one line."""
+"""Units of work on the cluster of a Dask scheduler: what is left when it, or a worker, dies is reported in one line.
+
+Workers touch no folder: what a search writes as it goes is sent to the process that gave the task.
+"""
 
 from __future__ import annotations
 
 import logging
+import pickle
 import time
 import warnings
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from shipid.errors import ShipidError
-from shipid.study.code import asked, code_digest
-from shipid.version import __version__
+from shipid.hybrid.method import Row, Space
+from shipid.study.code import code_and_fault, code_digest
 
 DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed in seconds
     "distributed.admin.large-graph-warning-threshold": "1GB",
@@ -31,18 +36,80 @@ AHEAD = 3  # tasks for each thread of the workers: others are left to whoever co
 Shared = TypeVar("Shared")
 Task = TypeVar("Task")
 Result = TypeVar("Result")
+Known = tuple[list[Row], int | None]  # trials of a search so far, and how many there will be
 log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Line:
+    """Sends messages of a task from a worker to the process that gave it, by a topic of the scheduler."""
+
+    topic: str
+
+    def send(self, *message: Any) -> None:
+        """Send a message."""
+        from dask.distributed import get_worker
+
+        get_worker().log_event(self.topic, pickle.dumps(message))
+
+    def sent(self) -> list[tuple[Any, ...]]:
+        """Messages of this task so far: of a worker that has died meanwhile."""
+        from dask.distributed import get_client
+
+        return [pickle.loads(content) for _, content in get_client().get_events(self.topic)]
+
+
+class SentSearches:
+    """The searches of a unit on a worker of a cluster: each trial is sent as it ends, see `shipid.hybrid.journal`.
+
+    known : what the journal holds, by cell; what a worker that died has sent since is added.
+    """
+
+    def __init__(self, known: Mapping[str, Known], line: Line) -> None:
+        self._rows = {cell: list(rows) for cell, (rows, _) in known.items()}
+        self._counts = {cell: count for cell, (_, count) in known.items()}
+        self._line = line
+        for name, *given in line.sent():
+            (self._keep if name == "add" else self._fix)(*given)
+
+    def rows(self, cell: str) -> list[Row]:
+        """Return the trials of a search that ended, in order."""
+        return list(self._rows[cell])
+
+    def count(self, cell: str) -> int | None:
+        """Return how many trials the budget of a search allowed; None before that is decided."""
+        return self._counts[cell]
+
+    def add(self, rows: Mapping[str, Sequence[Row]], space: Space) -> None:
+        """Append trials to searches: cell -> rows, each with the next number."""
+        self._keep(rows, space)
+        self._line.send("add", rows, space)
+
+    def decide(self, cells: Sequence[str], count: int) -> None:
+        """Write how many trials some searches have."""
+        self._fix(cells, count)
+        self._line.send("decide", cells, count)
+
+    def _keep(self, rows: Mapping[str, Sequence[Row]], _: Space) -> None:
+        for cell, more in rows.items():
+            for row in more:
+                if row["number"] == len(self._rows[cell]):  # two workers may have sent it
+                    self._rows[cell].append(row)
+
+    def _fix(self, cells: Sequence[str], count: int) -> None:
+        self._counts |= dict.fromkeys(cells, count)
 
 
 def on_dask(
     scheduler: str,
-    work: Callable[[Shared, Task], Result],
+    work: Callable[[Shared, Task, Line], Result],
     shared: Shared,
     tasks: Iterable[tuple[str, Task]],
     name: str,
     needs: object = None,
+    receive: Callable[..., object] = lambda *_: None,
 ) -> Iterator[tuple[Task, Result]]:
-    """Tasks and what `work(shared, task)` makes of them, in the order in which they finish.
+    """Tasks and what `work(shared, task, line)` makes of them, in the order in which they finish.
 
     A task whose worker dies is done by another one. While there is no worker at all it waits for one, and says so.
 
@@ -52,6 +119,7 @@ def on_dask(
     shared : sent once to each worker. tasks : with a key each, taken when workers are about to need them. name : of the
         whole work; beside it the keys name this client, since a scheduler computes a key once for all its clients.
     needs : a small part of `shared`; a worker that cannot read it is named, since it dies of the whole without a word.
+    receive : called in this thread with the key of a task and each message that it sends by its line.
 
     Raises
     ------
@@ -72,7 +140,11 @@ def on_dask(
         except (OSError, ValueError) as error:
             raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
         try:
-            yield from _results(client, scheduler, work, shared, tasks, name, needs)
+            yield from _results(
+                client, work, shared, tasks, f"shipid-{name}-{client.id}", _Watch(client, needs), receive
+            )
+        except ShipidError as error:
+            raise ShipidError(error.message, file=error.file, path=error.path or f"--scheduler {scheduler}") from error
         finally:
             with suppress(Exception):  # a client whose scheduler is gone complains in many ways
                 client.close(timeout=2)
@@ -80,64 +152,63 @@ def on_dask(
 
 def _results(
     client: Any,
-    scheduler: str,
-    work: Callable[[Shared, Task], Result],
+    work: Callable[[Shared, Task, Line], Result],
     shared: Shared,
     tasks: Iterable[tuple[str, Task]],
     name: str,
-    needs: object,
+    watch: _Watch,
+    receive: Callable[..., object],
 ) -> Iterator[tuple[Task, Result]]:
     from dask.distributed import CancelledError, KilledWorker
 
-    def gone() -> ShipidError:
-        return ShipidError(f"the Dask scheduler is gone; {KEPT}", path=f"--scheduler {scheduler}")
-
-    ended: SimpleQueue[Any] = SimpleQueue()
+    came: SimpleQueue[tuple[str, Any]] = SimpleQueue()  # (key, future that has ended, or message)
+    left: dict[str, tuple[Task, Any]] = {}
     killed: list[str] = []
     mistake: Exception | None = None
-    given: Any = None
-    keys = f"shipid-{name}-{client.id}"
+    waiting, given = iter(tasks), None
     try:
-        watch = _Watch(client, needs)
         watch.look()  # before anything is sent: what cannot be read ends a worker
-        given = client.submit(_given, shared, key=f"{keys}-shared", pure=False)  # made again if its worker dies
-        left: dict[str, tuple[str, Task, Any]] = {}
-        waiting = iter(tasks)
-        while True:
+        given = client.submit(_given, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
+        while mistake is None:
             watch.look()
             for key, task in islice(waiting, max(AHEAD * watch.threads - len(left), 0)):
-                future = client.submit(work, given, task, key=f"{keys}-{key}", pure=False)
-                left[future.key] = (key, task, future)
-                future.add_done_callback(ended.put)
+                topic = f"{name}-{key}"
+                client.subscribe_topic(topic, lambda event, key=key: came.put((key, event[1])))
+                future = client.submit(work, given, task, Line(topic), key=topic, pure=False)
+                left[key] = task, future
+                future.add_done_callback(lambda future, key=key: came.put((key, future)))
             if not left:
                 break
             try:
-                future = ended.get(timeout=LOOK)
+                key, future = came.get(timeout=LOOK)
             except Empty:
                 continue
-            key, task, _ = left.pop(future.key)
+            if isinstance(future, bytes):
+                receive(key, *pickle.loads(future))
+                continue
+            task, _ = left.pop(key)
+            client.unsubscribe_topic(f"{name}-{key}")
             try:
                 results = future.result(timeout=SILENT)
             except KilledWorker:
                 killed.append(key)
-                continue
             except Exception as error:
                 if future.status != "error":
                     raise
                 mistake = error  # of the task, and not of the cluster
-                break
-            yield task, results
-            del future, results  # a worker may forget them
+            else:
+                yield task, results
+                del future, results  # a worker may forget them
     except (OSError, TimeoutError, CancelledError):
         if given is not None and given.status == "error":  # the work was refused, and all that needs it with it
-            raise ShipidError(_unread(given), path=f"--scheduler {scheduler}") from None
-        raise gone() from None
+            raise ShipidError(_unread(given)) from None
+        raise ShipidError(f"the Dask scheduler is gone; {KEPT}") from None
     if mistake is not None:
         raise mistake
     if killed:
-        words = f"workers of the cluster die, perhaps for want of memory, at {', '.join(killed[:3])}"
         more = f" and {len(killed) - 3} more" if len(killed) > 3 else ""
-        raise ShipidError(f"{words}{more}; {KEPT} and larger workers", path=f"--scheduler {scheduler}")
+        words = f"workers of the cluster die, perhaps for want of memory, at {', '.join(killed[:3])}{more}"
+        raise ShipidError(f"{words}; {KEPT} and larger workers")
 
 
 def _given(shared: Shared) -> Shared:
@@ -164,10 +235,10 @@ class _Watch:
     def __init__(self, client: Any, needs: object = None) -> None:
         from distributed.protocol.pickle import dumps
 
-        self._needs: bytes = dumps(needs)
-        self._client, self._alone, self._warned = client, time.monotonic(), False
-        self._looked, self.threads = float("-inf"), 1
-        self._asked: set[str] = set()
+        self._client, self._needs = client, dumps(needs)
+        self._looked, self._seen, self._warned = float("-inf"), time.monotonic(), False
+        self._known: set[str] = set()
+        self.threads = 1
 
     def look(self) -> None:
         """Look, if the last look is some time ago."""
@@ -178,36 +249,27 @@ class _Watch:
         workers = self._client.sync(self._client.scheduler.identity, callback_timeout=SILENT)["workers"]
         self._looked = time.monotonic()
         self.threads = max(sum(worker["nthreads"] for worker in workers.values()), 1)
-        self._ask(workers.keys() - self._asked)
         if workers:
-            self._alone, self._warned = time.monotonic(), False
-        elif not self._warned and time.monotonic() - self._alone > PATIENCE:
+            self._ask(sorted(workers.keys() - self._known))
+            self._seen, self._warned = time.monotonic(), False
+        elif not self._warned and time.monotonic() - self._seen > PATIENCE:
             log.warning("the Dask scheduler has no workers: waiting for one")
             self._warned = True
 
-    def _ask(self, workers: Collection[str]) -> None:
+    def _ask(self, workers: list[str]) -> None:
         """Ask workers for their code, once each; a warning for each where it is another."""
+        self._known |= set(workers)
         if not workers:
             return
-        self._asked |= set(workers)
-        ask = self._client._run  # `Client.run` has no limit of time
-        answers: dict[str, Any] = {}
+        ask, answers = self._client._run, dict[str, Any]()  # `Client.run` has no limit of time
         with suppress(OSError, TimeoutError):  # a worker that is slow to answer gets its tasks all the same
             answers = self._client.sync(
-                ask, asked, self._needs, workers=list(workers), on_error="return", callback_timeout=SILENT
+                ask, code_and_fault, self._needs, workers=workers, on_error="return", callback_timeout=SILENT
             )
         for address, answer in sorted(answers.items()):
-            if isinstance(answer, OSError):
-                log.warning("the worker %s died before it said what it can read: %s", address, REMEDY)
-                continue
-            if isinstance(answer, Exception):
-                log.warning(
-                    "the worker %s has no shipid %s as here, and may die of a task (%s)", address, __version__, answer
-                )
-                continue
-            code, missing = answer
-            if missing:
-                log.warning("the worker %s cannot read the work, and dies of it (%s): %s", address, missing, REMEDY)
+            code, fault = ("", f"{answer}") if isinstance(answer, Exception) else answer
+            if fault:
+                log.warning("the worker %s cannot read the work, and may die of it (%s): %s", address, fault, REMEDY)
             elif code != code_digest():
                 log.warning("the worker %s has another shipid: code %s, here %s", address, code, code_digest())
 

@@ -27,7 +27,7 @@ def code_digest() -> str:
     return hashlib.sha256("".join(lines).encode()).hexdigest()[:8]
 
 
-def asked(packed: bytes) -> tuple[str, str]:
+def code_and_fault(packed: bytes) -> tuple[str, str]:
     """What a worker is asked: `code_digest`, and why it cannot read what is packed; empty where it can."""
     try:
         pickle.loads(packed)

@@ -12,10 +12,8 @@ import numpy as np
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.errors import ShipidError
-from shipid.metrics import position_error, summary
 from shipid.observer import Estimates
 from shipid.study.declared import Foundation
-from shipid.study.plan import Plan
 from shipid.study.prepare import Prepared, apart, chosen_observer, estimates_of, paths_of
 
 if TYPE_CHECKING:
@@ -43,13 +41,9 @@ class Prediction:
     seconds: float = 0.0
     estimates: Estimates | None = None
 
-    def accuracy(self, test: Windows) -> Mapping[str, Any]:
-        """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
-        return summary(position_error(self.test_paths, test.future))
-
 
 def predictions(
-    plan: Plan, prepared: Prepared, runs: tuple[str, ...], device: str, wanted: Collection[str] | None = None
+    prepared: Prepared, runs: tuple[str, ...], device: str, wanted: Collection[str] | None = None
 ) -> dict[str, Prediction]:
     """Every foundation for some runs of the pool; those to be fitted see these runs, and no moment of the test.
 
@@ -68,12 +62,11 @@ def predictions(
             result[one.name] = Prediction(one, *paths, estimates=prepared.estimates.get(one.name))
         else:
             data = apart(prepared.data, prepared.test) if data is None else data
-            result[one.name] = _fitted(plan, prepared, one, runs, data, windows, device, known)
+            result[one.name] = _fitted(prepared, one, runs, data, windows, device, known)
     return result
 
 
 def _fitted(
-    plan: Plan,
     prepared: Prepared,
     foundation: Foundation,
     runs: tuple[str, ...],
@@ -83,6 +76,7 @@ def _fitted(
     known: dict[Any, Solution],
 ) -> Prediction:
     """One foundation fitted to the runs; `known` keeps solutions for foundations that differ in the observer alone."""
+    study = prepared.study
     now, sentence, seconds = foundation, "", 0.0
     words = "identification" if foundation.identify is not None else "observer"
     try:
@@ -96,10 +90,11 @@ def _fitted(
             sentence, seconds = solution.sentence, solution.seconds
         if now.observer is not None and now.observer.choose:
             begun = time.thread_time()
-            now = replace(now, observer=chosen_observer(plan, now, data.select(runs), windows))
+            now = replace(now, observer=chosen_observer(study, now, data.select(runs), windows))
             seconds += time.thread_time() - begun
-        estimates = estimates_of(plan, now, prepared.data, prepared.test) if now.observer is not None else None
-        pair = paths_of(plan, prepared.data, (windows, prepared.test), now, device, estimates)
+        calls = sum(one.observer is not None for one in prepared.foundations)
+        estimates = estimates_of(study, now, prepared.data, prepared.test, calls) if now.observer is not None else None
+        pair = paths_of(study, prepared.data, (windows, prepared.test), now, device, estimates)
     except ShipidError as error:
         return _nothing(foundation, windows, prepared.test, f"{words}: {error.message}")
     if not np.isfinite(pair[0]).all():

@@ -270,9 +270,9 @@ def _check_that_runs(plan: Plan, dataset: Dataset) -> None:
     """Do all that a run of the plan does but the training."""
     prepared = prepare(plan, dataset)
     for batch in plan.batches:
-        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
+        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
         for way in plan.methods:
-            prepared.folds(plan, batch, windows, way.method.validation)
+            prepared.folds(batch, windows, way.method.validation)
 
 
 def _build(choices: Sequence[Choice], out: Path, vessels: Mapping[str, Vessel]) -> Plan:

@@ -9,7 +9,6 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,6 @@ import tomlkit
 
 from shipid import document as documents
 from shipid.arguments import by_name
-from shipid.data.windows import Commands
 from shipid.document import Document
 from shipid.errors import DataError, DocumentError, choices
 from shipid.files import as_argument
@@ -37,8 +35,8 @@ from shipid.study.declared import (
     named_vessel,
     same_file,
 )
-from shipid.study.ranges import LONGEST_NAME, Cut, check_memory, check_ranges, check_seeds
-from shipid.study.schema import Claims, Data, Published, Study, check_version
+from shipid.study.ranges import LONGEST_NAME, check_memory, check_ranges, check_seeds, window_numbers
+from shipid.study.schema import Data, Study, check_version
 from shipid.users import of_users
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, resolve
@@ -108,6 +106,11 @@ class Plan:
     sources : digests of the mapping, log or dataset that recorded runs come from; `PART/dataset` where a part has
         another one.
     changes : what `--set` changed, already in the document.
+    families : of the study, those that extend another written out.
+    pairs : every foundation with every method that it meets: a cell each at every amount of data and seed.
+    units : all work, the largest amounts of data first; a unit repeats hardly anything that another one does.
+    cells : their number.
+    digest : of the document, every vessel, the data's sources and the methods in full: what results depend on.
     parts : name -> a complete study for every repetition in every condition; empty where there is neither. If there
         are parts, they are run in place of this study.
     """
@@ -123,291 +126,223 @@ class Plan:
     vessels: Mapping[str, Vessel] = field(default_factory=dict, repr=False)
     sources: Mapping[str, str] = field(default_factory=dict)
     changes: Mapping[str, Any] = field(default_factory=dict)
+    families: tuple[Family, ...] = field(default=(), repr=False)
+    pairs: tuple[tuple[str, Way], ...] = field(default=(), repr=False)
+    units: tuple[Unit, ...] = field(default=(), repr=False)
+    cells: int = 0
+    digest: str = ""
     parts: Mapping[str, Part] = field(default_factory=dict, repr=False)
 
-    @property
-    def used_vessels(self) -> list[Vessel]:
-        """The vessel of the truth, if there is one, and the bases of the foundations."""
-        every = (self.truth, *(foundation.base for foundation in self.foundations))
-        of_parts = (vessel for part in self.parts.values() for vessel in part.plan.used_vessels)
-        return [*(vessel for vessel in every if vessel is not None), *of_parts]
 
-    @property
-    def disturbances(self) -> tuple[str, ...]:
-        """What moves the ship or its log and is no coefficient of the vessel, in words; recorded runs have waves."""
-        truth = self.study.truth
-        if truth is None:
-            return ("waves",)
-        known = {"waves": truth.waves, "gusts": truth.gusts, "noise of the sensors": truth.sensors}
-        return tuple(words for words, there in known.items() if there)
+def completed_plan(plan: Plan) -> Plan:
+    """The plan with what follows from its other fields: pairs, units, cells and digest."""
+    pairs = tuple((f.name, way) for f in plan.foundations for way in plan.methods if f.name in way.foundations)
+    groups = _shared_pairs(plan.foundations, pairs)
+    units = tuple(
+        Unit(batch, group, batch.key if len(groups) == 1 else batch.cell(*group[0]))
+        for batch in plan.batches
+        for group in groups
+    )
+    plan = replace(plan, pairs=pairs, units=units, cells=len(plan.batches) * len(pairs))
+    return replace(plan, digest=_digest_with(plan, plan.document))
 
-    @property
-    def inputs(self) -> list[Path]:
-        """Files that the study is read from: the document, the vessels, the mapping, the log and the dataset."""
-        data, here = self.study.data, Path(self.file)
-        named = [] if data is None else [mapping_of(data, here), data.log, data.dataset]
-        vessels = [Path(vessel.file) for vessel in self.vessels.values()]
-        of_parts = (name for part in self.parts.values() for name in part.plan.inputs)
-        mine = (beside(here.parent, name) for name in named if name is not None)
-        return list(dict.fromkeys([here, *vessels, *mine, *of_parts]))
 
-    @property
-    def digest(self) -> str:
-        """Digest of the document, every vessel, the data's sources and the methods in full: what results depend on."""
-        return self._digest(self.document)
+def _shared_pairs(
+    foundations: Iterable[Foundation], pairs: Iterable[tuple[str, Way]]
+) -> list[tuple[tuple[str, str], ...]]:
+    """The cells of a batch in groups: one group shares a fit of several foundations, or one to the runs."""
+    known = {one.name: one for one in foundations}
+    groups: list[tuple[set[Any], list[tuple[str, str]]]] = []
+    for name, way in pairs:
+        one = known[name]
+        shares: set[Any] = {way.name} if way.method.together else set()
+        if one.identify is not None and one.variant is not None:
+            shares.add((one.variant.name, one.identify.model_dump_json()))
+        elif one.fitted:
+            shares.add(one.name)
+        mine = [(name, way.name)]
+        for group in [group for group in groups if group[0] & shares]:
+            groups.remove(group)
+            shares |= group[0]
+            mine = [*group[1], *mine]
+        groups.append((shares, mine))
+    order = {(name, way.name): place for place, (name, way) in enumerate(pairs)}
+    return sorted((tuple(sorted(mine, key=order.__getitem__)) for _, mine in groups), key=lambda group: order[group[0]])
 
-    @property
-    def folder(self) -> Path:
-        """Folder of a run that was not given one: `results/<study>-<first digits of the digest>`."""
-        return Path("results") / f"{self.name}-{self.digest[:8]}"
 
-    @property
-    def program(self) -> str:
-        """The command line that knows methods and terms: `shipid`, or the user's script where the user wrote one."""
-        return "shipid" if not self.code else shlex.join(["python", _script() or USER_SCRIPT])
+def _digest_with(plan: Plan, document: Document) -> str:
+    vessels = sorted({vessel.digest for vessel in vessels_of(plan)})
+    methods = [{"kind": way.kind, **way.method.model_dump(mode="json", exclude_none=True)} for way in plan.methods]
+    return documents.digest({"study": document, "vessels": vessels, "sources": dict(plan.sources), "methods": methods})
 
-    @property
-    def code(self) -> dict[str, dict[str, str]]:
-        """What the user wrote: `code of the method`, by its name, and `code of the term`, by its key -> digest.
 
-        A method has the code of its corrector too, a term that of all its functions. What has none is left out.
-        KeyError for a term of a vessel that TERMS of this process lacks.
-        """
-        kinds = {way.name: type(way.method) for way in self.methods}
-        of_method = {name: (kind, getattr(kind, "corrector", kind)) for name, kind in kinds.items()}
-        of_term = {key: held for vessel in self.used_vessels for key, held in functions(vessel.document).items()}
-        every: dict[str, Mapping[str, tuple[Callable[..., Any], ...]]] = {METHOD_CODE: of_method, TERM_CODE: of_term}
-        found = {
-            what: {name: users_code(held) for name, held in named.items() if any(map(of_users, held))}
-            for what, named in every.items()
-        }
-        return {what: digests for what, digests in found.items() if digests}
+def digest_without_seed(plan: Plan) -> str:
+    """Digest of a study without its top-level seed: equal for repetitions in other worlds."""
+    return _digest_with(plan, {key: value for key, value in plan.document.items() if key != "seed"})
 
-    @property
-    def command(self) -> str:
-        """The command that runs this study, with its changes: by name if bundled, else by its file.
 
-        A line before it says what the script is where the user wrote a part and no script has started this process.
-        """
-        name = self.name if documents.bundled("studies").get(self.name) == Path(self.file) else as_argument(self.file)
-        changes = (f"--set {shlex.quote(f'{path}={json.dumps(value)}')}" for path, value in self.changes.items())
-        words = " ".join([self.program, "study run", name, *changes])
-        missing = self.program != "shipid" and not _script()
-        note = f"# {USER_SCRIPT}: your script that puts methods into METHODS or terms into TERMS and calls main\n"
-        return note + words if missing else words
+def vessels_of(plan: Plan) -> list[Vessel]:
+    """The vessel of the truth, if there is one, and the bases of the foundations, of all parts too."""
+    every = (plan.truth, *(foundation.base for foundation in plan.foundations))
+    of_parts = (vessel for part in plan.parts.values() for vessel in vessels_of(part.plan))
+    return [*(vessel for vessel in every if vessel is not None), *of_parts]
 
-    @property
-    def digest_in_any_world(self) -> str:
-        """Digest without the top-level seed: equal for repetitions of one study."""
-        return self._digest({key: value for key, value in self.document.items() if key != "seed"})
 
-    def _digest(self, document: Document) -> str:
-        vessels = sorted({vessel.digest for vessel in self.used_vessels})
-        methods = [{"kind": way.kind, **way.method.model_dump(mode="json", exclude_none=True)} for way in self.methods]
-        depends = {"vessels": vessels, "sources": dict(self.sources), "methods": methods}
-        return documents.digest({"study": document, **depends})
+def input_files(plan: Plan) -> list[Path]:
+    """Files that the study is read from: the document, the vessels, the mapping, the log and the dataset."""
+    data, here = plan.study.data, Path(plan.file)
+    named = [] if data is None else [mapping_of(data, here), data.log, data.dataset]
+    vessels = [Path(vessel.file) for vessel in plan.vessels.values()]
+    of_parts = (name for part in plan.parts.values() for name in input_files(part.plan))
+    mine = (beside(here.parent, name) for name in named if name is not None)
+    return list(dict.fromkeys([here, *vessels, *mine, *of_parts]))
 
-    @property
-    def fitted(self) -> set[str]:
-        """Families whose numbers or observer, and so their A, depend on the data of the batch."""
-        return {foundation.family for foundation in self.foundations if foundation.fitted}
 
-    def learns(self, family: str, method: str) -> bool:
-        """Whether other training runs would change what a method predicts with a family: either of them is fitted."""
-        return family in self.fitted or any(way.method.compensates for way in self.methods if way.name == method)
+def default_folder(plan: Plan) -> Path:
+    """Folder of a run that was not given one: `results/<study>-<first digits of the digest>`."""
+    return Path("results") / f"{plan.name}-{plan.digest[:8]}"
 
-    @property
-    def aside(self) -> set[str]:
-        """Families that are shown, but that no claim and no sentence of the answer counts."""
-        return self.study.claims.not_judged if self.study.claims else set()
 
-    def saw(self, runs: Iterable[str]) -> list[str]:
-        """Families whose numbers were set from any of these runs."""
-        return [family.name for family in self.families if not set(family.seen).isdisjoint(runs)]
+def program_of(plan: Plan) -> str:
+    """The command line that knows methods and terms: `shipid`, or the user's script where the user wrote one."""
+    return "shipid" if not own_code(plan) else shlex.join(["python", _script() or USER_SCRIPT])
 
-    def unfair(self, tests: Iterable[str]) -> str:
-        """Why R1-R4 and S1-S7 are not judged on these test runs; empty where no family of theirs saw any of them."""
-        roles = self.claims.roles.values() if self.claims else ()
-        saw = [name for name in self.saw(tests) if name in roles]
-        return f"the numbers of {', '.join(saw)} were set from runs that test: name another in [claims]" if saw else ""
 
-    @property
-    def judged(self) -> str:
-        """Name of the method that findings and the answer speak of."""
-        named = self.study.claims.method if self.study.claims else None
-        learning = [way for way in self.methods if way.method.compensates]
-        physics = [way for way in learning if way.foundations != (NO_MODEL,)]
-        return named or next((way.name for way in (*physics, *learning)), self.methods[0].name)
+def own_code(plan: Plan) -> dict[str, dict[str, str]]:
+    """What the user wrote: `code of the method`, by its name, and `code of the term`, by its key -> digest.
 
-    @property
-    def plain(self) -> str | None:
-        """Name of the method that predicts without physics and without mirror symmetry, if there is one."""
-        alone = [way for way in self.methods if way.foundations == (NO_MODEL,) and way.name != self.judged]
-        return next((way.name for way in alone if way.method.traits.mirror is False), None)
+    A method has the code of its corrector too, a term that of all its functions. What has none is left out.
+    KeyError for a term of a vessel that TERMS of this process lacks.
+    """
+    kinds = {way.name: type(way.method) for way in plan.methods}
+    every: dict[str, Mapping[str, tuple[Callable[..., Any], ...]]] = {
+        METHOD_CODE: {name: (kind, getattr(kind, "corrector", kind)) for name, kind in kinds.items()},
+        TERM_CODE: {key: held for one in vessels_of(plan) for key, held in functions(one.document).items()},
+    }
+    own = {
+        what: {name: users_code(held) for name, held in named.items() if any(map(of_users, held))}
+        for what, named in every.items()
+    }
+    return {what: digests for what, digests in own.items() if digests}
 
-    @property
-    def learning(self) -> list[str]:
-        """Names of the methods that learn from data, but for the plain rival without physics."""
-        return [way.name for way in self.methods if way.method.compensates and way.name != self.plain]
 
-    @property
-    def question(self) -> str:
-        """The question that the study answers."""
-        return self.study.question
+def run_command(plan: Plan) -> str:
+    """The command that runs this study, with its changes: by name if bundled, else by its file.
 
-    @property
-    def claims(self) -> Claims | None:
-        """What findings compare, if the study names it."""
-        return self.study.claims
+    A line before it says what the script is where the user wrote a part and no script has started this process.
+    """
+    name = plan.name if documents.bundled("studies").get(plan.name) == Path(plan.file) else as_argument(plan.file)
+    changes = (f"--set {shlex.quote(f'{path}={json.dumps(value)}')}" for path, value in plan.changes.items())
+    program = program_of(plan)
+    missing = program != "shipid" and not _script()
+    note = f"# {USER_SCRIPT}: your script that puts methods into METHODS or terms into TERMS and calls main\n"
+    return note * missing + " ".join([program, "study run", name, *changes])
 
-    @property
-    def published(self) -> Published | None:
-        """A published envelope of inputs to compare with, if there is one."""
-        return self.study.published
 
-    @property
-    def seed(self) -> int:
-        """Seed of the world."""
-        return self.study.seed
+def plan_text(plan: Plan) -> str:
+    """The resolved document as TOML."""
+    return tomlkit.dumps(plan.document)
 
-    @property
-    def seeds(self) -> tuple[int, ...]:
-        """Seeds of the grid, those of its world, each once, the least first."""
-        return tuple(sorted(set(self.study.grid.seeds)))
 
-    @property
-    def level(self) -> float:
-        """Nominal coverage of the bands."""
-        return self.study.bands.level
+def past_steps(plan: Plan) -> int:
+    """Steps of the past that every window holds: the run-up, what the study asks for, or more for a method."""
+    prediction, truth = plan.study.prediction, plan.study.truth
+    run_up = 0.0 if truth is None else truth.run_up
+    seconds = max(run_up, prediction.past, *(way.method.past for way in plan.methods))
+    return math.ceil(seconds / prediction.step - 1e-9)
 
-    @property
-    def refits(self) -> int:
-        """Number of fits without some runs that calibrate a band."""
-        return self.study.bands.refits
 
-    @property
-    def horizon(self) -> int:
-        """Number of steps ahead."""
-        return self.study.prediction.horizon
+def grid_seeds(plan: Plan) -> tuple[int, ...]:
+    """Seeds of the grid, those of its world, each once, the least first."""
+    return tuple(sorted(set(plan.study.grid.seeds)))
 
-    @property
-    def commands(self) -> Commands:
-        """Whether the commands of the horizon are `held` or `known`."""
-        return self.study.prediction.commands
 
-    @property
-    def euler(self) -> bool:
-        """Whether the physics takes explicit Euler steps."""
-        return self.study.prediction.integrator == "euler"
+def rotated_plan(plan: Plan, test: str, amount: int) -> Plan:
+    """The study with one test run and one amount of data, every seed of the grid; the digest stays."""
+    split = plan.study.split.model_copy(update={"test": [test]})
+    grid = plan.study.grid.model_copy(update={"N_D": [amount]})
+    study = plan.study.model_copy(update={"split": split, "grid": grid})
+    return completed_plan(replace(plan, study=study, batches=tuple(Batch(amount, seed) for seed in grid_seeds(plan))))
 
-    @property
-    def known(self) -> bool:
-        """Whether the commands of the horizon are known."""
-        return self.commands == "known"
 
-    @property
-    def reacting(self) -> bool:
-        """Whether orders may have reacted to the ship: recorded runs, or made manoeuvres that steer by her heading."""
-        truth = self.study.truth
-        return truth is None or any(KINDS[one.kind].reacts() for one in truth.manoeuvre)
+def whole_unit(plan: Plan, batch: Batch) -> Unit:
+    """All cells of a batch as one unit."""
+    return Unit(batch, tuple((name, way.name) for name, way in plan.pairs), batch.key)
 
-    @property
-    def draws(self) -> dict[str, Any] | None:
-        """What decides orders and weather of simulated runs, whatever the ship; None for recorded runs."""
-        truth = self.study.truth
-        weather = {"wind_speed", "gusts", "waves", "current_speed", "environment"}
-        return truth.model_dump(include={"seed", "manoeuvre", *weather}) if truth else None
 
-    @property
-    def obtaining(self) -> str:
-        """What is done to obtain the runs, in words."""
-        if self.study.truth is not None:
-            return "simulating the truth"
-        made = self.study.data is not None and self.study.data.dataset is not None
-        return "reading the dataset" if made else "importing the log"
+def judged_method(plan: Plan) -> str:
+    """Name of the method that findings and the answer speak of."""
+    named = plan.study.claims.method if plan.study.claims else None
+    learning = [way for way in plan.methods if way.method.compensates]
+    physics = [way for way in learning if way.foundations != (NO_MODEL,)]
+    return named or next((way.name for way in (*physics, *learning)), plan.methods[0].name)
 
-    @cached_property
-    def families(self) -> tuple[Family, ...]:
-        """The families of the study, those that extend another written out."""
-        return tuple(resolve(self.study.family, self.file))
 
-    @property
-    def causal(self) -> tuple[str, ...]:
-        """Columns whose inputs hold the last fix."""
-        return tuple(self.study.data.causal) if self.study.data else ()
+def plain_rival(plan: Plan) -> str | None:
+    """Name of the method that predicts without physics and without mirror symmetry, if there is one."""
+    judged = judged_method(plan)
+    alone = [way for way in plan.methods if way.foundations == (NO_MODEL,) and way.name != judged]
+    return next((way.name for way in alone if way.method.traits.mirror is False), None)
 
-    @property
-    def past(self) -> int:
-        """Steps of the past that every window holds: the run-up, what the study asks for, or more for a method."""
-        prediction, truth = self.study.prediction, self.study.truth
-        run_up = 0.0 if truth is None else truth.run_up
-        seconds = max(run_up, prediction.past, *(way.method.past for way in self.methods))
-        return math.ceil(seconds / prediction.step - 1e-9)
 
-    @property
-    def pairs(self) -> list[tuple[str, Way]]:
-        """Every foundation with every method that it meets: a cell each at every amount of data and seed."""
-        return [(f.name, way) for f in self.foundations for way in self.methods if f.name in way.foundations]
+def learning_methods(plan: Plan) -> list[str]:
+    """Names of the methods that learn from data, but for the plain rival without physics."""
+    plain = plain_rival(plan)
+    return [way.name for way in plan.methods if way.method.compensates and way.name != plain]
 
-    @property
-    def cells(self) -> int:
-        """Number of cells."""
-        return len(self.batches) * len(self.pairs)
 
-    @cached_property
-    def units(self) -> tuple[Unit, ...]:
-        """All work, the largest amounts of data first; a unit repeats hardly anything that another one does."""
-        groups = self._shared()
-        return tuple(
-            Unit(batch, group, batch.key if len(groups) == 1 else batch.cell(*group[0]))
-            for batch in self.batches
-            for group in groups
-        )
+def fitted_families(plan: Plan) -> set[str]:
+    """Families whose numbers or observer, and so their A, depend on the data of the batch."""
+    return {foundation.family for foundation in plan.foundations if foundation.fitted}
 
-    def turn(self, test: str, amount: int) -> Plan:
-        """Return the study with one test run and one amount of data, every seed of the grid."""
-        split = self.study.split.model_copy(update={"test": [test]})
-        grid = self.study.grid.model_copy(update={"N_D": [amount]})
-        study = self.study.model_copy(update={"split": split, "grid": grid})
-        return replace(self, study=study, batches=tuple(Batch(amount, seed) for seed in self.seeds))
 
-    def whole(self, batch: Batch) -> Unit:
-        """All cells of a batch as one unit."""
-        return Unit(batch, tuple((name, way.name) for name, way in self.pairs), batch.key)
+def learns_from_runs(plan: Plan, family: str, method: str) -> bool:
+    """Whether other training runs would change what a method predicts with a family: either of them is fitted."""
+    return family in fitted_families(plan) or any(way.method.compensates for way in plan.methods if way.name == method)
 
-    def _shared(self) -> list[tuple[tuple[str, str], ...]]:
-        """The cells of a batch in groups: one group shares a fit of several foundations, or one to the runs."""
-        known = {one.name: one for one in self.foundations}
-        groups: list[tuple[set[Any], list[tuple[str, str]]]] = []
-        for name, way in self.pairs:
-            one = known[name]
-            shares: set[Any] = {way.name} if way.method.together else set()
-            if one.identify is not None and one.variant is not None:
-                shares.add((one.variant.name, one.identify.model_dump_json()))
-            elif one.fitted:
-                shares.add(one.name)
-            pairs = [(name, way.name)]
-            for group in [group for group in groups if group[0] & shares]:
-                groups.remove(group)
-                shares |= group[0]
-                pairs = [*group[1], *pairs]
-            groups.append((shares, pairs))
-        order = {(name, way.name): place for place, (name, way) in enumerate(self.pairs)}
-        return sorted((tuple(sorted(pairs, key=order.__getitem__)) for _, pairs in groups), key=lambda g: order[g[0]])
 
-    def cut(self, columns: int) -> Cut:
-        """The numbers that decide the memory of the windows, for a dataset of so many columns."""
-        prediction = self.study.prediction
-        rolled = len(self.foundations)
-        return Cut(prediction.horizon, self.past, prediction.step, prediction.interval, columns, rolled)
+def families_aside(plan: Plan) -> set[str]:
+    """Families that are shown, but that no claim and no sentence of the answer counts."""
+    return plan.study.claims.not_judged if plan.study.claims else set()
 
-    def label(self, foundation: str, method: str) -> str:
-        """Name of a model for people: the foundation, with the method where that is not the one judged."""
-        return foundation if method == self.judged else f"{foundation} {WITH} {method}"
 
-    def text(self) -> str:
-        """The resolved document as TOML."""
-        return tomlkit.dumps(self.document)
+def families_set_from(plan: Plan, runs: Iterable[str]) -> list[str]:
+    """Families whose numbers were set from any of these runs."""
+    return [family.name for family in plan.families if not set(family.seen).isdisjoint(runs)]
+
+
+def unfair_reason(plan: Plan, tests: Iterable[str]) -> str:
+    """Why R1-R4 and S1-S7 are not judged on these test runs; empty where no family of theirs saw any of them."""
+    roles = plan.study.claims.roles.values() if plan.study.claims else ()
+    saw = [name for name in families_set_from(plan, tests) if name in roles]
+    return f"the numbers of {', '.join(saw)} were set from runs that test: name another in [claims]" if saw else ""
+
+
+def model_label(plan: Plan, foundation: str, method: str) -> str:
+    """Name of a model for people: the foundation, with the method where that is not the one judged."""
+    return foundation if method == judged_method(plan) else f"{foundation} {WITH} {method}"
+
+
+def disturbances_of(plan: Plan) -> tuple[str, ...]:
+    """What moves the ship or its log and is no coefficient of the vessel, in words; recorded runs have waves."""
+    truth = plan.study.truth
+    if truth is None:
+        return ("waves",)
+    known = {"waves": truth.waves, "gusts": truth.gusts, "noise of the sensors": truth.sensors}
+    return tuple(words for words, there in known.items() if there)
+
+
+def orders_may_react(plan: Plan) -> bool:
+    """Whether orders may have reacted to the ship: recorded runs, or made manoeuvres that steer by its heading."""
+    truth = plan.study.truth
+    return truth is None or any(KINDS[one.kind].reacts() for one in truth.manoeuvre)
+
+
+def drawn_conditions(plan: Plan) -> dict[str, Any] | None:
+    """What decides orders and weather of simulated runs, whatever the ship; None for recorded runs."""
+    truth = plan.study.truth
+    weather = {"wind_speed", "gusts", "waves", "current_speed", "environment"}
+    return truth.model_dump(include={"seed", "manoeuvre", *weather}) if truth else None
 
 
 def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Plan:
@@ -484,7 +419,14 @@ def _built(
             raise DocumentError(error.message, file=file, path=error.path) from None
     digests = _sources(study.data, file) if sources is None else sources
     mine = {name: digest for name, digest in digests.items() if OF_PART not in name}
-    plan = Plan(file.stem, str(file), document, study, foundations, methods, batches, truth, known, mine, changes or {})
+    families = tuple(resolve(study.family, file))
+    plan = completed_plan(
+        Plan(
+            *(file.stem, str(file), document, study, foundations, methods, batches, truth, known, mine),
+            changes=changes or {},
+            families=families,
+        )
+    )
     _check_names(plan)
     _check_memory(plan)
     plan = replace(plan, parts=_parts(plan, file, known, sources))
@@ -494,7 +436,7 @@ def _built(
         if part.plan.study.data != study.data
         for source, digest in part.plan.sources.items()
     }
-    return replace(plan, sources={**mine, **theirs})
+    return completed_plan(replace(plan, sources={**mine, **theirs}))
 
 
 def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[str, str] | None) -> dict[str, Part]:
@@ -522,7 +464,7 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
             part = build_plan(_changed(bare, mine, f"condition.{place}.set", file), file, known, plan.sources)
             part = build_plan(_changed(part.document, turn, "repeat", file), file, known, plan.sources)
             if part.study.data != plan.study.data:
-                part = replace(part, sources=_of_part(name, part, parts, sources))
+                part = completed_plan(replace(part, sources=_of_part(name, part, parts, sources)))
             twin = next((other for other, done in parts.items() if done.plan.study == part.study), None)
             if twin is not None:
                 message = f"{name} has the settings of {twin}: equal studies are no more evidence than one"
@@ -580,7 +522,9 @@ def _check_memory(plan: Plan) -> None:
         words = f"{between:g} s: {truth.manoeuvres} runs of {truth.length:g} s"
         check_memory(numbers, words, path, plan.file)
     words = f"{plan.study.prediction.interval:g} s: {truth.manoeuvres} runs cut into windows at this interval"
-    numbers = truth.manoeuvres * plan.cut(columns).numbers(truth.length)
+    numbers = truth.manoeuvres * window_numbers(
+        plan.study.prediction, past_steps(plan), columns, len(plan.foundations), truth.length
+    )
     check_memory(numbers, words, "prediction.interval", plan.file)
 
 

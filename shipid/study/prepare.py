@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -42,8 +43,9 @@ from shipid.simulation.manoeuvre import name_of
 from shipid.simulation.truth import draw_manoeuvres, simulate
 from shipid.study.declared import Foundation
 from shipid.study.kinds import kinds_of
-from shipid.study.plan import Batch, Plan, beside, mapping_of
-from shipid.study.ranges import check_memory
+from shipid.study.plan import Batch, Plan, beside, mapping_of, past_steps
+from shipid.study.ranges import check_memory, window_numbers
+from shipid.study.schema import Study
 from shipid.units import percent, plural
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
@@ -57,6 +59,7 @@ MOST_REDRAWS = 100
 class Prepared:
     """All that cells need, the same for every worker.
 
+    study : the checked document, with the seeds of its world.
     data : the runs themselves.
     pool, test : windows for training and validation, and windows of the untouched test runs.
     foundations : after redraws.
@@ -67,6 +70,7 @@ class Prepared:
     kinds : run -> kind of manoeuvre, see `kinds_of`.
     """
 
+    study: Study
     data: Dataset
     pool: Windows
     test: Windows
@@ -91,39 +95,39 @@ class Prepared:
         """Error (T, S) [m] of constant u, v, r on the test windows: the floor that any predictor must beat."""
         return position_error(constant_motion(self.test), self.test.future)
 
-    def runs(self, plan: Plan, batch: Batch) -> tuple[str, ...]:
+    def runs(self, batch: Batch) -> tuple[str, ...]:
         """Training and validation runs of a batch: nested over N_D for one seed."""
-        return nested(plan, self.pool, batch)
+        return nested(self.study, self.pool, batch)
 
-    def folds(self, plan: Plan, batch: Batch, windows: Windows, validation: str) -> list[tuple[Array, Array]]:
+    def folds(self, batch: Batch, windows: Windows, validation: str) -> list[tuple[Array, Array]]:
         """(Training, validation) indices into the windows of a batch, split by run, sharing no moment.
 
         With one fold, 20 % of the runs validate; a method with `validation` = `runs` leaves out every run in turn. A
         single run is left out part by part.
         """
-        return run_folds(windows, validation, batch.seed, plan.study.split.folds)
+        return run_folds(windows, validation, batch.seed, self.study.split.folds)
+
+
+@contextmanager
+def _located(plan: Plan) -> Iterator[None]:
+    """Name the file of the study in an error that names none."""
+    try:
+        yield
+    except DocumentError as error:
+        raise type(error)(error.message, file=error.file or plan.file, path=error.path) from None
 
 
 def obtain(plan: Plan) -> Dataset:
     """The runs of a study: simulated by its truth, imported from its log, or read."""
     study, folder = plan.study, Path(plan.file).parent
     if study.truth is not None and plan.truth is not None:
-        try:
+        with _located(plan):
             frame = simulate(study.truth, plan.truth)
-        except DocumentError as error:
-            raise DocumentError(error.message, file=plan.file, path=error.path) from None
         runs = map(str, frame["run"].unique())
         kinds = {run: declared_kind(name_of(one)) for run, one in zip(runs, draw_manoeuvres(study.truth), strict=True)}
-        return Dataset(
-            frame,
-            {
-                "vessel": study.truth.vessel,
-                "source": "simulated",
-                "clock": "run",
-                "flags": [],
-                "manoeuvres": {run: kind for run, kind in kinds.items() if kind is not None},
-            },
-        )
+        manoeuvres = {run: kind for run, kind in kinds.items() if kind is not None}
+        known = {"vessel": study.truth.vessel, "source": "simulated", "clock": "run", "flags": []}
+        return Dataset(frame, {**known, "manoeuvres": manoeuvres})
     assert study.data is not None
     if study.data.dataset is not None:
         return read_dataset(beside(folder, study.data.dataset))
@@ -138,28 +142,34 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
 
     Raises DocumentError where the runs do not suffice.
     """
-    windows = all_windows(plan, dataset)
-    test_runs = _test_runs(plan, windows)
-    test = windows.select(np.isin(windows.run, test_runs))
-    rest = windows.select(~np.isin(windows.run, test_runs))
-    coarse = coarse_in_words(dataset, windows.step)
-    notes = [*([coarse] if coarse else []), *nothing_varies(dataset, windows.spans), *over_gaps(dataset, windows)]
-    if windows.shared_clock:
-        touching = rest.touching(test.spans.values())
-        if touching.any():
-            notes.append(f"{int(touching.sum())} windows that touch the test runs in time never train")
-        rest = rest.select(~touching)
-    available, largest = len(rest.spans), max(plan.study.grid.N_D)
-    if available < largest:
-        raise DocumentError(
-            f"{largest}: only {available} {plural(available, 'run is', 'runs are')} left for training, "
-            f"{len(test.spans)} {plural(len(test.spans), 'tests', 'test')} (split.test)",
-            file=plan.file,
-            path="grid.N_D",
-        )
-    if min(plan.study.grid.N_D) == 1:
-        _check_single_runs(plan, rest)
+    with _located(plan):
+        windows = all_windows(plan, dataset)
+        is_test = np.isin(windows.run, _test_runs(plan.study, windows))
+        test, rest = windows.select(is_test), windows.select(~is_test)
+        coarse = coarse_in_words(dataset, windows.step)
+        notes = [*([coarse] if coarse else []), *nothing_varies(dataset, windows.spans), *over_gaps(dataset, windows)]
+        if windows.shared_clock:
+            touching = rest.touching(test.spans.values())
+            if touching.any():
+                notes.append(f"{int(touching.sum())} windows that touch the test runs in time never train")
+            rest = rest.select(~touching)
+        _check_amounts(plan, rest, len(test.spans))
     return rest, test, notes
+
+
+def _check_amounts(plan: Plan, rest: Windows, tests: int) -> None:
+    """Refuse amounts of data that the runs left to train do not give, or whose single run cannot be cut into parts."""
+    left, amounts = len(rest.spans), plan.study.grid.N_D
+    if left < max(amounts):
+        there = f"only {left} {plural(left, 'run is', 'runs are')} left for training"
+        tested = f"{tests} {plural(tests, 'tests', 'test')} (split.test)"
+        raise DocumentError(f"{max(amounts)}: {there}, {tested}", path="grid.N_D")
+    for batch in plan.batches:
+        if batch.N_D == 1:
+            try:
+                part_folds(rest.select(rest.run == nested(plan.study, rest, batch)[0]))
+            except DataError as error:
+                raise DocumentError(f"1: {error.message}; take 2 runs or more", path="grid.N_D") from None
 
 
 def over_gaps(dataset: Dataset, windows: Windows) -> list[str]:
@@ -177,42 +187,31 @@ def over_gaps(dataset: Dataset, windows: Windows) -> list[str]:
 
 def all_windows(plan: Plan, dataset: Dataset) -> Windows:
     """Every window of a study, test and training; DocumentError where no run is as long as the horizon."""
-    prediction = plan.study.prediction
+    study, prediction, past = plan.study, plan.study.prediction, past_steps(plan)
     cut = partial(
         cut_windows,
         horizon=prediction.horizon,
         step=prediction.step,
         interval=prediction.interval,
-        path=path_of(plan),
-        past=plan.past,
+        path=path_source(study),
+        past=past,
     )
     lengths = [float(np.ptp(rows["t"])) for _, rows in pieces(dataset)]
     words = f"{prediction.interval:g} s: {len(lengths)} runs cut into windows at this interval"
-    numbers = sum(map(plan.cut(len(dataset.frame.columns)).numbers, lengths))
+    columns = len(dataset.frame.columns)
+    numbers = sum(window_numbers(prediction, past, columns, len(plan.foundations), length) for length in lengths)
     check_memory(numbers, words, "prediction.interval", plan.file)
     try:
         windows = cut(dataset)
     except DataError as error:
         raise DocumentError(error.message, file=plan.file, path="prediction.ahead") from None
-    if plan.causal:
-        known = cut(known_by_then(plan, dataset))  # the truth is that of the log, inputs are what was known
+    if study.data is not None and study.data.causal:
+        with _located(plan):
+            known = cut(known_by_then(study, dataset))  # the truth is that of the log, inputs are what was known
         windows = replace(windows, columns=known.columns, past=known.past)
     if prediction.samples is not None:
         windows = windows.select(_place_in_run(windows) < prediction.samples)
     return windows
-
-
-def _check_single_runs(plan: Plan, pool: Windows) -> None:
-    """Refuse N_D = 1 where the run that a seed draws is too short to be left out part by part."""
-    for batch in plan.batches:
-        if batch.N_D == 1:
-            (run,) = nested(plan, pool, batch)
-            try:
-                part_folds(pool.select(pool.run == run))
-            except DataError as error:
-                raise DocumentError(
-                    f"1: {error.message}; take 2 runs or more", file=plan.file, path="grid.N_D"
-                ) from None
 
 
 def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
@@ -226,7 +225,6 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         f"{way.name} takes no observer: not fitted to {', '.join(way.left_out)}" for way in plan.methods if way.left_out
     ]
     notes += _copied(dataset, rest, test)
-    both = [rest, test]
     longest = max(float(np.ptp(rows["t"])) for _, rows in pieces(dataset))
     for foundation in plan.foundations:
         if foundation.identify is not None and foundation.identify.horizon / 2 > longest:
@@ -236,8 +234,10 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
             check_columns(foundation.base, test.columns, plan.file)
             notes += not_measured(foundation.base, test)
     estimates: dict[str, Estimates] = {}
-    foundations, paths = _roll_out(plan, dataset, both, notes, device, estimates)
+    with _located(plan):
+        foundations, paths = _roll_out(plan, dataset, [rest, test], notes, device, estimates)
     return Prepared(
+        study=plan.study,
         data=dataset,
         pool=rest,
         test=test,
@@ -262,36 +262,30 @@ def _in_order(plan: Plan, dataset: Dataset) -> Dataset:
 
 def _copied(dataset: Dataset, rest: Windows, test: Windows) -> list[str]:
     """Sentences on runs that move as others: test runs as runs that train, and each among themselves."""
-    found = (
-        (
-            copies(dataset, test.spans, rest.spans),
-            "test runs that move as runs that train do ({}): their errors say nothing of new runs: leave out copies",
-        ),
-        (
-            repeated(dataset, test.spans),
-            "test runs that move as other test runs do ({}): each counts as a manoeuvre of its own, so intervals are "
-            "too narrow: leave out copies",
-        ),
-        (
-            repeated(dataset, rest.spans),
-            "runs that train and move as others that train do ({}): N_D counts each, and validation and bands judge by "
-            "runs whose copies trained: leave out copies",
-        ),
-    )
+    pairs = {
+        "test runs that move as runs that train do ({}): their errors say nothing of new runs: "
+        "leave out copies": copies(dataset, test.spans, rest.spans),
+        "test runs that move as other test runs do ({}): each counts as a manoeuvre of its own, so intervals are "
+        "too narrow: leave out copies": repeated(dataset, test.spans),
+        "runs that train and move as others that train do ({}): N_D counts each, and validation and bands judge by "
+        "runs whose copies trained: leave out copies": repeated(dataset, rest.spans),
+    }
     return [
-        words.format(", ".join(f"{run!r} as {other!r}" for run, other in same.items())) for same, words in found if same
+        words.format(", ".join(f"{run!r} as {other!r}" for run, other in same.items()))
+        for words, same in pairs.items()
+        if same
     ]
 
 
-def nested(plan: Plan, pool: Windows, batch: Batch) -> tuple[str, ...]:
+def nested(study: Study, pool: Windows, batch: Batch) -> tuple[str, ...]:
     """Training and validation runs of a batch: nested over N_D for one seed."""
-    return nested_runs(pool.spans, plan.study.grid.N_D, batch.seed)[batch.N_D]
+    return nested_runs(pool.spans, study.grid.N_D, batch.seed)[batch.N_D]
 
 
-def runs_by_amount(plan: Plan, pool: Windows) -> dict[int, tuple[str, ...]]:
-    """Return the training and validation runs of each amount of data, fewest first, for the first seed."""
-    seed = plan.seeds[0]
-    return {batch.N_D: nested(plan, pool, batch) for batch in reversed(plan.batches) if batch.seed == seed}
+def runs_by_amount(study: Study, pool: Windows) -> dict[int, tuple[str, ...]]:
+    """Training and validation runs of each amount of data, fewest first, for the least seed."""
+    runs = nested_runs(pool.spans, study.grid.N_D, min(study.grid.seeds))
+    return {amount: runs[amount] for amount in sorted(runs)}
 
 
 def _place_in_run(windows: Windows) -> Array:
@@ -303,21 +297,17 @@ def _place_in_run(windows: Windows) -> Array:
     return place
 
 
-def _test_runs(plan: Plan, windows: Windows) -> list[str]:
-    wanted, runs = plan.study.split.test, windows.spans
+def _test_runs(study: Study, windows: Windows) -> list[str]:
+    wanted, runs = study.split.test, windows.spans
     if isinstance(wanted, int):
         if wanted >= len(runs):
             there = f"there {plural(len(runs), 'is only one run', f'are only {len(runs)} runs')}"
-            raise DocumentError(f"{wanted}: {there}", file=plan.file, path="split.test")
-        return list(nested_runs(runs, [wanted], plan.study.split.seed)[wanted])
-    for name in wanted:
-        if name not in runs:
-            raise DocumentError(
-                f"{name!r} is no run with windows{'' if '*' not in name else ' (a * is not read here)'}: "
-                f"{choices(name, runs)}",
-                file=plan.file,
-                path="split.test",
-            )
+            raise DocumentError(f"{wanted}: {there}", path="split.test")
+        return list(nested_runs(runs, [wanted], study.split.seed)[wanted])
+    if unknown := next((name for name in wanted if name not in runs), None):
+        star = " (a * is not read here)" if "*" in unknown else ""
+        message = f"{unknown!r} is no run with windows{star}: {choices(unknown, runs)}"
+        raise DocumentError(message, path="split.test")
     return wanted
 
 
@@ -334,20 +324,19 @@ def _roll_out(
     estimates: dict[str, Estimates],
 ) -> tuple[tuple[Foundation, ...], dict[str, Pair]]:
     """Paths of every foundation on (pool, test), members that diverge on the pool redrawn; fills in the estimates."""
+    study, calls = plan.study, sum(one.observer is not None for one in plan.foundations)
     families = {family.name: family for family in plan.families}
     finished: dict[str, tuple[Foundation, Pair]] = {}
     waiting = [one for one in plan.foundations if one.base and one.identify is None and one.observer is None]
     known: dict[Alike, list[Instants]] = {}
     while waiting:
         again = []
-        for foundation, paths, share in _one_round(plan, dataset, parts, waiting, device, known):
+        for foundation, paths, share in _one_round(study, dataset, parts, waiting, device, known):
             if share:
-                drawn = _redraw(plan, foundation, families[foundation.family], share)
-                counter = drawn.variant.counter if drawn.variant else 0
-                notes.append(
-                    f"{foundation.name} diverged on {percent(share, 1)} of the training windows: "
-                    f"redrawn, counter {counter}"
-                )
+                drawn = _redraw(foundation, families[foundation.family], share, plan.file)
+                assert drawn.variant is not None
+                words = f"{foundation.name} diverged on {percent(share, 1)} of the training windows"
+                notes.append(f"{words}: redrawn, counter {drawn.variant.counter}")
                 again.append(drawn)
             else:
                 finished[foundation.name] = (foundation, paths)
@@ -358,43 +347,42 @@ def _roll_out(
             same, paths = finished[foundation.variant.name]
             derived = replace(foundation, variant=same.variant)
             if derived.observer is not None and not derived.fitted:
-                estimates[derived.name] = estimated = estimates_of(plan, derived, dataset, parts[1])
-                paths = paths_of(plan, dataset, parts, derived, device, estimated)
+                estimates[derived.name] = estimated = estimates_of(study, derived, dataset, parts[1], calls)
+                paths = paths_of(study, dataset, parts, derived, device, estimated)
             finished[foundation.name] = (derived, paths)
         finished.setdefault(foundation.name, (foundation, zeros))
     foundations = tuple(finished[foundation.name][0] for foundation in plan.foundations)
     return foundations, {one.name: finished[one.name][1] for one in foundations}
 
 
-def physics_of(plan: Plan, vessel: Vessel | None, observer: Observer | None = None) -> Physics:
+def physics_of(study: Study, vessel: Vessel | None, observer: Observer | None = None) -> Physics:
     """The physics of a study: a vessel, rolled out over the horizon of the study."""
-    prediction = plan.study.prediction
-    return Physics(vessel, prediction.horizon, prediction.step, prediction.integrator, observer, path_of(plan))
+    prediction = study.prediction
+    return Physics(vessel, prediction.horizon, prediction.step, prediction.integrator, observer, path_source(study))
 
 
-def known_by_then(plan: Plan, dataset: Dataset) -> Dataset:
+def known_by_then(study: Study, dataset: Dataset) -> Dataset:
     """The runs as a predictor sees them: columns that the study calls `causal` hold their last fix."""
-    if not plan.causal:
+    if study.data is None or not study.data.causal:
         return dataset
     try:
-        return causal_columns(dataset, plan.causal)
+        return causal_columns(dataset, study.data.causal)
     except DataError as error:
-        raise DocumentError(error.message, file=plan.file, path="data.causal") from None
+        raise DocumentError(error.message, path="data.causal") from None
 
 
-def path_of(plan: Plan) -> PathSource:
+def path_source(study: Study) -> PathSource:
     """Where the true path of a study comes from."""
-    return plan.study.data.path if plan.study.data else "position"
+    return study.data.path if study.data else "position"
 
 
-def estimates_of(plan: Plan, foundation: Foundation, dataset: Dataset, test: Windows) -> Estimates:
-    """Estimates of the observer of a foundation at every row of the runs.
+def estimates_of(study: Study, foundation: Foundation, dataset: Dataset, test: Windows, calls: int = 1) -> Estimates:
+    """Estimates of the observer of a foundation at every row of the runs; `calls` as for `observe`.
 
     Where runs share a clock, an observer along another run sees no moment of the test windows.
     """
     assert foundation.vessel is not None
-    known = known_by_then(plan, dataset)
-    calls = sum(one.observer is not None for one in plan.foundations)
+    known = known_by_then(study, dataset)
     whole = observe(foundation.vessel, known, foundation.observer, calls=calls)
     kept = outside_of(dataset, test)
     rest = np.flatnonzero(kept & ~dataset.frame["run"].isin(list(test.spans)).to_numpy())
@@ -420,7 +408,7 @@ def apart(dataset: Dataset, test: Windows) -> Dataset:
     return kept_rows(dataset, outside_of(dataset, test))
 
 
-def chosen_observer(plan: Plan, foundation: Foundation, dataset: Dataset, windows: Windows) -> Observer:
+def chosen_observer(study: Study, foundation: Foundation, dataset: Dataset, windows: Windows) -> Observer:
     """Settings of the observer of a foundation with which its physics alone predicts these windows best.
 
     dataset : the runs of the windows.
@@ -430,18 +418,18 @@ def chosen_observer(plan: Plan, foundation: Foundation, dataset: Dataset, window
     hidden = window_memory(vessel, dataset, windows)
 
     def paths(observer: Observer, columns: Mapping[str, Array]) -> Array:
-        instants = windows.instants(known=plan.known, hidden=hidden, estimates=columns)
-        return physics_of(plan, vessel, observer).paths(instants)
+        instants = windows.instants(known=study.prediction.known, hidden=hidden, estimates=columns)
+        return physics_of(study, vessel, observer).paths(instants)
 
-    return tune_observer(vessel, known_by_then(plan, dataset), windows, paths, foundation.observer)[0]
+    return tune_observer(vessel, known_by_then(study, dataset), windows, paths, foundation.observer)[0]
 
 
 def instants_of(
-    plan: Plan, vessel: Vessel | None, dataset: Dataset, windows: Windows, estimates: Estimates | None = None
+    study: Study, vessel: Vessel | None, dataset: Dataset, windows: Windows, estimates: Estimates | None = None
 ) -> Instants:
     """Instants of a study at each window, with the states of the actuators and of the observer."""
     hidden = None if vessel is None else window_memory(vessel, dataset, windows)
-    known = plan.known
+    known = study.prediction.known
     return windows.instants(known=known, hidden=hidden, estimates=at_instants(dataset, windows, estimates))
 
 
@@ -454,7 +442,7 @@ def at_instants(dataset: Dataset, windows: Windows, estimates: Estimates | None)
 
 
 def _one_round(
-    plan: Plan,
+    study: Study,
     dataset: Dataset,
     parts: Sequence[Windows],
     foundations: Sequence[Foundation],
@@ -474,10 +462,10 @@ def _one_round(
     for key, group in alike.items():
         vessel = group[0][1]
         if key not in known:
-            known[key] = [instants_of(plan, vessel, dataset, windows) for windows in parts]
+            known[key] = [instants_of(study, vessel, dataset, windows) for windows in parts]
         parameters = np.array([one.variant.parameters for one, _ in group if one.variant is not None])
         (pool, pool_bad), (test, test_bad) = (
-            physics_of(plan, vessel).variant_paths(instants, parameters, device) for instants in known[key]
+            physics_of(study, vessel).variant_paths(instants, parameters, device) for instants in known[key]
         )
         for position, (foundation, _) in enumerate(group):
             paths = (pool[:, position], test[:, position])
@@ -486,7 +474,7 @@ def _one_round(
 
 
 def paths_of(
-    plan: Plan,
+    study: Study,
     dataset: Dataset,
     parts: Sequence[Windows],
     foundation: Foundation,
@@ -495,28 +483,26 @@ def paths_of(
 ) -> Pair:
     """Paths of one foundation on (pool, test); where it diverges they are not numbers."""
     vessel = foundation.vessel
-    physics = physics_of(plan, vessel, foundation.observer)
+    physics = physics_of(study, vessel, foundation.observer)
     (pool, pool_bad), (test, test_bad) = (
-        physics.variant_paths(instants_of(plan, vessel, dataset, windows, estimates), None, device) for windows in parts
+        physics.variant_paths(instants_of(study, vessel, dataset, windows, estimates), None, device)
+        for windows in parts
     )
     test[:, 0, test_bad[0]] = np.nan
     return (np.full_like(pool[:, 0], np.nan), test[:, 0]) if pool_bad.any() else (pool[:, 0], test[:, 0])
 
 
-def _redraw(plan: Plan, foundation: Foundation, family: Family, share: float) -> Foundation:
+def _redraw(foundation: Foundation, family: Family, share: float, file: str) -> Foundation:
     """The member drawn again with the next counter; Diverges where nothing can be drawn, or no more."""
     assert foundation.variant is not None
     assert foundation.base is not None
     counter = foundation.variant.counter + 1
     if counter > MOST_REDRAWS or not any(block.drawn for block in family.perturb):
         tries = f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else ""
-        raise Diverges(
-            f"{foundation.name} diverges on {percent(share, 1)} of the training windows{tries}: "
-            "take a smaller [prediction] step, rk4, or narrower factors",
-            file=plan.file,
-            path=f"family.{foundation.family}",
-        )
-    return replace(foundation, variant=draw(family, foundation.member, foundation.base, counter, plan.file))
+        words = f"{foundation.name} diverges on {percent(share, 1)} of the training windows{tries}"
+        remedy = "take a smaller [prediction] step, rk4, or narrower factors"
+        raise Diverges(f"{words}: {remedy}", path=f"family.{foundation.family}")
+    return replace(foundation, variant=draw(family, foundation.member, foundation.base, counter, file))
 
 
 def not_measured(vessel: Vessel, windows: Windows) -> list[str]:

@@ -6,15 +6,14 @@ A study that is meant so names the number in `unusual`, a list of dotted paths a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from shipid import document as documents
 from shipid.capacity import too_much
 from shipid.document import Document
 from shipid.errors import DocumentError
 from shipid.simulation.truth import LONGEST
+from shipid.study.schema import Prediction, Study
 
 UNUSUAL = "unusual"
 """Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
@@ -56,20 +55,18 @@ def check_ranges(document: Document, file: Path | str) -> None:
     for path, value in documents.leaves(document):
         if not isinstance(value, int | float) or isinstance(value, bool):
             continue
-        pattern = next((pattern for pattern in RANGES if documents.match(pattern, [path])), None)
-        if pattern is None:
-            continue
+        limits = next((row for pattern, row in RANGES.items() if documents.match(pattern, [path])), None)
         named = documents.by_name(document, path)
-        if any(documents.match(str(one), [path, named]) for one in meant):
+        if limits is None or any(documents.match(str(one), [path, named]) for one in meant):
             continue
-        least, most, unit = RANGES[pattern]
+        least, most, unit = limits
         if not least <= value <= most:
             message = f"{value:g}: expected {least:g} to {most:g} {unit}"
             remedy = f'if it is meant, write {UNUSUAL} = ["{named}"] at the top of the study'
             raise DocumentError(f"{message}; {remedy}", file=file, path=path)
 
 
-def check_seeds(study: Any, file: Path | str) -> None:
+def check_seeds(study: Study, file: Path | str) -> None:
     """Raise DocumentError for seeds, in the world of the study, that generators of random numbers do not take."""
     seeds = {"split.seed": study.split.seed, "grid.seeds": max(study.grid.seeds, default=0)}
     for path, seed in seeds.items():
@@ -77,29 +74,18 @@ def check_seeds(study: Any, file: Path | str) -> None:
             raise DocumentError(f"{seed}: seeds, with 1000 times `seed`, are at most {MOST_SEED}", file=file, path=path)
 
 
-@dataclass(frozen=True)
-class Cut:
-    """What decides how much memory the windows of a study take.
+def window_numbers(prediction: Prediction, past: int, columns: int, foundations: int, length: float) -> float:
+    """How many numbers the windows of a run of a length [s] are, with the paths of the foundations.
 
-    horizon, past : steps. step, interval : s. columns : of the dataset. foundations : whose paths are kept.
+    past : steps before each instant. columns : of the dataset.
     """
-
-    horizon: int
-    past: int
-    step: float
-    interval: float
-    columns: int
-    foundations: int
-
-    def numbers(self, length: float) -> float:
-        """How many numbers the windows of a run of this length [s] are, with the paths of the foundations."""
-        count = math.floor(max(0.0, length - (self.horizon + self.past) * self.step) / self.interval) + 1
-        each = (self.horizon + 1) * (self.columns + 6 + 2 * self.foundations) + self.past * self.columns
-        return float(count) * each
+    reach = (prediction.horizon + past) * prediction.step
+    count = math.floor(max(0.0, length - reach) / prediction.interval) + 1
+    each = (prediction.horizon + 1) * (columns + 6 + 2 * foundations) + past * columns
+    return float(count) * each
 
 
 def check_memory(numbers: float, words: str, path: str, file: Path | str) -> None:
     """Raise DocumentError with the number that causes it where so many numbers exceed this machine's memory."""
-    fault = too_much(numbers)
-    if fault is not None:
+    if fault := too_much(numbers):
         raise DocumentError(f"{words} {fault}", file=file, path=path)

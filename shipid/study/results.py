@@ -23,7 +23,7 @@ from shipid.predictor import checked_bands, read_bands
 from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL
 from shipid.study.kinds import kinds_of
-from shipid.study.plan import Plan
+from shipid.study.plan import Plan, families_aside, families_set_from, judged_method, model_label
 
 STRIDE = 20  # cells read between words on how far it is
 MOST_KEPT = 2**30  # bytes of predicted paths in memory
@@ -105,13 +105,13 @@ class Results:
     @property
     def aside(self) -> set[str]:
         """Families that are shown, but that no claim and no sentence of the answer counts."""
-        return {*self.plan.aside, *self.saw_test}
+        return {*families_aside(self.plan), *self.saw_test}
 
     @property
     def saw_test(self) -> set[str]:
         """Families whose numbers rest on test runs: those that the claims set aside, or that name such a run."""
-        claims = self.plan.claims
-        return {*(claims.aside if claims else ()), *self.plan.saw(self.test.spans)}
+        claims = self.plan.study.claims
+        return {*(claims.aside if claims else ()), *families_set_from(self.plan, self.test.spans)}
 
     @cached_property
     def windows(self) -> np.ndarray:
@@ -135,7 +135,7 @@ class Results:
     @property
     def judged_cells(self) -> pd.DataFrame:
         """Rows of the cells of the method that findings and the answer speak of; `model` is the foundation."""
-        cells = self.cells[self.cells["method"] == self.plan.judged]
+        cells = self.cells[self.cells["method"] == judged_method(self.plan)]
         return cells.assign(model=cells["foundation"])
 
 
@@ -168,7 +168,9 @@ def _cells(folder: Path, plan: Plan) -> pd.DataFrame:
 
 def _labelled(cells: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     """The cells with the name that figures give their models."""
-    return cells.assign(model=[plan.label(*pair) for pair in zip(cells["foundation"], cells["method"], strict=True)])
+    return cells.assign(
+        model=[model_label(plan, *pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
+    )
 
 
 def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | None = None) -> Results:
@@ -194,7 +196,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         if band is not None:
             bands[cell] = band
         try:
-            checked_bands(band, reason, plan.level)
+            checked_bands(band, reason, plan.study.bands.level)
         except DataError as error:
             no_band[cell] = error.message
     return Results(

@@ -95,6 +95,11 @@ class Prediction(Strict):
         """Number of steps T."""
         return round(self.ahead / self.step)
 
+    @property
+    def known(self) -> bool:
+        """Whether the commands of the horizon are known."""
+        return self.commands == "known"
+
 
 class Grid(Strict):
     """`[grid]`: amounts of data and repetitions; every model gets a cell at each."""

@@ -112,8 +112,8 @@ def _rows(
     for same in _equal_lags(base, values):
         vessel = base.with_values(dict(zip(base.parameters, values[same[0]].tolist(), strict=True)))
         measured = [
-            physics_of(plan, vessel).distances(
-                instants_of(plan, vessel, dataset, windows),
+            physics_of(plan.study, vessel).distances(
+                instants_of(plan.study, vessel, dataset, windows),
                 windows.future,
                 values[same],
                 engine=engine,

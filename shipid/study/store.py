@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from shipid import document as documents
 from shipid.data.windows import Windows
@@ -37,9 +37,9 @@ from shipid.hybrid.methods import METHODS
 from shipid.physics import TERMS
 from shipid.predictor import Predictor
 from shipid.study import seals
-from shipid.study.code import code_digest
 from shipid.study.declared import Foundation
-from shipid.study.plan import METHOD_CODE, TERM_CODE, USER_SCRIPT, WITH, Plan, Unit, build_plan
+from shipid.study.lock import sole_writer
+from shipid.study.plan import METHOD_CODE, TERM_CODE, Plan, Unit, build_plan, own_code, plan_text, program_of
 from shipid.units import listed, plural
 from shipid.version import __version__
 from shipid.vessel.load import check_vessel
@@ -47,19 +47,27 @@ from shipid.vessel.load import check_vessel
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", seals.PROVENANCE, "foundations.json"
 DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
 JOURNALS, TRIALS = "trials", "trials.log"
-FOLDERS = ("cells", "predictions", "batches", "claims", seals.FOLDER, JOURNALS)
-LISTED = ("batches", "claims", seals.FOLDER, JOURNALS)  # folders whose files say how far a run is
+FOLDERS = ("cells", "predictions", "batches", seals.FOLDER, JOURNALS)
 RESULTS = "results"  # name of the seal of the tables
 PARTS = "parts"
-COPY = "copy the folder of the run, and name the copy"  # what helps where this user may not write
 UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
-ENTRIES: dict[str, tuple[type | tuple[type, ...], type]] = {
-    **dict.fromkeys(("digest", "name", "file", "program"), (str, object)),
-    **dict.fromkeys(("sources", "changes", "machine", METHOD_CODE, TERM_CODE), (dict, object)),
-    **{"sessions": (list, dict), "notes": (list, str), "wall_seconds": ((float, int), object)},
-}
-"""Entries of the provenance -> what each is, and what those in it are."""
+
+
+class Provenance(BaseModel):
+    """What says to which study a folder belongs, and what it was computed with; entries of others stay."""
+
+    model_config = ConfigDict(extra="allow", strict=True)
+    digest: str
+    name: str
+    file: str
+    program: str = ""
+    sources: dict[str, str] = {}
+    changes: dict[str, Any] = {}
+    machine: dict[str, Any] = {}
+    sessions: list[dict[str, Any]] = []
+    notes: list[str] = []
+    wall_seconds: float = 0.0
 
 
 class NotTaken(ResultError):
@@ -74,11 +82,12 @@ class Cell(NamedTuple):
     paths: np.ndarray | None = None
 
 
-def open_folder(folder: Path, plan: Plan) -> None:
-    """Make the folder of a run, or check that an existing one belongs to the same study.
+@contextmanager
+def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
+    """Work alone in the folder of a run, which is made, or is that of the same study already.
 
-    It appears with all that says what it is, so that of two runs that begin at once only one makes it; the other joins
-    it, or is refused if it is of another plan.
+    It appears with all that says what it is. ResultError for the folder of another study, for one that this user may
+    not read or write, and where another process works in it.
     """
     if folder.is_symlink() and not folder.exists():
         raise ResultError("is a link that leads nowhere: choose another --out", file=folder)
@@ -96,13 +105,11 @@ def open_folder(folder: Path, plan: Plan) -> None:
     check_readable(folder)
     if provenance(folder)["digest"] != plan.digest:
         raise ResultError(_other_study(folder, plan), file=folder)
-    for name in FOLDERS:
-        if os.path.lexists(folder / name) and not (folder / name).is_dir():
-            raise ResultError("is no folder, where one belongs: move it away, and resume", file=folder / name)
     check_writable(folder)
-    _check_journals(folder, plan)
-    _mend(folder, plan)
-    sweep_run(folder)
+    with in_place(folder, plan), sole_writer(folder):
+        _mend(folder, plan)
+        sweep_run(folder)
+        yield
 
 
 def _other_study(folder: Path, plan: Plan) -> str:
@@ -111,31 +118,13 @@ def _other_study(folder: Path, plan: Plan) -> str:
         return f"holds the results of another study than {plan.file}: choose another --out"
     stored, record = read_json(folder / VESSELS), provenance(folder)
     try:
-        vessels = [one.file for name, one in plan.vessels.items() if stored[name]["document"] != one.document]
+        changed = [one.file for name, one in plan.vessels.items() if stored[name]["document"] != one.document]
     except (TypeError, KeyError):
         raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
-    before = record.get("sources", plan.sources)  # an early version noted none
-    sources = [name for name, digest in plan.sources.items() if before.get(name) != digest]
-    changed = [*vessels, *(f"the {name.rpartition('/')[2]} of {plan.file}" for name in sources)]
-    if not changed:
-        then, now = record.get(METHOD_CODE, {}), plan.code.get(METHOD_CODE, {})
-        changed = [f"the method {name!r}" for name, digest in then.items() if now.get(name) != digest]
-    if not changed:
-        return _otherwise_made(record)
-    words = f"holds results from before {listed(changed)} changed: choose another --out"
-    resume = f"{plan.program} study resume {as_argument(folder)}"
-    return f"{words}, or go on with the vessel as it was: `{resume}`" if changed == vessels else words
-
-
-def _otherwise_made(record: Mapping[str, Any]) -> str:
-    """What a folder of the same documents and data is whose digest is another one."""
-    made = next((str(session["shipid"]) for session in record.get("sessions", [])[-1:] if "shipid" in session), "")
-    here = f"{__version__}, code {code_digest()}"
-    if made == here:
-        why = "it was changed by hand, or a method has other defaults"
-        return f"says that it is of another study, and holds this one: {why}: choose another --out"
-    versions = f"{made}; this is {here}" if made else f"this is {here}"
-    return f"was made by another version of shipid ({versions}), whose defaults are others: choose another --out"
+    changed += [f"the {name}" for name, digest in plan.sources.items() if record["sources"].get(name) != digest]
+    what = listed(changed) if changed else f"a default of a method, or of shipid (this is {__version__}),"
+    words = f"holds results from before {what} changed: choose another --out"
+    return f"{words}, or go on with it as it was: `{program_of(plan)} study resume {as_argument(folder)}`"
 
 
 def check_readable(folder: Path) -> None:
@@ -145,10 +134,10 @@ def check_readable(folder: Path) -> None:
             with open_file(folder / name) as stream:
                 stream.read()
         except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
-            continue  # said elsewhere
+            continue  # reported where it is read
         except OSError as error:
             raise ResultError(f"cannot be read ({error.strerror}): let this user read it", file=folder / name) from None
-    for name in LISTED:
+    for name in (seals.FOLDER, "batches", JOURNALS):
         if (folder / name).is_dir() and not os.access(folder / name, os.R_OK | os.X_OK):
             raise ResultError("is a folder that this user may not read: let this user read it", file=folder / name)
 
@@ -156,31 +145,11 @@ def check_readable(folder: Path) -> None:
 def check_writable(folder: Path) -> None:
     """Raise ResultError for the folder of a run, or one in it, where this user may not write or replace files."""
     for place in (folder, *(folder / name for name in (*FOLDERS, PARTS))):
+        if place != folder and os.path.lexists(place) and not place.is_dir():
+            raise ResultError("is no folder, where one belongs: move it away, and resume", file=place)
         if place.is_dir() and not os.access(place, os.W_OK | os.X_OK):
-            raise ResultError(f"is a folder that this user may not write into: let this user, or {COPY}", file=place)
-        if place.is_dir() and (kept := _kept(place)):
-            message = f"its files may be replaced by their owners alone (sticky), such as {kept}"
-            raise ResultError(f"{message}: `chmod -t` ends that; or {COPY}", file=place)
-
-
-def _kept(place: Path) -> str:
-    """Name of a file that another user has and that the system lets nobody else replace; empty if there is none."""
-    status = place.stat()
-    user = os.geteuid() if hasattr(os, "geteuid") else 0
-    if not status.st_mode & stat.S_ISVTX or user in (0, status.st_uid):
-        return ""
-    with os.scandir(place) as entries:
-        return next((entry.name for entry in entries if entry.stat(follow_symlinks=False).st_uid != user), "")
-
-
-def _check_journals(folder: Path, plan: Plan) -> None:
-    """Raise ResultError for the journal of a search that is not finished where this user may not go on with it."""
-    units = {} if plan.parts else {unit.key: unit for unit in plan.units}
-    left = units.keys() - finished_keys(folder, units)
-    for file in (folder / JOURNALS).glob("*.log"):
-        if file.stem in left and not os.access(file, os.R_OK | os.W_OK):
-            message = f"is a journal that this user may not read and write: let this user, or {COPY}"
-            raise ResultError(message, file=file)
+            remedy = "let this user, or copy the folder of the run, and name the copy"
+            raise ResultError(f"is a folder that this user may not write into: {remedy}", file=place)
 
 
 @contextmanager
@@ -189,21 +158,22 @@ def in_place(folder: Path, plan: Plan) -> Iterator[None]:
     try:
         yield
     except (OSError, ShipidError) as error:
-        check_place(folder, plan)
+        check_place(folder, plan.digest)
         if isinstance(error, PermissionError):
             check_readable(folder)
             check_writable(folder)
         raise
 
 
-def check_place(folder: Path, plan: Plan) -> None:
-    """Raise ResultError where the folder is no longer that of the run: it may be moved, removed or replaced meanwhile.
+def check_place(folder: Path, digest: str) -> None:
+    """Raise ResultError where the folder is no longer that of a run: it may be moved, removed or replaced meanwhile.
 
     Call it before each write: else the results of two plans mix, or a part of them appears at the old place.
+
+    digest : of the plan of the run.
     """
     try:
-        record = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
-        same = record["digest"] == plan.digest
+        same = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["digest"] == digest
     except FileNotFoundError:
         same = (folder / STUDY).exists()
     except (OSError, ValueError, TypeError, KeyError):  # a file server that is slow, or a damage: it says nothing else
@@ -224,7 +194,7 @@ def _mend(folder: Path, plan: Plan) -> None:
     try:
         changed = documents.digest(documents.read(folder / STUDY)) != documents.digest(plan.document)
     except DocumentError:
-        write_text(folder / STUDY, plan.text())
+        write_text(folder / STUDY, plan_text(plan))
         changed = False
     try:
         stored = read_json(folder / VESSELS)
@@ -249,26 +219,22 @@ def _make(folder: Path, plan: Plan) -> None:
         try:
             os.rename(above / folder.name, folder)
             sync(folder.parent)
-            return
         except OSError as error:
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
                 raise
-    if (folder / STUDY).exists():
-        return
-    if any(entry.name not in (PROVENANCE, VESSELS) for entry in folder.iterdir()):
-        raise ResultError("is not empty and holds no run of shipid: choose another --out", file=folder)
-    _describe(folder, plan)
+            if not (folder / STUDY).exists():
+                raise ResultError(
+                    "is not empty and holds no run of shipid: choose another --out", file=folder
+                ) from None
 
 
 def _describe(folder: Path, plan: Plan) -> None:
     """Write what a folder is: provenance, vessels and, last, the study."""
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
-    origin["changes"] = dict(plan.changes)
-    if plan.code:
-        origin |= {"program": plan.program, **plan.code}
-    write_json(folder / PROVENANCE, {"digest": plan.digest, **origin})
+    own = {"program": program_of(plan), **own_code(plan)} if own_code(plan) else {}
+    write_json(folder / PROVENANCE, {"digest": plan.digest, **origin, "changes": dict(plan.changes), **own})
     _write_vessels(folder, plan)
-    write_text(folder / STUDY, plan.text())
+    write_text(folder / STUDY, plan_text(plan))
 
 
 def stored_plan(folder: Path) -> Plan:
@@ -284,19 +250,17 @@ def stored_plan(folder: Path) -> Plan:
         document = documents.read(folder / STUDY)
     except DocumentError as error:
         raise ResultError(f"damaged ({error.message}): run the study again", file=folder / STUDY) from None
-    remedy = _needed_script(folder, record, document)
-    stored = read_json(folder / VESSELS)
+    stored, file = read_json(folder / VESSELS), folder / VESSELS
     try:
         vessels = {name: check_vessel(entry["document"], entry["file"]) for name, entry in stored.items()}
+        file = folder / STUDY
+        plan = build_plan(document, Path(record["file"]), vessels, record["sources"], record["changes"])
+    except DocumentError as error:
+        other = "if the run is of another version, read its report.html, and run the study again into a new folder"
+        message = f"shipid {__version__} does not take it ({error.message}): {other}"
+        raise NotTaken(_needed_script(folder, record, document) or message, file=file, path=error.path) from None
     except (TypeError, KeyError, AttributeError, ValueError):
         raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
-    except DocumentError as error:
-        raise _not_taken(error, folder / VESSELS, remedy) from None
-    try:
-        sources, changes = (record.get(key, {}) for key in ("sources", "changes"))
-        plan = build_plan(document, Path(record["file"]), vessels, sources, changes)
-    except DocumentError as error:
-        raise _not_taken(error, folder / STUDY, remedy) from None
     if plan.digest != record["digest"]:
         raise ResultError(
             "its study or vessels were changed by hand, or this shipid has other defaults: run the study again",
@@ -305,51 +269,29 @@ def stored_plan(folder: Path) -> Plan:
     return plan
 
 
-def _not_taken(error: DocumentError, file: Path, remedy: str) -> NotTaken:
-    """The error for a document in the folder of a run that was right when the run began."""
-    other = "if the run is of another version, read its report.html, and run the study again into a new folder"
-    message = f"shipid {__version__} does not take it ({error.message}): {other}"
-    return NotTaken(remedy or message, file=file, path=error.path)
-
-
 def _needed_script(folder: Path, record: Mapping[str, Any], document: documents.Document) -> str:
-    """How to open a run with terms and methods of a user that this process lacks; empty where it has all.
-
-    Their names are in the provenance, or in its sessions where an earlier version made the folder.
-    """
-    noted = [record, *record.get("sessions", [])]
-    terms, methods = ({name for one in noted for name in _names_in(one, what)} for what in (TERM_CODE, METHOD_CODE))
-    blocks = document.get("method")
-    ways = [way for way in blocks if isinstance(way, dict)] if isinstance(blocks, list) else []
-    kinds = {str(way.get("kind")) for way in ways if way.get("name") in methods}
-    lacking = [*sorted(terms - TERMS.keys()), *sorted(kinds - METHODS.keys())]
+    """How to open a run with terms and methods of a user that this process lacks; empty where it has all."""
+    kinds = {str(way.get("name")): str(way.get("kind")) for way in document.get("method", []) if isinstance(way, dict)}
+    lacking = sorted(record.get(TERM_CODE, {}).keys() - TERMS.keys())
+    lacking += sorted({kinds.get(name, name) for name in record.get(METHOD_CODE, {})} - METHODS.keys())
     if not lacking:
         return ""
-    program = record.get("program", f"python {USER_SCRIPT}")
     words = f"{listed(lacking)}, which a user wrote, {plural(len(lacking), 'is', 'are')} not known to this process"
     script = f"open the run by the script that puts {plural(len(lacking), 'it', 'them')} into TERMS or METHODS"
-    return f"{words}: {script}: `{program} study report {as_argument(folder)}`"
-
-
-def _names_in(record: Mapping[str, Any], what: str) -> list[str]:
-    held = record.get(what)
-    return list(held) if isinstance(held, dict) else []
+    return f"{words}: {script}: `{record.get('program', 'shipid')} study report {as_argument(folder)}`"
 
 
 def provenance(folder: Path) -> dict[str, Any]:
-    """Read what says to which study a folder belongs; ResultError where it does not say so, or an entry is no such."""
-    record = read_json(folder / PROVENANCE)
-    if not isinstance(record, dict) or not {"digest", "name", "file"} <= record.keys():
-        raise ResultError("damaged: run the study again into a new folder", file=folder / PROVENANCE)
-    for key, (kind, inner) in ENTRIES.items():
-        if key not in record:
-            continue
-        held = record[key]
-        every = held.values() if isinstance(held, dict) else held if isinstance(held, list) else ()
-        if not isinstance(held, kind) or not all(isinstance(one, inner) for one in every):
-            message = "is not what shipid writes there: put it back, or run the study again into a new folder"
-            raise ResultError(message, file=folder / PROVENANCE, path=key)
-    return record
+    """Read what says to which study a folder belongs; ResultError where an entry is not what shipid writes there."""
+    try:
+        record: dict[str, Any] = Provenance.model_validate(read_json(folder / PROVENANCE)).model_dump(
+            exclude_unset=True
+        )
+    except ValidationError as error:
+        path = ".".join(map(str, error.errors()[0]["loc"]))
+        message = "is not what shipid writes there: put it back, or run the study again into a new folder"
+        raise ResultError(message, file=folder / PROVENANCE, path=path) from None
+    return {"sources": {}, "changes": {}, **record}
 
 
 def check_part(folder: Path, name: str, plan: Plan) -> Path:
@@ -405,29 +347,13 @@ def part_folder(folder: Path, part: str) -> Path:
 
 
 def finished(folder: Path, units: Iterable[Unit]) -> list[Unit]:
-    """Units whose results are stored whole: with a seal, or in a batch that was one unit to an earlier version."""
-    known = {unit.key: unit for unit in units}
-    done = finished_keys(folder, known)
-    return [unit for key, unit in known.items() if key in done]
-
-
-def finished_keys(folder: Path, units: Mapping[str, Unit]) -> set[str]:
-    """Keys of the units, by key, whose results are stored whole; 10,000 take some milliseconds."""
+    """Units whose results are stored whole."""
     sealed = seals.sealed(folder)
-    batches = {name for name in sealed - seals.FIRST.keys() if WITH not in name}
-    before = {key for key, unit in units.items() if unit.batch.key in batches} if batches else set()
-    return (sealed & units.keys()) | before
-
-
-def is_finished(folder: Path, unit: Unit) -> bool:
-    """Whether the results of one unit are stored whole."""
-    return seals.is_sealed(folder, unit.key) or seals.is_sealed(folder, unit.batch.key)
+    return [unit for unit in units if unit.key in sealed]
 
 
 def write_unit(folder: Path, unit: Unit, results: Sequence[Cell]) -> None:
     """Store the rows, predictors and test paths of a unit; the seal comes last, when all the rest is on the disk."""
-    if is_finished(folder, unit):  # by a process that took it over while this one was held up
-        return
     files = []
     for row, predictor, paths in results:
         if predictor is not None:
@@ -461,19 +387,12 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     return [f"{name} was {one.get(name)}, now {other.get(name)}" for name in changed]
 
 
-def _names(folder: Path, plan: Plan) -> set[str]:
-    """Names of the files of a plan's units: their keys, and those of batches that an earlier version stored whole."""
-    sealed = seals.sealed(folder)
-    return {unit.key for unit in plan.units} | ({unit.batch.key for unit in plan.units} & sealed)
-
-
 def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
     """One row per finished cell, with its trials; ordered by N_D, seed and, with the plan, foundation and method.
 
-    Other files, such as copies by a program that synchronises folders, are left out where the plan is given.
+    Other files, such as copies by a program that synchronises folders, are left out.
     """
-    wanted = seals.sealed(folder)  # other files are of units that are computed again, perhaps cut in another way
-    wanted &= _names(folder, plan) if plan is not None else wanted
+    wanted = seals.sealed(folder) if plan is None else {unit.key for unit in finished(folder, plan.units)}
     files = sorted(file for file in (folder / "batches").glob("*.json") if file.stem in wanted)
     rows = [row for file in files for row in read_json(file)]
     if not rows:
@@ -501,8 +420,8 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
     write_table(folder / "results.parquet", table)
     trials = [{"cell": row["cell"], **_flat(trial)} for _, row in rows.iterrows() for trial in row["trials"]]
     write_table(folder / "trials.parquet", pd.DataFrame(trials))
-    names = _names(folder, plan)
-    if journals := sorted(file for file in (folder / JOURNALS).glob("*.log") if file.stem in names):
+    keys = [unit.key for unit in plan.units]
+    if journals := sorted(file for file in (folder / JOURNALS).glob("*.log") if file.stem in keys):
         from shipid.hybrid.journal import merge  # with Optuna, which a study is read without
 
         merge(journals, folder / TRIALS)

@@ -138,7 +138,7 @@ def test_findings_say_what_the_cells_hold(results: Results) -> None:
 
 def test_a_family_that_the_claims_set_aside_is_not_in_the_mean(results: Results) -> None:
     frame = bands.coverage_frame(results)
-    top = frame[(frame["N_D"] == frame["N_D"].max()) & (frame["level"] == results.plan.level)]
+    top = frame[(frame["N_D"] == frame["N_D"].max()) & (frame["level"] == results.plan.study.bands.level)]
     tuned = "wrong"
     claims = Claims(aside=[tuned])
     apart = replace(results, plan=replace(results.plan, study=results.plan.study.model_copy(update={"claims": claims})))

@@ -24,7 +24,7 @@ from shipid.answer.rotate import (
 )
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
-from shipid.study.plan import Plan
+from shipid.study.plan import Plan, whole_unit
 from shipid.study.prepare import prepare
 from shipid.study.run import run_unit
 from tests.study.test_commands import weaving
@@ -74,7 +74,7 @@ def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Pl
     for test in ("a", "b"):
         single, _ = recorded(weaving(), split={"test": [test]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
         prepared = prepare(single, dataset)
-        rows = [row for row, *_ in run_unit(single, prepared, single.whole(single.batches[0]), "cpu")]
+        rows = [row for row, *_ in run_unit(single, prepared, whole_unit(single, single.batches[0]), "cpu")]
         turn = rows_of_turns[rows_of_turns["test"] == test]
         assert list(turn["foundation"]) == [row["foundation"] for row in rows]
         for name in ("A", "H"):
@@ -159,8 +159,8 @@ def test_no_finding_is_about_numbers_that_were_set_from_runs_that_test(made: Cal
     plan: Plan = made(cells, claims=claims, alone={"good": 1.0, "bad": 2.0, "tuned": 0.5}).plan
 
     def seen(**runs: list[str]) -> Plan:
-        families = [one.model_copy(update={"seen": runs.get(one.name, [])}) for one in plan.study.family]
-        return replace(plan, study=plan.study.model_copy(update={"family": families}))
+        families = [one.model_copy(update={"seen": runs.get(one.name, [])}) for one in plan.families]
+        return replace(plan, families=tuple(families))
 
     for name in ("good", "bad"):
         unfair = turn_findings(many(), seen(**{name: ["another run", "ZZ 1"]}))

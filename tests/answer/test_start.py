@@ -10,7 +10,7 @@ import pytest
 
 from shipid.answer.start import event_line, events, run
 from shipid.errors import ShipidError
-from shipid.study.plan import read_plan
+from shipid.study.plan import default_folder, read_plan
 from shipid.study.run import Event
 from tests.study.tiny import TINY
 
@@ -38,7 +38,7 @@ def test_run_logs_its_progress_and_returns_results(
 
 def test_the_folder_is_named_after_the_study() -> None:
     plan = read_plan(TINY)
-    assert plan.folder == Path("results") / f"plain-{plan.digest[:8]}"
+    assert default_folder(plan) == Path("results") / f"plain-{plan.digest[:8]}"
 
 
 def test_a_mistake_is_an_error_of_shipid() -> None:

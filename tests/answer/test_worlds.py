@@ -118,7 +118,7 @@ def test_a_member_weighs_once_and_a_failed_cell_nothing() -> None:
         ("i", "i", "drawn", 4, "ok", 7.0, 0.2, 0.9, 1.0),
         ("none", "none", "drawn", 4, "ok", 50.0, 9.0, np.nan, np.nan),
     ]
-    plan = SimpleNamespace(fitted={"i"})
+    plan = SimpleNamespace(foundations=[SimpleNamespace(family="i", fitted=True)])
     worlds: Any = [SimpleNamespace(cells=pd.DataFrame(rows, columns=columns), plan=plan)] * 2
     bands = compare_errors(worlds).set_index(["family", "N_D"])
     assert bands["H"].to_dict() == {("f", 0): 2.0, ("f", 4): 0.8, ("f", 6): 0.5, ("i", 4): 0.2, ("none", 4): 9.0}

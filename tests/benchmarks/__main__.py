@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from shipid.hybrid.device import use_threads
-from shipid.study.run import machine
+from shipid.study.sessions import machine
 from tests.benchmarks.compare import RECORDED, TOLERANCE, Ratio, accepted, best, compare, read_recorded
 
 THREADS = {  # group, the module of that name -> threads that PyTorch may use
@@ -38,7 +38,6 @@ ASKED = {
     "bands": 1,
     "verdicts": 1,
     "guess": 1,
-    "sharing": 1,
     "gpu": 1,
 }  # the same, only where named: they take minutes and are no matter of time, or need a GPU
 GROUPS = THREADS | ASKED

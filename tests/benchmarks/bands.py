@@ -33,7 +33,7 @@ from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.metrics import share_of, shares_by_run
 from shipid.predictor import limits_of
-from shipid.study.plan import Batch, read_plan
+from shipid.study.plan import Batch, model_label, read_plan, whole_unit
 from shipid.study.prepare import instants_of, obtain, partition, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.load import Vessel, load_vessel
@@ -259,10 +259,11 @@ def recorded(folder: Path, commands: str) -> pd.DataFrame:
         study = least.model_copy(update={"grid": least.grid.model_copy(update={"N_D": [amount]})})
         turn = replace(plan, study=study, batches=(Batch(amount, 0),))
         prepared = prepare(turn, dataset)
-        for row, predictor, _ in run_unit(turn, prepared, turn.whole(turn.batches[0]), "cpu"):
+        for row, predictor, _ in run_unit(turn, prepared, whole_unit(turn, turn.batches[0]), "cpu"):
             assert predictor is not None
-            instants = instants_of(turn, predictor.vessel, dataset, prepared.test)
-            frame = pd.DataFrame({"test": test, "model": plan.label(row["foundation"], row["method"]), "H": row["H"]},
+            instants = instants_of(turn.study, predictor.vessel, dataset, prepared.test)
+            model = model_label(plan, row["foundation"], row["method"])
+            frame = pd.DataFrame({"test": test, "model": model, "H": row["H"]},
                                  index=range(len(prepared.test)))  # fmt: skip
             for level in (0.8, 0.9):
                 prediction = predictor.predict(instants, level=level)

@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import read_plan
+from shipid.study.plan import read_plan, whole_unit
 from shipid.study.prepare import obtain, prepare
 from shipid.study.run import run_unit
 
@@ -19,7 +19,7 @@ def run() -> dict[str, Any]:
     result: dict[str, Any] = {"simulate, roll out [s]": round(time.perf_counter() - start, 2)}
     for batch in plan.batches:
         start = time.perf_counter()
-        rows = [cell.row for cell in run_unit(plan, prepared, plan.whole(batch), "cpu")]
+        rows = [cell.row for cell in run_unit(plan, prepared, whole_unit(plan, batch), "cpu")]
         seconds = (time.perf_counter() - start) / len(rows)
         errors = [row["H"] for row in rows if row["foundation"] != NO_MODEL]
         mean = sum(errors) / len(errors)

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from shipid.engine.rollout import rollout
-from shipid.study.plan import read_plan
+from shipid.study.plan import read_plan, whole_unit
 from shipid.study.prepare import obtain, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.load import load_vessel
@@ -66,7 +66,7 @@ def _batches() -> dict[str, Any]:
         prepared = prepare(plan, dataset, device)
         for batch in ends:  # the first is timed twice: what is loaded once is not its price
             rows = []
-            took = clock(lambda: rows.extend(run_unit(plan, prepared, plan.whole(batch), device)))  # noqa: B023
+            took = clock(lambda: rows.extend(run_unit(plan, prepared, whole_unit(plan, batch), device)))  # noqa: B023
             figures[f"batch, N_D {batch.N_D}, one thread, {device} [s]"] = round(took, 1)
             errors[device, batch.N_D] = np.array([cell.row["H"] for cell in rows])
     apart = max(float(np.abs(errors["cuda", n] - errors["cpu", n]).max()) for n in (10, 100))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shipid.hybrid.path_drawn import PathDrawn
+from shipid.study.plan import whole_unit
 from shipid.study.run import run_unit
 from tests.benchmarks.yardstick import KEPT, Cell, tune_cell, world
 
@@ -48,7 +49,7 @@ def _in_company(number: int) -> dict[str, Any]:
     result = {}
     for batch in plan.batches[:: len(plan.batches) - 1]:
         start = time.process_time()
-        rows = run_unit(plan, prepared, plan.whole(batch), "cpu")
+        rows = run_unit(plan, prepared, whole_unit(plan, batch), "cpu")
         seconds = (time.process_time() - start) / len(rows)
         result[f"in a batch of {len(rows)}, N_D {batch.N_D}: core-seconds a cell"] = round(seconds, 2)
     return result

@@ -30,7 +30,7 @@ from shipid.data.dataset import Dataset
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.study.plan import Plan, read_plan
-from shipid.study.prepare import constant_motion, obtain, partition, path_of, window_memory
+from shipid.study.prepare import constant_motion, obtain, partition, path_source, window_memory
 from shipid.study.results import judged_cells, read_results
 from shipid.vessel.load import load_vessel
 from tests.logs.judged_raw import judge_raw
@@ -206,7 +206,7 @@ def figures_of(ship: RawStranger, plan: Plan, folder: Path) -> dict[str, Any]:
     best = with_physics.iloc[int(np.argmin(losses))]  # by validation
     known = true_dataset(ship, imported, list(test.spans))
     _, seen, _ = partition(plan, known)
-    physics = Physics(ship.truth, seen.horizon, seen.step, "rk4", None, path_of(plan))
+    physics = Physics(ship.truth, seen.horizon, seen.step, "rk4", None, path_source(plan.study))
     paths = physics.paths(seen.instants(known=True, hidden=window_memory(ship.truth, known, seen)))
     true = float(position_error(paths, seen.future).mean())
     numbers = {

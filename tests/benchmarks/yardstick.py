@@ -27,7 +27,7 @@ from shipid.hybrid.path_trained import PathTrained
 from shipid.metrics import position_error, summary
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import Prepared, instants_of, obtain, physics_of, prepare
-from shipid.study.run import machine
+from shipid.study.sessions import machine
 
 KEPT = Path(__file__).with_suffix(".json")
 PIECES = Path("results/yardstick")
@@ -66,17 +66,17 @@ def world(number: int) -> tuple[Plan, Prepared]:
 def tune_cell(plan: Plan, prepared: Prepared, cell: Cell, method: Method) -> dict[str, Any]:
     """Tune one cell alone, on one thread: core-seconds, H and H_90 [m], and its trials."""
     batch = Batch(cell.N_D, plan.batches[0].seed)
-    mask = np.isin(prepared.pool.run, prepared.runs(plan, batch))
+    mask = np.isin(prepared.pool.run, prepared.runs(batch))
     windows = prepared.pool.select(mask)
     vessel = next(one.vessel for one in prepared.foundations if one.name == cell.model)
-    physics = physics_of(plan, vessel)
-    folds = prepared.folds(plan, batch, windows, method.validation)
+    physics = physics_of(plan.study, vessel)
+    folds = prepared.folds(batch, windows, method.validation)
     case = Case(physics, prepared.pool_paths[cell.model][:, mask])
     start = time.process_time()
     fit = method.fit(Task({cell.model: case}, windows, folds, prepared.commands, seed=batch.seed))[cell.model]
     seconds = time.process_time() - start
     assert fit.corrector is not None
-    instants = instants_of(plan, vessel, prepared.data, prepared.test)
+    instants = instants_of(plan.study, vessel, prepared.data, prepared.test)
     paths = fit.corrector.predict(physics, instants, prepared.test_paths[cell.model])
     error = summary(position_error(paths, prepared.test.future))
     alone = None if cell.model == "none" else prepared.accuracy(cell.model)["mean"]

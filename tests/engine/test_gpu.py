@@ -12,6 +12,7 @@ import torch
 from shipid.engine import torch as engine
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
+from shipid.study.plan import whole_unit
 from shipid.study.prepare import obtain, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.load import load_vessel
@@ -76,7 +77,7 @@ def test_strange_ships_on_a_gpu_are_those_of_the_processor(seed: int) -> None:
 def test_a_study_on_a_gpu_gives_the_errors_of_the_processor(tmp_path: Path) -> None:
     plan = mixed_plan(tmp_path)
     data = obtain(plan)
-    units = [plan.whole(batch) for batch in plan.batches]
+    units = [whole_unit(plan, batch) for batch in plan.batches]
     rows = []
     for device in ("cpu", "cuda"):
         prepared = prepare(plan, data, device)

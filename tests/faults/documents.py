@@ -14,7 +14,7 @@ from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
-from shipid.study.plan import read_plan
+from shipid.study.plan import plan_text, read_plan, whole_unit
 from shipid.study.prepare import obtain, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.dynamics import dynamics
@@ -33,7 +33,7 @@ def study(seed: int) -> None:
         content, words = mutated("study", seed)
         file.write_bytes(content)
         plan = read_plan(file)
-        plan.text()
+        plan_text(plan)
         truth = plan.study.truth
         if truth is None or plan.cells > 60 or not words.startswith(("plain", "rich")):
             return
@@ -41,7 +41,7 @@ def study(seed: int) -> None:
         searched = max(getattr(way.method, "trials", 1) * getattr(way.method, "units", 1) for way in plan.methods)
         if steps < RUNNABLE and plan.study.prediction.horizon < 100 and searched < 50:
             prepared = prepare(plan, obtain(plan))
-            run_unit(plan, prepared, plan.whole(plan.batches[-1]), "cpu")
+            run_unit(plan, prepared, whole_unit(plan, plan.batches[-1]), "cpu")
 
 
 def vessel(seed: int) -> None:

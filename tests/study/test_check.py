@@ -12,9 +12,7 @@ from shipid.files import TEMPORARY
 from shipid.hybrid.methods import METHODS
 from shipid.study import seals, store
 from shipid.study.check import check_folder
-from shipid.study.claims import UnitClaims
-from shipid.study.run import MENDED
-from tests.study.tiny import tiny_plan
+from tests.study.tiny import make_run, tiny_plan
 
 
 def test_a_sound_folder_has_no_fault(tiny_run: Path) -> None:
@@ -34,7 +32,7 @@ def test_every_fault_is_a_line(tiny_run: Path, tmp_path: Path) -> None:
     assert sorted(fault.kind for fault in check.faults) == ["damaged", "missing"]
     text = "\n".join(check.lines)
     for words in (
-        "computes it again",
+        "missing or damaged: continue",
         "2 faults",
         "1 temporary folder of killed runs: the next run removes it",
         "computed in parts: shipid was",
@@ -43,20 +41,10 @@ def test_every_fault_is_a_line(tiny_run: Path, tmp_path: Path) -> None:
 
 
 def test_a_run_that_has_just_begun(tmp_path: Path) -> None:
-    store.open_folder(tmp_path / "run", tiny_plan(tmp_path))
+    make_run(tmp_path / "run", tiny_plan(tmp_path))
     assert check_folder(tmp_path / "run").lines == ["0 of 8 cells finished, 0 faults"]
     with pytest.raises(ResultError, match=r"no study\.toml"):
         check_folder(tmp_path)
-
-
-def test_units_that_a_process_works_on_are_named_and_no_other_claim(tmp_path: Path) -> None:
-    """`mended`, the claim of a process that has looked at the files, stood between the units."""
-    plan = tiny_plan(tmp_path)
-    store.open_folder(tmp_path / "run", plan)
-    with UnitClaims(tmp_path / "run") as claims:
-        assert all(map(claims.take, (MENDED, plan.units[0].key)))
-        (line,) = check_folder(tmp_path / "run").lines[1:]
-    assert line == f"at work, or ended without giving back: {plan.units[0].key}"
 
 
 def test_files_of_a_study_whose_method_is_not_here_are_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,9 +53,9 @@ def test_files_of_a_study_whose_method_is_not_here_are_checked(tmp_path: Path, m
     with monkeypatch.context() as patch:
         patch.setitem(METHODS, "mine", type("Mine", (METHODS["path-drawn"],), {"__module__": "mine"}))
         plan = tiny_plan(tmp_path, changes)
-        store.open_folder(folder, plan)
+        make_run(folder, plan)
         for name, part in plan.parts.items():
-            store.open_folder(store.part_folder(folder, name), part.plan)
+            make_run(store.part_folder(folder, name), part.plan)
     check = check_folder(folder)
     assert not check.faults
     (line,) = check.lines
@@ -79,4 +67,4 @@ def test_files_of_a_study_whose_method_is_not_here_are_checked(tmp_path: Path, m
     (part / "test.npz").write_bytes(b"half")
     check = check_folder(folder)
     assert [fault.file for fault in check.faults] == ["test.npz"]
-    assert check.lines[0].startswith(f"{part / 'test.npz'}: damaged")
+    assert check.lines[0].startswith(f"{part / 'test.npz'}: missing or damaged")

@@ -10,7 +10,7 @@ import tomlkit
 
 from shipid.errors import DocumentError
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import build_plan, read_plan
+from shipid.study.plan import build_plan, fitted_families, read_plan
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import tiny_plan
 
@@ -95,7 +95,7 @@ def test_an_identified_family_on_an_identified_one_has_the_members_of_the_first(
     assert [one.name for one in plan.foundations] == ["right", "fitted", "again", NO_MODEL]
     right, fitted, again, _ = plan.foundations
     assert right.variant == fitted.variant == again.variant
-    assert plan.fitted == {"fitted", "again"}
+    assert fitted_families(plan) == {"fitted", "again"}
     assert fitted.identify is not None
     assert again.identify is not None
     assert (fitted.identify.horizon, again.identify.horizon) == (5.0, 9.0)

@@ -22,7 +22,9 @@ def test_the_truth_fills_the_published_envelope() -> None:
     plan = read_plan("simulation")
     dataset = obtain(plan)
     pool, test, _ = partition(plan, dataset)
-    rows = envelope_table(envelope(pool, test, runs_by_amount(plan, pool), dataset.commands), plan.study.published)
+    rows = envelope_table(
+        envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands), plan.study.published
+    )
     theirs = rows[rows["set"] == "published"].set_index("quantity")
     ours = rows[rows["set"].isin(["D_100", "test"])].groupby("quantity").agg({"min": "min", "max": "max"})
     assert list(theirs.index) == ["u", "v", "r", "port.n", "port.alpha", "u_rw", "v_rw"]

@@ -22,8 +22,9 @@ from shipid.observer import Observer, observe
 from shipid.predictor import Predictor
 from shipid.study import foundations, run, store
 from shipid.study import prepare as preparing
+from shipid.study.cells import accuracy_of
 from shipid.study.foundations import predictions
-from shipid.study.plan import Batch, Plan
+from shipid.study.plan import Batch, Plan, fitted_families, judged_method, whole_unit
 from shipid.study.prepare import apart, instants_of, prepare
 from shipid.study.results import read_results
 from tests.study.test_commands import weaving
@@ -51,10 +52,10 @@ def study(recorded: Recorded, families: list[dict[str, Any]], **changes: Any) ->
 def test_a_wrong_model_finds_the_right_numbers(recorded: Recorded) -> None:
     plan, dataset = study(recorded, BOTH)
     prepared = prepare(plan, dataset)
-    foundations = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
+    foundations = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")
     assert list(foundations) == ["wrong", "fitted", "none"]
-    assert foundations["wrong"].accuracy(prepared.test)["mean"] > 0.01
-    assert foundations["fitted"].accuracy(prepared.test)["mean"] < 1e-4
+    assert accuracy_of(foundations["wrong"].test_paths, prepared.test)["A"] > 0.01
+    assert accuracy_of(foundations["fitted"].test_paths, prepared.test)["A"] < 1e-4
     variant = foundations["fitted"].foundation.variant
     assert variant is not None
     right = plan.vessels["gunnerus-28.9"].parameters
@@ -73,13 +74,11 @@ def test_other_runs_teach_nothing(recorded: Recorded, families: list[dict[str, A
     plan, dataset = study(recorded, families)
     prepared = prepare(plan, dataset)
     batch = plan.batches[0]
-    seen = set(prepared.runs(plan, batch))
+    seen = set(prepared.runs(batch))
     frame = dataset.frame.copy()
     frame.loc[~frame["run"].isin(seen), "u"] += 0.3
     other = prepare(plan, Dataset(frame, dataset.metadata))
-    pair = [
-        predictions(plan, each, each.runs(plan, batch), "cpu", {name})[name].foundation for each in (prepared, other)
-    ]
+    pair = [predictions(each, each.runs(batch), "cpu", {name})[name].foundation for each in (prepared, other)]
     assert pair[0].variant == pair[1].variant
     assert pair[0].observer == pair[1].observer
     assert pair[0].observer is None or not pair[0].observer.choose
@@ -96,7 +95,7 @@ def test_what_cannot_be_fitted_says_what_it_was(
     monkeypatch.setattr(solve, "identify", fails)
     plan, dataset = study(recorded, [WRONG, family])
     prepared = prepare(plan, dataset)
-    known = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")[family["name"]]
+    known = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")[family["name"]]
     assert known.sentence == f"{words}no"
     assert np.isnan(known.paths).all()
 
@@ -115,8 +114,8 @@ def test_the_observer_of_a_log_with_causal_columns_is_judged_by_the_true_paths(
 
     monkeypatch.setattr(preparing, "tune_observer", tune)
     prepared = prepare(plan, dataset)
-    runs = prepared.runs(plan, plan.batches[0])
-    predictions(plan, prepared, runs, "cpu", {"seen"})
+    runs = prepared.runs(plan.batches[0])
+    predictions(prepared, runs, "cpu", {"seen"})
     ((data, windows),) = given
     expected = prepared.pool.select(np.isin(prepared.pool.run, runs))
     np.testing.assert_array_equal(windows.future, expected.future)
@@ -158,8 +157,8 @@ def test_an_observer_along_another_run_sees_no_moment_of_the_test(recorded: Reco
 def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
     """On a shared clock the rows of the test are gone: errors on runs left out are as small as on separate clocks."""
     kept: list[Any] = []
-    refitted = run.refitted
-    monkeypatch.setattr(run, "refitted", lambda *given: kept.append(refitted(*given)) or kept[-1])
+    refitted = run.errors_left_out
+    monkeypatch.setattr(run, "errors_left_out", lambda *given: kept.append(refitted(*given)) or kept[-1])
     method = [{"name": "force", "kind": "learned-force", "units": 3, "iterations": 3, "families": ["wrong", "plain"]}]
     method.append({**METHODS[0], "families": ["none"]})
     changes: dict[str, Any] = {"method": method, "bands": {"refits": 2}, "split": {"test": ["b"]}}
@@ -169,7 +168,7 @@ def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monk
     errors = []
     for clock in ("run", "shared"):
         data = Dataset(frame, {**dataset.metadata, "clock": clock})
-        run.run_unit(plan, prepare(plan, data), plan.whole(plan.batches[0]), "cpu")
+        run.run_unit(plan, prepare(plan, data), whole_unit(plan, plan.batches[0]), "cpu")
         left_out, _ = kept[-1]["plain", "force"]
         errors.append(float(np.nanmean(np.hypot(left_out[..., 0], left_out[..., 1]))))
     assert errors[1] == pytest.approx(errors[0], rel=0.1)
@@ -178,16 +177,16 @@ def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monk
 def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(recorded: Recorded) -> None:
     """Among its levels and fades none predicts the training runs better; the page says whose A moves with the data."""
     plan, dataset = study(recorded, [WRONG, SEEN])
-    assert plan.fitted == {"seen"}
+    assert fitted_families(plan) == {"seen"}
     prepared = prepare(plan, dataset)
-    runs = prepared.runs(plan, plan.batches[0])
-    known = predictions(plan, prepared, runs, "cpu")["seen"]
+    runs = prepared.runs(plan.batches[0])
+    known = predictions(prepared, runs, "cpu")["seen"]
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
     chosen = position_error(known.paths, windows.future).mean()
     for waves, fade in product(([0.0], [0.01], [0.0, 0.01]), (0.0, 12.0, 40.0)):
         block = {**CHOOSING, "choose": False, "waves": waves, "fade": fade}
         other, _ = study(recorded, [WRONG, {**SEEN, "observer": block}])
-        given = predictions(other, prepare(other, dataset), runs, "cpu", {"seen"})["seen"]
+        given = predictions(prepare(other, dataset), runs, "cpu", {"seen"})["seen"]
         assert chosen <= position_error(given.paths, windows.future).mean() * 1.02, (waves, fade)
     assert known.seconds > 0
 
@@ -218,9 +217,9 @@ def test_what_is_identified_sees_no_moment_of_the_test(recorded: Recorded, monke
         return SimpleNamespace(status="failed", sentence="", seconds=0.0, values={})
 
     monkeypatch.setattr(solve, "identify", identify)
-    predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
+    predictions(prepared, prepared.runs(plan.batches[0]), "cpu")
     ((data, runs),) = given
-    assert runs == prepared.runs(plan, plan.batches[0])
+    assert runs == prepared.runs(plan.batches[0])
     ((first, last),) = prepared.test.spans.values()
     overlapping = frame["t"].between(first, last) & (frame["run"] != "f")
     assert overlapping.any()
@@ -239,7 +238,7 @@ def test_what_is_not_identified_stays_as_it_was(recorded: Recorded, monkeypatch:
         return SimpleNamespace(status="ok", sentence="", seconds=0.0, values=values)
 
     monkeypatch.setattr(solve, "identify", identify)
-    found = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")
+    found = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")
     for name, factors in {"wrong": [1.3, 1.3, 1.3], "fitted": [1, 1, 1], "some": [1, 1.3, 1.3]}.items():
         variant = found[name].foundation.variant
         assert variant is not None
@@ -260,7 +259,7 @@ def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
     dataset, test = results.dataset, results.test
     for row in rows.itertuples():
         predictor = Predictor.load(store.cell_file(tmp_path / "run", str(row.cell)))
-        paths = predictor.predict(instants_of(plan, predictor.vessel, dataset, test))
+        paths = predictor.predict(instants_of(plan.study, predictor.vessel, dataset, test))
         np.testing.assert_allclose(results.paths[str(row.cell)], paths, atol=1e-9)
     assert "fitted" not in results.physics  # its numbers depend on the cell
     assert not any("alone" in text and "+" in text for text, _ in answer(results))
@@ -311,7 +310,7 @@ def test_values_that_the_vessel_refuses_fail_in_their_cells(
     prepared = prepare(plan, dataset)
     solution = SimpleNamespace(status="ok", sentence="", seconds=1.0, values={"inertia.m": -1.0})
     monkeypatch.setattr(solve, "identify", lambda *_: solution)
-    both = predictions(plan, prepared, prepared.runs(plan, plan.batches[0]), "cpu")["fitted"]
+    both = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")["fitted"]
     assert np.isnan(both.paths).all()
     assert both.sentence.startswith("identification: ")
 
@@ -336,6 +335,6 @@ def test_the_prediction_of_the_study_is_the_default(recorded: Recorded) -> None:
     settings = plan.foundations[1].identify
     assert settings is not None
     assert (settings.horizon, settings.step, settings.method) == (5.0, 1.0, "euler")
-    assert plan.fitted == {"fitted"}
-    assert plan.judged == "drawn"
+    assert fitted_families(plan) == {"fitted"}
+    assert judged_method(plan) == "drawn"
     assert Batch(3, 0) in plan.batches

@@ -23,7 +23,7 @@ from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor, limits_of
 from shipid.study import prepare as module
 from shipid.study.envelope import envelope
-from shipid.study.plan import Plan, read_plan
+from shipid.study.plan import Plan, read_plan, whole_unit
 from shipid.study.prepare import (
     Prepared,
     all_windows,
@@ -62,7 +62,7 @@ def test_the_order_of_columns_changes_no_digit(tmp_path: Path) -> None:
     turned = Dataset(dataset.frame[["run", *[name for name in dataset.frame if name != "run"][::-1]]], dataset.metadata)
     assert turned.commands == dataset.commands[::-1]
     first, again = (
-        [row["H"] for row, *_ in run_unit(plan, prepare(plan, one), plan.whole(plan.batches[0]), "cpu")]
+        [row["H"] for row, *_ in run_unit(plan, prepare(plan, one), whole_unit(plan, plan.batches[0]), "cpu")]
         for one in (dataset, turned)
     )
     assert first == again
@@ -76,11 +76,11 @@ def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Datase
     assert test | set(prepared.pool.spans) == set(dataset.runs)
     for seed in (0, 1):
         batches = sorted((batch for batch in plan.batches if batch.seed == seed), key=lambda batch: batch.N_D)
-        drawn = [set(prepared.runs(plan, batch)) for batch in batches]
+        drawn = [set(prepared.runs(batch)) for batch in batches]
         assert [len(runs) for runs in drawn] == [2, 4, 6, 8]
         assert all(small < large for small, large in pairwise(drawn))
         assert not drawn[-1] & test
-    first, second = (prepared.runs(plan, next(b for b in plan.batches if b.N_D == 4 and b.seed == s)) for s in (0, 1))
+    first, second = (prepared.runs(next(b for b in plan.batches if b.N_D == 4 and b.seed == s)) for s in (0, 1))
     assert set(first) != set(second)
 
 
@@ -88,10 +88,10 @@ def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Datase
 def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> None:
     plan, _, prepared = tiny
     split = plan.study.split.model_copy(update={"folds": folds})
-    plan = replace(plan, study=plan.study.model_copy(update={"split": split}))
+    prepared = replace(prepared, study=plan.study.model_copy(update={"split": split}))
     for batch in plan.batches:
-        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
-        pairs = prepared.folds(plan, batch, windows, "share")
+        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
+        pairs = prepared.folds(batch, windows, "share")
         assert len(pairs) == min(folds, batch.N_D)
         validated: list[str] = []
         for train, validation in pairs:
@@ -101,14 +101,14 @@ def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> N
         if folds == 1:
             assert len(validated) == max(1, round(0.2 * batch.N_D))
         else:
-            assert sorted(validated) == sorted(prepared.runs(plan, batch))
+            assert sorted(validated) == sorted(prepared.runs(batch))
 
 
 def test_a_method_in_closed_form_leaves_out_each_run_once(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     plan, _, prepared = tiny
     for batch in plan.batches:
-        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
-        pairs = prepared.folds(plan, batch, windows, "runs")
+        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
+        pairs = prepared.folds(batch, windows, "runs")
         assert len(pairs) == batch.N_D
         for train, validation in pairs:
             assert len(set(windows.run[validation])) == 1
@@ -139,7 +139,7 @@ def test_on_one_clock_no_moment_is_shared(recorded: Callable[..., tuple[Plan, Da
     assert any(note.startswith(f"{left_out} windows that touch the test") for note in prepared.notes)
     assert shared(everything.select(everything.run != "r3"), prepared.test)
     assert not shared(prepared.pool, prepared.test)
-    for train, validation in prepared.folds(plan, batch, prepared.pool, plan.methods[0].method.validation):
+    for train, validation in prepared.folds(batch, prepared.pool, plan.methods[0].method.validation):
         assert not shared(prepared.pool.select(train), prepared.pool.select(validation))
 
 
@@ -236,7 +236,7 @@ def test_divergence_on_test_windows_only_is_shown_never_redrawn(
     accuracy = prepared.accuracy("brittle-1")
     assert (accuracy["status"], accuracy["failed_share"]) == ("diverged", 0.5)
     assert np.isnan(accuracy["mean"])
-    rows = {row["foundation"]: row for row, *_ in run_unit(plan, prepared, plan.whole(plan.batches[0]), "cpu")}
+    rows = {row["foundation"]: row for row, *_ in run_unit(plan, prepared, whole_unit(plan, plan.batches[0]), "cpu")}
     assert rows["brittle-1"]["status"] == "diverged"
     assert "50.0 %" in rows["brittle-1"]["sentence"]
     assert np.isnan(rows["brittle-1"]["H"])
@@ -310,7 +310,7 @@ def test_perturbed_lags_have_separate_hidden_states(
         vessel = model.vessel
         assert vessel is not None
         predictor = Predictor(Physics(vessel, 5, 1.0), "alone", Unchanged({}))
-        paths = predictor.predict(instants_of(plan, vessel, dataset, prepared.test))
+        paths = predictor.predict(instants_of(plan.study, vessel, dataset, prepared.test))
         np.testing.assert_allclose(paths, prepared.test_paths[model.name], atol=1e-9)
 
 
@@ -331,7 +331,7 @@ def test_nothing_that_a_prediction_knows_depends_on_a_later_fix(
     np.testing.assert_array_equal(one.columns["u"][early], other.columns["u"][early])
     np.testing.assert_array_equal(one.past["u"][:, early], other.past["u"][:, early])
     monkeypatch.setattr("shipid.study.prepare.observe", lambda _, dataset, *__, **___: dataset.frame)
-    frames = [estimates_of(plan, plan.foundations[0], dataset, one) for dataset in data]
+    frames = [estimates_of(plan.study, plan.foundations[0], dataset, one) for dataset in data]
     rows = data[0].frame["t"] <= 11.0
     assert frames[0][rows].equals(frames[1][rows])  # type: ignore[index]
     assert not frames[0].equals(frames[1])  # type: ignore[attr-defined]
@@ -409,12 +409,12 @@ def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset
     plan, _, prepared = tiny
     rows = {
         (row["set"], row["quantity"]): row
-        for row in envelope(prepared.pool, prepared.test, runs_by_amount(plan, prepared.pool), prepared.commands)
+        for row in envelope(prepared.pool, prepared.test, runs_by_amount(plan.study, prepared.pool), prepared.commands)
     }
     batches = {f"D_{batch.N_D}": batch for batch in plan.batches if batch.seed == min(plan.study.grid.seeds)}
     assert {name for name, _ in rows} == {*batches, "test"}
     for name in ("test", *batches):
-        chosen = prepared.runs(plan, batches[name]) if name in batches else ()
+        chosen = prepared.runs(batches[name]) if name in batches else ()
         windows = prepared.pool.select(np.isin(prepared.pool.run, chosen)) if chosen else prepared.test
         u, V_w = windows.columns["u"], windows.columns["V_w"]
         u_rw = u - V_w * np.cos(windows.columns["beta_w"] - windows.columns["psi"])
@@ -446,8 +446,8 @@ def test_the_sea_trials_test_is_untouched(shared_data: Path, monkeypatch: pytest
     assert any("V_w, beta_w not measured, assumed 0" in note for note in prepared.notes)
     assert "V_w" not in prepared.pool.columns
     for batch in plan.batches:
-        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
-        for train, validation in prepared.folds(plan, batch, windows, plan.methods[0].method.validation):
+        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
+        for train, validation in prepared.folds(batch, windows, plan.methods[0].method.validation):
             gaps = np.abs(windows.t[train][:, None] - windows.t[validation])
             assert gaps.min() > 15.0
     assert prepared.accuracy("accurate")["mean"] < prepared.accuracy("inaccurate")["mean"]

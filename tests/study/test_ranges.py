@@ -14,7 +14,8 @@ from shipid.data.windows import cut_windows
 from shipid.document import bundled
 from shipid.errors import DocumentError
 from shipid.study.plan import read_plan
-from shipid.study.ranges import Cut
+from shipid.study.ranges import window_numbers
+from shipid.study.schema import Prediction
 from tests.study.tiny import logged, tiny_plan
 
 NONSENSE: dict[str, Any] = {
@@ -93,8 +94,9 @@ def test_the_numbers_are_those_that_windows_hold(horizon: int, past: int) -> Non
         parts += group.values()
     held = sum(np.size(part) for part in parts)
     wide = len(log.frame.columns)
-    numbers = 2 * Cut(horizon, past, 2.0, 3.0, wide, 0).numbers(60.0)
+    ahead = Prediction.model_construct(ahead=2.0 * horizon, step=2.0, interval=3.0)
+    numbers = 2 * window_numbers(ahead, past, wide, 0, 60.0)
     assert held <= numbers <= len(windows.t) * ((horizon + 1) * 2 * wide + (past + 1) * wide)
-    more = 2 * Cut(horizon, past, 2.0, 3.0, wide, 2).numbers(60.0)
+    more = 2 * window_numbers(ahead, past, wide, 2, 60.0)
     assert more - numbers == len(windows.t) * (horizon + 1) * 4, "north and east of two foundations"
-    assert Cut(horizon, past, 2.0, 3.0, wide, 0).numbers(0.0) > 0
+    assert window_numbers(ahead, past, wide, 0, 0.0) > 0

@@ -11,7 +11,7 @@ import pytest
 
 from shipid import figures
 from shipid.study import results as module
-from shipid.study.plan import read_plan
+from shipid.study.plan import read_plan, run_command
 from shipid.study.results import Results, read_cells, read_results
 
 
@@ -51,7 +51,7 @@ def test_few_paths_stay_in_memory(tiny_run: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_the_command_reproduces_the_study(read: Results) -> None:
     """A bundled study by its name, any other by its file; with what `--set` changed."""
-    assert read.plan.command == f"shipid study run {read.plan.file}"
+    assert run_command(read.plan) == f"shipid study run {read.plan.file}"
     changed = read_plan("quick", {"grid.N_D": [10], "question": "How far?"})
     assert changed.command == "shipid study run quick --set 'grid.N_D=[10]' --set 'question=\"How far?\"'"
     asked = read_plan("quick", {"question": "How good is the captain's model?"})

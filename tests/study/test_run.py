@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import json
-import os
 import re
 import shutil
 import sys
@@ -15,7 +13,6 @@ from types import ModuleType, SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
-import pandas as pd
 import pytest
 import tomlkit
 
@@ -24,7 +21,7 @@ from shipid.answer.rotate import kept_folder
 from shipid.data.dataset import read_dataset
 from shipid.engine import native
 from shipid.errors import DataError, ResultError, ShipidError
-from shipid.files import read_json, write_json
+from shipid.files import TEMPORARY, read_json, write_json
 from shipid.hybrid.method import Fitted, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
@@ -32,18 +29,23 @@ from shipid.hybrid.trials import row_of
 from shipid.metrics import position_error, summary
 from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor
-from shipid.study import run, seals, store
+from shipid.study import cells, run, seals, sessions, store
 from shipid.study.check import check_folder
-from shipid.study.claims import UnitClaims
-from shipid.study.code import code_digest
-from shipid.study.plan import METHOD_CODE, Plan, read_plan
+from shipid.study.plan import Plan, completed_plan, own_code, program_of, read_plan, whole_unit
 from shipid.study.prepare import obtain, prepare
 from shipid.study.results import provenance_words, read_results
 from shipid.study.run import run_study, run_unit
 from shipid.version import __version__
 from shipid.vessel.load import load_vessel
 from tests.documented import code
-from tests.study.tiny import events_here, mixed_plan, run_here, tiny_plan
+from tests.study.tiny import events_here, make_run, mixed_plan, run_here, tiny_plan
+
+
+class Silent:
+    """A line on which nothing was sent."""
+
+    def sent(self) -> list[Any]:
+        return []
 
 
 def numbers(folder: Path) -> list[dict[str, Any]]:
@@ -90,7 +92,8 @@ def test_another_shipid_that_goes_on_is_noted(
     for event in events_here(plan, folder):
         if event.kind == "cell":
             break
-    monkeypatch.setattr(run, name, other)
+    for module in (sessions, cells):
+        monkeypatch.setattr(module, name, other, raising=False)
     notes = [event.text for event in events_here(plan, folder) if event.kind == "note"]
     assert any("computed otherwise: shipid was" in note and words in note for note in notes)
     assert any(words in line for line in check_folder(folder).lines)
@@ -146,18 +149,18 @@ def test_an_engine_that_a_worker_of_a_cluster_gives_up_is_noted(
     monkeypatch.setattr(native, "_refused", [])
     if native.compiler() is None:
         pytest.skip("no compiler")
-    monkeypatch.setattr(run, "_claimed", lambda *_: native.refuse("the C compiler failed (Killed)"))
+    monkeypatch.setattr(run, "run_unit", lambda *_: native.refuse("the C compiler failed (Killed)"))
     plan = tiny_plan(tmp_path)
-    sessions, _ = run._there((plan, None, "cpu", tmp_path, None, {}), plan.units[0])  # type: ignore[arg-type]
-    assert [session["engine"].partition(",")[0] for session in sessions] == ["native", "casadi"]
+    noted, _ = run._on_cluster((plan, None, "cpu", {}), (plan.units[0], {}), Silent())  # type: ignore[arg-type]
+    assert [session["engine"].partition(",")[0] for session in noted] == ["native", "casadi"]
 
 
 @pytest.mark.parametrize("package", ["scikit-learn", "scipy"])
 def test_another_version_of_a_package_that_computes_is_noted(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A forest is that of scikit-learn, a fit or a learned force that of SciPy: nothing said that one was another."""
-    before, version = run.session_on("cpu", {}), run.version
-    monkeypatch.setattr(run, "version", lambda name: "9.8.7" if name == package else version(name))
-    (words,) = store.differences(before, run.session_on("cpu", {}))
+    before, version = sessions.session_on("cpu", {}), sessions.version
+    monkeypatch.setattr(sessions, "version", lambda name: "9.8.7" if name == package else version(name))
+    (words,) = store.differences(before, sessions.session_on("cpu", {}))
     assert words.startswith(f"packages.{package} was ")
     assert words.endswith(", now 9.8.7")
 
@@ -202,9 +205,9 @@ def skeg_plan(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[ModuleType
 
 def test_a_term_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The finished cells are those of the ship as she was; nothing said so, and hints named a command without it."""
-    assert not tiny_plan(tmp_path).code
+    assert not own_code(tiny_plan(tmp_path))
     module, plan = skeg_plan(tmp_path, monkeypatch)
-    assert plan.program == "python my.py"
+    assert program_of(plan) == "python my.py"
     folder = tmp_path / "run"
     run_here(plan, folder)
     (session,) = read_json(folder / store.PROVENANCE)["sessions"]
@@ -223,7 +226,7 @@ def test_a_worker_of_a_cluster_without_the_term_says_so(tmp_path: Path, monkeypa
     _, plan = skeg_plan(tmp_path, monkeypatch)
     monkeypatch.delitem(TERMS, "hull.skeg")
     with pytest.raises(ShipidError, match=r"lack the term 'hull\.skeg': start them with --preload"):
-        run._there((plan, None, "cpu", tmp_path, None, {}), plan.units[0])  # type: ignore[arg-type]
+        run._on_cluster((plan, None, "cpu", {}), (plan.units[0], {}), Silent())  # type: ignore[arg-type]
 
 
 def test_a_dask_cluster_gives_the_same_numbers(tmp_path: Path, tiny_run: Path) -> None:
@@ -261,7 +264,9 @@ def test_a_unit_has_the_digits_of_its_whole_batch(tmp_path: Path) -> None:
     """Every method, an identified family and refits: units of work against all cells at once, bit by bit."""
     plan = mixed_plan(tmp_path, {"bands": {"refits": 2}})
     prepared = prepare(plan, obtain(plan))
-    whole = {row["cell"]: (row, one) for row, one, _ in run_unit(plan, prepared, plan.whole(plan.batches[0]), "cpu")}
+    whole = {
+        row["cell"]: (row, one) for row, one, _ in run_unit(plan, prepared, whole_unit(plan, plan.batches[0]), "cpu")
+    }
     parts = [pair for unit in reversed(plan.units) for pair in run_unit(plan, prepared, unit, "cpu")]
     assert len(parts) == len(whole) == plan.cells
     for row, predictor, _ in parts:
@@ -278,122 +283,6 @@ def _plain(row: dict[str, Any]) -> str:
     """A row without what a clock measured."""
     trials = [{key: value for key, value in trial.items() if key != "seconds"} for trial in row["trials"]]
     return repr({**row, "trials": trials, "seconds": 0})
-
-
-def test_one_process_leaves_what_another_works_on(tmp_path: Path, tiny_run: Path) -> None:
-    """It ends without tables; the other one, which comes back from far away, ends the run and writes them."""
-    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
-    store.open_folder(folder, plan)
-    with UnitClaims(folder) as other:
-        assert other.take("N0004-s0")
-        *_, end = events_here(plan, folder, leave=True)
-        assert (end.kind, end.done, end.total) == ("end", 4, 8)
-        assert not (folder / "results.parquet").exists()
-    *_, end = events_here(plan, folder, leave=True)
-    assert (end.done, end.total) == (8, 8)
-    assert (folder / "results.parquet").is_file()
-    assert numbers(folder) == numbers(tiny_run)
-
-
-def test_what_another_process_finishes_is_waited_for(tmp_path: Path, tiny_run: Path) -> None:
-    """Its cells are counted, and what it has left behind, here with the claim of a dead one, is taken over."""
-    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
-    run_here(plan, folder)
-    (folder / "seals" / "N0004-s0.sha256").unlink()
-    seal = (folder / "seals" / "N0006-s0.sha256").rename(tmp_path / "seal")
-    claims = folder / "claims"
-    claims.mkdir()
-    for key in ("N0004-s0", "N0006-s0"):
-        (claims / key).write_text('{"host": "elsewhere", "process": 1, "system": ""}')
-    events, kinds = events_here(plan, folder), []
-    for event in events:
-        kinds.append((event.kind, event.done))
-        if event.kind == "start":
-            seal.rename(folder / "seals" / "N0006-s0.sha256")
-            os.utime(claims / "N0004-s0", (1.0, 1.0))
-    assert [kind for kind in kinds if kind[0] != "note"] == [
-        ("start", 0),
-        *(("cell", done) for done in range(1, 5)),
-        ("others", 8),
-        ("end", 8),
-    ]
-    assert numbers(folder) == numbers(tiny_run)
-
-
-@pytest.mark.parametrize("late", [False, True])
-def test_a_process_that_was_held_up_leaves_its_unit_to_the_one_that_took_it_over(
-    late: bool, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its search writes no more to the journal, or its results are not stored; the other units go on."""
-    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
-    store.open_folder(folder, plan)
-    fit, lost = PathDrawn.fit, list[str]()
-    with UnitClaims(folder) as other:
-
-        def held_up(self: PathDrawn, task: Task) -> dict[str, Fitted]:
-            fits = fit(self, task) if late or lost else {}
-            if not lost:
-                (claim,) = (folder / "claims").glob("N*")
-                claim.unlink()
-                assert other.take(claim.name)
-                lost.append(claim.name)
-            return fits or fit(self, task)
-
-        monkeypatch.setattr(PathDrawn, "fit", held_up)
-        *events, end = events_here(plan, folder, leave=True)
-        notices = [event.text for event in events if "has taken it over" in event.text]
-        assert [words.split(":")[0] for words in notices] == lost
-        assert (end.done, end.total) == (4, 8)
-        assert not (folder / "batches" / f"{lost[0]}.json").exists()
-        journal = folder / "trials" / f"{lost[0]}.log"
-        assert (journal.stat().st_size > 0) == late
-    run_here(plan, folder)
-    assert numbers(folder) == numbers(tiny_run)
-
-
-@pytest.mark.parametrize("leave", [False, True])
-@pytest.mark.parametrize("pattern", ["dataset.parquet", "cells/right+drawn-N0006-s0.npz"])
-def test_of_processes_that_start_together_one_mends(pattern: str, leave: bool, tmp_path: Path, tiny_run: Path) -> None:
-    """Another process has joined a folder with a damaged file, and has not looked."""
-    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
-    shutil.copytree(tiny_run, folder)
-    (folder / pattern).write_bytes(b"half")
-    with UnitClaims(folder) as other:
-        assert other.take("elsewhere")
-        *events, end = events_here(plan, folder, leave=leave)
-    assert any("damaged: computed again" in event.text for event in events)
-    assert (end.done, end.total) == (8, 8)
-    assert seals.faults(folder) == []
-    assert numbers(folder) == numbers(tiny_run)
-
-
-def test_what_is_mended_while_a_process_works_is_done_again(tmp_path: Path, tiny_run: Path) -> None:
-    """A unit that it took for finished is none any more: it does not end before all are."""
-    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
-    shutil.copytree(tiny_run, folder)
-    seals.remove(folder, "N0004-s0")
-    for event in events_here(plan, folder):
-        if event.kind == "start":
-            seals.remove(folder, "N0006-s0")
-    assert event.done == 8
-    assert numbers(folder) == numbers(tiny_run)
-    assert seals.is_sealed(folder, "results")
-
-
-def test_an_interrupted_folder_of_whole_batches_goes_on(tmp_path: Path) -> None:
-    """Rows that an earlier version stored by batch count for all units of the batch, and keep their order."""
-    plan, folder = mixed_plan(tmp_path), tmp_path / "run"
-    store.open_folder(folder, plan)
-    batch = plan.whole(plan.batches[0])
-    row = dict.fromkeys(store.METRICS, 1.0) | {"trials": [], "N_D": 4, "seed": 0, "status": "ok"}
-    rows = [{**row, "cell": f"{f}+{m}", "foundation": f, "method": m} for f, m in batch.pairs]
-    store.write_unit(folder, batch, [store.Cell(row) for row in rows])
-    assert store.finished(folder, plan.units) == list(plan.units)
-    stored = store.read_rows(folder, plan)
-    assert list(zip(stored["foundation"], stored["method"], strict=True)) == list(batch.pairs)
-    one = plan.units[1]
-    store.write_unit(folder, one, [store.Cell(rows[-1])])  # finished already: nothing is stored twice
-    assert len(store.read_rows(folder, plan)) == len(rows)
 
 
 def test_seeds_change_the_numbers(tmp_path: Path) -> None:
@@ -418,25 +307,12 @@ def test_H_is_what_the_stored_predictor_does_on_the_test_windows(tmp_path: Path,
         assert error["rms"] == pytest.approx(row.rms, rel=1e-9)
         alone = summary(position_error(predictor.alone(prepared.test.instants()), prepared.test.future))
         assert np.isnan(row.A) if row.foundation == "none" else alone["mean"] == pytest.approx(row.A, rel=1e-9)
-        assert set(predictor.provenance["runs"]) == set(prepared.runs(tiny_plan(tmp_path), _batch(tmp_path, row.N_D)))
+        assert set(predictor.provenance["runs"]) == set(prepared.runs(_batch(tmp_path, row.N_D)))
         assert not set(predictor.provenance["runs"]) & set(prepared.test.spans)
 
 
 def _batch(tmp_path: Path, N_D: Any) -> Any:
     return next(batch for batch in tiny_plan(tmp_path).batches if batch.N_D == N_D)
-
-
-def test_results_hold_one_row_per_cell_and_metric(tiny_run: Path) -> None:
-    table = pd.read_parquet(tiny_run / "results.parquet")
-    assert len(table) == 8 * len(store.METRICS)
-    assert not table.duplicated(["cell", "metric"]).any()
-    rows = store.read_rows(tiny_run).set_index("cell")
-    for entry in table.itertuples():
-        assert entry.value == pytest.approx(rows.loc[entry.cell, entry.metric], nan_ok=True)
-        assert entry.unit == {"seconds": "s", "coverage": "1"}.get(entry.metric, "m")
-    trials = pd.read_parquet(tiny_run / "trials.parquet")
-    assert list(trials["cell"].value_counts().unique()) == [1]  # the method of the tiny study has one trial
-    assert {"value", "motion_scale", "mirror", "state"} <= set(trials.columns)
 
 
 def test_the_folder_tells_what_it_was_computed_with(tmp_path: Path, tiny_run: Path) -> None:
@@ -449,11 +325,10 @@ def test_the_folder_tells_what_it_was_computed_with(tmp_path: Path, tiny_run: Pa
     entry = next(row for row in models if row["foundation"] == "wrong-2")
     assert entry["factors"] == pytest.approx(dict(variant.factors), rel=1e-15)
     assert entry["base_digest"] == load_vessel("gunnerus-28.9").digest
-    assert not list(tiny_run.rglob(".*"))  # nothing temporary is left
+    assert not list(tiny_run.rglob(f"{TEMPORARY}*"))
 
 
 def test_a_folder_can_be_copied_and_read_elsewhere(tmp_path: Path, tiny_run: Path) -> None:
-    import shutil
 
     shutil.copytree(tiny_run, tmp_path / "copy")
     here, there = read_results(tmp_path / "copy"), read_results(tiny_run)
@@ -492,7 +367,7 @@ def test_a_path_that_no_ship_can_follow_is_a_cell_without_a_result(
         return paths
 
     monkeypatch.setattr(Predictor, "predict", wild)
-    rows = [row for row, *_ in run_unit(plan, prepare(plan, obtain(plan)), plan.whole(plan.batches[0]), "cpu")]
+    rows = [row for row, *_ in run_unit(plan, prepare(plan, obtain(plan)), whole_unit(plan, plan.batches[0]), "cpu")]
     assert {row["status"] for row in rows} == {"diverged"}
     assert all("farther than any ship gets, on 50.0" in row["sentence"] for row in rows)
     assert np.isnan([row["H"] for row in rows]).all()
@@ -515,7 +390,7 @@ def test_runs_too_short_to_learn_from_are_a_value(tmp_path: Path) -> None:
 def test_absent_device_is_one_line(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path)
     with pytest.raises(ShipidError, match="no such device") as caught:
-        run_unit(plan, prepare(plan, obtain(plan)), plan.whole(plan.batches[0]), "cuda:99")
+        run_unit(plan, prepare(plan, obtain(plan)), whole_unit(plan, plan.batches[0]), "cuda:99")
     assert caught.value.path == "--device cuda:99"
 
 
@@ -550,35 +425,35 @@ def test_a_folder_of_before_a_vessel_changed_names_the_vessel(tmp_path: Path) ->
     vessel, folder = tmp_path / "ship.toml", tmp_path / "run"
     vessel.write_text('extends = "gunnerus-28.9"\n')
     changes = {"truth.vessel": "ship.toml", "family.0.base": "ship.toml"}
-    store.open_folder(folder, tiny_plan(tmp_path, changes))
+    make_run(folder, tiny_plan(tmp_path, changes))
     vessel.write_text('extends = "gunnerus-28.9"\n[inertia]\nm = 5e5\n')
-    words = f"holds results from before {vessel} changed: choose another --out, or go on with the vessel as it was: "
+    words = f"holds results from before {vessel} changed: choose another --out, or go on with it as it was: "
     with pytest.raises(ResultError) as caught:
-        store.open_folder(folder, tiny_plan(tmp_path, changes))
+        make_run(folder, tiny_plan(tmp_path, changes))
     assert str(caught.value) == f"{folder}: {words}`shipid study resume {folder}`"
-    store.open_folder(folder, store.stored_plan(folder))
+    make_run(folder, store.stored_plan(folder))
     with pytest.raises(ResultError, match="another study than"):
-        store.open_folder(folder, tiny_plan(tmp_path, {**changes, "truth.seed": 99}))
+        make_run(folder, tiny_plan(tmp_path, {**changes, "truth.seed": 99}))
 
 
 def test_a_folder_of_before_a_log_changed_names_the_log(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path)
-    store.open_folder(tmp_path / "run", replace(plan, sources={"mapping": "a", "log": "b"}))
+    make_run(tmp_path / "run", completed_plan(replace(plan, sources={"mapping": "a", "log": "b"})))
     with pytest.raises(
-        ResultError, match=r"results from before the log of .*tiny\.toml changed: choose another --out$"
+        ResultError, match=r"results from before the log changed: choose another --out, or go on with it as it was"
     ):
-        store.open_folder(tmp_path / "run", replace(plan, sources={"mapping": "a", "log": "c"}))
+        make_run(tmp_path / "run", completed_plan(replace(plan, sources={"mapping": "a", "log": "c"})))
 
 
 def refused(folder: Path, plan: Plan, stored: object = None, **record: object) -> str:
     """What is said of a folder of the same document whose digest is another one, without the folder."""
-    store.open_folder(folder, plan)
+    make_run(folder, plan)
     entries = {**read_json(folder / store.PROVENANCE), "digest": "0" * 64, **record}
     write_json(folder / store.PROVENANCE, {name: entry for name, entry in entries.items() if entry is not None})
     if stored is not None:
         write_json(folder / store.VESSELS, stored)
     with pytest.raises(ResultError) as caught:
-        store.open_folder(folder, plan)
+        make_run(folder, plan)
     return str(caught.value).removeprefix(f"{folder}: ")
 
 
@@ -587,25 +462,6 @@ def test_a_folder_of_another_digest_with_damaged_vessels_says_so(tmp_path: Path,
     """It ended with an AttributeError, or said that the study is another one than itself."""
     words = refused(tmp_path / "run", tiny_plan(tmp_path), stored)
     assert words == f"{tmp_path / 'run' / 'vessels.json'}: damaged: run the study again into a new folder"
-
-
-def test_a_folder_of_another_version_says_so(tmp_path: Path) -> None:
-    """As where a method has another default since: it said that the study is another one than itself."""
-    plan = replace(tiny_plan(tmp_path), sources={"mapping": "a", "log": "b"})
-    here = f"{__version__}, code {code_digest()}"
-    made = "was made by another version of shipid"
-    words = refused(tmp_path / "a", plan, sessions=[{"shipid": "0.0.1, code 01234567"}])
-    assert words == f"{made} (0.0.1, code 01234567; this is {here}), whose defaults are others: choose another --out"
-    unknown = f"{made} (this is {here}), whose defaults are others: choose another --out"
-    assert refused(tmp_path / "b", plan) == unknown
-    assert refused(tmp_path / "c", plan, sources=None) == unknown  # says nothing of mapping and log
-    words = refused(tmp_path / "d", plan, sessions=[{"shipid": here}])
-    assert words.startswith("says that it is of another study, and holds this one: it was changed by hand, or a method")
-
-
-def test_a_folder_of_before_a_method_of_a_user_changed_names_the_method(tmp_path: Path) -> None:
-    words = refused(tmp_path / "run", tiny_plan(tmp_path), **{METHOD_CODE: {"own": "01234567"}})
-    assert words == "holds results from before the method 'own' changed: choose another --out"
 
 
 @pytest.mark.parametrize("at", ["note", "start", "cell"])
@@ -630,20 +486,6 @@ def test_a_folder_that_is_moved_or_replaced_gets_nothing_more(
     assert numbers(tmp_path / "moved") == numbers(tiny_run)
 
 
-def test_a_folder_that_is_moved_while_a_worker_writes_there_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It ended with `trials/none+plain-N0010-s0.log: No such file or directory`."""
-
-    def moved(*_: Any, **__: Any) -> None:
-        (tmp_path / "run").rename(tmp_path / "moved")
-        (tmp_path / "run" / store.JOURNALS / "a.log").open("r+b")
-
-    monkeypatch.setattr(run, "run_unit", moved)
-    with pytest.raises(ResultError, match="was moved, removed or replaced while this run worked in it"):
-        run_here(tiny_plan(tmp_path), tmp_path / "run")
-
-
 def test_folder_with_other_things_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "photos"
     folder.mkdir()
@@ -657,12 +499,10 @@ def test_folder_with_other_things_is_refused(tmp_path: Path) -> None:
     assert [file.name for file in folder.iterdir()] == ["cat.jpg"]
 
 
-def test_an_empty_folder_and_a_half_opened_one_are_taken(tmp_path: Path) -> None:
+def test_an_empty_folder_is_taken(tmp_path: Path) -> None:
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     folder.mkdir()
-    next(run_study(plan, folder))
-    (folder / store.STUDY).unlink()  # as if the machine had stopped between the first two files
-    next(run_study(plan, folder))
+    make_run(folder, plan)
     assert store.stored_plan(folder).digest == plan.digest
 
 
@@ -700,7 +540,6 @@ DAMAGES = {
 
 @pytest.mark.parametrize("kind", DAMAGES)
 def test_damaged_folders_are_one_line(tmp_path: Path, tiny_run: Path, kind: str) -> None:
-    import shutil
 
     folder = tmp_path / "run"
     shutil.copytree(tiny_run, folder)
@@ -741,14 +580,9 @@ def test_patches_rebuild_variants_from_anywhere(tmp_path: Path) -> None:
     assert 'base = "gunnerus-28.9"' in bundled
 
 
-def test_json_holds_no_nan(tmp_path: Path) -> None:
-    write_json(tmp_path / "a.json", {"x": np.float64("nan"), "y": [np.int64(3), (1.5, np.inf)], "z": np.True_})
-    assert json.loads((tmp_path / "a.json").read_text()) == {"x": None, "y": [3, [1.5, None]], "z": True}
-
-
 def test_the_plan_of_a_bundled_study_survives_the_folder(tmp_path: Path) -> None:
     plan = read_plan("full-scale")
-    store.open_folder(tmp_path / "run", plan)
+    make_run(tmp_path / "run", plan)
     assert store.stored_plan(tmp_path / "run") == plan
 
 
@@ -763,7 +597,7 @@ def test_methods_are_fitted_with_the_seed_of_their_batch(tmp_path: Path, monkeyp
     monkeypatch.setattr(PathDrawn, "fit", fit)
     prepared = prepare(plan, obtain(plan))
     for batch in plan.batches:
-        run_unit(plan, prepared, plan.whole(batch), "cpu")
+        run_unit(plan, prepared, whole_unit(plan, batch), "cpu")
     assert seen == [batch.seed for batch in plan.batches]
     assert sorted(seen) == [3, 8]
 
@@ -880,9 +714,9 @@ def test_a_method_in_the_script_itself_has_the_code_of_the_script_on_a_cluster(
     """Its class travels by value: what a worker was started by has nothing to do with it."""
     kind = type("Mine", (METHODS["path-drawn"],), {"__module__": "__main__"})
     monkeypatch.setitem(METHODS, "mine", kind)
-    monkeypatch.setattr(run, "_claimed", lambda *_: "left")
+    monkeypatch.setattr(run, "run_unit", lambda *_: [])
     plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine"}, {"name": "bare", "kind": "alone"}]})
     written = {"code of the method": {"mine": "01234567"}}
-    (session, after), _ = run._there((plan, None, "cpu", tmp_path, None, written), plan.units[0])  # type: ignore[arg-type]
+    (session, after), _ = run._on_cluster((plan, None, "cpu", written), (plan.units[0], {}), Silent())  # type: ignore[arg-type]
     assert session["code of the method"] == {"mine": "01234567"}
     assert after == session

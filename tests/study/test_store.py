@@ -7,8 +7,6 @@ import json
 import os
 import re
 import shutil
-import socket
-import subprocess
 import sys
 from contextlib import suppress
 from functools import partial
@@ -21,25 +19,25 @@ import pytest
 
 from shipid.answer.pages import write_pages
 from shipid.errors import ResultError
-from shipid.files import TEMPORARY, read_json, temporary_folder, write_json
+from shipid.files import read_json, write_json
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.methods import METHODS
 from shipid.physics import TERMS
 from shipid.study import seals, store
 from shipid.study.check import check_folder
-from shipid.study.plan import Batch, Unit, build_plan, read_plan
+from shipid.study.plan import Batch, Unit, build_plan, read_plan, run_command
 from shipid.study.results import read_results
 from tests.study.test_run import skeg_plan
-from tests.study.tiny import TINY, tiny_plan
+from tests.study.tiny import TINY, make_run, tiny_plan
 
 
 def test_a_folder_opens_again_for_the_same_study_alone(tmp_path: Path) -> None:
     plan, other = tiny_plan(tmp_path), tiny_plan(tmp_path, {"grid.N_D": [4]})
-    store.open_folder(tmp_path / "run", plan)
-    store.open_folder(tmp_path / "run", plan)
+    make_run(tmp_path / "run", plan)
+    make_run(tmp_path / "run", plan)
     assert store.stored_plan(tmp_path / "run").digest == plan.digest
     with pytest.raises(ResultError, match="another study"):
-        store.open_folder(tmp_path / "run", other)
+        make_run(tmp_path / "run", other)
 
 
 def test_a_folder_of_another_user_is_named_before_anything_is_computed(
@@ -47,12 +45,12 @@ def test_a_folder_of_another_user_is_named_before_anything_is_computed(
 ) -> None:
     """A run that went on there said `claims: Permission denied`."""
     plan = tiny_plan(tmp_path)
-    store.open_folder(tmp_path / "run", plan)
+    make_run(tmp_path / "run", plan)
     monkeypatch.setattr("os.access", lambda *_: False)
     with pytest.raises(
         ResultError, match=r"run: is a folder that this user may not write into: let this user, or copy"
     ):
-        store.open_folder(tmp_path / "run", plan)
+        make_run(tmp_path / "run", plan)
 
 
 @pytest.mark.parametrize("name", [store.STUDY, store.VESSELS, store.PROVENANCE])
@@ -61,7 +59,7 @@ def test_a_file_that_this_user_may_not_read_is_named_and_never_replaced(
 ) -> None:
     """A run replaced it, and the others called it damaged."""
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
-    store.open_folder(folder, plan)
+    make_run(folder, plan)
     held = {file: file.read_bytes() for file in folder.iterdir()}
     really = Path.open
 
@@ -72,7 +70,7 @@ def test_a_file_that_this_user_may_not_read_is_named_and_never_replaced(
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "open", closed)
-        for look in (partial(store.open_folder, plan=plan), check_folder, write_pages):
+        for look in (partial(make_run, plan=plan), check_folder, write_pages):
             with pytest.raises(ResultError, match=rf"{name}: cannot be read \(Permission denied\): let this user"):
                 look(folder)
     assert {file: file.read_bytes() for file in folder.iterdir()} == held
@@ -84,7 +82,7 @@ def closed_to_me(monkeypatch: pytest.MonkeyPatch, *places: Path) -> None:
     monkeypatch.setattr(os, "access", lambda place, mode: Path(place) not in places and access(place, mode))
 
 
-@pytest.mark.parametrize("name", store.LISTED)
+@pytest.mark.parametrize("name", ["batches", "seals", "trials"])
 def test_a_folder_in_it_that_this_user_may_not_list_is_named(
     name: str, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -96,7 +94,7 @@ def test_a_folder_in_it_that_this_user_may_not_list_is_named(
         check_folder(folder)
 
 
-@pytest.mark.parametrize("name", ["cells", "trials", "claims"])
+@pytest.mark.parametrize("name", ["cells", "trials"])
 def test_a_folder_in_it_that_this_user_may_not_write_into_is_named_before_anything_is_computed(
     name: str, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -108,67 +106,9 @@ def test_a_folder_in_it_that_this_user_may_not_write_into_is_named_before_anythi
         os, "access", lambda place, mode: access(place, mode) and not (place == folder / name and mode & os.W_OK)
     )
     words = rf"{name}: is a folder that this user may not write into: let this user, or copy the folder of the run"
-    for look in (lambda: store.open_folder(folder, store.stored_plan(folder)), lambda: write_pages(folder)):
+    for look in (lambda: make_run(folder, store.stored_plan(folder)), lambda: write_pages(folder)):
         with pytest.raises(ResultError, match=words):
             look()
-
-
-@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no owners of files")
-@pytest.mark.parametrize("name", [".", "cells", "seals"])
-def test_a_sticky_folder_with_files_of_others_is_named(
-    name: str, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = shutil.copytree(tiny_run, tmp_path / "run")
-    plan = store.stored_plan(folder)
-    (folder / name).chmod(0o1777)
-    store.open_folder(folder, plan)  # its owner may replace all
-    monkeypatch.setattr(os, "geteuid", lambda: 12345)
-    with pytest.raises(ResultError, match=r"owners alone \(sticky\), such as .*: `chmod -t` ends that"):
-        store.open_folder(folder, plan)
-    (folder / name).chmod(0o777)
-    store.open_folder(folder, plan)
-
-
-def test_a_journal_that_this_user_may_not_go_on_with_is_named(
-    tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = shutil.copytree(tiny_run, tmp_path / "run")
-    plan = store.stored_plan(folder)
-    file = folder / store.JOURNALS / f"{plan.units[0].key}.log"
-    assert file.is_file()
-    closed_to_me(monkeypatch, file)
-    store.open_folder(folder, plan)  # its search has ended
-    seals.remove(folder, plan.units[0].key)
-    with pytest.raises(ResultError, match=r"\.log: is a journal that this user may not read and write: let this user"):
-        store.open_folder(folder, plan)
-
-
-@pytest.mark.parametrize("parts", [False, True])
-def test_an_error_in_a_folder_that_is_gone_or_closed_says_so(
-    parts: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    plan, folder = tiny_plan(tmp_path, {"repeat": {"seed": [0, 1]}} if parts else {}), tmp_path / "run"
-    store.open_folder(folder, plan)
-    with pytest.raises(FileNotFoundError), store.in_place(folder, plan):
-        raise FileNotFoundError(errno.ENOENT, "No such file or directory", "elsewhere")
-    with monkeypatch.context() as patch:
-        closed_to_me(patch, folder)
-        with pytest.raises(ResultError, match="may not write into"), store.in_place(folder, plan):
-            raise PermissionError(errno.EACCES, "Permission denied", str(folder / "cells"))
-    folder.rename(tmp_path / "moved")
-    with pytest.raises(ResultError, match="was moved, removed or replaced"), store.in_place(folder, plan):
-        raise FileNotFoundError(errno.ENOENT, "No such file or directory", str(folder / "trials" / "a.log"))
-
-
-def test_a_folder_of_other_things_is_left_alone(tmp_path: Path) -> None:
-    plan = tiny_plan(tmp_path)
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "thesis.tex").write_text("words")
-    with pytest.raises(ResultError, match="not empty"):
-        store.open_folder(tmp_path / "full", plan)
-    with pytest.raises(ResultError, match="is a file"):
-        store.open_folder(tmp_path / "tiny.toml", plan)
-    assert [entry.name for entry in (tmp_path / "full").iterdir()] == ["thesis.tex"]
 
 
 def test_the_working_folder_holds_no_new_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,16 +116,16 @@ def test_the_working_folder_holds_no_new_run(tmp_path: Path, monkeypatch: pytest
     folder.mkdir()
     monkeypatch.chdir(folder)
     with pytest.raises(ResultError, match="is the working folder"):
-        store.open_folder(Path(), plan)
+        make_run(Path(), plan)
     monkeypatch.chdir(tmp_path)
-    store.open_folder(folder, plan)
+    make_run(folder, plan)
     monkeypatch.chdir(folder)
-    store.open_folder(Path(), plan)  # a run that is there goes on from anywhere
+    make_run(Path(), plan)  # a run that is there goes on from anywhere
 
 
 def test_a_study_changed_by_hand_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    store.open_folder(folder, tiny_plan(tmp_path))
+    make_run(folder, tiny_plan(tmp_path))
     text = (folder / store.STUDY).read_text()
     (folder / store.STUDY).write_text(text.replace("ahead = 5.0", "ahead = 6.0"))
     with pytest.raises(ResultError, match="changed by hand"):
@@ -201,11 +141,13 @@ def test_a_stored_plan_knows_what_was_changed(tmp_path: Path) -> None:
     """Of a study of several parts too: its page and its resumed parts name the command with all changes."""
     changes = {"grid.N_D": [4], "repeat": {"seed": [0, 1]}}
     plan = read_plan(TINY, changes)
-    store.open_folder(tmp_path / "run", plan)
+    make_run(tmp_path / "run", plan)
     stored = store.stored_plan(tmp_path / "run")
-    assert stored.command == plan.command
-    assert "--set 'grid.N_D=[4]'" in stored.command
-    assert [part.plan.command for part in stored.parts.values()] == [part.plan.command for part in plan.parts.values()]
+    assert run_command(stored) == run_command(plan)
+    assert "--set 'grid.N_D=[4]'" in run_command(stored)
+    assert [run_command(part.plan) for part in stored.parts.values()] == [
+        run_command(part.plan) for part in plan.parts.values()
+    ]
     provenance = tmp_path / "run" / store.PROVENANCE
     write_json(provenance, {**read_json(provenance), "changes": [3]})
     with pytest.raises(ResultError, match="changes: is not what shipid writes there"):
@@ -213,7 +155,7 @@ def test_a_stored_plan_knows_what_was_changed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("wrong", [None, 3, "x", [3], {"a": 1}])
-@pytest.mark.parametrize("key", sorted(store.ENTRIES))
+@pytest.mark.parametrize("key", ["digest", "sources", "sessions", "notes", "wall_seconds"])
 def test_an_entry_of_the_provenance_that_is_none_is_one_line(
     key: str, wrong: Any, tiny_run: Path, tmp_path: Path
 ) -> None:
@@ -235,14 +177,14 @@ def test_a_file_where_a_folder_of_a_run_belongs_is_named(name: str, tiny_run: Pa
     shutil.rmtree(folder / name, ignore_errors=True)
     (folder / name).write_text("")
     with pytest.raises(ResultError, match=f"{name}: is no folder, where one belongs: move it away, and resume"):
-        store.open_folder(folder, store.stored_plan(folder))
+        make_run(folder, store.stored_plan(folder))
 
 
 def test_a_link_to_an_empty_folder_is_a_place_for_a_run(tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()
     (tmp_path / "run").symlink_to("disk")
     plan = tiny_plan(tmp_path)
-    store.open_folder(tmp_path / "run", plan)
+    make_run(tmp_path / "run", plan)
     assert (tmp_path / "run").is_symlink()
     assert store.stored_plan(tmp_path / "disk").digest == plan.digest
     assert not list(tmp_path.glob(".shipid-*"))
@@ -252,7 +194,7 @@ def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(
     """The file of the study may be gone, or be written anew as the message says: what is in the folder stays."""
     plan, study, ship = tiny_plan(tmp_path), tmp_path / "study", tmp_path / "ship"
     for folder in (study, ship):
-        store.open_folder(folder, plan)
+        make_run(folder, plan)
     text = (study / store.STUDY).read_text()
     (study / store.STUDY).write_text(text.replace("ahead = 5.0", "horizon = 5"))
     with pytest.raises(ResultError, match=r"prediction.horizon: shipid .* does not take it .*new folder") as caught:
@@ -266,9 +208,8 @@ def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(
     assert caught.value.file == str(ship / store.VESSELS)
 
 
-@pytest.mark.parametrize("earlier", [False, True])
 def test_a_folder_with_a_term_and_a_method_of_a_user_names_the_script(
-    earlier: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It said that the run is of another version, and to compute it again."""
     monkeypatch.setattr(sys, "argv", ["mine.py", "study", "run"])
@@ -276,15 +217,10 @@ def test_a_folder_with_a_term_and_a_method_of_a_user_names_the_script(
     _, plan = skeg_plan(tmp_path, monkeypatch)
     plan = build_plan({**plan.document, "method": [{"name": "mine", "kind": "own"}]}, Path(plan.file))
     folder = tmp_path / "run"
-    store.open_folder(folder, plan)
-    record = read_json(folder / store.PROVENANCE)
-    if earlier:
-        record["sessions"] = [{what: record.pop(what) for what in (*plan.code,)}]
-        assert record.pop("program") == "python mine.py"
-        write_json(folder / store.PROVENANCE, record)
+    make_run(folder, plan)
     assert store.stored_plan(folder).digest == plan.digest
     monkeypatch.setattr(sys, "argv", ["shipid", "study", "report"])
-    script, words = "my.py" if earlier else "mine.py", r"hull\.skeg and own, which a user wrote, are not known"
+    script, words = "mine.py", r"hull\.skeg and own, which a user wrote, are not known"
     remedy = rf"that puts them into TERMS or METHODS: `python {script} study report {re.escape(str(folder))}`$"
     monkeypatch.delitem(METHODS, "own")
     with monkeypatch.context() as without:
@@ -326,19 +262,6 @@ def test_results_are_a_row_for_each_metric_and_each_trial(tiny_run: Path, tmp_pa
     assert set(table.loc[table["metric"] == "seconds", "unit"]) == {"s"}
 
 
-def test_results_end_what_a_process_that_is_gone_was_writing(tiny_run: Path, tmp_path: Path) -> None:
-    """A worker of a killed run outlives it by a moment: it may begin a file after others joined the folder."""
-    rows, cells = store.read_rows(tiny_run), tmp_path / "cells"
-    cells.mkdir()
-    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True)
-    left = cells / f"{TEMPORARY}{socket.gethostname()}-{gone.stdout.strip()}-abc"
-    left.mkdir()
-    with temporary_folder(cells) as mine:
-        store.write_results(tmp_path, store.stored_plan(tiny_run), rows)
-        assert mine.exists()
-    assert not left.exists()
-
-
 def test_tables_lose_their_seal_when_a_unit_is_stored_after_them(tmp_path: Path) -> None:
     """As where a damaged unit is computed again: else the run counts as ended, with tables that do not hold it."""
     for name in ("results.parquet", "trials.parquet"):
@@ -347,7 +270,7 @@ def test_tables_lose_their_seal_when_a_unit_is_stored_after_them(tmp_path: Path)
     batch = Batch(4, 0)
     unit = Unit(batch, (("right", "drawn"),), batch.key)
     store.write_unit(tmp_path, unit, [store.Cell({"cell": "right+drawn-4-0"})])
-    assert store.is_finished(tmp_path, unit)
+    assert store.finished(tmp_path, [unit]) == [unit]
     assert not seals.is_sealed(tmp_path, store.RESULTS)
 
 
@@ -371,7 +294,7 @@ def test_the_test_windows_come_back_as_they_were(tiny_run: Path, tmp_path: Path)
 def test_each_kind_of_session_is_noted_once(tmp_path: Path) -> None:
     """Two kinds of processors in turns, as the tasks of an array come: two entries, and a sentence at each change."""
     folder = tmp_path / "run"
-    store.open_folder(folder, tiny_plan(tmp_path))
+    make_run(folder, tiny_plan(tmp_path))
     one, other = ({"shipid": "1", "processor": name, "packages": {"torch": "2"}} for name in ("one", "other"))
     notes = [store.note_session(folder, session) for session in (one, one, other, one, other)]
     changes = [f"processor was {before}, now {now}" for before, now in (("one", "other"), ("other", "one"))]
@@ -383,4 +306,4 @@ def test_each_kind_of_session_is_noted_once(tmp_path: Path) -> None:
 def test_a_link_that_leads_nowhere_is_no_folder_of_a_run(target: str, tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to(target)
     with pytest.raises(ResultError, match="loop: is a link that leads nowhere: choose another --out"):
-        store.open_folder(tmp_path / "loop", tiny_plan(tmp_path))
+        make_run(tmp_path / "loop", tiny_plan(tmp_path))

@@ -20,6 +20,7 @@ from shipid.hybrid.trials import row_of
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.apply import predict_log
+from shipid.study.plan import judged_method, model_label, plain_rival
 from shipid.study.prepare import prepare
 from shipid.study.progress import Watch
 from shipid.study.results import provenance_words, read_results
@@ -44,8 +45,8 @@ def test_a_new_method_goes_through_a_whole_study(
     plan = tiny_plan(tmp_path, changes)
     # four foundations with `drawn`, two with `toy`, three with `bare`: `alone` does not meet `none`
     assert plan.cells == 4 + 2 + 3
-    assert plan.judged == "toy"
-    assert plan.label("right", "toy") == "right"
+    assert judged_method(plan) == "toy"
+    assert model_label(plan, "right", "toy") == "right"
     folder = tmp_path / "run"
     run_here(plan, folder)
     rows = store.read_rows(folder).set_index("cell")
@@ -64,7 +65,7 @@ def test_a_new_method_goes_through_a_whole_study(
     # without a ridge what is left over the windows that train is orthogonal to every input: least squares
     prepared = prepare(plan, read_dataset(folder / store.DATASET))
     batch = plan.batches[0]
-    seen = np.isin(prepared.pool.run, prepared.runs(plan, batch))
+    seen = np.isin(prepared.pool.run, prepared.runs(batch))
     physics = prepared.pool_paths["right"][:, seen]
     instants = prepared.pool.select(seen).instants()
     left = prepared.pool.future[:, seen] - predictor.corrector.predict(predictor.physics, instants, physics)
@@ -93,9 +94,9 @@ def test_settings_of_a_users_method_mean_what_the_user_says(tmp_path: Path, monk
     plan = tiny_plan(tmp_path, {"method": [drawn, added], "grid.N_D": [4]})
     mine = plan.methods[1]
     assert (mine.method.traits, mine.method.num_trials()) == (Traits(), None)
-    assert plan.plain is None
+    assert plain_rival(plan) is None
     assert not any(taken(mine, foundation) for foundation in plan.foundations)
-    assert not smooth_by_construction(mine.method, plan.horizon)
+    assert not smooth_by_construction(mine.method, plan.study.prediction.horizon)
     Watch(plan, tmp_path)
     run_here(plan, tmp_path / "run")
     results = read_results(tmp_path / "run")

@@ -201,7 +201,7 @@ def test_stored_predictors_give_the_paths_of_the_results(whole: Finished, result
         estimates = None
         if again.vessel is not None and again.physics.observer is not None:
             estimates = apply.observe(again.vessel, results.dataset, again.physics.observer)
-        instants = instants_of(whole.plan, again.vessel, results.dataset, results.test, estimates)
+        instants = instants_of(whole.plan.study, again.vessel, results.dataset, results.test, estimates)
         np.testing.assert_allclose(again.predict(instants), results.paths[cell], atol=1e-9, err_msg=cell)
 
 
@@ -305,6 +305,6 @@ def test_on_a_shared_clock_no_training_window_touches_a_test_window(
 
     assert not touch(prepared.pool, prepared.test)
     for batch in plan.batches:
-        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(plan, batch)))
-        for training, judged in prepared.folds(plan, batch, windows, validation):
+        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
+        for training, judged in prepared.folds(batch, windows, validation):
             assert not touch(windows.select(training), windows.select(judged))

@@ -14,7 +14,7 @@ import pandas as pd
 from shipid.data.dataset import Dataset
 from shipid.report import page
 from shipid.report.sections import SECTIONS
-from shipid.study import run
+from shipid.study import run, sessions, store
 from shipid.study.plan import Plan, Unit, build_plan, read_plan
 
 TINY = Path(__file__).parents[1] / "bad" / "studies" / "plain.toml"
@@ -56,15 +56,21 @@ def mixed_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
     return build_plan(document, folder / "tiny.toml")
 
 
+def make_run(folder: Path, plan: Plan) -> None:
+    """Make the folder of a run, or open it again."""
+    with store.open_folder(folder, plan):
+        pass
+
+
 def run_here(plan: Plan, folder: Path) -> list[run.Event]:
     """Run a study in this process, without a cluster."""
     return list(events_here(plan, folder))
 
 
-def events_here(plan: Plan, folder: Path, leave: bool = False) -> Iterator[run.Event]:
+def events_here(plan: Plan, folder: Path) -> Iterator[run.Event]:
     """The same, event by event."""
     with without_workers():
-        yield from run.run_study(plan, folder, leave=leave)
+        yield from run.run_study(plan, folder)
 
 
 @contextmanager
@@ -82,7 +88,7 @@ def without_workers() -> Iterator[None]:
     def in_turn(work: Callable[[Unit], Any], units: Iterable[Unit], _: int) -> Iterator[Any]:
         return ((unit, work(unit)) for unit in units)
 
-    with patch.object(run, "on_workers", in_turn):
+    with patch.object(run, "on_workers", in_turn), patch.object(sessions, "on_workers", in_turn):
         yield
 
 

@@ -1,0 +1,230 @@
+"""From methods to cells: what a method is fitted to, what bands rest on, and the errors of a predictor on the test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shipid.data.windows import Windows, covered
+from shipid.engine.rollout import SPEED_LIMIT
+from shipid.errors import DataError, legible
+from shipid.hybrid.method import Case, Corrector, Fitted, Journal, Task, fit_all
+from shipid.metrics import lengths, position_error, share_of, summary
+from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
+from shipid.study.declared import Foundation, Way
+from shipid.study.foundations import Prediction, predictions
+from shipid.study.plan import Batch, Unit
+from shipid.study.prepare import Prepared, apart, at_instants, instants_of, outside_of, physics_of, window_memory
+from shipid.study.store import Cell
+from shipid.units import percent
+from shipid.version import __version__
+
+NO_ACCURACY = dict.fromkeys(("A", "A_90", "A_rms"), np.nan)  # of no physics
+Errors = dict[tuple[str, str], tuple[Array, float]]
+
+
+class Work(NamedTuple):
+    """A batch as the methods of a unit see it.
+
+    windows : of its training and validation runs. ways : method -> with the foundations that it meets in the unit.
+    known : foundation -> what it predicts for the batch.
+    """
+
+    prepared: Prepared
+    batch: Batch
+    windows: Windows
+    ways: Mapping[str, Way]
+    known: Mapping[str, Prediction]
+    device: str
+
+
+def work_of(prepared: Prepared, unit: Unit, ways: tuple[Way, ...], device: str) -> Work:
+    """The windows of a unit, and its foundations, those fitted that are to be."""
+    runs = prepared.runs(unit.batch)
+    windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
+    known = predictions(prepared, runs, device, {name for name, _ in unit.pairs})
+    met = {way.name: replace(way, foundations=unit.foundations(way.name)) for way in ways}
+    return Work(
+        prepared, unit.batch, windows, {name: way for name, way in met.items() if way.foundations}, known, device
+    )
+
+
+def fit_method(work: Work, way: Way, journal: Journal | None = None) -> dict[str, Fitted]:
+    """Results of one method for the foundations that it meets; no corrector where it cannot learn from these runs."""
+    prepared, windows, batch, method = work.prepared, work.windows, work.batch, way.method
+    mine = {name: work.known[name] for name in way.foundations}
+    cases = {
+        name: Case(physics_of(prepared.study, one.foundation.vessel, one.foundation.observer), one.paths)
+        for name, one in mine.items()
+    }
+    hidden = {
+        name: window_memory(case.physics.vessel, prepared.data, windows)
+        for name, case in cases.items()
+        if case.physics.vessel is not None and method.compensates
+    }
+    try:
+        task = Task(
+            cases=cases,
+            windows=windows,
+            folds=prepared.folds(batch, windows, method.validation) if method.compensates else (),
+            commands=prepared.commands,
+            known=prepared.study.prediction.known,
+            seed=batch.seed,
+            hidden=hidden,
+            estimates={name: at_instants(prepared.data, windows, one.estimates) for name, one in mine.items()},
+            device=work.device,
+            journal=journal,
+            cells={name: batch.cell(name, way.name) for name in mine},
+        )
+        return fit_all(method, task)
+    except DataError as error:
+        return {name: Fitted(None, [], 0.0, sentence=error.message) for name in mine}
+
+
+def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, Fitted]]) -> Errors:
+    """(Foundation, method) -> errors (T, S, 2) [m] by cells fitted without these runs, and seconds that they took.
+
+    Of the pairs that have no such errors for nothing: methods that learn step by step, and foundations fitted to the
+    runs of the batch. None of them unless the study has `bands.refits`.
+    """
+    prepared, batch, windows = work.prepared, work.batch, work.windows
+    adapted = {one.name for one in prepared.foundations if one.fitted}
+    wanted: dict[str, tuple[str, ...]] = {}
+    for way in work.ways.values():
+        results = fitted[way.name]
+        trained = [name for name in way.foundations if results[name].corrector is not None]
+        names = tuple(name for name in trained if name in adapted or results[name].left_out is None)
+        if names:
+            wanted[way.name] = names
+    refits = prepared.study.bands.refits
+    if not refits or not wanted:
+        return {}
+    left_out: Errors = {
+        (name, method): (np.full_like(windows.future, np.nan), 0.0)
+        for method, names in wanted.items()
+        for name in names
+    }
+    kept = outside_of(prepared.data, prepared.test)
+    seen = replace(
+        prepared,
+        data=apart(prepared.data, prepared.test),
+        estimates={name: known.select(kept) for name, known in prepared.estimates.items()},
+    )
+    place = np.flatnonzero(np.isin(prepared.pool.run, prepared.runs(batch)))
+    try:
+        folds = refit_folds(windows, refits, batch.seed)
+    except DataError:  # runs of one clock that overlap: without some of them nothing is left, so no run has errors
+        folds = []
+    for training, judged in folds:
+        rest, part = windows.select(training), windows.select(judged)
+        inside = replace(
+            seen,
+            pool=rest,
+            test=part,
+            pool_paths={name: paths[:, place[training]] for name, paths in prepared.pool_paths.items()},
+            test_paths={name: paths[:, place[judged]] for name, paths in prepared.pool_paths.items()},
+        )
+        known = predictions(inside, tuple(rest.spans), work.device, {name for name, _ in left_out})
+        again = work._replace(prepared=inside, windows=rest, known=known)
+        for method, names in wanted.items():
+            way = replace(work.ways[method], foundations=names)
+            for name, result in fit_method(again, way).items():
+                one, (errors, seconds) = known[name], left_out[name, method]
+                left_out[name, method] = errors, seconds + result.seconds + one.seconds
+                if result.corrector is None:  # too little is left to train: the runs that it leaves out have no errors
+                    continue
+                predictor = _predictor(again, one.foundation, way, result.corrector, {})
+                instants = instants_of(inside.study, predictor.vessel, inside.data, part, one.estimates)
+                errors[:, judged] = part.future - predictor.predict(instants, one.test_paths)
+    return left_out
+
+
+def evaluate_cell(
+    work: Work,
+    pair: tuple[str, str],
+    fitted: Mapping[str, Mapping[str, Fitted]],
+    left_out: Errors,
+    origin: Mapping[str, str],
+) -> Cell:
+    """The predictor of a foundation and a method with its bands, and its errors on the test.
+
+    left_out : errors of refits. origin : name and digest of the study, for the provenance of the predictor.
+    """
+    name, method = pair
+    one, way, result = work.known[name], work.ways[method], fitted[method][name]
+    foundation, prepared, batch = one.foundation, work.prepared, work.batch
+    errors, seconds = left_out.get(pair, (None, 0.0))
+    row: dict[str, Any] = {"cell": batch.cell(name, method), "foundation": name, "family": foundation.family}
+    row |= {"member": foundation.member, "method": method}
+    row |= accuracy_of(one.test_paths, prepared.test) if foundation.base is not None else NO_ACCURACY
+    row |= {"N_D": batch.N_D, "seed": batch.seed, "runs": len(prepared.runs(batch))}
+    row |= {"minutes": covered(work.windows) / 60, "seconds": result.seconds + one.seconds + seconds}
+    row["trials"] = result.trials
+    if result.corrector is None:
+        return Cell(row | _failed("failed", legible(result.sentence or one.sentence or "no training converged")))
+    if not any(other.fitted for other in prepared.foundations if other.family == foundation.family):
+        errors = result.left_out if result.left_out is not None else errors  # fair: the physics saw none of these runs
+    predictor = _predictor(work, foundation, way, result.corrector, origin)
+    bands, reason = bands_of(errors, work.windows, predictor.limits, prepared.kinds)
+    without = {} if bands is not None else {"no_band": reason}
+    predictor = replace(predictor, bands=bands, provenance={**predictor.provenance, **without})
+    chosen = result.corrector.hyperparameters
+    words = ", ".join(f"{key} {chosen[key]:.3g}" for key in way.method.varied() if key in chosen)
+    outcome, paths = _tested(prepared, one, predictor, way)
+    return Cell({**row, **outcome, "hyperparameters": words}, predictor, paths)
+
+
+def accuracy_of(paths: Array, test: Windows) -> dict[str, float]:
+    """A, A_90, A_rms [m] of the paths (T, S, 2) of the physics alone on the test windows."""
+    known: Mapping[str, Any] = summary(position_error(paths, test.future))
+    return {"A": known["mean"], "A_90": known["p90"], "A_rms": known["rms"]}
+
+
+def _failed(status: str, sentence: str) -> dict[str, Any]:
+    """The columns of a row without a result."""
+    blank = dict.fromkeys(("H", "H_90", "rms", "coverage", "width"), np.nan)
+    return {**blank, "status": status, "sentence": sentence, "hyperparameters": ""}
+
+
+def _tested(prepared: Prepared, one: Prediction, predictor: Predictor, way: Way) -> tuple[dict[str, Any], Array | None]:
+    """Errors [m] of a predictor on the test windows, and its paths where they are finite and within reach of a ship."""
+    test, study = prepared.test, prepared.study
+    failed = ~np.isfinite(one.test_paths).all(axis=(0, 2))
+    if failed.any():
+        share = f"physics diverges on {percent(failed.mean(), 1)} of the test windows"
+        return _failed("diverged", share if np.isfinite(one.paths).all() else one.sentence), None
+    instants = instants_of(study, predictor.vessel, prepared.data, test, one.estimates)
+    predictor.check_restored(instants, one.test_paths, way.method.corrector)
+    paths = predictor.predict(instants, one.test_paths)
+    failed = ~(lengths(paths) <= SPEED_LIMIT * test.step * len(paths)).all(axis=0)  # where physics has diverged, too
+    if failed.any():
+        where = f"{percent(failed.mean(), 1)} of the test windows"
+        return _failed("diverged", f"the prediction is not a number, or farther than any ship gets, on {where}"), None
+    error = summary(position_error(paths, test.future))
+    outcome = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"], "coverage": np.nan, "width": np.nan}
+    level = study.bands.level
+    if predictor.bands is not None and predictor.bands.promises(level):
+        region = predictor.band(paths, instants, level)
+        outcome["coverage"] = share_of(region.holds(test.future - paths), test.run)
+        outcome["width"] = float(region.radius.mean())
+    return {**outcome, "status": "ok", "sentence": one.sentence}, paths
+
+
+def _predictor(
+    work: Work, foundation: Foundation, way: Way, corrector: Corrector, origin: Mapping[str, str]
+) -> Predictor:
+    windows, study = work.windows, work.prepared.study
+    named = {"cell": work.batch.cell(foundation.name, way.name), "foundation": foundation.name, "method": way.name}
+    return Predictor(
+        physics=physics_of(study, foundation.vessel, foundation.observer),
+        method=way.kind,
+        corrector=corrector,
+        limits=limits_of(windows, work.prepared.commands),
+        commands=study.prediction.commands,
+        causal=tuple(study.data.causal) if study.data else (),
+        run_up=windows.num_past * windows.step if foundation.observer is not None else 0.0,
+        provenance={**origin, **named, "runs": list(windows.spans), "shipid": __version__},
+    )

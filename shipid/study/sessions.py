@@ -1,0 +1,147 @@
+"""What results are computed with: versions, engine, processor, device and users' code, noted before any is stored."""
+
+from __future__ import annotations
+
+import logging
+import platform
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from shipid.capacity import cores, processor
+from shipid.engine.native import engine
+from shipid.errors import ShipidError, legible
+from shipid.hybrid.device import vectors
+from shipid.physics import TERMS
+from shipid.study import store
+from shipid.study.code import UNKNOWN, code_digest
+from shipid.study.plan import USER_SCRIPT, Plan, own_code
+from shipid.study.workers import on_workers
+from shipid.units import listed
+from shipid.version import __version__
+
+PACKAGES = (
+    *("casadi", "numpy", "scipy", "scikit-learn", "torch", "optuna", "pandas", "pyarrow"),
+    *("dask", "distributed", "plotly"),
+)
+
+Code = Mapping[str, Mapping[str, str]]  # what a user wrote, as `Plan.code`
+MAIN = "__main__"  # module of a script, a cell or a console
+
+log = logging.getLogger(__name__)
+
+
+@dataclass
+class Sessions:
+    """The sessions that a process notes in the folder of a run, each kind once.
+
+    now : that of this process as it begins. Its engine, or that of a worker, is another one from the moment on at which
+        a model cannot be compiled.
+    """
+
+    folder: Path
+    now: dict[str, Any]
+    noted: list[Mapping[str, Any]] = field(default_factory=list)
+
+    def note(self, session: Mapping[str, Any]) -> list[str]:
+        """Note a session; returns a sentence per difference to the one before."""
+        if session in self.noted:
+            return []
+        self.noted.append(session)
+        return store.note_session(self.folder, session)
+
+    def note_others(self, *sessions: Mapping[str, Any]) -> None:
+        """Note sessions of workers, or of this process by now; a warning where one differs from that before."""
+        for session in sessions:
+            if changed := self.note(session):
+                log.warning("computed otherwise in this process or a worker: %s", "; ".join(changed))
+
+    def note_engine(self, name: str | None) -> None:
+        """Note by which engine this process or a worker computes by now; None: it has not computed yet."""
+        if name is not None:
+            self.note_others({**self.now, "engine": name})
+
+
+def session_on(device: str, code: Code) -> dict[str, Any]:
+    """What results depend on beside the plan, to the last digit: versions, engine, processor, device, users' code."""
+    computer = machine()
+    others = {name: version for name, version in computer["packages"].items() if name != "shipid"}
+    return {
+        "shipid": f"{__version__}, code {code_digest()}",  # the code may differ and the version not
+        "engine": engine(),
+        "processor": computer["processor"],
+        "python": computer["python"],
+        "device": device,
+        "packages": others,
+        **code,
+    }
+
+
+def machine() -> dict[str, Any]:
+    """What the results were computed with: interpreter, packages, machine."""
+    packages = {"shipid": __version__}
+    for name in PACKAGES:
+        with suppress(PackageNotFoundError):  # an extra that is not installed
+            packages[name] = version(name)
+    system = {"python": sys.version.split()[0], "system": platform.platform(terse=True), "machine": platform.machine()}
+    return {**system, "processor": f"{processor()}, {vectors()}", "cores": cores(), "packages": packages}
+
+
+def session_at_worker(plan: Plan, device: str, code: Code) -> dict[str, Any]:
+    """The session of a worker on another machine; `code` is that of the process that gave the work.
+
+    A method of that process's script has no file there.
+    """
+    imported = replace(plan, methods=tuple(way for way in plan.methods if type(way.method).__module__ != MAIN))
+    try:
+        here = own_code(imported)
+    except KeyError as unknown:
+        words = f"its workers lack the term {unknown}: start them with --preload and your file that puts it into TERMS"
+        raise ShipidError(words) from None
+    return session_on(device, {what: {**code.get(what, {}), **here.get(what, {})} for what in {**code, **here}})
+
+
+def check_workers(plan: Plan) -> None:
+    """Raise ShipidError where a local worker lacks the code that a user wrote, or has another one."""
+    here, there, why, failed = _digests(plan), dict[str, str](), "", ""
+    try:
+        ((_, there),) = on_workers(partial(_digests, plan), [None], 1)
+    except ShipidError:
+        raise
+    except Exception as error:  # of a module as it is imported, of a class or of a name in TERMS that is not there
+        why = "" if isinstance(error, KeyError) and any(key in error.args for key in TERMS) else f" ({error})"
+        in_script = isinstance(error, AttributeError) and any(
+            type(way.method).__module__ == MAIN for way in plan.methods
+        )
+        failed = "" if in_script or not why else legible(f"{type(error).__name__}: {error}".removesuffix(": "))
+    lacking = {what: digest for what, digest in here.items() if there.get(what) != digest}
+    if not lacking:
+        return
+    named, known = listed([*lacking]), UNKNOWN not in lacking.values()
+    if failed and known:
+        raise ShipidError(f"a worker cannot import the {named}: {failed}")
+    if there.keys() >= lacking.keys() and known:
+        words = f"the file of the {named}, or one that it imports, has changed since it was imported"
+        raise ShipidError(f"{words}: start this process again")
+    file = getattr(sys.modules[MAIN], "__file__", None)
+    if file:
+        remedy = 'they import your script: define and name it above the line `if __name__ == "__main__":`'
+    elif "term" in named:
+        script = f"a script, as {USER_SCRIPT} in docs/extending.md"
+        remedy = f"write it, with its line TERMS[...] = ..., into {script}, and run the study by that"
+    else:
+        remedy = "write it into a file, such as my_method.py, and import it from there"
+    words = f"workers are processes, which do not see what a cell or a console defines: they lack the {named}{why}"
+    raise ShipidError(f"{words}: {remedy}", file=file)
+
+
+def _digests(plan: Plan, _: None = None) -> dict[str, str]:
+    """What the user wrote, in words, as this process or a worker has it -> digest."""
+    return {
+        f"{what.split()[-1]} {name!r}": digest for what, held in own_code(plan).items() for name, digest in held.items()
+    }
