@@ -18,7 +18,7 @@ from shipid.cli import app
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.hybrid.bands import LEVELS, Bands
-from shipid.predictor import NO_BAND, NO_REFITS, Predictor
+from shipid.predictor import NO_BAND, Predictor
 from shipid.study import store
 from shipid.study.apply import Band, along_run
 from shipid.study.plan import Plan, read_plan
@@ -196,17 +196,6 @@ def test_an_adaptive_band_looks_at_ended_paths_alone() -> None:
     np.testing.assert_array_equal(later, factors)
 
 
-def test_an_adaptive_band_is_the_same_whenever_the_clock_began() -> None:
-    """Seconds since 1970 are rounded to some 1e-7 s: a path that ends at a row is known there."""
-    table, now = np.linspace(0.1, 3.0, 99), 0.1 * np.arange(200)
-    reach = np.random.default_rng(2).uniform(0.5, 1.5, 200)
-    factors = [
-        along_run(reach, t + 4.9, t, Band(0.9, rate=0.05), table) for t in (now, now + 1.7e9, now + 1_699_999_999.3)
-    ]
-    np.testing.assert_array_equal(factors[1], factors[0])
-    np.testing.assert_array_equal(factors[2], factors[0])
-
-
 def test_an_adaptive_band_judges_by_the_band_that_was_given() -> None:
     """Errors of 1.3 radii all along: once the band is that wide they are hits, and it misses its share."""
     now, table = np.arange(600.0), -np.log1p(-LEVELS)
@@ -275,14 +264,6 @@ def test_why_no_band_is_promised_is_the_reason_of_the_cells_with_most_runs(resul
     reasons = {row["cell"]: f"{NO_BAND}{row['N_D']} runs calibrate it" for row in results.rows}
     ((sentence, _),) = bands.answer_on_bands(replace(results, bands={}, no_band=reasons))
     assert sentence == f"No band is promised: {most} runs calibrate it."
-
-
-def test_a_method_without_errors_on_runs_left_out_says_which_key_gives_them(tiny_run: Path) -> None:
-    results = read_results(tiny_run)
-    without = replace(results, no_band=dict.fromkeys(results.paths, f"{NO_BAND}{NO_REFITS}"))
-    ((sentence, _),) = bands.answer_on_bands(without)
-    assert sentence.startswith("No band is promised: errors on runs left out need")
-    assert "`bands.refits`" in sentence
 
 
 def test_a_refit_that_has_too_little_to_train_leaves_its_runs_without_errors(tmp_path: Path) -> None:

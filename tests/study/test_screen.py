@@ -139,7 +139,7 @@ def test_what_drives_the_error_comes_first(tmp_path: Path) -> None:
     assert abs(ranking["factor"][0]) < ranking["away"][0]
 
 
-@pytest.mark.parametrize("members", [1, 2, 3, 8, 100])
+@pytest.mark.parametrize("members", [2, 100])
 def test_chance_drives_nothing(members: int) -> None:
     """200 families of 8 factors that A knows nothing of: two members had correlations of 1, and were believed."""
     rng = np.random.default_rng(members)
@@ -150,16 +150,6 @@ def test_chance_drives_nothing(members: int) -> None:
     assert drivers(frame)["family"].nunique() <= stats.binom.ppf(0.999, 200, 0.05)
     driven = drivers(frame.assign(A=A * frame["p3"] ** 12)).groupby("family", sort=False)["paths"].first()
     assert members < 100 or (len(driven), set(driven)) == (200, {"p3"})
-
-
-def test_a_factor_of_two_values_may_drive() -> None:
-    """All its values are as far from 1, so the distance has no rank."""
-    factor = np.tile([0.5, 1.5], 50)
-    A = factor + np.random.default_rng(0).uniform(0, 0.1, 100)
-    frame = pd.DataFrame({"family": "f", "member": "f", "A": A, "A_90": A, "diverged": 0.0, "p": factor})
-    (row,) = drivers(frame).to_dict("records")
-    assert (row["paths"], row["away"]) == ("p", 0.0)
-    assert row["factor"] > 0.8
 
 
 def test_a_parameter_left_alone_has_the_factor_one(tmp_path: Path) -> None:
@@ -184,12 +174,6 @@ def test_families_that_cannot_be_screened(plan: Plan, name: str, remedy: str) ->
     with pytest.raises(DocumentError, match=remedy) as caught:
         families(plan, name)
     assert "\n" not in str(caught.value)
-
-
-def test_a_study_that_draws_nothing(tmp_path: Path) -> None:
-    plan = tiny_plan(tmp_path, {"family": [{"name": "right", "base": "gunnerus-28.9"}]})
-    with pytest.raises(DocumentError, match="draws a factor from a range"):
-        families(plan)
 
 
 def test_a_table_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
