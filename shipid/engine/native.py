@@ -31,7 +31,6 @@ from shipid.engine.tables import Table, even_tables, find_tables
 from shipid.engine.threads import in_parallel, threaded
 from shipid.engine.vectors import DOUBLE, SINGLE, Precision, Target, head
 from shipid.errors import visible
-from shipid.files import TEMPORARY
 from shipid.metrics import BINS, BINS_AN_OCTAVE, LEAST, OCTAVES, SHIFT
 from shipid.vessel.dynamics import Dynamics
 
@@ -92,7 +91,7 @@ def _probed() -> tuple[str, bytes] | None:
             continue
         tried.add(os.path.realpath(command))
         try:
-            with _trials() as folder:
+            with tempfile.TemporaryDirectory() as folder:
                 library = Path(folder) / "probe.so"
                 failure = build(_command(command, Target(1)), trial, library, PROBE_LIMIT)
                 if failure is None:
@@ -105,19 +104,6 @@ def _probed() -> tuple[str, bytes] | None:
     if not tried:
         log.warning("engine 'native' is not used, others are slower: there is no C compiler (gcc, cc or clang)")
     return None
-
-
-def _trials() -> tempfile.TemporaryDirectory[str]:
-    """A folder to try a compiler in: where the system has no temporary ones, one in the user's cache. OSError if none.
-
-    What is compiled there is not loaded.
-    """
-    try:
-        return tempfile.TemporaryDirectory()
-    except FileNotFoundError:
-        place = os.path.join(_cache(), "shipid")
-        os.makedirs(place, 0o700, exist_ok=True)
-        return tempfile.TemporaryDirectory(dir=place, prefix=TEMPORARY)
 
 
 _refused: list[str] = []  # why this process compiles no more, if so
@@ -202,7 +188,7 @@ def target(precision: Precision = DOUBLE) -> Target:
     called = f"{best.prefix}v_tanh{precision.letter}"
     probe = f"typedef {precision.real} V __attribute__((vector_size({precision.bits // 8 * best.lanes}))); "
     probe += f"V {called}(V); V run(V x) {{ return {called}(x); }}"
-    with _trials() as folder:
+    with tempfile.TemporaryDirectory() as folder:
         failure = build(_command(command, best), probe, Path(folder) / "probe.so", PROBE_LIMIT)
     return best if failure is None else replace(best, prefix="")
 

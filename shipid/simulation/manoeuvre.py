@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from shipid.physics.helm import Helmsman
 from shipid.physics.signals import SIGNALS, signal_of
 from shipid.simulation.approach import Controls, helm_effect, thrust_sharing
 from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
-from shipid.simulation.request import Request, Side
+from shipid.simulation.request import Request, Side, in_rows
 from shipid.units import DEGREE, RPM
 from shipid.vessel.schema import term_blocks
 
@@ -116,6 +116,7 @@ class Ordered(Manoeuvre):
     one command (`bow.n_rpm`), which has priority. Every command needs an order.
     """
 
+    orders: dict[str, Any] = {}
     duration: Annotated[Positive, Field(description="s")]
     start_speed: Annotated[FiniteFloat, Field(description="m/s ahead at t = 0")] = 0.0
     actuators_at: Annotated[
@@ -132,18 +133,13 @@ class Ordered(Manoeuvre):
         """At `start_speed`, without an approach."""
         return Start(speed=self.start_speed, at_order=self.actuators_at == "order")
 
-    @property
-    @abstractmethod
-    def keys(self) -> tuple[str, ...]:
-        """Keys of the orders."""
-
     @abstractmethod
     def series(self, key: str, t: Array) -> Array:
         """Order of a key at times (T,) [s], in the unit of the key."""
 
     def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
         """Command -> (T,) [SI] at times t (T,) [s]; DocumentError for a command without order, or an unknown key."""
-        series = {key: self.series(key, t) for key in self.keys}
+        series = {key: self.series(key, t) for key in self.orders}
         chosen = {name: order_keys(name) for name in controls.commands}
         valid = [key for pair in chosen.values() for key in pair]
         unknown = next((key for key in series if key not in valid), None)
@@ -170,11 +166,6 @@ class Turning(Ordered):
 
     orders: Annotated[dict[str, FiniteFloat], Field(description="key -> order, in the unit of the key")] = {}
 
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Keys of the orders."""
-        return tuple(self.orders)
-
     def series(self, key: str, t: Array) -> Array:
         """Order at times (T,), constant."""
         return np.full(len(t), self.orders[key])
@@ -189,11 +180,6 @@ class Steps(Ordered):
     orders: Annotated[dict[str, Range], Field(description="key -> least and greatest level, in the unit of the key")]
     hold: Annotated[Hold, Field(description="s, least and greatest time of a level")] = (10.0, 40.0)
     seed: Annotated[int, Field(description="of levels and times")] = 0
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Keys of the orders."""
-        return tuple(self.orders)
 
     def series(self, key: str, t: Array) -> Array:
         """Order at times (T,), piecewise constant."""
@@ -221,14 +207,9 @@ class Approached(Manoeuvre):
         return inputs
 
     @property
-    def greatest_helm(self) -> float:
-        """Largest helm angle [deg] that the manoeuvre may order, to either side."""
-        return 0.0
-
-    @property
-    def greatest_shaft(self) -> float:
-        """Largest shaft speed [rpm] that the manoeuvre may order, ahead or astern."""
-        return abs(self.n_rpm)
+    def greatest_orders(self) -> tuple[float, float]:
+        """Largest helm angle [deg] and shaft speed [rpm] that the manoeuvre may order, to either side."""
+        return 0.0, abs(self.n_rpm)
 
     def shaft(self, t: Array) -> Array:
         """Ordered shaft speed [rev/s] at times (T,) [s]."""
@@ -244,7 +225,7 @@ class Approached(Manoeuvre):
 
     def check(self, controls: Controls) -> None:
         """Raise DocumentError for a vessel that no command drives ahead, or none turns where the manoeuvre moves it."""
-        controls.orders(np.zeros(1), np.full(1, self.greatest_helm * DEGREE))
+        controls.orders(np.zeros(1), np.full(1, self.greatest_orders[0] * DEGREE))
         self.helmsman(controls)
 
 
@@ -322,14 +303,18 @@ class HelmOver(Timed):
     side: Annotated[Side, Field(description="to which the ship turns first")] = "starboard"
 
     @property
-    def greatest_helm(self) -> float:
-        """Greatest angle [deg]."""
-        return self.angle_deg
+    def greatest_orders(self) -> tuple[float, float]:
+        """Helm of the turn [deg], and shaft speed [rpm]."""
+        return self.angle_deg, abs(self.n_rpm)
 
     @property
     def sense(self) -> float:
         """+1 to starboard, -1 to port."""
         return 1.0 if self.side == "starboard" else -1.0
+
+    def title(self, words: str) -> str:
+        """Title with the helm."""
+        return f"{words}, {self.angle_deg:g} deg of helm to {self.side}"
 
     def helm(self, t: Array) -> Array:
         """Helm angle [rad] at times (T,) [s]: amidships, then the first helm angle."""
@@ -348,10 +333,6 @@ class TurningCircle(HelmOver, Trial):
         """A turning circle of 60 ship lengths."""
         return cls(angle_deg=request.angle(35.0), side=request.side, duration=request.time(TURN), **request.keys)
 
-    def title(self, words: str) -> str:
-        """Title with the helm."""
-        return f"{words}, {self.angle_deg:g} deg of helm to {self.side}"
-
 
 class PullOut(HelmOver, Trial):
     """A turn, then the helm amidships: a stable ship's yaw rate decays to zero."""
@@ -368,14 +349,10 @@ class PullOut(HelmOver, Trial):
     def scaled(cls, request: Request) -> Self:
         """A turn of 30 ship lengths, then as many amidships or more: until the rate of a stable ship has decayed."""
         begin, end = request.keys["execute_at"], request.time(TURN)
-        turn = request.in_rows((end - begin) / 2)  # between two rows the log would show the release after it
+        turn = in_rows((end - begin) / 2, request.interval)  # between two rows the log would show the release after it
         if request.duration is None:
             end = begin + turn + request.passing * request.settling(TURN / 2)
         return cls(angle_deg=request.angle(20.0), side=request.side, turn=turn, duration=end, **request.keys)
-
-    def title(self, words: str) -> str:
-        """Title with the helm of the turn."""
-        return f"{words}, {self.angle_deg:g} deg of helm to {self.side}"
 
 
 class Zigzag(HelmOver, Trial):
@@ -433,9 +410,9 @@ class Spiral(Trial):
     hold: Annotated[Positive, Field(description="s that each is held")]
 
     @property
-    def greatest_helm(self) -> float:
-        """Greatest angle [deg]."""
-        return max(map(abs, self.angles_deg))
+    def greatest_orders(self) -> tuple[float, float]:
+        """Greatest angle of the levels [deg], and shaft speed [rpm]."""
+        return max(map(abs, self.angles_deg)), abs(self.n_rpm)
 
     @property
     def length(self) -> float:
@@ -472,9 +449,9 @@ class ReverseSpiral(Trial):
     angle_deg: Annotated[Positive, Field(le=MOST_HELM, description="deg: greatest helm")] = 35.0
 
     @property
-    def greatest_helm(self) -> float:
-        """Greatest angle [deg]."""
-        return self.angle_deg
+    def greatest_orders(self) -> tuple[float, float]:
+        """Limit of the helm [deg], and shaft speed [rpm]."""
+        return self.angle_deg, abs(self.n_rpm)
 
     @property
     def length(self) -> float:
@@ -533,9 +510,9 @@ class CrashStop(Timed, Trial):
             raise DocumentError(f"{message}, take a vessel with a propeller", file=vessel.file, path=about)
 
     @property
-    def greatest_shaft(self) -> float:
-        """Largest shaft speed [rpm], ahead or astern."""
-        return max(abs(self.n_rpm), self.astern_rpm)
+    def greatest_orders(self) -> tuple[float, float]:
+        """No helm, and the largest shaft speed [rpm], ahead or astern."""
+        return 0.0, max(abs(self.n_rpm), self.astern_rpm)
 
     def shaft(self, t: Array) -> Array:
         """Shaft speed [rev/s] at times (T,)."""
@@ -574,14 +551,9 @@ class Excitation(Timed):
     seed: Annotated[int, Field(description="of the levels, and of the search for phases")] = 0
 
     @property
-    def greatest_helm(self) -> float:
-        """Greatest angle [deg]."""
-        return self.angle_deg
-
-    @property
-    def greatest_shaft(self) -> float:
-        """Largest shaft speed [rpm]: mean plus amplitude."""
-        return abs(self.n_rpm) + self.amplitude_rpm
+    def greatest_orders(self) -> tuple[float, float]:
+        """Greatest angle [deg], and shaft speed [rpm]: mean plus amplitude."""
+        return self.angle_deg, abs(self.n_rpm) + self.amplitude_rpm
 
     def helm(self, t: Array) -> Array:
         """Helm angle [rad] at times (T,)."""
@@ -624,14 +596,9 @@ class StationKeeping(Approached):
     most_rpm: Annotated[Positive, Field(description="rpm, limit of a unit")] = 200.0
 
     @property
-    def greatest_helm(self) -> float:
-        """Largest azimuth angle [deg]: all directions."""
-        return 180.0
-
-    @property
-    def greatest_shaft(self) -> float:
-        """Largest shaft speed of a unit [rpm]."""
-        return max(abs(self.n_rpm), self.most_rpm)
+    def greatest_orders(self) -> tuple[float, float]:
+        """Azimuth angle [deg]: all directions; largest shaft speed of a unit [rpm]."""
+        return 180.0, max(abs(self.n_rpm), self.most_rpm)
 
     @property
     def length(self) -> float:

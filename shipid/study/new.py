@@ -441,7 +441,7 @@ def _wrong_helm(vessel: Vessel, dataset: Dataset) -> Iterator[str]:
     """Angles that turn the vessel one way and the ship of the log the other."""
     seen = helm_sense(dataset)
     try:
-        expected = Controls.of(vessel).helm
+        expected = Controls(vessel).helm
     except ShipidError:
         return  # nothing drives or turns the ship
     for name, sign in expected.items():

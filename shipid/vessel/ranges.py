@@ -93,7 +93,7 @@ def out_of_range(
 ) -> tuple[str, str] | None:
     """Dotted path of the first number that no ship has, and a sentence; None where all are usual.
 
-    values, units : of every number that the equations use, by dotted path; arrays (members,) are checked together.
+    values, units : of every number that the equations use, by dotted path.
     """
     meant = document.get(UNUSUAL, [])
     size = _size(document, values)
@@ -102,9 +102,7 @@ def out_of_range(
     for path, number in limited:
         least, most = ends[number]
         value = values[path]
-        usual = (least <= abs(value)) & (abs(value) <= most)
-        if not everywhere(usual) and not _is_meant(path, meant):
-            value, least, most = first_of(usual, value, least, most)
+        if not least <= abs(value) <= most and not _is_meant(path, meant):
             words = f"{value:g}: expected {ranges[number].words} ({least:.3g} to {most:.3g})"
             return path, f"{words}; {_remedy(path)}"
     for path, names in tables:
@@ -112,19 +110,6 @@ def out_of_range(
         if widest <= TURN and not _is_meant(path, meant):
             return path, f"angles up to {widest:.3g}: expected degrees, are these radians? {_remedy(path)}"
     return None
-
-
-def everywhere(holds: Any) -> bool:
-    """Whether something holds of all members: an array (members,) of truth values, or one of them for all."""
-    return bool(holds.all() if hasattr(holds, "all") else holds)
-
-
-def first_of(holds: Any, *numbers: Any) -> list[float]:
-    """Numbers of the first member of which something does not hold: each an array (members,), or one for all."""
-    import numpy as np  # a vessel alone is checked without
-
-    place = int(np.argmin(holds))
-    return [float(np.broadcast_to(number, np.shape(holds)).flat[place]) for number in numbers]
 
 
 def contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> tuple[str, str] | None:

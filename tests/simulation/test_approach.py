@@ -38,20 +38,20 @@ def moved(**places: float) -> Vessel:
 
 def test_aft_azimuths_turn_against_their_angle_and_forward_ones_with_it() -> None:
     for vessel in (SHIP, TUNNEL, load_vessel("gunnerus-28.9-6dof")):
-        controls = Controls.of(vessel)
+        controls = Controls(vessel)
         assert controls.drives == ("port.n", "starboard.n")  # a tunnel unit drives nothing ahead
         assert controls.helm == BOTH
-    tractor = Controls.of(moved(port_x=8.0))
+    tractor = Controls(moved(port_x=8.0))
     assert tractor.helm == {"port.alpha": 1.0, "starboard.alpha": -1.0}
 
 
 @pytest.mark.parametrize("key", ["kvlcc2-l7", "mariner"])
 def test_a_positive_rudder_angle_turns_the_ship_to_starboard(key: str) -> None:
-    assert Controls.of(load_vessel(key)).helm == {"rudder.delta": 1.0}
+    assert Controls(load_vessel(key)).helm == {"rudder.delta": 1.0}
 
 
 def test_orders_name_every_command() -> None:
-    orders = Controls.of(TUNNEL).orders(np.array([2.0, 3.0]), np.array([0.1, -0.2]))
+    orders = Controls(TUNNEL).orders(np.array([2.0, 3.0]), np.array([0.1, -0.2]))
     assert set(orders) == set(dynamics(TUNNEL).commands)
     np.testing.assert_array_equal(orders["port.n"], [2.0, 3.0])
     np.testing.assert_array_equal(orders["starboard.alpha"], [-0.1, 0.2])
@@ -59,7 +59,7 @@ def test_orders_name_every_command() -> None:
 
 
 def test_helm_effect_is_the_yaw_acceleration_to_starboard() -> None:
-    controls = Controls.of(SHIP)
+    controls = Controls(SHIP)
     slow, fast = helm_effect(controls, 1.0, 0.0), helm_effect(controls, 2.0, 0.0)
     assert slow > 0
     assert fast == pytest.approx(4 * slow)  # thrust goes with n^2 at rest
@@ -68,12 +68,12 @@ def test_helm_effect_is_the_yaw_acceleration_to_starboard() -> None:
 def test_a_vessel_that_nothing_drives_or_turns_is_refused() -> None:
     fixed = {f"thruster.{side}.off": True for side in ("port", "starboard")}
     with pytest.raises(DocumentError, match="no command drives R/V Gunnerus") as caught:
-        Controls.of(TUNNEL.with_values(fixed))
+        Controls(TUNNEL.with_values(fixed))
     assert caught.value.path == "thruster"
     amidships = {"thruster.port.x": 0.0, "thruster.port.y": 0.0, "thruster.starboard.off": True}
     balanced = SHIP.with_values(amidships | {"added_mass.Y_rdot": 0.0, "added_mass.N_vdot": 0.0})
     with pytest.raises(DocumentError, match="no angle command turns R/V Gunnerus"):
-        Controls.of(balanced)
+        Controls(balanced)
 
 
 def test_two_screws_steer_by_their_difference() -> None:
@@ -91,9 +91,9 @@ def test_two_screws_steer_by_their_difference() -> None:
 def test_no_approach_depends_on_its_company() -> None:
     """A fast and a slow ship settle at different times: each start is what it is alone, bit for bit."""
     n = np.array([0.8, 3.5])
-    together = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi").state
+    together = steady(Controls(SHIP), n, step=0.1, method="rk4", engine="casadi").state
     for place, one in enumerate(n):
-        alone = steady(Controls.of(SHIP), np.array([one]), step=0.1, method="rk4", engine="casadi").state
+        alone = steady(Controls(SHIP), np.array([one]), step=0.1, method="rk4", engine="casadi").state
         assert {name: values[place] for name, values in together.items()} == {name: v[0] for name, v in alone.items()}
 
 
@@ -101,23 +101,23 @@ def test_an_approach_is_that_of_the_vessel_whoever_asked_before() -> None:
     """The same numbers give the same approach, other numbers another; nobody changes what the next one gets."""
     how = {"step": 0.1, "method": "rk4", "engine": "casadi"}
     n, other = np.array([2.0]), SHIP.with_values({"hull.derivatives.X_u|u|": -4e3})
-    first = steady(Controls.of(SHIP), n, **how)  # type: ignore[arg-type]
+    first = steady(Controls(SHIP), n, **how)  # type: ignore[arg-type]
     kept = {name: values.copy() for name, values in first.state.items()}
     for values in (*first.state.values(), *first.memory.values()):
         values += 1.0
-    again = steady(Controls.of(load_vessel(SHIP.key)), n, **how).state  # type: ignore[arg-type]
+    again = steady(Controls(load_vessel(SHIP.key)), n, **how).state  # type: ignore[arg-type]
     for name, values in kept.items():
         np.testing.assert_array_equal(again[name], values)
-    changed = steady(Controls.of(other), n, **how).state  # type: ignore[arg-type]
+    changed = steady(Controls(other), n, **how).state  # type: ignore[arg-type]
     assert abs(changed["u"][0] - kept["u"][0]) > 0.01
-    held = steady(Controls.of(SHIP), n, held=True, **how)  # type: ignore[arg-type]
+    held = steady(Controls(SHIP), n, held=True, **how)  # type: ignore[arg-type]
     assert held.helm, "an approach of a helmsman is another one"
 
 
 def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
     """Speeds of the 2015 derivatives, computed separately in NumPy: 75, 145, 200 rpm."""
     n = np.array([75, 145, 200]) / 60
-    approach = steady(Controls.of(SHIP), n, step=0.1, method="rk4", engine="casadi")
+    approach = steady(Controls(SHIP), n, step=0.1, method="rk4", engine="casadi")
     state = approach.state
     np.testing.assert_allclose(state["u"], [2.27, 4.39, 6.06], atol=0.02)
     assert approach.memory == {}
@@ -129,7 +129,7 @@ def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
 
 def test_hidden_states_and_actuators_are_steady_too() -> None:
     vessel = load_vessel("gunnerus-28.9-6dof")
-    approach = steady(Controls.of(vessel), np.array([2.0]), step=0.05, method="rk4", engine="casadi")
+    approach = steady(Controls(vessel), np.array([2.0]), step=0.05, method="rk4", engine="casadi")
     state, memory = approach.state, approach.memory
     assert set(state) == {*dynamics(vessel).state, *dynamics(vessel).hidden}
     assert memory == {name: pytest.approx(2.0 if name.endswith(".n") else 0.0) for name in dynamics(vessel).memory}
@@ -139,10 +139,10 @@ def test_hidden_states_and_actuators_are_steady_too() -> None:
 
 
 def test_an_approach_that_never_settles_or_diverges_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    gains = Controls.of(SHIP.with_values({"hull.derivatives.X_u|u|": 1e5}))
+    gains = Controls(SHIP.with_values({"hull.derivatives.X_u|u|": 1e5}))
     with pytest.raises(ShipidError, match=r"at 145 rpm diverges: take a smaller step"):
         steady(gains, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
-    ponderous = Controls.of(
+    ponderous = Controls(
         SHIP.with_values({"added_mass.X_udot": -1e9, "hull.derivatives.X_u|u|": -2.1, "unusual": ["added_mass.X_udot"]})
     )
     with pytest.raises(ShipidError, match=r"after 3600 s straight ahead at 145 rpm, u still changes: let a helmsman"):
@@ -156,7 +156,7 @@ def test_an_approach_that_never_settles_or_diverges_is_reported(monkeypatch: pyt
 
 def test_a_large_and_slow_ship_reaches_her_speed_whatever_time_that_takes() -> None:
     given = Particulars(length=300.0, beam=58.0, draught=20.8, block=0.82, speed=8.0)
-    tanker = Controls.of(first_guess(given, "tanker", "tanker.toml").vessel)
+    tanker = Controls(first_guess(given, "tanker", "tanker.toml").vessel)
     for shaft in (0.15, 0.4):
         steadily = steady(tanker, np.array([shaft]), step=1.0, method="euler", engine="casadi")
         balanced = fsolve(lambda u, n=shaft: acceleration(tanker.vessel, float(u[0]), tanker.ahead(n))[0], 8 * shaft)
@@ -169,7 +169,7 @@ def test_a_large_and_slow_ship_reaches_her_speed_whatever_time_that_takes() -> N
 
 
 def test_a_vessel_that_turns_with_the_helm_amidships_has_no_straight_approach() -> None:
-    lame = Controls.of(SHIP.with_values({"thruster.starboard.off": True}))
+    lame = Controls(SHIP.with_values({"thruster.starboard.off": True}))
     with pytest.raises(ShipidError, match="turns with the helm amidships at 120 rpm"):
         steady(lame, np.array([2.0]), step=0.1, method="rk4", engine="casadi")
 
@@ -177,7 +177,7 @@ def test_a_vessel_that_turns_with_the_helm_amidships_has_no_straight_approach() 
 @pytest.mark.parametrize("speed", [3.0, 2.0, 0.5])
 def test_a_large_ship_that_turns_goes_no_straighter_because_she_is_slow(speed: float) -> None:
     """7 deg in a ship length at any speed: at 2 m/s that is less than 0.001 rad/s."""
-    controls = Controls.of(load_vessel("esso-190k"))
+    controls = Controls(load_vessel("esso-190k"))
     n = balanced_shaft(controls, speed)
     with pytest.raises(NotStraight, match="turns with the helm amidships"):
         steady(controls, np.array([n]), step=1.0, method="euler", engine="casadi")
@@ -197,7 +197,7 @@ LAGS = {"thruster.port.actuator.alpha": {"kind": "first_order", "T": 0.5, "rate"
 def test_a_helmsman_holds_what_does_not_go_straight(key: str, changes: dict[str, object], n: list[float]) -> None:
     """No velocity changes with the helm that he holds, and the yaw rate is nil."""
     vessel = load_vessel(key).with_values(changes)
-    controls, model = Controls.of(vessel), dynamics(vessel)
+    controls, model = Controls(vessel), dynamics(vessel)
     how = {"step": 0.1, "method": "rk4", "engine": "casadi"}
     with pytest.raises(NotStraight, match="helmsman"):
         steady(controls, np.array(n), **how)  # type: ignore[arg-type]
@@ -228,7 +228,7 @@ def test_a_rudder_that_is_called_helm_is_held_like_any_other() -> None:
     screw, rudder = tanker.document["thruster"].values()
     ship = check_vessel({**tanker.document, "thruster": {"propeller": screw, "helm": rudder}}, "renamed.toml")
     one, other = (
-        steady(Controls.of(v), np.array([10.229]), step=0.1, method="rk4", engine="casadi", held=True)
+        steady(Controls(v), np.array([10.229]), step=0.1, method="rk4", engine="casadi", held=True)
         for v in (tanker, ship)
     )
     assert other.memory["helm.delta"] == one.memory["rudder.delta"] != 0
@@ -237,7 +237,7 @@ def test_a_rudder_that_is_called_helm_is_held_like_any_other() -> None:
 def test_a_slow_ship_is_held_until_she_is_on_course() -> None:
     """Her velocities change little long before: speed, drift and helm are those at which all accelerations are nil."""
     n, vessel = 0.5, SHIP.with_values({"thruster.starboard.off": True})
-    controls, model = Controls.of(vessel), dynamics(vessel)
+    controls, model = Controls(vessel), dynamics(vessel)
     approach = steady(controls, np.array([n]), step=0.5, method="rk4", engine="casadi", held=True)
     given = list(vessel.parameters.values()), np.zeros(model.num_dof)
 
@@ -294,4 +294,4 @@ def test_the_term_whose_force_is_not_finite_at_rest_is_named(monkeypatch: pytest
 
     monkeypatch.setitem(TERMS, "hull.dry", Term(dry))
     with pytest.raises(DocumentError, match=rf"at rest, .*: mend hull\.dry in {__file__}, line \d+ or its numbers$"):
-        _ = Controls.of(SHIP.with_values({"hull.dry.C": 10.0}))
+        _ = Controls(SHIP.with_values({"hull.dry.C": 10.0}))

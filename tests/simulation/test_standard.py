@@ -32,7 +32,7 @@ def measured(name: str, *angles: float, **how: object) -> Measures:
 
 @pytest.mark.parametrize("speed", [1.5, 3.0, 5.0])
 def test_shaft_speed_gives_the_speed(speed: float) -> None:
-    n_rpm = 60 * shaft_speed(Controls.of(SHIP), speed)
+    n_rpm = 60 * shaft_speed(Controls(SHIP), speed)
     path = perform(SHIP, [Zigzag(n_rpm=n_rpm, duration=1.0)], step=0.1)
     assert path["u"].iloc[0] == pytest.approx(speed, abs=0.02)  # an approach ends where it changes by 1 mm/s in 30 s
 
@@ -41,7 +41,7 @@ def test_shaft_speed_gives_the_speed(speed: float) -> None:
 def test_a_ship_that_the_thrust_trims_reaches_the_speed(name: str) -> None:
     """Her shafts had the speed at which she, with no trim yet, did not gain speed: 1 % too little."""
     ship = load_vessel(name)
-    run = Zigzag(n_rpm=60 * shaft_speed(Controls.of(ship), 4.0), duration=1.0)
+    run = Zigzag(n_rpm=60 * shaft_speed(Controls(ship), 4.0), duration=1.0)
     assert perform(ship, [run], step=0.05)["u"].iloc[0] == pytest.approx(4.0, rel=2e-3)
 
 
@@ -56,7 +56,7 @@ def test_a_pull_out_begins_at_the_rate_of_the_steady_turn(speed: float) -> None:
 def test_a_small_model_may_have_a_fast_shaft(rpm: float, diameter: float) -> None:
     particulars = Particulars(1.2, 0.2, 0.05, 0.5, 1.37, rpm=rpm, propeller_diameter=diameter)
     guess = first_guess(particulars, "model", "model.toml")
-    assert 60 * shaft_speed(Controls.of(guess.vessel), 1.37) == pytest.approx(60 * guess.n, rel=1e-6)
+    assert 60 * shaft_speed(Controls(guess.vessel), 1.37) == pytest.approx(60 * guess.n, rel=1e-6)
 
 
 def test_a_speed_that_no_shaft_speed_gives_is_refused() -> None:
