@@ -12,7 +12,7 @@ from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import beginning, bundled_or_file, files
 from shipid.cli.options import MappingName
 from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import criterion_table, measure_table, reading, table
+from shipid.cli.terminal import criterion_table, measure_table, steps, table
 from shipid.errors import ShipidError
 from shipid.units import percent, plural
 
@@ -90,8 +90,13 @@ def data_import(
     check_output(out, [source, Path(mapping)], "--out")
     if source.is_dir():
         check_output(out, source.glob("*"), "--out")
-    with reading(source) as progress:
-        dataset = import_log(declared, source, without=without or (), progress=progress)
+    with steps() as show:
+        dataset = import_log(
+            declared,
+            source,
+            without=without or (),
+            progress=lambda share: show(f"{source.name}: {percent(share)} read"),
+        )
     file = write_dataset(dataset, out)
     repairs = dataset.metadata.get("repairs", [])
     with answering(as_json) as answer:

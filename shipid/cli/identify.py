@@ -11,9 +11,9 @@ import typer
 
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import files
-from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
+from shipid.cli.options import VesselName, assignments, command_line, parsed, stem
 from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import digits, ended_by, iterations, steps, table
+from shipid.cli.terminal import digits, ended_by, steps, table
 from shipid.errors import DocumentError, ShipidError
 from shipid.units import interval_text, listed, percent, plural
 
@@ -109,8 +109,8 @@ def identify(
         "parameters": parameters and _paths(parameters),
         "fixed": fixed and _paths(fixed),
         "together": together and [_paths([group]) for group in together],
-        "prior": prior and pairs(prior, "--prior", "paths=0.3"),
-        "bounds": bounds and pairs(bounds, "--bounds", "paths=[0.5,2]"),
+        "prior": prior and assignments(prior, "--prior", "paths=0.3"),
+        "bounds": bounds and assignments(bounds, "--bounds", "paths=[0.5,2]"),
         "nuisance": nuisance and _widths(nuisance),
         "horizon": horizon,
     }
@@ -134,10 +134,11 @@ def identify(
         if structures is not None:
             _compare(ship, log, declared, names, how, band, file, html, dataset, answer)
             return
-        with ended_by(), iterations() as progress:
+        with ended_by(), steps("cutting runs") as show:
             outcome = run_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or (),
-                programme=design, band=band, progress=progress,
+                programme=design, band=band,
+                progress=lambda count, objective: show(f"iteration {count}, objective {objective:.6g}"),
             )  # fmt: skip
         _show_identified(outcome, answer)
         write_patch(outcome, file)
@@ -290,7 +291,7 @@ def _widths(given: list[str]) -> list[str] | dict[str, Any]:
     from shipid.identification.settings import WIDE
 
     named = {name: WIDE.get(name, 1.0) for name in given if "=" not in name}
-    return named | pairs([name for name in given if "=" in name], "--nuisance", "current=0.3")
+    return named | assignments([name for name in given if "=" in name], "--nuisance", "current=0.3")
 
 
 def _show_nuisances(outcome: Identified, answer: Answer) -> None:

@@ -8,13 +8,12 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from shipid.errors import visible
-from shipid.units import length_text, percent
+from shipid.units import length_text
 
 if TYPE_CHECKING:
     from shipid.study.progress import Watch
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
 
 
 SILENCE, LOOK = 15.0, 2.0  # s without a line before there is one; between looks at the searches on a terminal
-HANDLER = "command line"
-"""Name of the handler that writes log messages to standard error."""
 
 
 @dataclass(frozen=True)
@@ -88,33 +85,6 @@ def _width(text: str) -> int:
     from rich.cells import cell_len
 
     return cell_len(text)
-
-
-@contextmanager
-def reading(log: Path) -> Iterator[Callable[[float], None]]:
-    """Give a function that says which share of a large log has been read (0 to 1), on standard error.
-
-    A terminal shows it in one line; elsewhere there is a line for every quarter.
-    """
-    last = [-1]
-    tty = sys.stderr.isatty()
-
-    def say(share: float) -> None:
-        step = int(100 * share) if tty else int(4 * share)
-        if step > last[0]:
-            last[0] = step
-            print(
-                f"{chr(13) if tty else ''}{log.name}: {percent(share)} read",
-                end="" if tty else "\n",
-                file=sys.stderr,
-                flush=True,
-            )
-
-    try:
-        yield say
-    finally:
-        if tty and last[0] >= 0:
-            print(file=sys.stderr)
 
 
 def show_reasons(choices: Iterable[Mapping[str, str]]) -> None:
@@ -186,44 +156,16 @@ def ended_by(interrupted: str = NOTHING) -> Iterator[None]:
 
 
 def counted(blocks: Iterable[Any], total: int, what: str = "members", interrupted: str = NOTHING) -> Iterator[Any]:
-    """Yield the blocks of rows unchanged; show how many of `total` rows are there, as a bar or, elsewhere, as lines.
+    """Yield the blocks of rows unchanged; show how many of `total` rows are there.
 
     interrupted : what Ctrl-C is answered with.
     """
-    with ended_by(interrupted):
-        if not sys.stderr.isatty():
-            yield from _said(blocks, total, what)
-            return
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=_console(stderr=True)) as progress:
-            task = progress.add_task(what, total=total)
-            for block in blocks:
-                progress.advance(task, len(block))
-                yield block
-
-
-def _said(blocks: Iterable[Any], total: int, what: str) -> Iterator[Any]:
-    """Yield the blocks; say every `SILENCE` seconds on standard error how many rows there are."""
-    import time
-
-    begun, count = time.monotonic(), 0
-
-    def say() -> None:
-        sys.stderr.write(f"{count} of {total} {what} after {time.monotonic() - begun:.0f} s\n")
-
-    with looking(say, SILENCE):
+    with ended_by(interrupted), steps() as show:
+        count = 0
         for block in blocks:
             count += len(block)
+            show(f"{count} of {total} {what}")
             yield block
-
-
-@contextmanager
-def iterations() -> Iterator[Any]:
-    """Give a function that `identify` calls after each iteration, to show how far it is."""
-    with steps("cutting runs") as show:
-        yield lambda count, objective: show(f"iteration {count}, objective {objective:.6g}")
 
 
 @contextmanager
@@ -360,12 +302,9 @@ def log_to_stderr(verbose: bool) -> None:
     import logging
 
     logger = logging.getLogger("shipid")
-    for before in [one for one in logger.handlers if one.name == HANDLER]:
-        logger.removeHandler(before)
     handler = logging.StreamHandler()
-    handler.name = HANDLER
     handler.setLevel(logging.DEBUG if verbose else logging.WARNING)
     handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
-    logger.addHandler(handler)
+    logger.handlers = [handler]
     if verbose:
         logger.setLevel(logging.DEBUG)

@@ -1,4 +1,4 @@
-"""Approach of a manoeuvre: which commands drive and steer a ship, its steady speed, and thrust allocation.
+"""Approach of a manoeuvre: which commands drive and steer a ship, and its steady speed.
 
 All results come from numerical evaluation of the vessel's equations, so they hold for any vessel.
 """
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
-from shipid.physics.helm import Unit, course_keeping
+from shipid.physics.helm import course_keeping
 from shipid.physics.signals import ACTUAL, is_shaft, neutral, steers
 from shipid.units import GRAVITY, listed
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
@@ -37,7 +37,6 @@ KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
 LENGTH, FASTEST = 100.0, 100.0  # m, of a ship whose document does not say; m/s
 REMEDY = 'let a helmsman hold the course (approach = "helmsman"), or start from rest (approach = "rest")'
 SWINGING = {"w", "p", "q"}  # velocities that nothing but damping ends
-WORST_CONDITION = 1e5  # of the thrusts that the accelerations ask for
 
 
 @dataclass(frozen=True)
@@ -342,39 +341,3 @@ def _held(
 
 def _rpm(n: Array, faulty: NDArray[np.bool_]) -> str:
     return f"{60 * n[int(np.argmax(faulty))]:g}"
-
-
-def thrust_sharing(vessel: Vessel) -> tuple[Unit, ...]:
-    """Thrust allocation: shares of the azimuth units in a demanded acceleration; least sum of n^4, exact at rest.
-
-    Raises
-    ------
-    DocumentError : the vessel has no two azimuth units that can push it ahead, aside and round.
-    """
-    commands = dynamics(vessel).commands
-    names = [name.removesuffix(".alpha") for name in commands if name.endswith(".alpha")]
-    names = [name for name in names if f"{name}.n" in commands]
-    idle = acceleration(vessel, 0.0, {})
-    effects = [
-        acceleration(vessel, 0.0, {f"{name}.n": PROBE_SHAFT, f"{name}.alpha": alpha}) - idle
-        for name in names
-        for alpha in (0.0, np.pi / 2)
-    ]
-    matrix = np.array(effects).reshape(-1, 3).T / PROBE_SHAFT**2  # (3, 2 x units)
-    if len(names) < 2 or np.linalg.cond(matrix) > WORST_CONDITION:
-        message = f"station keeping needs two azimuth units that push ahead, aside and round; {vessel.name} has "
-        raise DocumentError(message + (", ".join(names) or "none"), file=vessel.file, path="thruster")
-    shares = np.linalg.pinv(matrix)  # (2 x units, 3)
-    bias = _against_each_other(vessel, names, np.eye(len(shares)) - shares @ matrix)
-    return tuple(
-        Unit(name, *(tuple(row.tolist()) for row in (shares[2 * i], shares[2 * i + 1], bias[i])))  # type: ignore[arg-type]
-        for i, name in enumerate(names)
-    )
-
-
-def _against_each_other(vessel: Vessel, names: list[str], without_effect: Array) -> Array:
-    """Directions (units, 2) of inward thrust with zero total force and moment: the propeller wash goes outwards."""
-    blocks = vessel.document["thruster"]
-    place = np.array([[blocks[name]["x"], blocks[name]["y"]] for name in names], dtype=float)
-    pushed = (without_effect @ (place.mean(axis=0) - place).ravel()).reshape(-1, 2)
-    return np.asarray(pushed / max(np.linalg.norm(pushed, axis=1).max(), NOTHING))

@@ -22,7 +22,7 @@ from shipid.measures.spiral import Levels, levels, rate_levels
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman
 from shipid.physics.signals import SIGNALS, signal_of
-from shipid.simulation.approach import Controls, helm_effect, thrust_sharing
+from shipid.simulation.approach import Controls, helm_effect
 from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
 from shipid.simulation.request import Request, Side, in_rows
 from shipid.units import DEGREE, RPM
@@ -582,50 +582,6 @@ class Excitation(Timed):
         return np.asarray(limit_rate(np.concatenate([[0.0], series]), float(t[1] - t[0]), rate)[1:])
 
 
-class StationKeeping(Approached):
-    """Azimuth units hold a position and a heading from t = 0 on."""
-
-    n_rpm: FiniteFloat = 0.0
-    approach: Literal["steady", "helmsman", "rest"] = "rest"
-    duration: Annotated[Positive, Field(description="s")]
-    north: Annotated[FiniteFloat, Field(description="m, to hold")] = 0.0
-    east: Annotated[FiniteFloat, Field(description="m, to hold")] = 0.0
-    heading_deg: Annotated[FiniteFloat | None, Field(description="deg, to hold; absent: course_deg")] = None
-    natural_period: Annotated[Positive, Field(description="s, of the controlled ship; longer is softer")] = 60.0
-    bias_rpm: Annotated[Positive, Field(description="rpm at which the units push against each other")] = 60.0
-    most_rpm: Annotated[Positive, Field(description="rpm, limit of a unit")] = 200.0
-
-    @property
-    def greatest_orders(self) -> tuple[float, float]:
-        """Azimuth angle [deg]: all directions; largest shaft speed of a unit [rpm]."""
-        return 180.0, max(abs(self.n_rpm), self.most_rpm)
-
-    @property
-    def length(self) -> float:
-        """Length of the log [s]."""
-        return self.duration
-
-    def helmsman(self, controls: Controls) -> Helmsman:
-        """The station-keeping controller of position and heading.
-
-        DocumentError for a vessel without two azimuth units that give surge, sway and yaw.
-        """
-        units = thrust_sharing(controls.vessel)
-        used = {f"{unit.name}.{signal}" for unit in units for signal in ("n", "alpha")}
-        return helm.station_keeping(units, tuple(name for name in controls.commands if name not in used))
-
-    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
-        """Name -> (T,): position and heading to hold, natural frequency, bias and limit of the shaft speeds [SI]."""
-        heading = self.course_deg if self.heading_deg is None else self.heading_deg
-        values = {"north": self.north, "east": self.east, "heading": heading * DEGREE}
-        values |= {
-            "omega": 2 * np.pi / self.natural_period,
-            "n_bias": self.bias_rpm * RPM,
-            "n_max": self.most_rpm * RPM,
-        }
-        return {name: np.full(len(t), value) for name, value in values.items()}
-
-
 KINDS: dict[str, type[Manoeuvre]] = {
     "turning": Turning,
     "steps": Steps,
@@ -636,7 +592,6 @@ KINDS: dict[str, type[Manoeuvre]] = {
     "reverse_spiral": ReverseSpiral,
     "crash_stop": CrashStop,
     "excitation": Excitation,
-    "station_keeping": StationKeeping,
 }
 """Name -> class of every kind. To add one, write the class and name it here."""
 

@@ -32,9 +32,9 @@ from shipid.vessel.schema import (
     behind,
     components,
     kinds,
-    model_for,
     term_blocks,
     term_model,
+    vessel_model,
 )
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class Vessel:
     @property
     def above_zero(self) -> frozenset[str]:
         """Dotted paths of the parameters that must be above 0, such as `inertia.m`."""
-        model = model_for(self.document)
+        model = vessel_model()
         return frozenset(
             path for path in self._units if not documents.suits(model, documents.replace(self.document, {path: 0.0}))
         )
@@ -158,7 +158,7 @@ class Vessel:
         documents.check_values(odd, self.file)
         document = documents.replace(self.document, values, self.file)
         numbers = all(type(value) in (float, int) for value in values.values())
-        if numbers and values.keys() <= self._units.keys() and documents.suits(model_for(document), document):
+        if numbers and values.keys() <= self._units.keys() and documents.suits(vessel_model(), document):
             vessel = Vessel(document, self.file)  # terms, names and units are as they were
             vessel.__dict__.update(bound=self.bound, _units=self._units, structure=self.structure)
             vessel.__dict__["_parameters"] = self._parameters | {path: float(value) for path, value in values.items()}
@@ -315,7 +315,7 @@ def check_vessel(document: Document, file: str) -> Vessel:
     """Check a complete document; DocumentError with file, dotted path and remedy for the first problem."""
     for path, group, block in components(document):
         _check_component(path, group, block, file)
-    documents.parse(model_for(document), document, file)
+    documents.parse(vessel_model(), document, file)
     vessel = Vessel(document, file)
     paths: dict[str, str] = {}
     for path, key, block in term_blocks(document):
