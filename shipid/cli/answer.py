@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from shipid.cli.terminal import show
+from shipid.cli.terminal import show, table
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -44,6 +44,13 @@ class Answer:
             self.contents[name] = rows.to_dict("records") if hasattr(rows, "to_dict") else [dict(row) for row in rows]
         elif shown is not None:
             show(shown)
+
+    def records(
+        self, name: str, rows: Sequence[Mapping[str, Any]], formats: Mapping[str, Callable[[Any], str]] | None = None
+    ) -> None:
+        """Print dicts, if there are any, as a table headed by their keys; `formats`: key -> how values are written."""
+        shown = [[(formats or {}).get(key, str)(value) for key, value in row.items()] for row in rows]
+        self.rows(name, rows, table(list(rows[0]), shown) if rows else None)
 
 
 @contextmanager

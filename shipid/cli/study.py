@@ -37,7 +37,7 @@ def study_list(as_json: Json = False) -> None:
 
     rows = [{"name": name, "question": read(file)["question"]} for name, file in bundled("studies").items()]
     with answering(as_json) as answer:
-        answer.rows("studies", rows, table(["name", "question"], (row.values() for row in rows)))
+        answer.records("studies", rows)
 
 
 @app.command("new")

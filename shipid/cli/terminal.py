@@ -169,7 +169,7 @@ def counted(blocks: Iterable[Any], total: int, what: str = "members", interrupte
 
 
 @contextmanager
-def steps(first: str = "") -> Iterator[Callable[[str], object]]:
+def steps(first: str = "") -> Iterator[Callable[[str], None]]:
     """Give a function that takes the step of a long calculation: shown on a terminal, else printed once if long."""
     if sys.stderr.isatty():
         with _console(stderr=True).status(first) as status:

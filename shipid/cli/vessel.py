@@ -23,7 +23,7 @@ def vessel_list(as_json: Json = False) -> None:
 
     rows = [{"name": name, "vessel": read(file)["name"]} for name, file in bundled("models").items()]
     with answering(as_json) as answer:
-        answer.rows("vessels", rows, table(["name", "vessel"], (row.values() for row in rows)))
+        answer.records("vessels", rows)
 
 
 @app.command("show")
