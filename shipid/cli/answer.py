@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from shipid.cli.terminal import show, table
+from shipid.cli.terminal import digits, show, table
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -46,11 +46,26 @@ class Answer:
             show(shown)
 
     def records(
-        self, name: str, rows: Sequence[Mapping[str, Any]], formats: Mapping[str, Callable[[Any], str]] | None = None
+        self,
+        name: str,
+        rows: DataFrame | Sequence[Mapping[Any, Any]],
+        heads: Mapping[str, str] | None = None,
+        formats: Mapping[str, Callable[[Any], str]] | None = None,
     ) -> None:
-        """Print dicts, if there are any, as a table headed by their keys; `formats`: key -> how values are written."""
-        shown = [[(formats or {}).get(key, str)(value) for key, value in row.items()] for row in rows]
-        self.rows(name, rows, table(list(rows[0]), shown) if rows else None)
+        """Print dicts or rows of a frame, if there are any, as a table; programs get all of their columns.
+
+        heads : key -> heading of the columns to print; default: all, headed by their keys. formats : key -> how its
+        values are written; default: floats with four digits.
+        """
+        records: Any = rows.to_dict("records") if hasattr(rows, "to_dict") else rows
+        heads = heads or {key: key for record in records[:1] for key in record}
+        formats = dict.fromkeys(heads, _cell) | dict(formats or {})
+        cells = [[formats[key](record[key]) for key in heads] for record in records]
+        self.rows(name, rows, table(list(heads.values()), cells) if cells else None)
+
+
+def _cell(value: Any) -> str:
+    return digits(value) if isinstance(value, float) else str(value)
 
 
 @contextmanager

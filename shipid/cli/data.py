@@ -131,9 +131,9 @@ def _draft(
         {"column": c.name, "from": c.source, "unit": c.unit, "sure": c.confidence, "why": c.evidence}
         for c in guessed.columns
     ]
-    answer.records("columns", columns, {"sure": percent})
+    answer.records("columns", columns, formats={"sure": percent})
     findings = [{"finding": f.kind, "sure": f.confidence, "what": f.sentence} for f in guessed.findings]
-    answer.records("findings", findings, {"sure": percent})
+    answer.records("findings", findings, formats={"sure": percent})
     source = guessed.source
     if source.pattern is not None:
         count = f"{source.held} runs" if source.parts else "as many runs"
@@ -175,7 +175,7 @@ def data_segment(
     write_new(segments_text(segments, unit), file)
     with answering(as_json) as answer:
         rows = [{"run": one.run, "start": one.start, "end": one.end} for one in segments]
-        answer.records("segments", rows, dict.fromkeys(("start", "end"), lambda time: moment(time, unit)))
+        answer.records("segments", rows, formats=dict.fromkeys(("start", "end"), lambda time: moment(time, unit)))
         answer.say(f"{len(segments)} segments -> {file}", file=file)
 
 

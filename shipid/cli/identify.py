@@ -13,9 +13,9 @@ from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import files
 from shipid.cli.options import VesselName, assignments, command_line, parsed, stem
 from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import digits, ended_by, steps, table
+from shipid.cli.terminal import digits, ended_by, motion_errors, steps, table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import interval_text, listed, percent, plural
+from shipid.units import interval_text, listed, plural
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
@@ -204,8 +204,6 @@ def _compare(
 
 def _show_structures(compared: Compared, answer: Answer) -> None:
     """Print errors on runs held out, standard manoeuvres, errors by side, and what to run next."""
-    from math import degrees
-
     from shipid.identification.sides import HEADS, shown
 
     length = f"of {compared.ahead:g} s" if compared.ahead else "as long as the runs"
@@ -216,7 +214,8 @@ def _show_structures(compared: Compared, answer: Answer) -> None:
         [
             row["structure"],
             str(row["numbers"]),
-            *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"], row["more"])),
+            *motion_errors(row),
+            digits(row["more"]),
             interval_text(row["low"], row["high"]) if row["low"] == row["low"] else "-",
             digits(row["test"]),
             row["note"],
@@ -268,7 +267,7 @@ def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], 
 
     log, fitted, _ = without_shared(log, *pick_runs(log, runs, test))
     try:
-        with steps("comparing the vessel as she is with the runs, before the fit"):
+        with steps("comparing the vessel as it is with the runs, before the fit"):
             ahead, step = proposed_horizon(ship, log)
             look = first_look(ship, log, fitted, ahead=ahead, step=step)
     except DataError:
@@ -329,13 +328,9 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     answer.say("\n".join(f"profile: {sentence}" for sentence in profiles), profiles=profiles)
     if outcome.programme is not None:
         answer.say("To run next, by information per hour:")
-        ranked = [
-            [row["manoeuvre"], *(f"{row[name]:.2f}" for name in ("hours", "gain", "per_hour")), row["narrows"],
-             percent(1 - row['after'] / row['before'])]
-            for row in outcome.programme.head(10).to_dict("records")
-        ]  # fmt: skip
-        heads = ["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"]
-        answer.rows("to_run_next", outcome.programme, table(heads, ranked))
+        heads = {"manoeuvre": "manoeuvre", "hours": "h", "gain": "gain [bit]", "per_hour": "bit/h"}
+        ranked = outcome.programme if answer.as_json else outcome.programme.head(10)
+        answer.records("to_run_next", ranked, heads | {"narrows": "narrows most"})
     answer.say(warnings=outcome.warnings)
     for warning in outcome.warnings:
         typer.echo(f"warning: {warning}", err=True)
@@ -378,16 +373,20 @@ def _show_estimates(outcome: Identified, answer: Answer) -> None:
 
 def _show_free_runs(outcome: Identified, answer: Answer) -> None:
     """Print errors of free runs, and of measured outputs, before the fit and after it."""
+    from shipid.identification.free_run import ALL
+
     answer.say(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
     heads = ["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
-    answer.rows("free_runs", outcome.errors, table(heads, _free_rows(outcome)))
+    sets = {"fit": f"{len(outcome.runs)} fitted", "test": f"{len(outcome.held_out)} held out"}
+    rows = [
+        [sets[row["set"]], row["model"], *motion_errors(row)]
+        for row in outcome.errors.to_dict("records")
+        if row["run"] == ALL
+    ]
+    answer.rows("free_runs", outcome.errors, table(heads, rows))
     if len(outcome.outputs):
-        levels = [
-            [row["output"], row["unit"], *(digits(row[name]) for name in ("measured", "before", "after"))]
-            for row in outcome.outputs.to_dict("records")
-        ]
-        heads = ["measured output", "unit", "rms", "error before", "after"]
-        answer.rows("outputs", outcome.outputs, table(heads, levels))
+        heads = {"measured": "rms", "before": "error before", "after": "after"}
+        answer.records("outputs", outcome.outputs, {"output": "measured output", "unit": "unit"} | heads)
 
 
 def _show_manoeuvres(outcome: Identified, answer: Answer) -> None:
@@ -409,15 +408,3 @@ def _show_manoeuvres(outcome: Identified, answer: Answer) -> None:
         typer.echo(f"note: no {', '.join(titles)}: {note}", err=True)
     beyond = list(outcome.beyond)
     answer.say("\n".join(f"extrapolated: {sentence}" for sentence in beyond), extrapolated=beyond)
-
-
-def _free_rows(outcome: Identified) -> Iterator[list[str]]:
-    from math import degrees
-
-    from shipid.identification.free_run import ALL
-
-    for row in outcome.errors.to_dict("records"):
-        if row["run"] == ALL:
-            numbers = (row["u"], row["v"], degrees(row["r"]), row["position"])
-            named = {"fit": f"{len(outcome.runs)} fitted", "test": f"{len(outcome.held_out)} held out"}[row["set"]]
-            yield [named, row["model"], *(f"{value:.3g}" if value == value else "diverges" for value in numbers)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
@@ -106,6 +107,12 @@ def digits(value: float) -> str:
     if abs(value) >= 1e6:  # a moment on a clock of dates
         return f"{value:.1f}"
     return "-" if value != value else f"{round(value, 4) + 0.0:.4g}"
+
+
+def motion_errors(row: Mapping[str, Any]) -> list[str]:
+    """Errors of u, v [m/s], r [deg/s] and position [m] of a run; that it diverges, where it does."""
+    values = (row["u"], row["v"], math.degrees(row["r"]), row["position"])
+    return ["diverges" if value != value else digits(value) for value in values]
 
 
 def measure_table(rows: Iterable[Any], first: list[str]) -> Table:

@@ -47,13 +47,6 @@ def test_pairs_split_at_the_last_equals_sign() -> None:
     assert pairs(["hull.*[order >= 3]=0.2"], "--prior", "paths=0.3") == {"hull.*[order >= 3]": 0.2}
 
 
-def test_stem_keeps_the_dot_of_a_name() -> None:
-    from shipid.cli.options import stem
-
-    names = ("gunnerus-28.9", "a/b.toml", Path("x/log.parquet"))
-    assert [stem(name) for name in names] == ["gunnerus-28.9", "b", "log"]
-
-
 def test_the_command_line_can_be_typed_again(monkeypatch: pytest.MonkeyPatch) -> None:
     from shipid.cli.options import command_line
 
@@ -94,8 +87,7 @@ AFTER = {"out", "as_json", "html", "csv", "log", "save"}
 BAND = "--level 0.8 --kind zigzag --adaptive 0.03"
 THE_BAND = {"level": 0.8, "kind": "zigzag", "rate": 0.03}
 SIZES = {"length": 90.0, "beam": 15.0, "draught": 5.0, "block": 0.6, "speed": 6.0, "rpm": 150.0, "shafts": 2}
-SIZES |= {"propeller_diameter": 3.0, "rudder_area": 7.0, "rudder_span": 4.0, "rudder_rate": 3.5, "scale": 1.0}
-SIZES |= {"density": 1010.0, "frontal_area": 200.0, "lateral_area": 800.0}
+SIZES |= {"propeller_diameter": 3.0, "rudder_area": 7.0, "scale": 1.0}
 IDENTIFY = (
     f"identify {SHIP} log.parquet --runs A* --test B1 --parameters hull.*,inertia.m --fixed inertia.m --together a,b "
     "--prior hull.*=0.4 --bounds hull.*=[0.5,3] --nuisance current=0.2 --horizon 12 --set weights.u=0.07 "

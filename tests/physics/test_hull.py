@@ -42,16 +42,6 @@ def test_cross_flow_in_pure_sway_is_the_closed_form() -> None:
     assert wrench[5] == pytest.approx(1.5 * Y, rel=1e-12)
 
 
-def test_cross_flow_converges_to_the_integral() -> None:
-    v, r = 0.3, -0.06
-    x = np.linspace(-15.0, 18.0, 330_001)
-    across = -0.5 * 1025 * 2.6 * 1.2 * (v + x * r) * np.abs(v + x * r)
-    exact = np.array([np.trapezoid(across, x), np.trapezoid(x * across, x)])
-    errors = [np.abs(cross_flow(strips, v, r)[[1, 5]] / exact - 1).max() for strips in (8, 32, 128)]
-    assert errors[0] > 4 * errors[1] > 16 * errors[2]
-    assert errors[2] < 2e-4
-
-
 def test_cross_flow_along_the_hull_has_coefficients_for_force_and_for_moment() -> None:
     """Pure sway: the force of C_d, its centre k_fwd L / 6 forward. Pure yaw about the middle: 1 + k_ends / 2."""
     uniform, along = (cross_flow(400, 0.5, 0.0, **more) for more in ({}, {"k_fwd": 0.4, "k_ends": 0.6}))
@@ -60,15 +50,6 @@ def test_cross_flow_along_the_hull_has_coefficients_for_force_and_for_moment() -
     ends = {"x_aft": -16.5, "x_fwd": 16.5}
     plain, strong = (cross_flow(400, 0.0, 0.04, k_ends=k, **ends)[5] for k in (0.0, 0.6))
     assert strong / plain == pytest.approx(1.3, rel=1e-3)
-
-
-def test_cross_flow_of_neutral_shape_is_the_uniform_one() -> None:
-    """To the last digit, and as the same expression: bundled vessels do not change."""
-    numbers_of = {name: ca.SX.sym(name) for name in ("C_d", "x_aft", "x_fwd", "T", "rho")}
-    nu_r, row = ca.SX.sym("nu", 6), (ca.SX.sym("fraction"), ca.SX.sym("share"))
-    neutral = {"k_fwd": 0.0, "k_ends": 0.0}
-    plain, neutral = (hull.cross_flow(nu_r, *row, **numbers_of, **more) for more in ({}, neutral))
-    assert str(plain) == str(neutral)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -80,12 +61,6 @@ def test_cross_flow_of_any_shape_takes_energy_and_is_mirrored(seed: int) -> None
     wrench = cross_flow(11, v, r, **shape)
     assert wrench[1] * v + wrench[5] * r <= 0
     np.testing.assert_allclose(cross_flow(11, -v, -r, **shape), -wrench, rtol=1e-12)
-
-
-def test_strips_cover_the_length_once() -> None:
-    columns = hull.strips(strips=7)
-    assert columns["share"].sum() == pytest.approx(1.0)
-    np.testing.assert_allclose(columns["fraction"], -columns["fraction"][::-1] + 1)
 
 
 def test_resistance_polynomial() -> None:
@@ -110,25 +85,6 @@ def test_astern_the_hull_has_more_resistance() -> None:
         assert ahead == numbers(kind(ca.SX(ca.DM([0.8, 0.1, 0, 0, 0, 0]))))[0]
         near = [numbers(kind(ca.SX(ca.DM([u, 0, 0, 0, 0, 0])), k_astern=1.4))[0] for u in (-1e-6, 1e-6)]
         assert np.abs(near).max() < 1e-3
-
-
-def test_prime_derivatives_are_si_ones_at_their_speed() -> None:
-    """Y_v' = -0.3: Y = -0.3 x 1/2 rho L^2 U v; the floor of the speed does not show at 4 m/s."""
-    u, v = 4.0, 0.3
-    forces = numbers(hull.prime_derivatives(ca.SX(ca.DM([u, v, 0, 0, 0, 0])), UPRIGHT, L_pp=20.0, rho=1000.0, Y_v=-0.3))
-    assert forces[1] == pytest.approx(-0.3 * 0.5 * 1000 * 400 * np.hypot(u, v) * v, rel=1e-5)
-
-
-def test_heel_is_a_factor_without_a_scale() -> None:
-    """Y_phi' phi and N_vvphi' v'^2 phi in each scaling; the order of a derivative does not count heel."""
-    nu_r, eta, L = ca.SX(ca.DM([4.0, 0.3, 0, 0, 0, 0.05])), ca.SX(ca.DM([0, 0, 0, -0.2, 0, 0])), 20.0
-    names, U = {"Y_phi": -0.01, "N_vvphi": 0.02}, np.hypot(4.0, 0.3)
-    monomials = np.array([-0.01 * -0.2, 0.02 * 0.3**2 * -0.2])
-    np.testing.assert_allclose(numbers(hull.derivatives(nu_r, eta, **names))[[1, 5]], monomials)
-    prime = numbers(hull.prime_derivatives(nu_r, eta, L_pp=L, rho=1000.0, **names))[[1, 5]]
-    np.testing.assert_allclose(prime, monomials * [500 * L**2 * U**2, 500 * L**3], rtol=1e-12)
-    bis = numbers(hull.bis_derivatives(nu_r, eta, nabla=90.0, L_pp=L, rho=1000.0, g=9.81, **names))[[1, 5]]
-    np.testing.assert_allclose(bis, monomials * [90e3 * 9.81, 90e3], rtol=1e-12)
 
 
 def test_bis_derivatives_by_hand() -> None:
@@ -195,14 +151,6 @@ def test_astern_the_mmg_hull_is_alike_fore_and_aft(name: str, value: float) -> N
     assert mmg(name, value, 1.2, 0.4, 0.1)[axis] == pytest.approx(500 * 7 * 0.46 * U**2 * lever * expected, rel=1e-4)
     abeam = mmg(name, value, 0.0, 0.4, 0.0)[axis]
     assert (abeam == 0) or name in ALIKE
-
-
-def test_the_mmg_resistance_turns_round_with_the_ship() -> None:
-    ahead, astern = (
-        numbers(hull.mmg(ca.SX(ca.DM([u, 0.2, 0, 0, 0, 0])), UPRIGHT, R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0))[0]
-        for u in (1.0, -1.0)
-    )
-    assert ahead == -astern < 0
 
 
 def test_abkowitz_counts_speed_from_that_of_service() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shipid.physics.frames import current
-from shipid.physics.waves import drift, first_order, multiples, passage_rates
+from shipid.physics.waves import drift, first_order, passage_rates
 
 COUNT = 7  # harmonics 0 ... 6
 OMEGA, CHI, EPSILON = 1.2, 2.3, 0.8
@@ -37,13 +37,6 @@ def transfer(beta: float) -> np.ndarray:
     """F (6) of the series: cosines for X, Z, M, sines for Y, K, N."""
     m = np.arange(COUNT)
     return np.where(EVEN, COEFFICIENTS @ np.cos(m * beta), COEFFICIENTS @ np.sin(m * beta))
-
-
-def test_multiples_are_cosines_and_sines() -> None:
-    for count in (0, 1, 2, 12):
-        cosines, sines = multiples(ca.cos(ca.SX(0.7)), ca.sin(ca.SX(0.7)), count)
-        np.testing.assert_allclose([float(c) for c in cosines], np.cos(0.7 * np.arange(count + 1)), atol=1e-12)
-        np.testing.assert_allclose([float(s) for s in sines], np.sin(0.7 * np.arange(count + 1)), atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -77,11 +70,6 @@ def test_a_moving_ship_meets_the_waves_at_the_frequency_of_encounter(beta_deg: i
     period = 2 * np.pi / met
     np.testing.assert_allclose(load_at(2.0 + period), load_at(2.0), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(load_at(2.0 + period / 2), -load_at(2.0), rtol=1e-9, atol=1e-9)
-
-
-def test_port_and_starboard() -> None:
-    """Mirrored heading, place and waves: surge, heave, pitch the same, sway, roll, yaw the other way."""
-    np.testing.assert_allclose(force(3.0, 20, -40, -0.5, -CHI), MIRROR * force(3.0, 20, 40, 0.5, CHI), atol=1e-12)
 
 
 def test_drift_is_a_series_in_the_relative_heading() -> None:

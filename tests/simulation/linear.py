@@ -19,7 +19,6 @@ SPEEDS = "uvwpqr"
 GRAVITY = 9.81
 HEAVE, ROLL, PITCH = 2, 3, 4
 UPRIGHT = (HEAVE, ROLL, PITCH)
-EVERY = tuple(range(6))
 MIRROR = np.array([1, -1, 1, -1, 1, -1])
 
 

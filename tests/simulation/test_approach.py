@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import casadi as ca
 import numpy as np
 import pytest
-from casadi import SX
 from scipy.optimize import fsolve
 
 from shipid.errors import DocumentError, ShipidError
-from shipid.physics import TERMS, Term
-from shipid.physics.frames import force_at
 from shipid.simulation.approach import (
     Controls,
     NotStraight,
@@ -20,10 +14,9 @@ from shipid.simulation.approach import (
     balanced_shaft,
     helm_effect,
     steady,
-    thrust_sharing,
 )
 from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, check_vessel, load_vessel
+from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.template import Particulars, first_guess
 from tests.conftest import PATCHED
 
@@ -48,14 +41,6 @@ def test_aft_azimuths_turn_against_their_angle_and_forward_ones_with_it() -> Non
 @pytest.mark.parametrize("key", ["kvlcc2-l7", "mariner"])
 def test_a_positive_rudder_angle_turns_the_ship_to_starboard(key: str) -> None:
     assert Controls(load_vessel(key)).helm == {"rudder.delta": 1.0}
-
-
-def test_orders_name_every_command() -> None:
-    orders = Controls(TUNNEL).orders(np.array([2.0, 3.0]), np.array([0.1, -0.2]))
-    assert set(orders) == set(dynamics(TUNNEL).commands)
-    np.testing.assert_array_equal(orders["port.n"], [2.0, 3.0])
-    np.testing.assert_array_equal(orders["starboard.alpha"], [-0.1, 0.2])
-    np.testing.assert_array_equal(orders["bow.n"], [0.0, 0.0])
 
 
 def test_helm_effect_is_the_yaw_acceleration_to_starboard() -> None:
@@ -97,23 +82,6 @@ def test_no_approach_depends_on_its_company() -> None:
         assert {name: values[place] for name, values in together.items()} == {name: v[0] for name, v in alone.items()}
 
 
-def test_an_approach_is_that_of_the_vessel_whoever_asked_before() -> None:
-    """The same numbers give the same approach, other numbers another; nobody changes what the next one gets."""
-    how = {"step": 0.1, "method": "rk4", "engine": "casadi"}
-    n, other = np.array([2.0]), SHIP.with_values({"hull.derivatives.X_u|u|": -4e3})
-    first = steady(Controls(SHIP), n, **how)  # type: ignore[arg-type]
-    kept = {name: values.copy() for name, values in first.state.items()}
-    for values in (*first.state.values(), *first.memory.values()):
-        values += 1.0
-    again = steady(Controls(load_vessel(SHIP.key)), n, **how).state  # type: ignore[arg-type]
-    for name, values in kept.items():
-        np.testing.assert_array_equal(again[name], values)
-    changed = steady(Controls(other), n, **how).state  # type: ignore[arg-type]
-    assert abs(changed["u"][0] - kept["u"][0]) > 0.01
-    held = steady(Controls(SHIP), n, held=True, **how)  # type: ignore[arg-type]
-    assert held.helm, "an approach of a helmsman is another one"
-
-
 def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
     """Speeds of the 2015 derivatives, computed separately in NumPy: 75, 145, 200 rpm."""
     n = np.array([75, 145, 200]) / 60
@@ -125,17 +93,6 @@ def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
         assert np.abs(acceleration(SHIP, u, {"port.n": shaft, "starboard.n": shaft})).max() < 5e-4
     for name in ("north", "east", "psi", "v", "r"):
         np.testing.assert_allclose(state[name], 0, atol=1e-9)
-
-
-def test_hidden_states_and_actuators_are_steady_too() -> None:
-    vessel = load_vessel("gunnerus-28.9-6dof")
-    approach = steady(Controls(vessel), np.array([2.0]), step=0.05, method="rk4", engine="casadi")
-    state, memory = approach.state, approach.memory
-    assert set(state) == {*dynamics(vessel).state, *dynamics(vessel).hidden}
-    assert memory == {name: pytest.approx(2.0 if name.endswith(".n") else 0.0) for name in dynamics(vessel).memory}
-    for name in ("p", "q"):
-        assert abs(state[name][0]) < 1e-3
-    assert state["w"][0] == pytest.approx(state["u"][0] * np.tan(state["theta"][0]), abs=1e-3)  # trimmed, not heaving
 
 
 def test_an_approach_that_never_settles_or_diverges_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -172,15 +129,6 @@ def test_a_vessel_that_turns_with_the_helm_amidships_has_no_straight_approach() 
     lame = Controls(SHIP.with_values({"thruster.starboard.off": True}))
     with pytest.raises(ShipidError, match="turns with the helm amidships at 120 rpm"):
         steady(lame, np.array([2.0]), step=0.1, method="rk4", engine="casadi")
-
-
-@pytest.mark.parametrize("speed", [3.0, 2.0, 0.5])
-def test_a_large_ship_that_turns_goes_no_straighter_because_she_is_slow(speed: float) -> None:
-    """7 deg in a ship length at any speed: at 2 m/s that is less than 0.001 rad/s."""
-    controls = Controls(load_vessel("esso-190k"))
-    n = balanced_shaft(controls, speed)
-    with pytest.raises(NotStraight, match="turns with the helm amidships"):
-        steady(controls, np.array([n]), step=1.0, method="euler", engine="casadi")
 
 
 LAGS = {"thruster.port.actuator.alpha": {"kind": "first_order", "T": 0.5, "rate": 0.21}}
@@ -220,78 +168,3 @@ def test_a_helmsman_holds_what_does_not_go_straight(key: str, changes: dict[str,
         assert 0.001 < max(map(abs, helm.values())) < 0.3
     alone = steady(controls, np.array(n[:1]), held=True, **how)  # type: ignore[arg-type]
     assert alone.state["u"][0] == approach.state["u"][0]  # whatever the company
-
-
-def test_a_rudder_that_is_called_helm_is_held_like_any_other() -> None:
-    """Its actuator began at 0 and not at the angle that holds the course."""
-    tanker = load_vessel("kvlcc2-l7").with_values({"hull.mmg.N_u": 4e-4})
-    screw, rudder = tanker.document["thruster"].values()
-    ship = check_vessel({**tanker.document, "thruster": {"propeller": screw, "helm": rudder}}, "renamed.toml")
-    one, other = (
-        steady(Controls(v), np.array([10.229]), step=0.1, method="rk4", engine="casadi", held=True)
-        for v in (tanker, ship)
-    )
-    assert other.memory["helm.delta"] == one.memory["rudder.delta"] != 0
-
-
-def test_a_slow_ship_is_held_until_she_is_on_course() -> None:
-    """Her velocities change little long before: speed, drift and helm are those at which all accelerations are nil."""
-    n, vessel = 0.5, SHIP.with_values({"thruster.starboard.off": True})
-    controls, model = Controls(vessel), dynamics(vessel)
-    approach = steady(controls, np.array([n]), step=0.5, method="rk4", engine="casadi", held=True)
-    given = list(vessel.parameters.values()), np.zeros(model.num_dof)
-
-    def unbalanced(x: np.ndarray) -> np.ndarray:
-        orders = controls.orders(np.array([n]), x[2:])
-        commands = [orders[name][0] for name in model.commands]
-        state = [{"u": x[0], "v": x[1]}.get(name, 0.0) for name in model.state]
-        return np.array(model.rates(state, [], commands, np.zeros(len(model.environment)), *given)).ravel()[3:]
-
-    (helm,), sign = approach.helm.values(), next(iter(controls.helm.values()))
-    reached = np.array([approach.state["u"][0], approach.state["v"][0], sign * helm[0]])
-    balanced = fsolve(unbalanced, reached, xtol=1e-12)
-    np.testing.assert_allclose(unbalanced(balanced), 0.0, atol=1e-10)
-    np.testing.assert_allclose(reached, balanced, rtol=0.02)
-
-
-def test_shares_give_the_acceleration_asked_for_and_the_bias_gives_none() -> None:
-    units = thrust_sharing(SHIP)
-    effects = [
-        acceleration(SHIP, 0.0, {f"{unit.name}.n": 1.0, f"{unit.name}.alpha": alpha})
-        for unit in units
-        for alpha in (0.0, np.pi / 2)
-    ]
-    matrix = np.array(effects).T
-    shares = np.array([row for unit in units for row in (unit.along, unit.across)])
-    np.testing.assert_allclose(matrix @ shares, np.eye(3), atol=1e-5)
-    np.testing.assert_allclose(matrix @ np.array([unit.bias for unit in units]).ravel(), 0, atol=1e-5)
-    np.testing.assert_allclose([unit.bias for unit in units], [[0, 1], [0, -1]], atol=1e-5)  # inwards
-
-
-def test_units_in_line_push_along_the_line() -> None:
-    fore_and_aft = moved(port_y=0.0, port_x=10.0, starboard_y=0.0)
-    np.testing.assert_allclose([unit.bias for unit in thrust_sharing(fore_and_aft)], [[-1, 0], [1, 0]], atol=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("changes", "has"),
-    [
-        ({"port.off": True}, "has starboard"),
-        ({"port.off": True, "starboard.off": True, "bow.off": False}, "has none"),
-        ({"port.x": -13.22, "port.y": 2.7}, "has port, starboard"),
-    ],
-)
-def test_a_vessel_that_cannot_hold_station_is_refused(changes: dict[str, float | bool], has: str) -> None:
-    """One unit, none, or two in one place."""
-    vessel = SHIP.with_values({f"thruster.{path}": value for path, value in changes.items()})
-    with pytest.raises(DocumentError, match=f"needs two azimuth units .* {has}"):
-        thrust_sharing(vessel)
-
-
-def test_the_term_whose_force_is_not_finite_at_rest_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    def dry(nu_r: SX, *, C: Annotated[SX, "kg m^-1"]) -> SX:
-        return force_at(SX(0), SX(0), SX(0), -C * nu_r[0] ** 2 * nu_r[0] / ca.fabs(nu_r[0]), SX(0))
-
-    monkeypatch.setitem(TERMS, "hull.dry", Term(dry))
-    with pytest.raises(DocumentError, match=rf"at rest, .*: mend hull\.dry in {__file__}, line \d+ or its numbers$"):
-        _ = Controls(SHIP.with_values({"hull.dry.C": 10.0}))

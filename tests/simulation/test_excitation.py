@@ -54,14 +54,6 @@ def test_peaks_are_below_schroeders(name: str) -> None:
     assert crest_factor(sines(BANDS[name])) < min(0.95 * by_formula, REACHED[name])
 
 
-@every_band
-def test_it_begins_and_ends_at_zero(harmonics: tuple[int, ...]) -> None:
-    first, after, last = (sines(harmonics, np.array([t]))[0] for t in (0.0, 1e-3, PERIOD))
-    assert abs(first) < 1e-9
-    assert abs(last) < 1e-9
-    assert after > 0
-
-
 def test_dealt_commands_are_orthogonal_and_share_the_band() -> None:
     parts = deal(range(2, 30), 3)
     assert sorted(harmonic for part in parts for harmonic in part) == list(range(2, 30))
@@ -70,10 +62,6 @@ def test_dealt_commands_are_orthogonal_and_share_the_band() -> None:
     products = commands.T @ commands / len(TIME)
     off_diagonal = products - np.diag(np.diag(products))
     assert np.abs(off_diagonal).max() < 1e-12
-
-
-def test_one_sine_has_the_crest_factor_of_a_sine() -> None:
-    assert crest_factor(sines((4,))) == pytest.approx(np.sqrt(2), rel=1e-4)
 
 
 def test_phases_depend_on_the_key_alone() -> None:
@@ -90,21 +78,6 @@ def held(series: np.ndarray, step: float = 0.1) -> np.ndarray:
     """Hold times [s] of all levels but the last, which the end cuts."""
     changes = np.flatnonzero(np.diff(series) != 0) + 1
     return np.diff(np.concatenate([[0], changes])) * step
-
-
-def test_hold_times_fill_their_range() -> None:
-    """Within one sample, as changes show in the next row; uniform: mean within 4 standard errors."""
-    times = held(steps())
-    assert len(times) > 180
-    assert times.min() > 4.0 - 0.1 - 1e-9
-    assert times.max() < 15.0 + 0.1 + 1e-9
-    assert times.mean() == pytest.approx(9.5, abs=4 * 11 / np.sqrt(12 * len(times)))
-    assert times.min() < 4.5
-    assert times.max() > 14.5
-
-
-def test_a_fixed_hold_is_exact() -> None:
-    np.testing.assert_allclose(held(steps(hold=(0.3, 0.3))), 0.3)
 
 
 def test_levels_fill_their_range_evenly() -> None:
@@ -136,12 +109,6 @@ def test_rate_limit_is_respected_and_caught_up_with() -> None:
     assert np.mean(np.isclose(executed, ordered)) > 0.8  # 0.8 units at most take 1.6 s of holds of 4 s and more
     ends = np.flatnonzero(np.diff(ordered[:, 0]) != 0)
     np.testing.assert_allclose(executed[ends, 0], ordered[ends, 0])
-
-
-def test_a_slow_order_passes_the_rate_limit_unchanged() -> None:
-    slow = sines(BANDS["successive"])
-    fastest = np.abs(np.diff(slow)).max() / 0.05
-    np.testing.assert_allclose(limit_rate(slow, 0.05, 1.01 * fastest), slow, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

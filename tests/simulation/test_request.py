@@ -21,11 +21,6 @@ def test_times_are_in_ship_lengths_unless_they_are_given() -> None:
     assert (given.time(30), given.level(40)) == (70.0, 70.0)
 
 
-def test_an_angle_that_is_not_given_is_the_default() -> None:
-    assert (ASKED.angle(35.0), ASKED.angle(20.0, 1)) == (15.0, 20.0)
-    assert (ASKED.sense, replace(ASKED, side="starboard").sense) == (-1.0, 1.0)
-
-
 def test_rows_are_whole() -> None:
     assert [ASKED.in_rows(time) for time in (1.0, 1.1, 1.5)] == [1.0, 1.5, 1.5]
 

@@ -46,19 +46,6 @@ def mass_matrix(vessel: Vessel) -> np.ndarray:
     return np.array(mass(inertia, added))[np.ix_(vessel.axes, vessel.axes)]
 
 
-def test_mass_is_positive_definite(vessel: Vessel) -> None:
-    M = mass_matrix(vessel)
-    assert np.linalg.eigvalsh((M + M.T) / 2)[0] > 0
-
-
-def test_extra_force_at_rest_is_force_over_mass(vessel: Vessel) -> None:
-    tau = np.array([1e4, -2e4, 3e5] if len(vessel.axes) == 3 else [1e4, -2e4, *[1e4] * (len(vessel.axes) - 3), 3e5])
-    without, moved = rates(vessel), rates(vessel, tau)
-    names = dynamics(vessel).state[len(vessel.axes) :]
-    difference = np.array([moved[name] - without[name] for name in names])
-    np.testing.assert_allclose(difference, np.linalg.solve(mass_matrix(vessel), tau), rtol=1e-9, atol=1e-12)
-
-
 def test_rest_stays_rest(vessel: Vessel) -> None:
     assert max(abs(rate) for name, rate in rates(vessel).items() if not name.endswith(".t")) < 1e-6
 
@@ -149,41 +136,6 @@ def test_a_current_carries_a_ship_that_heels_in_her_turn(name: str, coriolis: st
         np.testing.assert_allclose(path[key][:, 0, 1], path[key][:, 0, 0], atol=1e-6, err_msg=key)
 
 
-def test_place_and_north_are_of_no_account(bundled_vessel: Vessel) -> None:
-    """A frame moved and turned by 0.7 rad, wind and current with it: the motion is the same, turned."""
-    ship, model, rng = bundled_vessel, dynamics(bundled_vessel), np.random.default_rng(1)
-    names = (*model.state, *model.commands, *model.memory, *model.environment)
-    drawn = {name.replace(".", "_"): rng.uniform(0.1, 0.4) for name in names}
-    c, s = np.cos(0.7), np.sin(0.7)
-    moved = {**drawn, "north": drawn["north"] + 1234.5, "east": drawn["east"] - 77.0}
-    moved |= {name: drawn[name] + 0.7 for name in ("psi", "beta_w", "beta_c") if name in drawn}
-    before, after = rates(ship, **drawn), rates(ship, **moved)
-    before |= {
-        "north": c * before["north"] - s * before["east"],
-        "east": s * before["north"] + c * before["east"],
-    }
-    for name in model.state:
-        assert after[name] == pytest.approx(before[name], rel=1e-8, abs=1e-10)
-
-
-def test_commands_and_environment_are_what_the_terms_ask_for() -> None:
-    base = load_vessel("gunnerus-28.9")
-    model = dynamics(base)
-    assert model.commands == ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
-    assert model.environment == ("V_w", "beta_w")
-    assert dynamics(base.with_values({"wind.off": True})).environment == ()
-    assert dynamics(base.with_values({"current.kind": "uniform"})).environment == ("V_w", "beta_w", "V_c", "beta_c")
-    assert dynamics(base.with_values({"thruster.bow.off": False})).commands[-1] == "bow.n"
-
-
-def test_switching_the_wind_off_takes_its_force_away() -> None:
-    vessel = load_vessel("gunnerus-28.9")
-    calm = rates(vessel, u=3.0, psi=0.2, V_w=0.0)
-    off = rates(vessel.with_values({"wind.off": True}), u=3.0, psi=0.2)
-    headwind = 0.5 * 1.23 * 9 * 0.53 * 81 / (410931.81 + 79320.5895)  # of the ship's speed
-    assert calm["u"] - off["u"] == pytest.approx(-headwind, rel=1e-9)
-
-
 def test_vessels_of_one_structure_share_one_compilation() -> None:
     base = load_vessel("gunnerus-28.9")
     assert dynamics(base) is dynamics(base.with_values({"inertia.m": 5e5, "wind.C_X.3": 0.1}))
@@ -228,24 +180,6 @@ def test_actuator_memory_replaces_the_command(draw_inputs: Callable[..., Mapping
     np.testing.assert_allclose(np.array(through), np.array(direct), rtol=1e-14)
     after = float(model.advance(state, [1.0], [1.1, 0, 0, 0], environment, values(lagged), 0.5))
     assert after == pytest.approx(1.1 + (1.0 - 1.1) * np.exp(-0.5))
-
-
-def test_a_steering_gear_that_is_off_keeps_its_numbers_and_does_nothing() -> None:
-    ship = load_vessel("kvlcc2-l7")
-    off = ship.with_values({"thruster.rudder.actuator.delta.off": True})
-    assert dict(dynamics(ship).memory) == {"rudder.delta": "rad"}
-    assert dict(dynamics(off).memory) == {}
-    assert off.document["thruster"]["rudder"]["actuator"]["delta"]["T"] == 0.1
-    assert not [path for path in off.parameters if ".actuator." in path]
-    assert rates(off, u=1.0, rudder_delta=0.3)["r"] == rates(ship, u=1.0, rudder_delta=0.3)["r"] != 0
-
-
-def test_a_limit_holds_from_the_first_instant() -> None:
-    """An order beyond the stops of the rudder acts as the stops do, also where a run begins beyond them."""
-    gear = {"kind": "rate_limit", "rate": 0.3, "low": -0.6, "high": 0.5}
-    ship = load_vessel("kvlcc2-l7").with_values({"thruster.rudder.actuator.delta": gear})
-    for order, stop in ((0.9, 0.5), (-0.9, -0.6)):
-        assert rates(ship, u=1.0, rudder_delta=order)["r"] == rates(ship, u=1.0, rudder_delta=stop)["r"] != 0
 
 
 def test_without_coriolis_the_mass_does_not_turn() -> None:
