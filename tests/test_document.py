@@ -254,8 +254,8 @@ def test_a_quoted_key_may_hold_dots() -> None:
 @pytest.mark.parametrize(
     ("text", "remedy"),
     [
-        ("a.b = 1979-05-27", "a.b: 1979-05-27: a date"),
-        ("a = [1, 07:32:00]", "a.1: 07:32:00: a date"),
+        ("a.b = 1979-05-27", "a.b: 1979-05-27: a date: give"),
+        ("a = [1, 07:32:00]", "a.1: 07:32:00: a time: give"),
         ("a = " + "[" * 60 + "]" * 60, "nested deeper than 40"),
         ("a = " + "[" * 2000 + "]" * 2000, "nested deeper than 40"),
         ("a = " + "9" * 400, "a: an integer of 400 digits"),
@@ -292,7 +292,7 @@ def test_values_that_documents_hold(value: str, tmp_path: Path) -> None:
 
 
 def test_what_has_no_end_is_no_document() -> None:
-    with pytest.raises(DocumentError, match="it is no file"):
+    with pytest.raises(DocumentError, match="a device or a pipe"):
         documents.read("/dev/zero")
 
 

@@ -91,12 +91,12 @@ def data_import(
     check_output(out, [source, Path(mapping)], "--out")
     if source.is_dir():
         check_output(out, source.glob("*"), "--out")
-    with steps() as show:
+    with steps() as say:
         dataset = import_log(
             declared,
             source,
             without=without or (),
-            progress=lambda share: show(f"{source.name}: {percent(share)} read"),
+            progress=lambda share: say(f"{source.name}: {percent(share)} read"),
         )
     file = write_dataset(dataset, out)
     repairs = dataset.metadata.get("repairs", [])

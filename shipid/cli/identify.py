@@ -134,11 +134,11 @@ def identify(
         if structures is not None:
             _compare(ship, log, declared, names, how, band, file, html, dataset, answer)
             return
-        with ended_by(), steps("cutting runs") as show:
+        with ended_by(), steps("cutting runs") as say:
             outcome = run_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or (),
                 programme=design, band=band,
-                progress=lambda count, objective: show(f"iteration {count}, objective {objective:.6g}"),
+                progress=lambda count, objective: say(f"iteration {count}, objective {objective:.6g}"),
             )  # fmt: skip
         _show_identified(outcome, answer)
         write_patch(outcome, file)

@@ -169,6 +169,7 @@ def counted(blocks: Iterable[Any], total: int, what: str = "members", interrupte
     """
     with ended_by(interrupted), steps() as show:
         count = 0
+        show(f"{count} of {total} {what}")
         for block in blocks:
             count += len(block)
             show(f"{count} of {total} {what}")

@@ -310,8 +310,6 @@ def members(
 
     Raises ShipidError for a number that is no whole number, and DocumentError as `draw` does.
     """
-    if not isinstance(numbers, Iterable | None):
-        raise DocumentError(f"numbers must be several whole numbers, such as [0, 1], not {numbers!r}")
     return _draw_members(family, base, file, range(family.members) if numbers is None else numbers)
 
 
@@ -325,6 +323,8 @@ def _draw_members(
     """Members of these numbers from 0, each drawn again so often; DocumentError for one that is no valid vessel."""
     steps, original, result = _draw_steps(family, base, file), base.parameters, []
     counter = whole_number("counter", counter)
+    if not isinstance(numbers, Iterable):
+        raise DocumentError(f"numbers must be several whole numbers, such as [0, 1], not {numbers!r}")
     for number in (whole_number("member", number) for number in numbers):  # of 1.0 is another hash
         values: dict[str, float] = {}
         for path, change, argument, key in steps:

@@ -217,14 +217,16 @@ def _check(given: Particulars) -> None:
             raise ShipidError(words)
 
 
-def _ranges(given: Particulars) -> list[tuple[str, float | None, float, float]]:
+def _ranges(given: Particulars) -> Iterator[tuple[str, float | None, float, float]]:
     """Name, value, lower and upper limit of each quantity; sizes before the ratios derived from them."""
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
-    return [
+    yield from (
         ("length [m]", L, 1.0, 450.0),
         ("beam [m]", B, 0.1, 80.0),
         ("draught [m]", T, 0.02, 30.0),
         ("block", C_b, 0.4, 0.9),
+    )
+    yield from (
         ("length / beam", L / B, 2.0, 9.0),
         ("beam / draught", B / T, 1.8, 6.0),
         ("block x beam / length", C_b * B / L, 0.04, 0.3),
@@ -234,7 +236,7 @@ def _ranges(given: Particulars) -> list[tuple[str, float | None, float, float]]:
         ("rpm", given.rpm, 1.0, 20000.0),
         ("propeller diameter [m]", given.propeller_diameter, 0.1 * T, 1.2 * T),
         ("rudder area [m^2]", given.rudder_area, 2e-3 * L * T, 0.1 * L * T),
-    ]
+    )
 
 
 def inertia(given: Particulars) -> Values:

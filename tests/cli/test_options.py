@@ -40,11 +40,10 @@ def test_changes_are_toml_or_text() -> None:
             parsed([wrong])
 
 
-def test_pairs_split_at_the_last_equals_sign() -> None:
-    """A selection of paths may hold a comparison."""
-    from shipid.cli.options import pairs
+def test_a_path_may_hold_a_comparison() -> None:
+    from shipid.cli.options import assignments
 
-    assert pairs(["hull.*[order >= 3]=0.2"], "--prior", "paths=0.3") == {"hull.*[order >= 3]": 0.2}
+    assert assignments(["hull.*[order >= 3]=0.2"], "--prior", "paths=0.3") == {"hull.*[order >= 3]": 0.2}
 
 
 def test_the_command_line_can_be_typed_again(monkeypatch: pytest.MonkeyPatch) -> None:

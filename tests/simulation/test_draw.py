@@ -30,7 +30,6 @@ BLOCKS: dict[str, dict[str, Any]] = {
     "reverse_spiral": {**SHAFT, "hold": 8.0, "rates_deg": [1.0, -1.0]},
     "crash_stop": {**SHAFT, "astern_rpm": [50.0, 100.0], "execute_at": [0.0, 5.0]},
     "excitation": {**SHAFT, "signal": "aprbs", "angle_deg": 15.0, "hold": [2.0, 6.0]},
-    "station_keeping": {"north": [-1.0, 1.0], "most_rpm": 150.0},
 }
 
 
@@ -170,7 +169,7 @@ def test_blocks_that_mean_nothing_are_refused(block: dict[str, Any], message: st
 
 def test_a_vessel_that_cannot_is_refused_beforehand() -> None:
     rudder = load_vessel("mariner")
-    blocks = {"kind": "zigzag", **SHAFT}, {"kind": "station_keeping", **BLOCKS["station_keeping"]}
-    with pytest.raises(DocumentError, match="station keeping needs two azimuth units") as caught:
+    blocks = {"kind": "zigzag", **SHAFT}, {"kind": "crash_stop", **BLOCKS["crash_stop"]}
+    with pytest.raises(DocumentError, match="cannot stop") as caught:
         check_truth(truth(*blocks), rudder)
     assert caught.value.path == "truth.manoeuvre.1"

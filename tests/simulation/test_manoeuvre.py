@@ -20,7 +20,6 @@ from shipid.simulation.manoeuvre import (
     PullOut,
     ReverseSpiral,
     Spiral,
-    StationKeeping,
     Steps,
     Turning,
     TurningCircle,
@@ -116,10 +115,9 @@ def test_together_is_one_at_a_time() -> None:
         TurningCircle(name="circle", n_rpm=120, duration=30, side="port"),
         Zigzag(name="zigzag 10/10", n_rpm=110, angle_deg=10, execute_heading_deg=10, duration=60, approach="rest"),
         ReverseSpiral(name="reverse", n_rpm=145, rates_deg=(1, -1), hold=20),
-        StationKeeping(name="station", duration=20, north=2.0),
         CrashStop(name="stop", n_rpm=120, astern_rpm=100, duration=20, execute_at=5),
     ]
-    wind = {"V_w": np.arange(6.0), "beta_w": np.full(6, 0.4)}
+    wind = {"V_w": np.arange(5.0), "beta_w": np.full(5, 0.4)}
     together = perform(LAGGED, mixed, step=0.1, environment=wind)
     assert list(together["run"].unique()) == [manoeuvre.name for manoeuvre in mixed]
     for number, manoeuvre in enumerate(mixed):

@@ -122,7 +122,7 @@ FAULTS: dict[str, tuple[str, str, str, str]] = {
         "hull.drag",
         DRAG.format("return wrench(Y * v / ca.fabs(v))"),
         "begins",
-        "V_w, beta_w 0, as where none is given: mend hull.drag",
+        "V_w, beta_w 0, as where none is given: mend its terms",
     ),
     "an error": ("hull.drag", DRAG.format("raise ValueError('no drag')"), "body", "hull.drag: ValueError: no drag"),
     "an index": ("hull.drag", DRAG.format("return wrench(nu_r[7])"), "body", "hull.drag: RuntimeError: "),
@@ -172,7 +172,7 @@ FAULTS: dict[str, tuple[str, str, str, str]] = {
         "hull.drag",
         signature("nu_r: SX, *, C: Annotated[SX, 'kg/meter']"),
         "begins",
-        "hull.drag: the unit 'kg/meter' of its parameter 'C' is not known: write 'kg/m'",
+        "hull.drag: the unit 'kg/meter' of its parameter 'C' is not known: write a product of powers",
     ),
     "a unit that is none": ("hull.drag", signature("nu_r: SX, *, C: Annotated[SX, 3]"), "begins", "must be a text"),
     "a table": (
