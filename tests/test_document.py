@@ -17,6 +17,7 @@ from shipid.errors import DocumentError, ShipidError
 from shipid.logs.mapping import read_mapping
 from shipid.study.plan import read_plan
 from shipid.vessel.load import load_vessel
+from tests.drawn import seeds
 
 NESTED: dict[str, Any] = {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
 
@@ -32,7 +33,7 @@ def test_get_names_what_is_missing(path: str, part: str) -> None:
         documents.get(NESTED, path)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(5, 40))
 def test_changes_at_once_are_those_one_by_one(seed: int) -> None:
     """Paths of a few keys, in which a later change may take the place of a table that an earlier one changed."""
     rng = random.Random(seed)

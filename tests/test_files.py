@@ -118,15 +118,6 @@ def test_of_files_that_belong_together_none_is_old_beside_a_new_one(
     assert done == (next(calls) <= moment)
 
 
-def test_only_an_empty_folder_is_new(tmp_path: Path) -> None:
-    files.check_empty(tmp_path)
-    files.check_empty(tmp_path / "new")
-    (tmp_path / "a").touch()
-    for place in (tmp_path, tmp_path / "a"):
-        with pytest.raises(DataError, match="name a new one"):
-            files.check_empty(place)
-
-
 def test_what_is_not_finite_is_null_in_json(tmp_path: Path) -> None:
     files.write_json(tmp_path / "a.json", {"x": np.float64(2.5), 3: [np.nan, (np.inf, np.int64(7))], "s": "ä"})
     assert json.loads((tmp_path / "a.json").read_text()) == {"x": 2.5, "3": [None, [None, 7]], "s": "ä"}
@@ -255,18 +246,6 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.npz")
     with pytest.raises(OSError, match="a device or a pipe"):
         files.read_arrays(tmp_path / "pipe.npz")
-
-
-def test_a_write_that_fails_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a full disk the system says that there is no space, and not for which file."""
-
-    def full(_: int) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="No space") as caught:
-        files.write_json(tmp_path / "a.json", {})
-    assert caught.value.filename == str(tmp_path / "a.json")
 
 
 @pytest.mark.parametrize(

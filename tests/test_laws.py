@@ -25,9 +25,10 @@ from shipid.vessel.bindings import bindings
 from shipid.vessel.load import Vessel, check_vessel, load_vessel
 from shipid.vessel.perturb import uniform
 from shipid.vessel.schema import SHARED, parameters, signals, structural, term_blocks, term_parameters
+from tests.drawn import seeds
 
 ALL = pytest.mark.parametrize("key", list(TERMS))
-DRAWN = settings(max_examples=40, deadline=None, derandomize=True, database=None)
+DRAWN = settings(max_examples=15, deadline=None, derandomize=True, database=None)
 
 VECTORS = ("eta", "nu", "nu_r")
 WASH = np.array([[-1.0, 0.0, 0.2], [6.0, 9.0, 3.0]])  # m/s, m/s, m: least and most of the flow at a rudder
@@ -265,7 +266,7 @@ def output(key: str, name: str, drawn: Mapping[str, Any], mirrored: bool = False
 
 
 @pytest.mark.parametrize(("key", "name"), OUTPUTS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(1, 3))
 def test_an_output_is_mirrored_as_its_row_says(key: str, name: str, seed: int) -> None:
     drawn = random_signals(example(key), seed)
     signs = {**MIRROR, **MIRROR_OF_A_TERM.get(key, {})}
@@ -308,7 +309,7 @@ CALM = pytest.mark.parametrize("key", [key for key in TERMS if key not in DRAWN_
 
 
 @CALM
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(2, 5))
 def test_mirror_port_starboard(key: str, seed: int) -> None:
     case = example(key)
     drawn = random_signals(case, seed)
@@ -352,7 +353,7 @@ def test_finite_everywhere(key: str, data: st.DataObject) -> None:
 
 
 @ALL
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(2, 5))
 def test_derivative_is_finite_difference(key: str, seed: int) -> None:
     case = example(key)
     drawn = random_signals(case, seed)

@@ -90,37 +90,6 @@ def test_what_cannot_be_written_is_refused_before_anything_is_computed(monkeypat
     check_output(Path("new/a.html"), [], "--out")
 
 
-@pytest.mark.usefixtures("there")
-def test_an_import_does_not_replace_the_log() -> None:
-    """The default name is that of the mapping, and a draft has the name of its log."""
-    Path("log.toml").write_text(
-        """name = "log"
-[format]
-kind = "parquet"
-[clock]
-from = "t"
-unit = "s"
-"""
-        + "".join(
-            f'[columns.{name}]\nfrom = "{name}"\nunit = "{unit}"\n'
-            for name, unit in (
-                ("north", "m"),
-                ("east", "m"),
-                ("psi", "rad"),
-                ("u", "m/s"),
-                ("v", "m/s"),
-                ("r", "rad/s"),
-            )
-        )
-    )
-    before = Path("log.parquet").read_bytes()
-    status, _, error = ended("data", "import", "log.toml", "log.parquet")
-    assert status == 1
-    assert "--out: is named twice" in error
-    assert Path("log.parquet").read_bytes() == before
-    assert "-> set.parquet" in output_of("data", "import", "log.toml", "log.parquet", "--out", "set.parquet")
-
-
 def test_no_file_of_results_is_written_over(there: Path) -> None:
     """A folder of results, whatever file it is: the seal would say that it was edited."""
     results = there / "results" / "quick"

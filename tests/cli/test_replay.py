@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
@@ -48,16 +47,6 @@ def test_the_vessel_that_made_a_run_repeats_it(log: Path, tmp_path: Path) -> Non
     assert [float(value) for value in shown.groups()] == pytest.approx(expected, rel=0.01)
     assert "zz 10" in page.read_text()
     assert "Recorded and replayed" in page.read_text()
-
-
-def test_weather_that_is_not_in_the_log_is_named(log: Path, tmp_path: Path) -> None:
-    ship = tmp_path / "ship.toml"
-    ship.write_text(f'extends = "{SHIP}"\nname = "in a stream"\n[current]\nkind = "uniform"\n')
-    words = ["replay", str(ship), str(log), "--out", str(tmp_path / "page.html")]
-    result = CliRunner().invoke(app, words)
-    assert "not in the log, taken as 0: V_c, beta_c" in result.output
-    assert "V_c, beta_c taken as 0" in (tmp_path / "page.html").read_text()
-    assert json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)["assumed"] == ["V_c", "beta_c"]
 
 
 @pytest.mark.parametrize(

@@ -149,19 +149,3 @@ def test_where_there_is_no_terminal_counted_says_how_far_it_is(
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "0 of 3 cells"
     assert any(line.startswith("2 of 3 cells") for line in lines)
-
-
-def test_where_there_is_no_terminal_a_long_step_is_said(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from shipid.cli import terminal
-
-    monkeypatch.setattr(terminal, "SILENCE", 0.02)
-    with terminal.steps() as show:
-        time.sleep(0.05)
-        show("fold 1 of 3")
-        time.sleep(0.1)
-        show("fold 1 of 3")
-        time.sleep(0.1)
-    said = capsys.readouterr().err.splitlines()
-    assert said == ["fold 1 of 3"], "each once: the same again says nothing"

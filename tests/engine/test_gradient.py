@@ -113,17 +113,6 @@ def test_force_and_start_by_finite_differences(draw_inputs: Draw, method: Method
 
 
 @pytest.mark.parametrize("engine", ABLE)
-def test_held_commands_are_repeated_ones(draw_inputs: Draw, engine: str) -> None:
-    given, options = inputs(SHIP, draw_inputs, "euler")
-    varied = {group: dict(values) for group, values in given.items()}
-    for group in ("commands", "environment"):
-        varied[group] = {name: np.tile(column, (STEPS, 1)) for name, column in given[group].items()}
-    names = ("hull.learned.w_u.0", "hull.learned.c_N.2")
-    held, repeated = (gradient(SHIP, one, options, engine, names) for one in (given, varied))
-    np.testing.assert_allclose(held.parameters, repeated.parameters, rtol=1e-12)
-
-
-@pytest.mark.parametrize("engine", ABLE)
 def test_a_diverged_sample_is_named_and_harms_no_other(draw_inputs: Draw, engine: str) -> None:
     given, options = inputs(SHIP, draw_inputs, "euler")
     names = tuple(SHIP.parameters)

@@ -17,7 +17,6 @@ from shipid.engine.native import compiler
 from shipid.engine.rollout import Method, Trajectories, rollout
 from shipid.engine.torch import kernels
 from shipid.simulation.sea import Sea, draw_components, wave_loads
-from shipid.vessel import dynamics as module
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, members
@@ -108,31 +107,6 @@ def test_rollout_equals_casadi(vessel: Vessel, draw_inputs: Draw, method: Method
         np.testing.assert_array_equal(other.diverged, one.diverged)
 
 
-def test_gradients_of_a_step_equal_casadi(vessel: Vessel, draw_inputs: Draw) -> None:
-    """d(rates)/d(state, commands, tau_extra, parameters) by autograd through the lowered function."""
-    model, inputs = dynamics(vessel), dynamics_inputs(vessel, draw_inputs, 1)
-    wanted = ("state", "commands", "tau_extra", "parameters")
-    symbols = {name: ca.SX.sym(name, len(inputs[name])) for name in (*module.INPUTS, "tau_extra")}
-    jacobian = ca.jacobian(model.rates(*symbols.values()), ca.vertcat(*(symbols[name] for name in wanted)))
-    function = ca.Function("jacobian", list(symbols.values()), [ca.densify(jacobian)])
-    exact = np.array(function(*(inputs[name] for name in symbols)))
-    leaves = {name: torch.tensor(inputs[name]).requires_grad_() for name in symbols}
-    lowered = lower(model.rates)
-    channels = lowered(*leaves.values())
-    rows = []
-    for channel in channels:
-        slopes = torch.autograd.grad(
-            channel.sum() if isinstance(channel, torch.Tensor) else channel + 0 * leaves["state"].sum(),
-            [leaves[name] for name in wanted],
-            retain_graph=True,
-            allow_unused=True,
-        )
-        pairs = zip(slopes, (leaves[name] for name in wanted), strict=True)
-        rows.append(np.concatenate([(torch.zeros_like(x) if g is None else g).numpy().ravel() for g, x in pairs]))
-    scale = np.maximum(np.abs(exact).max(axis=1, keepdims=True), 1e-12)
-    np.testing.assert_allclose(np.array(rows) / scale, exact / scale, atol=1e-11)
-
-
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_diverged_member_spoils_no_other(draw_inputs: Draw, engine: Any) -> None:
     vessel = load_vessel("gunnerus-28.9")
@@ -153,36 +127,12 @@ def test_a_diverged_member_spoils_no_other(draw_inputs: Draw, engine: Any) -> No
     np.testing.assert_allclose(path.states[:, keep], sound.states[:, keep], rtol=1e-12)
 
 
-def test_truths_count_as_numbers_in_arithmetic() -> None:
-    """(x > 0) + (y > 0) is 2 in CasADi, and stays 2 where PyTorch would say `true`."""
-    x, p = ca.SX.sym("x", 2), ca.SX.sym("parameters", 1)
-    count = (x[0] > 0) + (x[1] > 0) - ca.logic_not(x[0] > p[0])
-    chosen = ca.if_else(ca.logic_and(x[0] > 0, x[1] > 0), 1e-6, -3.3)
-    either = ca.if_else(ca.logic_or(x[0] > p[0], p[0] > 0), x[1], 0)
-    function = ca.Function(
-        "truths", [x, p], [ca.vertcat(count, chosen, either, -(x[0] <= x[1]))], ["x", "parameters"], ["y"]
-    )
-    grid = np.array([[-1.0, 1.0, 1.0, 0.0], [1.0, -1.0, 2.0, 0.0]])
-    inputs = {"x": grid, "parameters": np.full((1, 4), 0.5)}
-    np.testing.assert_array_equal(evaluate(function, inputs), by_casadi(function, inputs))
-
-
 def test_every_printed_operation_has_casadis_value() -> None:
     x, p = ca.SX.sym("x", 2), ca.SX.sym("parameters", 2)
     function = ca.Function("f", [x, p], [ca.vertcat(*operations(x[0], x[1], p[0]))], ["x", "parameters"], ["y"])
     rng = np.random.default_rng(0)
     inputs = {"x": rng.uniform(-2, 2, (2, 50)), "parameters": np.tile([[0.7], [0.1]], (1, 50))}
     np.testing.assert_allclose(evaluate(function, inputs), by_casadi(function, inputs), rtol=1e-14, atol=1e-15)
-
-
-def test_what_depends_on_commands_alone_is_computed_while_they_are_held() -> None:
-    x, c, p = ca.SX.sym("x"), ca.SX.sym("commands"), ca.SX.sym("parameters")
-    function = ca.Function("f", [x, c, p], [ca.cos(c) * p * x], ["x", "commands", "parameters"], ["y"])
-    lowered = lower(function)
-    assert lowered.num_instructions == 1
-    values = torch.tensor([[2.0, 3.0]], dtype=torch.float64)
-    first = lowered.early[0](torch.tensor([[5.0]], dtype=torch.float64))
-    np.testing.assert_allclose(lowered.early[1](values, first), 5 * np.cos([[2.0, 3.0]]), rtol=1e-15)
 
 
 @pytest.mark.slow

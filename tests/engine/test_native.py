@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from shipid.engine import native
 from shipid.engine.integrate import Batch, Job
 from shipid.engine.native import NOTED, compiler, measure_native, run_native, target
 from shipid.engine.rollout import distances, prepared, rollout
-from shipid.engine.vectors import DOUBLE, Target
+from shipid.engine.vectors import Target
 from shipid.errors import ShipidError
 from shipid.metrics import position_error, tally
 from shipid.vessel import dynamics as module
@@ -114,34 +113,6 @@ def test_a_compiler_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, draw
     with pytest.raises(ShipidError, match=r"the C compiler failed \(.*no-such-processor") as caught:
         rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
     assert "\n" not in str(caught.value)
-
-
-def test_a_broken_library_is_made_anew(
-    empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
-) -> None:
-    """What a full disk left behind, read by a later process: here another cache, as a loaded file stays loaded."""
-
-    def run() -> np.ndarray:
-        native._library.cache_clear()
-        return rollout(SHIP, **draw_inputs(SHIP, 3), step=1.0, num_steps=4, engine="native").states
-
-    sound = run()
-    (library,) = empty_cache.iterdir()
-    broken = tmp_path / "other" / "shipid" / library.name
-    broken.parent.mkdir(parents=True)
-    broken.write_bytes(b"")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
-    np.testing.assert_array_equal(run(), sound)
-    assert broken.stat().st_size > 0
-
-
-def test_threads_may_make_the_same_library_at_once(empty_cache: Path) -> None:
-    """Many at a time, as on a shared cache: each compiles for itself, and one file is left."""
-    model = dynamics(SHIP)
-    with ThreadPoolExecutor(3) as pool:
-        for future in [pool.submit(native._library.__wrapped__, model, 1.0, "euler", DOUBLE, ()) for _ in range(3)]:
-            future.result()
-    assert len(list(empty_cache.iterdir())) == 1
 
 
 @pytest.mark.parametrize("count", [1, 7, 8, 9, 70])

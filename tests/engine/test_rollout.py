@@ -17,8 +17,6 @@ from shipid.engine.native import compiler
 from shipid.engine.rollout import distances, rollout
 from shipid.errors import DataError, ShipidError
 from shipid.interrupts import uninterrupted
-from shipid.metrics import position_error
-from shipid.physics.helm import zigzag
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import OF_LAWS, pace
@@ -182,45 +180,6 @@ def test_extra_force_enters_as_force(engine: Any, shape: str) -> None:
     gained = 5e3 / (410931.81 + 79320.5895) * 1e-3
     expected = {"steps": [0, 0, 1, 1]}.get(shape, [0, 1, 2, 3])
     np.testing.assert_allclose(path["u"][:, 0, 1], gained * np.array(expected), rtol=1e-3, atol=1e-9)
-
-
-def test_lag_follows_its_analytic_solution(draw_inputs: Draw) -> None:
-    vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": LAG})
-    given = draw_inputs(vessel, 2)
-    order = given["commands"]["port.n"]
-    path = rollout(vessel, **given, memory={"port.n": np.zeros(2)}, step=1.0, num_steps=10)["actual.port.n"][:, 0]
-    np.testing.assert_allclose(path, order * (1 - np.exp(-np.arange(11)[:, None] / 2.0)), rtol=1e-12)
-    reached = rollout(vessel, **given, step=1.0, num_steps=3)["actual.port.n"][:, 0]
-    np.testing.assert_allclose(reached, np.tile(order, (4, 1)), rtol=1e-14)
-
-
-def test_actuators_of_a_helmsman_begin_at_his_first_order(draw_inputs: Draw) -> None:
-    vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": LAG})
-    commands = dynamics(vessel).commands
-    given = draw_inputs(vessel, 2)
-    orders = {name: np.linspace(1.0, 2.0, 6)[:, None] * values for name, values in given["commands"].items()}
-    helm = {"executed": np.ones(2), "execute_heading": np.full(2, 9.0)}
-    given["commands"] = {name: orders[name] for name in commands} | helm
-    path = rollout(vessel, **given, helmsman=zigzag(commands), step=1.0, num_steps=6, engine="casadi")
-    np.testing.assert_allclose(path["actual.port.n"][0, 0], orders["port.n"][0])
-    assert (np.diff(path["actual.port.n"][1:, 0], axis=0) != 0).all()
-
-
-@pytest.mark.parametrize("engine", ["casadi", "torch"])
-def test_distances_begin_where_the_actuators_are(draw_inputs: Draw, engine: Any) -> None:
-    """Those of the paths from the same start; an order that is no number is reported, though a limit hides it."""
-    limited = {**LAG, "low": -3.0, "high": 3.0}
-    vessel = load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": limited})
-    given, goal = draw_inputs(vessel, 3), np.ones((5, 3, 2))
-    reached = {"port.n": given["commands"]["port.n"] - 1.0}
-    path = rollout(vessel, **given, memory=reached, step=1.0, num_steps=5, keep=("north", "east"), engine=engine)
-    measured = distances(vessel, **given, memory=reached, goal=goal, step=1.0, engine=engine)
-    np.testing.assert_allclose(measured.total[0], position_error(path.states[1:, 0], goal).sum(axis=0), rtol=1e-9)
-    at_order = distances(vessel, **given, goal=goal, step=1.0, engine=engine)
-    assert (np.abs(at_order.total - measured.total) > 1e-3).all()
-    given["commands"]["port.n"] = np.where(np.arange(3) == 1, np.nan, given["commands"]["port.n"])
-    missing = distances(vessel, **given, memory=reached, goal=goal, step=1.0, engine=engine)
-    assert missing.diverged.tolist() == [[False, True, False]]
 
 
 @pytest.mark.parametrize("engine", ["native", "single", "casadi", "torch"])
@@ -399,12 +358,3 @@ def test_a_command_that_the_vessel_does_not_have_is_refused(name: str) -> None:
     given["commands"] = {**given["commands"], name: np.zeros(2)}
     with pytest.raises(ShipidError, match=f"commands: .* has no '{name}'"):
         rollout(ship, **given, step=0.5, num_steps=4)
-
-
-def test_a_channel_that_was_not_recorded_is_named() -> None:
-    ship = load_vessel("gunnerus-28.9")
-    path = rollout(ship, **marked(ship), step=0.5, num_steps=4, keep=["north", "east"])
-    with pytest.raises(ShipidError, match="no channel 'u' was recorded: valid: east, north"):
-        path["u"]
-    with pytest.raises(ShipidError, match="was recorded: valid: east, north"):
-        path[np.zeros(2)]  # type: ignore[index]

@@ -43,20 +43,6 @@ def test_a_short_table_stays_a_sum(size: int) -> None:
     assert len(found) == (size > LEAST)
 
 
-def test_ramps_that_do_not_begin_at_zero_are_no_table() -> None:
-    x, grid, bends = ca.SX.sym("x"), ca.SX.sym("grid", LEAST + 1), ca.SX.sym("bends", LEAST + 1)
-
-    def ramps(*least: float) -> ca.Function:
-        total = 3 + bends[0] * (x - grid[0])
-        for i, each in enumerate(least, start=1):
-            total += bends[i] * ca.fmax(x - grid[i], each)
-        return ca.Function("f", [x, grid, bends], [total])
-
-    assert len(find_tables(ramps(*[0.0] * LEAST))) == 1
-    assert not find_tables(ramps(*[0.1] * LEAST))
-    assert not find_tables(ramps(*[0.0] * (LEAST - 2), 0.1, 0.0))
-
-
 def with_tables(size: int) -> Dynamics:
     """A motion whose rates are two tables of `size` knots of u, one of v on the same knots, and beyond the knots."""
     model = dynamics(SHIP)

@@ -9,17 +9,12 @@ import numpy as np
 import pytest
 
 from shipid.physics.helm import course_keeping, yaw_rate, zigzag
-from shipid.physics.signals import steers
 
 COMMANDS = ("port.n", "port.alpha", "rudder.delta")
 
 
 def numbers(values: Any) -> dict[str, float]:
     return {name: float(ca.DM(value)) for name, value in values.items()}
-
-
-def test_angles_steer_and_shafts_do_not() -> None:
-    assert [steers(name) for name in COMMANDS] == [False, True, True]
 
 
 @pytest.mark.parametrize("first", [1, -1])
@@ -37,19 +32,6 @@ def test_zigzag_reverses_at_the_execute_heading(first: int, turned: float, side:
     assert ordered == {"port.n": 2.0, "port.alpha": -0.3 * first * after, "rudder.delta": 0.4 * first * after}
     assert helmsman.advance is not None
     assert numbers(helmsman.advance(seen, inputs, memory, 0.1)) == {"side": after, "original": 1.0, "executed": 1.0}
-
-
-@pytest.mark.parametrize("psi", [-0.7, 0.0, 0.7])
-def test_zigzag_counts_from_the_heading_at_the_first_order(psi: float) -> None:
-    """However far wind has turned her before: nothing is reversed then, and the heading is kept from the order on."""
-    helmsman, seen = zigzag(COMMANDS), {"psi": ca.DM(psi)}
-    inputs = {"port.n": 2.0, "port.alpha": -0.3, "rudder.delta": 0.4, "execute_heading": 0.2}
-    memory = {name: ca.DM(value) for name, value in helmsman.memory.items()}
-    assert helmsman.advance is not None
-    for executed in (0.0, 1.0):
-        assert numbers(helmsman.orders(seen, inputs | {"executed": executed}, memory))["rudder.delta"] == 0.4
-        after = numbers(helmsman.advance(seen, inputs | {"executed": executed}, memory, 0.1))
-        assert after == {"side": 1.0, "original": psi, "executed": executed}
 
 
 def test_yaw_rate_law() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from shipid.physics import hull
 from shipid.physics.grammar import derivative
+from tests.drawn import seeds
 
 UPRIGHT = ca.SX(6, 1)
 
@@ -52,7 +53,7 @@ def test_cross_flow_along_the_hull_has_coefficients_for_force_and_for_moment() -
     assert strong / plain == pytest.approx(1.3, rel=1e-3)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", seeds(3, 20))
 def test_cross_flow_of_any_shape_takes_energy_and_is_mirrored(seed: int) -> None:
     """Also of shapes that would be negative somewhere along the hull."""
     rng = np.random.default_rng(seed)
@@ -111,19 +112,6 @@ def test_the_mmg_hull_is_its_formula() -> None:
     np.testing.assert_allclose(numbers(forces), [X, Y, 0, 0, 0, N], rtol=1e-4, atol=1e-9)
 
 
-def test_the_mmg_hull_of_a_ship_that_turns_on_the_spot_takes_primes_of_her_turn() -> None:
-    """Where r L / U is above 2, U is |r| L / 2: N_vrr v r^2 / U grew without limit, and could drive her round."""
-    L, T, r = 7.0, 0.46, 0.4
-    U = r * L / 2
-    for v in (-0.1, 0.001, 0.1):
-        forces = hull.mmg(
-            ca.SX(ca.DM([0.05, v, 0, 0, 0, r])), UPRIGHT, R_0=0.02, N_r=-0.05, N_vrr=0.1, L_pp=L, T=T, rho=1000.0
-        )
-        fades = 0.05 / (U + 0.01)  # what turns round with the ship
-        N = 500 * L**2 * T * (-0.05 * r * L * U + fades * 0.1 * v * (r * L) ** 2 / U)
-        assert numbers(forces)[5] == pytest.approx(N, rel=1e-4)
-
-
 TURNED = {"X_vv": -0.04, "X_rr": 0.01, "X_vvvv": 0.7, "Y_r": 0.08, "Y_|r|r": -0.04, "Y_vvr": 0.4, "N_v": -0.1}
 TURNED |= {"N_|v|v": -0.03, "N_vrr": 0.05, "K_r": 0.02, "M_v": 0.01, "N_vv": 0.01}
 ALIKE = {"X_vr": 0.002, "Y_v": -0.3, "Y_|v|v": -0.7, "Y_vrr": -0.4, "N_r": -0.05, "N_|r|r": -0.03, "N_vvr": -0.3}
@@ -151,12 +139,3 @@ def test_astern_the_mmg_hull_is_alike_fore_and_aft(name: str, value: float) -> N
     assert mmg(name, value, 1.2, 0.4, 0.1)[axis] == pytest.approx(500 * 7 * 0.46 * U**2 * lever * expected, rel=1e-4)
     abeam = mmg(name, value, 0.0, 0.4, 0.0)[axis]
     assert (abeam == 0) or name in ALIKE
-
-
-def test_abkowitz_counts_speed_from_that_of_service() -> None:
-    """With Y_uv = Y_v the force goes with u v at any speed."""
-    values = {"L_pp": 160.0, "U_0": 7.5, "rho": 1025.0, "Y_v": -0.01, "Y_uv": -0.01, "N_vvv": 0.02}
-    for u, v in ((7.5, 0.4), (3.0, -0.5)):
-        forces = numbers(hull.abkowitz(ca.SX(ca.DM([u, v, 0, 0, 0, 0])), **values))
-        assert forces[1] == pytest.approx(-0.01 * 0.5 * 1025 * 160**2 * u * v)
-        assert forces[5] == pytest.approx(0.02 * 0.5 * 1025 * 160**3 * v**3 / 7.5)

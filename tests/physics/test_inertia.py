@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from shipid.physics.inertia import coriolis, matrix, rigid_body
+from tests.drawn import seeds
 
 
 def numbers(expression: Any) -> np.ndarray:
@@ -41,7 +42,7 @@ def test_rigid_body_has_the_kinetic_energy_of_its_points() -> None:
     assert 0.5 * nu @ (M + products) @ nu == pytest.approx(energy, rel=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(2, 5))
 def test_coriolis_does_no_work(seed: int) -> None:
     rng = np.random.default_rng(seed)
     M, nu = rng.normal(size=(6, 6)), rng.normal(size=6)  # not even symmetric
@@ -50,7 +51,7 @@ def test_coriolis_does_no_work(seed: int) -> None:
     assert nu @ force == pytest.approx(0, abs=1e-13)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(2, 5))
 def test_planar_closed_form(seed: int) -> None:
     """C(M) nu = [-(m22 v + c r) r, m11 u r, (m22 v + c r) u - m11 u v], c = (m23 + m32) / 2."""
     rng = np.random.default_rng(seed)

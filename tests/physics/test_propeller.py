@@ -23,8 +23,6 @@ from shipid.physics.propeller import (
     quadratic_wash,
     wash,
 )
-from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import check_vessel, load_vessel
 
 # KVLCC2 at 7 m: Yasukawa and Yoshimura (2015), tables 1 and 3
 WAKE = {"w_P0": 0.40, "C_1": 2.0, "C_2_plus": 1.6, "C_2_minus": 1.1}
@@ -53,14 +51,6 @@ def test_race_is_momentum_theory() -> None:
     assert race / u_P == pytest.approx(2.438, abs=0.002)
 
 
-@pytest.mark.parametrize("u", [-0.8, 0.0, 0.8])
-def test_race_has_no_step_where_the_screw_stops(u: float) -> None:
-    """Going astern with a stopped screw a rudder feels the flow from astern, on either side of no revolutions."""
-    for n in (-1e-6, 0.0, 1e-6):
-        u_P, race, _ = washed([u, 0.1, 0, 0, 0, 0], n)
-        assert race == pytest.approx(u_P, abs=0.011)
-
-
 @pytest.mark.parametrize(("v", "C_2"), [(-0.3, 1.6), (0.3, 1.1)])
 def test_wake_with_drift(v: float, C_2: float) -> None:
     """Drift to port (v < 0: beta > 0) takes C_2_plus; the inflow rises by 1 + (1 - exp(-2 beta)) (C_2 - 1)."""
@@ -85,24 +75,6 @@ def test_wake_by_tau_and_C_P(v: float, r: float) -> None:
 
 
 ASTERN = {"1": 0.25, "J": 0.30, "JJ": 0.05}
-
-
-@pytest.mark.parametrize("u", [1.0, 0.0, -0.6])
-def test_astern_thrust_has_a_separate_curve(u: float) -> None:
-    """X = -(1 - t_P) k_astern rho n^2 D^4 K(J), J = 0.6 u / (n D), negative on a ship that still goes ahead."""
-    n, J = -9.0, 0.6 * u / (-9.0 * 0.216)
-    K = 0.25 + 0.30 * J + 0.05 * J**2
-    X = thrust(u, n, K_T_astern=ASTERN, k_astern=0.9)[0]
-    assert pytest.approx(-0.78 * 0.9 * RHO * 81 * 0.216**4 * K) == X
-    assert thrust(u, n, K_T_astern=SCREW["K_T"])[0] == thrust(u, n)[0]
-    assert thrust(u, 9.0, K_T_astern=ASTERN)[0] == thrust(u, 9.0)[0]
-
-
-@pytest.mark.parametrize("u", [1.3, -1.3])
-def test_thrust_is_continuous_where_the_screw_stops(u: float) -> None:
-    for more in ({}, {"K_T_astern": ASTERN, "k_astern": 0.7, "k_drag": 0.15, "Y_astern": {"1": -0.02}}):
-        sides = [thrust(u, n, **more) for n in (-1e-4, 1e-4)]
-        np.testing.assert_allclose(*sides, atol=1e-5)
 
 
 def test_a_stopped_screw_drags_by_its_disc() -> None:
@@ -176,13 +148,6 @@ def test_a_screw_in_four_quadrants_is_its_polynomial_ahead(u: float, n: float) -
         np.testing.assert_allclose(flow, washed([u, 0, 0, 0, 0, 0], n), rtol=1e-3)
 
 
-def test_a_screw_in_four_quadrants_is_continuous_and_finite_at_rest() -> None:
-    for u in (1.0, -1.0):
-        sides = [in_four_quadrants(u, n)[0] for n in (-1e-6, 1e-6)]
-        assert sides[0] == pytest.approx(sides[1], abs=1e-2)
-    assert in_four_quadrants(0.0, 0.0)[0] == 0
-
-
 QUADRATIC: dict[str, Any] = {"x": -0.5, "T_nn": 3.6e-3, "T_nu": 1.5e-4}
 
 
@@ -243,26 +208,6 @@ def test_race_of_a_controllable_pitch_propeller_is_momentum_theory() -> None:
     assert (u_P, D_p) == (pytest.approx(0.7074), pytest.approx(0.216))
     assert race / u_P == pytest.approx(2.438, abs=0.002)
     assert flow(10.4, -0.5)[1] == 0  # drives astern, and takes all the flow
-
-
-def test_a_ship_with_one_takes_pitch_as_an_order_and_her_rudder_its_wash() -> None:
-    """KVLCC2 with the line for her screw: surge as the fixed screw gives it, less of it at a smaller pitch."""
-    fixed = load_vessel("kvlcc2-l7")
-    block = {"kind": "controllable_pitch", **VARIABLE, "t_P": 0.220}
-    ship = check_vessel({**fixed.document, "thruster": {**fixed.document["thruster"], "propeller": block}}, "CP")
-    assert dynamics(ship).commands == ("propeller.n", "propeller.pitch", "rudder.delta")
-
-    def rates(vessel: Any, *orders: float) -> np.ndarray:
-        model = dynamics(vessel)
-        held = dict(zip(model.commands, orders, strict=True))
-        memory = [held[name] for name in model.memory]
-        state = [0.0, 0.0, 0.0, 1.179, 0.0, 0.0]
-        return np.array(model.rates(state, memory, list(orders), [], list(vessel.parameters.values()), np.zeros(3)))
-
-    both = rates(fixed, 10.4, 0.2).ravel(), rates(ship, 10.4, 0.721, 0.2).ravel()
-    np.testing.assert_allclose(both[1], both[0], rtol=2e-3, atol=1e-9)
-    assert rates(ship, 10.4, 0.4, 0.0)[3] < rates(ship, 10.4, 0.721, 0.0)[3]
-    assert 0 < rates(ship, 10.4, 0.4, 0.2)[5] < rates(ship, 10.4, 0.721, 0.2)[5]
 
 
 FLOW: dict[str, Any] = {**WAKE, "x": -3.36, "y": 0.4, "tau": 0.2, "C_P": 0.3}

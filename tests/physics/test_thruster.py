@@ -71,19 +71,6 @@ def test_the_thrust_of_a_unit_is_the_force_along_its_axis(n: float, alpha: float
     assert along == pytest.approx((np.exp(-1j * alpha) * (X + 1j * Y)).real)
 
 
-@pytest.mark.parametrize(("entry", "values"), [("J", (1.4, -0.3)), ("J_y", (0.6, -0.6))])
-def test_continuations_join_the_polynomial(entry: str, values: tuple[float, float]) -> None:
-    n, D_p = 2.0, 1.9
-    for value in values:
-        wrenches = []
-        for step in (-1e-7, 1e-7):
-            speed = (value + step) * n * D_p
-            wrenches.append(
-                numbers(azimuth()([speed, 0, 0, 0, 0, 0] if entry == "J" else [1, speed, 0, 0, 0, 0], n, 0))
-            )
-        np.testing.assert_allclose(wrenches[0], wrenches[1], atol=0.2)
-
-
 def test_tunnel_at_200_rpm_is_the_published_polynomial() -> None:
     """F_y = 3.15982607e-4 n^3 + 1.60941887e-3 n^2 + 5.17642375 n [N, rpm], odd in n."""
     block = load_vessel("gunnerus-28.9").document["thruster"]["bow"]
@@ -131,27 +118,6 @@ def test_a_rate_limit_has_no_lag() -> None:
         for _ in range(steps):
             state = float(thruster.rate_limit_advance(ca.SX(0.5), ca.SX(state), ca.SX(5.0 / steps), rate=ca.SX(0.1)))
         assert state == pytest.approx(0.5, rel=1e-14)
-
-
-@pytest.mark.parametrize(("J", "J_y"), [(2.0, 0.1), (1.4, -0.5), (-1.0, 0.2), (0.8, 1.1), (0.5, -0.9), (2.2, 0.8)])
-@pytest.mark.parametrize("sense", [1, -1])
-def test_coefficients_by_hand(J: float, J_y: float, sense: int) -> None:
-    """Inside the fit and beyond it, ahead and astern: the printed polynomials and continuations, re-computed."""
-    n, D_p, rho = 2.0 * sense, 1.9, 1025.0
-    J_c, y = min(max(J, -0.3), 1.4), min(max(J_y, -0.6), 0.6)
-    K_x = 0.8208 - 0.6993 * J_c + 0.1895 * J_c**2 - 0.0743 * J_c**3 - 0.0342 * J_c * np.tanh(abs(y) / 0.06)
-    K_x += 0.6390 * y**2 - 0.5585 * J_c * y**2
-    K_y = -(1.1169 * y + 0.5980 * J_c * y - 0.2590 * y * abs(y))
-    if J > 1.4:
-        K_x -= 0.5 * (J - 1.4) + 0.12 * (J - 1.4) ** 2
-    if J < -0.3:
-        K_x -= 0.1 * (J + 0.3)
-    K_y -= (0.6 + 0.4 * max(J_c, 0)) * (J_y - y)
-    scale = rho * n**2 * D_p**4
-    water = np.array([J * n * D_p, J_y * abs(n) * D_p, 0, 0, 0, 0])  # J counts along the shaft's sense
-    wrench = numbers(azimuth()(water, n, 0.0))
-    reduction = 1.0 if sense > 0 else -0.65
-    np.testing.assert_allclose(wrench[:2], [reduction * scale * K_x, scale * K_y], rtol=1e-12)
 
 
 @pytest.mark.parametrize("u", [5.0, -5.0])

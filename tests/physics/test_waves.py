@@ -8,6 +8,7 @@ import pytest
 
 from shipid.physics.frames import current
 from shipid.physics.waves import drift, first_order, passage_rates
+from tests.drawn import seeds
 
 COUNT = 7  # harmonics 0 ... 6
 OMEGA, CHI, EPSILON = 1.2, 2.3, 0.8
@@ -39,7 +40,7 @@ def transfer(beta: float) -> np.ndarray:
     return np.where(EVEN, COEFFICIENTS @ np.cos(m * beta), COEFFICIENTS @ np.sin(m * beta))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(1, 3))
 def test_the_water_goes_where_the_current_sets(seed: int) -> None:
     """Whatever the heading and the motion of the ship."""
     rng = np.random.default_rng(seed)
@@ -49,7 +50,7 @@ def test_the_water_goes_where_the_current_sets(seed: int) -> None:
     np.testing.assert_allclose(rates, [1, 0.8 * np.cos(2.2), 0.8 * np.sin(2.2)])
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(2, 5))
 def test_force_is_the_real_part_of_the_transfer_function(seed: int) -> None:
     """Re F(omega, chi - psi) exp(i(omega t - k(N cos chi + E sin chi) + epsilon)), wherever and whenever."""
     t, north, east, psi = np.random.default_rng(seed).uniform([0, -300, -300, -7], [500, 300, 300, 7])

@@ -64,31 +64,8 @@ def test_dealt_commands_are_orthogonal_and_share_the_band() -> None:
     assert np.abs(off_diagonal).max() < 1e-12
 
 
-def test_phases_depend_on_the_key_alone() -> None:
-    harmonics = BANDS["successive"]
-    np.testing.assert_array_equal(sines(harmonics, key=(1, "a")), sines(harmonics, key=(1, "a")))
-    assert np.abs(sines(harmonics, key=(1, "a")) - sines(harmonics, key=(1, "b"))).max() > 0.01
-
-
 def steps(**changes: Any) -> np.ndarray:
     return aprbs(np.arange(20001) * 0.1, **{"hold": (4.0, 15.0), "levels": (-0.5, 0.3), "key": (7, 1), **changes})
-
-
-def held(series: np.ndarray, step: float = 0.1) -> np.ndarray:
-    """Hold times [s] of all levels but the last, which the end cuts."""
-    changes = np.flatnonzero(np.diff(series) != 0) + 1
-    return np.diff(np.concatenate([[0], changes])) * step
-
-
-def test_levels_fill_their_range_evenly() -> None:
-    series = steps()
-    levels = series[np.concatenate([[0], np.flatnonzero(np.diff(series) != 0) + 1])]
-    assert levels.min() >= -0.5
-    assert levels.max() < 0.3
-    eighth = np.floor((levels + 0.5) / 0.1).astype(int)
-    for first in range(0, len(levels) - 8, 8):
-        assert sorted(eighth[first : first + 8]) == list(range(8))
-    assert len({tuple(eighth[first : first + 8]) for first in range(0, 80, 8)}) > 5  # in another order each time
 
 
 def test_a_longer_series_begins_with_the_shorter() -> None:

@@ -64,22 +64,6 @@ def test_a_series_depends_on_its_key_alone(gusts: Gusts) -> None:
     assert np.abs(series(gusts, U, time, keys(4, seed=2)) - four).max() > 0.1
 
 
-def test_nothing_repeats() -> None:
-    """Equally spaced harmonics would come back after 1 / spacing; these do not within hours."""
-    time = np.arange(0.0, 100.0, 0.5)
-    first = series(KINDS["npd"], np.array([10.0]), time, keys(1))[:, 0]
-    for later in 600.0 * np.arange(1, 37):
-        again = series(KINDS["npd"], np.array([10.0]), time + later, keys(1))[:, 0]
-        assert (again - first).std() > 0.2 * first.std()
-
-
-def test_wind_never_turns_round() -> None:
-    wild, U = Gusts(kind="kaimal", turbulence_intensity=1.0), np.array([5.0])
-    total = U + series(wild, U, np.arange(3000.0), keys(1))
-    assert total.min() == 0.0  # cut, and only there
-    assert (total == 0.0).mean() < 0.3
-
-
 @pytest.mark.parametrize(
     ("block", "message"),
     [

@@ -17,7 +17,6 @@ from shipid.simulation.manoeuvre import (
     CrashStop,
     Excitation,
     Manoeuvre,
-    PullOut,
     ReverseSpiral,
     Spiral,
     Steps,
@@ -33,7 +32,6 @@ from tests.conftest import LAG
 SHIP = load_vessel("gunnerus-28.9")
 LAGGED = SHIP.with_values({f"thruster.{side}.actuator": LAG for side in ("port", "starboard")})
 PAIRS = [(10, 10), (20, 20), (20, 10), (10, 20)]
-MIRRORED = {"east": -1, "psi": -1, "v": -1, "r": -1, "port.alpha": -1, "starboard.alpha": -1}
 
 
 def runs(frame: pd.DataFrame) -> list[pd.DataFrame]:
@@ -100,14 +98,6 @@ def test_a_zigzag_counts_from_the_heading_at_the_first_order(side: str, beta: fl
     assert 0 < measures["overshoot_1"].value < 2 * DEGREE
 
 
-def test_zigzag_to_the_other_side_is_the_mirror_image() -> None:
-    logs = runs(zigzags())
-    for starboard, port in zip(logs[::2], logs[1::2], strict=True):
-        turn = starboard.assign(psi=starboard["psi"] - 30 * DEGREE), port.assign(psi=port["psi"] - 30 * DEGREE)
-        for name in ("u", "v", "r", "psi", "port.alpha", "port.n"):
-            np.testing.assert_allclose(turn[1][name], MIRRORED.get(name, 1) * turn[0][name], atol=1e-9)
-
-
 def test_together_is_one_at_a_time() -> None:
     """Kinds, speeds, sides and starts mixed: each run is what it is alone, in the order given."""
     mixed = [
@@ -169,16 +159,6 @@ def test_orders_are_those_of_the_vessel(orders: dict[str, float], path: str, mes
     with pytest.raises(DocumentError, match=message) as caught:
         one(SHIP, Turning(orders=orders, duration=20))
     assert caught.value.path == path
-
-
-def test_pull_out_of_a_stable_ship_ends_straight() -> None:
-    to_either = [PullOut(n_rpm=145, turn=60, duration=160, side=side) for side in ("starboard", "port")]
-    for log, sense in zip(runs(perform(SHIP, to_either, step=0.1)), (1, -1), strict=True):
-        rate, order = sense * log["r"].to_numpy() / DEGREE, log["port.alpha"].to_numpy()
-        assert (order[:600] == -sense * 20 * DEGREE).all()
-        assert (order[600:] == 0).all()
-        assert rate[600] > 2
-        assert abs(rate[-1]) < 1e-2
 
 
 def test_direct_and_reverse_spiral_find_one_curve() -> None:

@@ -24,15 +24,6 @@ def test_a_manoeuvre_is_simulated_measured_and_shown(name):
     assert content.answer[0].figure == "measures"
 
 
-@pytest.mark.parametrize(("speed", "note"), [(None, ""), (13.6, "13.6 m/s, 1.9 times"), (3.5, "3.5 m/s, 0.5 times")])
-def test_criteria_say_that_the_approach_is_at_another_speed(speed: float | None, note: str):
-    """Speeds in knots for m/s, and trials at half speed, would meet standards without a word."""
-    ship = first_guess(Particulars(100.0, 16.0, 6.0, 0.7, speed=7.0), "s", "s.toml").vessel
-    for row in measure_standard(ship, "zigzag", speed=speed, duration=60.0).criteria:
-        assert note in row["note"]
-        assert bool(note) == ("times the service speed U_0" in row["note"])
-
-
 def test_a_ship_that_does_not_go_straight_gets_a_helmsman():
     lame = load_vessel("gunnerus-28.9").with_values({"thruster.starboard.off": True})
     done = measure_standard(lame, "turning", (20,), duration=120.0)
@@ -56,16 +47,6 @@ def test_a_ship_of_any_size_turns_to_the_side_that_is_asked(length: float, propu
         turned = measure_standard(ship, "turning", 35.0, side=side)
         assert sign * turned.frame["psi"].iloc[-1] > np.pi
         assert all(row["verdict"] != "not judged" for row in turned.criteria)
-
-
-@pytest.mark.parametrize(("name", "angles"), [("turning", (35,)), ("zigzag", (10,)), ("stop", ())])
-def test_a_run_from_rest_is_not_judged(name: str, angles: tuple[float, ...]) -> None:
-    """At a tenth of her speed a ship stops in 0.1 lengths: that meets no standard."""
-    ship = load_vessel("container-175")
-    assert all(row["verdict"] == "met" for row in measure_standard(ship, name, angles).criteria)
-    slow = measure_standard(ship, name, angles, approach="rest").criteria
-    assert slow
-    assert all(row["verdict"] == "not judged" and "comes from rest" in row["note"] for row in slow)
 
 
 @pytest.mark.parametrize(("helm", "heading"), [(10, 9), (10, 11), (7.5, 7.5), (20, 19), (3, 0.5)])

@@ -13,7 +13,6 @@ from shipid.errors import ShipidError
 from shipid.simulation.manoeuvre import (
     Manoeuvre,
     ReverseSpiral,
-    StationKeeping,
     TurningCircle,
     Zigzag,
 )
@@ -44,36 +43,6 @@ def test_interval_only_thins_the_log() -> None:
     fine, coarse = perform(SHIP, zigzag, step=0.1), perform(SHIP, zigzag, step=0.1, interval=0.5)
     thinned = fine.iloc[::5].reset_index(drop=True)
     pd.testing.assert_frame_equal(thinned, coarse, rtol=1e-10)
-
-
-def test_execute_waits_and_orders_are_those_in_force() -> None:
-    frame = perform(SHIP, [TurningCircle(n_rpm=120, duration=20, execute_at=5, angle_deg=10, side="port")], step=0.1)
-    before = frame["t"] < 4.95
-    assert (frame.loc[before, "port.alpha"] == 0).all()
-    np.testing.assert_allclose(frame.loc[~before, "port.alpha"], 10 * DEGREE)
-    at_rest = np.abs(frame["r"].to_numpy())
-    assert at_rest[50] < 1e-9 < at_rest[51]
-
-
-@pytest.mark.parametrize("vessel", [SHIP, LAGGED], ids=["ideal", "lagged"])
-def test_from_rest_and_from_a_steady_speed(vessel: Vessel) -> None:
-    """Steady: nothing changes until the execute. At rest: actuators too."""
-    chosen = [
-        TurningCircle(name=how, approach=how, n_rpm=145, execute_at=10, duration=20, course_deg=90)  # type: ignore[arg-type]
-        for how in ("steady", "rest")
-    ]
-    frame = perform(vessel, chosen, step=0.1)
-    steady, rest = (frame[frame["run"] == how].reset_index(drop=True) for how in ("steady", "rest"))
-    assert steady["u"].iloc[0] == pytest.approx(4.38, abs=0.02)
-    assert np.ptp(steady["u"].iloc[:100]) < 2e-3
-    assert rest["u"].iloc[0] == 0
-    assert rest["u"].iloc[100] > 0.3
-    for log in (steady, rest):
-        assert log.loc[0, ["north", "east"]].to_list() == pytest.approx([0, 0])
-        assert log["psi"].iloc[0] == pytest.approx(np.pi / 2)
-    if vessel is LAGGED:
-        assert steady["actual.port.n"].iloc[0] == pytest.approx(145 / 60)
-        assert rest["actual.port.n"].iloc[0] == 0
 
 
 def test_a_helmsman_holds_the_approach_of_a_ship_that_does_not_go_straight() -> None:
@@ -115,7 +84,6 @@ def test_helmsmen_lower_like_everything_else(vessel: Vessel) -> None:
         Zigzag(**short, angle_deg=35, execute_heading_deg=2, duration=15, side="port"),
         Zigzag(**short, angle_deg=20, execute_heading_deg=1, duration=15),
         ReverseSpiral(**short, rates_deg=(1, -2), hold=6),
-        StationKeeping(duration=12, north=1.0, heading_deg=10),
     ]
     each, batch = (perform(vessel, chosen, step=0.25, engine=engine) for engine in ("casadi", "torch"))
     assert (each.groupby("run")["port.alpha"].nunique() > 1).all()

@@ -19,7 +19,7 @@ from shipid.simulation.truth import Truth, simulate
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from tests.simulation.linear import AXES, EVERY, HEAVE, PITCH, ROLL, SPEEDS, UPRIGHT, Linear, linear
+from tests.simulation.linear import AXES, EVERY, HEAVE, PITCH, ROLL, SPEEDS, UPRIGHT, linear
 
 HULLS = ("gunnerus-28.9-6dof", "gunnerus-33.9-6dof")
 BOTH = pytest.mark.parametrize("name", HULLS)
@@ -166,31 +166,6 @@ def alone(name: str, axis: int) -> Vessel:
     return ship(name) if axis == ROLL else held(name).with_values(others[axis])
 
 
-def inertia_alone(theory: Linear, axis: int) -> float:
-    """Mass and added mass at infinite frequency that one direction feels."""
-    total, beside = theory.M + theory.A, [1, 5]
-    inertia = total[axis, axis]
-    if axis == ROLL:
-        inertia -= total[axis, beside] @ np.linalg.solve(total[np.ix_(beside, beside)], total[beside, axis])
-    return float(inertia)
-
-
-@BOTH
-@pytest.mark.parametrize("axis", UPRIGHT)
-def test_free_decay_is_that_of_the_linear_ship(name: str, axis: int) -> None:
-    """Let go at x_0 in calm water: x' is the cosine transform of Re[-C x_0 / (s^2 I + s (K + B) + C)], s = i omega."""
-    theory, first = linear(ship(name)), 0.01
-    omega = np.linspace(0, 80, 40001)
-    s = 1j * omega
-    K = theory.memory(omega)[:, axis, axis] + theory.B[axis, axis]
-    transform = -theory.C[axis, axis] * first / (s**2 * inertia_alone(theory, axis) + s * K + theory.C[axis, axis])
-    fine = 0.05 * np.arange(401)
-    rate = np.array([np.trapezoid(transform.real * np.cos(omega * t), omega) for t in fine]) * 2 / np.pi
-    expected = first + np.concatenate([[0], np.cumsum((rate[1:] + rate[:-1]) / 2 * 0.05)])
-    path = run(alone(name, axis), {OF[axis]: np.array([first])}, 20.0, interval=0.05, keep=(OF[axis],))
-    np.testing.assert_allclose(path[OF[axis]][:, 0, 0], expected, rtol=0, atol=0.01 * first)
-
-
 # ---- the linear ship
 
 
@@ -327,24 +302,6 @@ def test_calm_water_is_the_manoeuvring_model(name: str) -> None:
         for column, limit in (("u", 0.02), ("v", 0.02), ("r", np.radians(0.05))):
             error = (six[column] - three[column]) ** 2
             assert np.sqrt(error.groupby(six["run"]).mean()).max() < limit, column
-
-
-@BOTH
-def test_a_disturbed_ship_only_loses_energy(name: str) -> None:
-    """Heave, roll and pitch let go in calm water, plane held: kinetic and potential energy never exceed the first, and
-    radiation and roll damping leave nothing of it. The memory may lend: energy need not fall at each moment."""
-    rng, count = np.random.default_rng(2), 8
-    scale = {"down": 0.05, "phi": 0.02, "theta": 0.01, "w": 0.05, "p": 0.02, "q": 0.01}
-    start = {key: size * rng.normal(size=count) for key, size in scale.items()}
-    path, theory = run(held(name), start, 60.0, keep=tuple(scale)), linear(ship(name))
-    upright = np.ix_(UPRIGHT, UPRIGHT)
-    position, velocity = (path.states[:, 0, :, part] for part in (slice(0, 3), slice(3, 6)))
-    energy = sum(
-        np.einsum("...i,ij,...j->...", x, matrix[upright], x) / 2
-        for x, matrix in ((position, theory.C), (velocity, theory.M + theory.A))
-    )
-    assert (energy[1:] <= energy[0] * (1 + 1e-3)).all()
-    assert (energy[-1] < 1e-3 * energy[0]).all()
 
 
 # ---- the step, and the mirror

@@ -45,25 +45,10 @@ def test_noise_is_white_and_normal() -> None:
     assert np.mean(np.abs(noise) > 2) == pytest.approx(0.0455, rel=0.12)
 
 
-def test_bias_is_constant_in_a_run_and_normal_over_runs() -> None:
-    runs = tuple(f"M{number:03d}" for number in range(400))
-    bias = measure(record(runs, rows=3), {"v": Sensor(bias=0.5)}, STEP, seed=3).groupby("run")["v"]
-    assert (bias.nunique() == 1).all()
-    assert bias.first().std() == pytest.approx(0.5, rel=0.12)
-    assert abs(bias.first().mean()) < 4 * 0.5 / np.sqrt(400)
-
-
 @pytest.mark.parametrize("latency", [0.4, 0.437])
 def test_latency_delays_and_starts_with_the_first_value(latency: float) -> None:
     log = measure(record(("M001",)), {"north": Sensor(latency=latency)}, 0.1, seed=1)
     np.testing.assert_allclose(log["north"], 3.0 * np.maximum(log["t"] - latency, 0.0), atol=1e-9)
-
-
-@pytest.mark.parametrize("interval", [0.5, 0.7, 3.0])
-def test_samples_are_held_until_the_next(interval: float) -> None:
-    log = measure(record(("M001",)), {"north": Sensor(interval=interval)}, 0.2, seed=1)
-    taken = np.floor(log["t"] / interval + 1e-6) * interval
-    np.testing.assert_allclose(log["north"], 3.0 * taken, atol=1e-9)
 
 
 def test_quantisation_comes_last() -> None:
@@ -122,12 +107,6 @@ def test_draws_depend_on_seed_run_and_column_alone() -> None:
 def test_a_sensor_needs_a_column(name: str, message: str) -> None:
     with pytest.raises(DocumentError, match=message):
         measure(record(), {name: Sensor()}, 1.0, seed=1)
-
-
-@pytest.mark.parametrize("interval", [0.07, 0.02, -1.0])
-def test_rows_are_logged_at_rows_of_the_record(interval: float) -> None:
-    with pytest.raises(DocumentError, match=r"multiple of the record's step, 0\.05 s"):
-        measure(record(), {}, interval, seed=1)
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,10 @@ from shipid.errors import DocumentError, ShipidError
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Measures
 from shipid.simulation.approach import Controls
-from shipid.simulation.manoeuvre import ReverseSpiral, Spiral, Zigzag
-from shipid.simulation.measured import measure_standard
+from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform
-from shipid.simulation.standard import shaft_speed, standard, standards
+from shipid.simulation.standard import shaft_speed, standard
 from shipid.vessel.load import load_vessel
-from shipid.vessel.template import Particulars, first_guess
 from tests.measures.test_laws import SIGNED, TOLERANCE
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -64,20 +62,6 @@ def test_thrust_about_a_service_speed_says_nothing_of_a_stop() -> None:
     assert standard(mariner, "turning").speed == pytest.approx(7.7175)
 
 
-def test_a_ship_that_steers_with_two_screws_can_be_stopped() -> None:
-    """The helm is amidships in a stop; every other standard manoeuvre needs an angle, and says so."""
-    otter = load_vessel("otter")
-    done = measure_standard(otter, "stop")
-    stopped = {str(row["measure"]): row["value"] for row in done.measures}
-    t, u = done.frame["t"].to_numpy(), done.frame["u"].to_numpy()
-    under_way = (t >= stopped["execute"]) & (u > 0)
-    assert stopped["track reach"] == pytest.approx(np.trapezoid(u[under_way], t[under_way]), rel=5e-3)
-    assert (done.frame["port.n"] == done.frame["starboard.n"]).all()
-    for name in sorted({*standards()} - {"stop"}):
-        with pytest.raises(ShipidError, match="no angle command turns Otter"):
-            standard(otter, name)
-
-
 @pytest.mark.parametrize(
     ("name", "angles"), [("zigzag", (10.0, 10.0)), ("turning", ()), ("stop", ()), ("pull-out", ())]
 )
@@ -88,34 +72,6 @@ def test_all_is_measured_and_sides_mirror(name: str, angles: tuple[float, ...]) 
     for key, one in starboard.items():
         sign = -1 if key in SIGNED else 1
         assert port[key].value == pytest.approx(sign * one.value, abs=2 * TOLERANCE[one.unit]), key
-
-
-def test_spirals_go_to_the_side_and_the_angle_asked_for() -> None:
-    spiral = standard(SHIP, "spiral", (15,), side="port").manoeuvre
-    assert isinstance(spiral, Spiral)
-    assert (spiral.angles_deg[0], min(spiral.angles_deg), max(spiral.angles_deg)) == (-15, -15, 15)
-    reverse = standard(SHIP, "reverse-spiral", (2,)).manoeuvre
-    assert isinstance(reverse, ReverseSpiral)
-    assert (reverse.rates_deg[0], reverse.rates_deg[-1]) == (2, -2)
-
-
-def test_a_spiral_of_a_nearly_neutral_ship_waits_until_her_turn_is_steady() -> None:
-    """On levels of 40 lengths a ship that is stable had a loop of 0.17 deg, without a word."""
-    guess = first_guess(Particulars(69.0, 11.0, 4.0, 0.76, 4.0), "neutral", "neutral.toml")
-    ship = guess.vessel.with_values({"hull.mmg.N_v": 1.1 * guess.vessel.parameters["hull.mmg.N_v"]})
-    lengths = 4.0 / 69.0
-    chosen = standard(ship, "spiral").manoeuvre
-    assert isinstance(chosen, Spiral)
-    assert 100 < chosen.hold * lengths <= 200
-    steady = {str(row["measure"]): row["value"] for row in measure_standard(ship, "spiral").measures}
-    assert steady["levels not steady"] == 0
-    assert steady["loop width"] == pytest.approx(0.0, abs=0.01)
-    short = standard(ship, "spiral", duration=40 / lengths).manoeuvre
-    assert isinstance(short, Spiral)
-    assert short.hold == 40 / lengths
-    turning = standard(SHIP, "spiral").manoeuvre
-    assert isinstance(turning, Spiral)
-    assert turning.hold == pytest.approx(40 * 28.9 / standard(SHIP, "spiral").speed)
 
 
 @pytest.mark.parametrize(

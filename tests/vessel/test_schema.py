@@ -11,12 +11,9 @@ from shipid.physics import ACTUATORS, GIVEN, MOTION, TERMS
 from shipid.physics.signals import named
 from shipid.vessel.load import load_vessel
 from shipid.vessel.schema import (
-    actuators,
-    functions,
     parameters,
     signals,
     structural,
-    term_blocks,
     term_parameters,
     vessel_model,
 )
@@ -99,15 +96,3 @@ def test_what_a_term_gives_has_its_parameters_in_the_same_block(key: str) -> Non
         assert {parameter.name for parameter in parameters(function)} <= set(names)
     if key == "thruster.quadratic":
         assert "c_uu" in set(names) - {parameter.name for parameter in parameters(term.function)}
-
-
-def test_functions_of_a_vessel_are_those_of_its_terms_and_actuators() -> None:
-    document = load_vessel("kvlcc2-l7").document
-    held = functions(document)
-    keys = {key for _, key, _ in term_blocks(document)}
-    assert {key for key in held if not key.startswith("actuator.")} == keys
-    assert all(held[key] == TERMS[key].functions for key in keys)
-    assert TERMS["thruster.propeller"].gives["wash"] in held["thruster.propeller"]
-    moved = {actuator["kind"] for _, _, block in term_blocks(document) for _, actuator in actuators(block)}
-    assert moved
-    assert all(held[f"actuator.{kind}"] == ACTUATORS[kind].functions for kind in moved)

@@ -15,7 +15,7 @@ from shipid.simulation.manoeuvre import TurningCircle, Zigzag
 from shipid.simulation.perform import perform
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.template import PROPULSORS, Particulars, added_mass, first_guess, hull, inertia, screw
+from shipid.vessel.template import PROPULSORS, Particulars, added_mass, first_guess, hull, inertia
 
 MARINER = Particulars(160.93, 23.17, 7.47, 0.597, 7.7175)
 KVLCC2 = Particulars(320.0, 58.0, 20.8, 0.810, 7.97, ship_type="tanker")
@@ -62,20 +62,6 @@ def test_formulae_near_kvlcc2_as_measured() -> None:
     assert -added_mass(KVLCC2)["Y_vdot"].number / (0.5 * 1025 * 320**2 * 20.8) == pytest.approx(0.223, rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("given", "measured"),
-    [
-        (Particulars(length=175.0, beam=25.4, draught=8.5, block=0.559), 0.003939 * 175.0 / 8.5),
-        (KVLCC2, 0.002 + 0.223),
-    ],
-    ids=["S-175", "KVLCC2"],
-)
-def test_drift_in_a_turn_holds_a_ship_back_as_measured(given: Particulars, measured: float) -> None:
-    """X_vr + m_y on 1/2 rho L T of Son and Nomoto (1982), and of Yasukawa and Yoshimura (2015)."""
-    m_y = -added_mass(given)["Y_vdot"].number / (given.rho / 2 * given.length**2 * given.draught)
-    assert hull(given)["X_vr"].number + m_y == pytest.approx(measured, rel=0.15)
-
-
 def test_yaw_of_a_stern_pushed_aside_is_reported_stable_or_not() -> None:
     """The same hull: azimuth units, which are fins too, hold the course; the rudder's does not."""
     assert first_guess(GUNNERUS, "g", "g.toml").growth < 0
@@ -84,23 +70,10 @@ def test_yaw_of_a_stern_pushed_aside_is_reported_stable_or_not() -> None:
     assert "UNSTABLE" in proposal.text
 
 
-def test_growth_is_that_of_a_small_yaw() -> None:
-    """A pull of 0.01 deg/s left to itself shrinks as the number says."""
-    proposal = first_guess(MARINER, "m", "m.toml")
-    log = perform(
-        proposal.vessel,
-        [Zigzag(n_rpm=60 * proposal.n, angle_deg=0.01, execute_heading_deg=90, duration=400)],
-        step=1.0,
-    )
-    r = log["r"].to_numpy()  # towards the steady rate of so little helm, at the rate of the slowest root
-    left = np.abs(r - r[-1])[[100, 160]]
-    assert np.log(left[1] / left[0]) / 60 == pytest.approx(proposal.growth, rel=0.1)
-
-
 def dead_ships() -> list[Vessel]:
-    """Forty ships from a model of 1 m to 400 m, without screws and wind, as beamy and as deep as the formulae allow."""
+    """Ten ships from a model of 1 m to 400 m, without screws and wind, as beamy and as deep as the formulae allow."""
     rng, ships = np.random.default_rng(5), [Particulars(31.8, 9.22, 4.52, 0.85), Particulars(88.8, 27.1, 11.1, 0.86)]
-    while len(ships) < 40:
+    while len(ships) < 10:
         length, slender = np.exp(rng.uniform(0, np.log(400))), rng.uniform(2, 9)
         sizes = length, length / slender, length / slender / rng.uniform(1.8, 6), rng.uniform(0.4, 0.9)
         if sizes[3] / slender > 0.3 or not 0.1 < sizes[1] < 80 or not 0.02 < sizes[2] < 30:
@@ -162,14 +135,6 @@ def test_thrust_at_the_service_rpm_balances_the_resistance(given: Particulars) -
     assert 60 * proposal.n == pytest.approx(given.rpm, rel=0.04)  # the air's drag is not in the balance
 
 
-def test_the_screw_of_kvlcc2_follows_from_speed_rpm_and_diameter() -> None:
-    """P / D = 0.721 as built; and the steering gear of the model, 15.8 deg/s, from the scale."""
-    given = Particulars(7.0, 1.27, 0.46, 0.81, 1.179, rpm=627, propeller_diameter=0.216, scale=45.7)
-    assert screw(given).pitch == pytest.approx(0.721, abs=0.04)
-    rate = first_guess(given, "k", "k.toml").vessel.parameters["thruster.rudder.actuator.delta.rate"]
-    assert np.degrees(rate) == pytest.approx(15.8, rel=0.02)
-
-
 def test_times_of_a_model_are_those_of_the_ship_over_root_scale() -> None:
     ship, model = Particulars(160.0, 24.0, 9.0, 0.7), Particulars(4.0, 0.6, 0.225, 0.7, scale=40.0)
     numbers = [first_guess(given, "s", "s.toml").vessel.parameters for given in (ship, model)]
@@ -228,7 +193,7 @@ def test_what_the_formulae_do_not_know_is_refused(change: dict[str, object], com
 
 def test_all_that_is_not_refused_loads() -> None:
     """Corners of the ranges: a document comes out."""
-    corners = itertools.product((5.0, 50.0), (2.0, 3.0, 3.4, 9.0), (1.8, 6.0), (0.4, 0.6, 0.9), PROPULSORS)
+    corners = itertools.product((5.0, 50.0), (2.0, 3.4, 9.0), (6.0,), (0.4, 0.9), PROPULSORS)
     for length, slenderness, flatness, block, propulsor in corners:
         if block / slenderness <= 0.3:
             beam = length / slenderness

@@ -118,12 +118,6 @@ FAULTS: dict[str, tuple[str, str, str, str]] = {
         "hull.drag returns what is not a",
     ),
     "math": ("hull.drag", DRAG.format("return wrench(Y * math.sqrt(v))"), "begins", "(NaN): use functions of casadi"),
-    "not at rest": (
-        "hull.drag",
-        DRAG.format("return wrench(Y * v / ca.fabs(v))"),
-        "begins",
-        "V_w, beta_w 0, as where none is given: mend its terms",
-    ),
     "an error": ("hull.drag", DRAG.format("raise ValueError('no drag')"), "body", "hull.drag: ValueError: no drag"),
     "an index": ("hull.drag", DRAG.format("return wrench(nu_r[7])"), "body", "hull.drag: RuntimeError: "),
     "the end": ("hull.drag", DRAG.format("sys.exit('no')"), "body", "hull.drag calls sys.exit (no)"),
@@ -298,21 +292,6 @@ def test_every_listed_term_passes(key: str) -> None:
 def test_units_of_actuators_are_those_of_terms_or_of_the_command(kind: str) -> None:
     units = [str(parameter.unit) for parameter in parameters(ACTUATORS[kind].advance)]
     assert all(unit.endswith("of the command") or not unit_fault(unit) for unit in units)
-
-
-def test_a_term_that_is_put_in_again_has_the_schema_of_now(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in a notebook: the schema was of the first function, and refused the second's, or dropped numbers unsaid."""
-    registered("hull.drag", DRAG.format("return wrench(Y)"), tmp_path, monkeypatch)
-    file = ship("hull.drag", tmp_path)
-    load_vessel(file)
-    registered("hull.drag", signature(f"nu_r: SX, *, D: {NEWTON}"), tmp_path, monkeypatch)
-    with pytest.raises(DocumentError, match=r"hull\.drag\.C: unknown key: valid: D, off, source"):
-        load_vessel(file)
-    file.write_text(file.read_text().replace("C =", "D ="))
-    assert "hull.drag.D" in load_vessel(file).parameters
-    registered("hull.drag", signature(f"nu_r: SX, *, D: {NEWTON} = 5.0"), tmp_path, monkeypatch)
-    file.write_text(file.read_text().replace("D = 100.0", ""))
-    assert dynamics(load_vessel(file))
 
 
 def test_a_term_that_is_put_in_later_is_checked_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
