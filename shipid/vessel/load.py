@@ -92,31 +92,23 @@ class Vessel:
         """Dotted path of every block that the equations use -> what binds its numbers to a physics function."""
         return bindings(self.document)
 
-    @property
+    @cached_property
     def units(self) -> dict[str, str]:
-        """Dotted path -> unit of every parameter, in document order of use; a copy, free to be changed."""
-        return dict(self._units)
+        """Dotted path -> unit of every parameter, in document order of use; not to be changed."""
+        return units(self.document)
 
-    @property
+    @cached_property
     def parameters(self) -> dict[str, float]:
-        """Dotted path -> value of every number that the equations use; a copy, free to be changed."""
-        return dict(self._parameters)
+        """Dotted path -> value of every number that the equations use; not to be changed."""
+        return {path: float(documents.get(self.document, path)) for path in self.units}
 
     @property
     def above_zero(self) -> frozenset[str]:
         """Dotted paths of the parameters that must be above 0, such as `inertia.m`."""
         model = vessel_model()
         return frozenset(
-            path for path in self._units if not documents.suits(model, documents.replace(self.document, {path: 0.0}))
+            path for path in self.units if not documents.suits(model, documents.replace(self.document, {path: 0.0}))
         )
-
-    @cached_property
-    def _units(self) -> dict[str, str]:
-        return units(self.document)
-
-    @cached_property
-    def _parameters(self) -> dict[str, float]:
-        return {path: float(documents.get(self.document, path)) for path in self._units}
 
     @property
     def mass(self) -> NDArray[np.float64]:
@@ -128,7 +120,7 @@ class Vessel:
     @cached_property
     def _mass(self) -> list[list[float]]:
         numbers: list[dict[str, Any]] = [
-            {name: self._parameters[target] if isinstance(target, str) else target for name, target in block.items()}
+            {name: self.parameters[target] if isinstance(target, str) else target for name, target in block.items()}
             for block in (self.bound["inertia"], self.bound["added_mass"])
         ]
         M = mass(*numbers)
@@ -137,8 +129,8 @@ class Vessel:
     @cached_property
     def structure(self) -> str:
         """Digest of the document without its parameters' values: vessels of one structure compile once."""
-        without_values = documents.replace(_without_words(self.document), dict.fromkeys(self._parameters, 0))
-        return documents.digest([without_values, list(self._parameters)])  # the order is that of the input vector
+        without_values = documents.replace(_without_words(self.document), dict.fromkeys(self.parameters, 0))
+        return documents.digest([without_values, list(self.parameters)])  # the order is that of the input vector
 
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
         """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document.
@@ -158,10 +150,10 @@ class Vessel:
         documents.check_values(odd, self.file)
         document = documents.replace(self.document, values, self.file)
         numbers = all(type(value) in (float, int) for value in values.values())
-        if numbers and values.keys() <= self._units.keys() and documents.suits(vessel_model(), document):
+        if numbers and values.keys() <= self.units.keys() and documents.suits(vessel_model(), document):
             vessel = Vessel(document, self.file)  # terms, names and units are as they were
-            vessel.__dict__.update(bound=self.bound, _units=self._units, structure=self.structure)
-            vessel.__dict__["_parameters"] = self._parameters | {path: float(value) for path, value in values.items()}
+            vessel.__dict__.update(bound=self.bound, units=self.units, structure=self.structure)
+            vessel.__dict__["parameters"] = self.parameters | {path: float(value) for path, value in values.items()}
             _check_numbers(vessel)
             return vessel
         return check_vessel(document, self.file)

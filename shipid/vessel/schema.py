@@ -265,13 +265,14 @@ def _fixed(group: str, of: Mapping[str, type[Block]]) -> Any:
 
 def vessel_model() -> type[BaseModel]:
     """Pydantic model of a whole vessel document; its JSON schema serves editors."""
-    return _vessel_model(tuple((key, term_model(key)) for key, _ in zip(TERMS, split_keys(tuple(TERMS)), strict=True)))
+    return _vessel_model(tuple(TERMS.items()), tuple(ACTUATORS.items()), tuple(named("command")))
 
 
 @cache
-def _vessel_model(models: tuple[tuple[str, type[Block]], ...]) -> type[BaseModel]:
-    """Model of a vessel document from models of terms, by key of TERMS."""
-    of = dict(models)
+def _vessel_model(terms: tuple[tuple[str, Term], ...], *_: object) -> type[BaseModel]:
+    """Model of a vessel document with these terms; kept by all that it is made of, for a notebook may put in others."""
+    split_keys(tuple(key for key, _ in terms))
+    of = {key: term_model(key) for key, _ in terms}
     current: dict[str, Any] = {"kind": (Literal["uniform"], ...)}
     fields: dict[str, Any] = {
         "name": (str, ...),

@@ -224,11 +224,15 @@ FAULTS: dict[str, tuple[str, str, str, str]] = {
         "hul.drag",
         DRAG.format("return wrench(Y)"),
         "begins",
-        "TERMS['hul.drag']: 'hul' is no block of a vessel document: blocks are hull, restoring, radiation, waves, wind "
-        "and thruster: write TERMS['hull.drag']",
+        "TERMS['hul.drag']: no block of a vessel document and a kind in it: write <block>.<kind>, such as TERMS['hull.drag']",
     ),
-    "no block": ("drag", DRAG.format("return wrench(Y)"), "begins", "TERMS['drag']: it names no block"),
-    "a kind with a dot": ("hull.my.drag", DRAG.format("return wrench(Y)"), "begins", "'my.drag' is no name for a kind"),
+    "no block": ("drag", DRAG.format("return wrench(Y)"), "begins", "TERMS['drag']: no block of"),
+    "a kind with a dot": (
+        "hull.my.drag",
+        DRAG.format("return wrench(Y)"),
+        "begins",
+        "TERMS['hull.my.drag']: no block of",
+    ),
 }
 
 
