@@ -249,7 +249,10 @@ def test_a_compiler_that_never_returns_is_ended(
         np.testing.assert_allclose(numbers(), sound, rtol=1e-9)
     (line,) = [record.getMessage() for record in caplog.records]
     assert "hangs: not done after 0.5 s" in line
-    assert not _alive(int((tmp_path / "child").read_text()))
+    child, limit = int((tmp_path / "child").read_text()), time.monotonic() + 5.0
+    while _alive(child) and time.monotonic() < limit:
+        time.sleep(0.02)
+    assert not _alive(child)
 
 
 def _alive(number: int) -> bool:
@@ -270,3 +273,10 @@ def test_a_compiler_that_cannot_be_started_is_a_reason(tmp_path: Path) -> None:
     reason, _ = run_compiler([str(tmp_path / "none")])
     assert reason is not None
     assert reason.startswith("cannot be started")
+
+
+def test_a_library_under_the_name_of_another_is_never_loaded(tmp_path: Path) -> None:
+    library = made(tmp_path / "a")
+    other = library.rename(library.with_name("other.so"))
+    with pytest.raises(NoLibrary, match="is damaged"):
+        load(other)

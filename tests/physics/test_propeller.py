@@ -234,3 +234,14 @@ def test_thrust_in_the_shaft_is_that_on_the_ship_before_the_deduction(
         X, T = float(ca.evalf(force(*inputs, t_P=0.22, **numbers))[0]), float(ca.evalf(shaft(*inputs, **numbers)))
         assert pytest.approx(0.78 * T, rel=1e-12) == X
         assert T != 0
+
+
+@pytest.mark.parametrize("u", [1.0, 0.0, -0.6])
+def test_astern_thrust_has_a_separate_curve(u: float) -> None:
+    """X = -(1 - t_P) k_astern rho n^2 D^4 K(J), J = 0.6 u / (n D), negative on a ship that still goes ahead."""
+    n, J = -9.0, 0.6 * u / (-9.0 * 0.216)
+    K = 0.25 + 0.30 * J + 0.05 * J**2
+    X = thrust(u, n, K_T_astern=ASTERN, k_astern=0.9)[0]
+    assert pytest.approx(-0.78 * 0.9 * RHO * 81 * 0.216**4 * K) == X
+    assert thrust(u, n, K_T_astern=SCREW["K_T"])[0] == thrust(u, n)[0]
+    assert thrust(u, 9.0, K_T_astern=ASTERN)[0] == thrust(u, 9.0)[0]

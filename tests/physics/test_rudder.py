@@ -97,3 +97,21 @@ def test_rudder_coefficients_by_hand() -> None:
     np.testing.assert_allclose(forces, [X, Y, 0, 0, 0, N], rtol=1e-9)
     shown = ca.evalf(coefficients_normal_force(*given, kappa=0.5, L_pp=L, rho=1000.0, **values))
     assert float(shown) == pytest.approx(-X * np.sin(delta) - Y * np.cos(delta))  # across the blade
+
+
+def side_force(delta: float, **other: float) -> float:
+    return float(wrench([1.0, 0, 0, 0, 0, 0], delta, [0.6, 1.4, D_P], **other)[1])
+
+
+@pytest.mark.parametrize("delta", [0.2, 0.6])
+def test_a_rudder_force_may_differ_by_side_and_angle(delta: float) -> None:
+    """F_N times 1 + f_angle |s| + f_side sign(s) + f_angle_side s, s = sin(delta) in flow from ahead."""
+    shape = {"f_angle": -0.2, "f_side": 0.05, "f_angle_side": 0.1}
+    for sense in (1, -1):
+        s = np.sin(sense * delta)
+        factor = 1 - 0.2 * abs(s) + 0.05 * sense + 0.1 * s
+        assert side_force(sense * delta, **shape) == pytest.approx(factor * side_force(sense * delta))
+    mirrored = {**shape, "f_side": -0.05, "f_angle_side": -0.1}  # a screw that turns the other way
+    assert side_force(-delta, **mirrored) == pytest.approx(-side_force(delta, **shape))
+    both = side_force(delta, f_angle=-0.2), side_force(-delta, f_angle=-0.2)
+    assert both[0] == -both[1]

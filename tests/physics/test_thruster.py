@@ -127,3 +127,24 @@ def test_the_over_running_drag_of_an_azimuth_unit_has_a_step_at_zero_revolutions
     above, below = (numbers(azimuth()([u, 0, 0, 0, 0, 0], n, 0.0))[0] for n in (1e-7, -1e-7))
     drag = unit["k_T"] * 1025.0 * unit["D_p"] ** 2 * unit["k_over2"] * u**2
     assert above - below == pytest.approx(-drag if u > 0 else -unit["k_astern"] * drag, rel=1e-3)
+
+
+@pytest.mark.parametrize(("J", "J_y"), [(2.0, 0.1), (1.4, -0.5), (-1.0, 0.2), (0.8, 1.1), (0.5, -0.9), (2.2, 0.8)])
+@pytest.mark.parametrize("sense", [1, -1])
+def test_coefficients_by_hand(J: float, J_y: float, sense: int) -> None:
+    """Inside the fit and beyond it, ahead and astern: the printed polynomials and continuations, re-computed."""
+    n, D_p, rho = 2.0 * sense, 1.9, 1025.0
+    J_c, y = min(max(J, -0.3), 1.4), min(max(J_y, -0.6), 0.6)
+    K_x = 0.8208 - 0.6993 * J_c + 0.1895 * J_c**2 - 0.0743 * J_c**3 - 0.0342 * J_c * np.tanh(abs(y) / 0.06)
+    K_x += 0.6390 * y**2 - 0.5585 * J_c * y**2
+    K_y = -(1.1169 * y + 0.5980 * J_c * y - 0.2590 * y * abs(y))
+    if J > 1.4:
+        K_x -= 0.5 * (J - 1.4) + 0.12 * (J - 1.4) ** 2
+    if J < -0.3:
+        K_x -= 0.1 * (J + 0.3)
+    K_y -= (0.6 + 0.4 * max(J_c, 0)) * (J_y - y)
+    scale = rho * n**2 * D_p**4
+    water = np.array([J * n * D_p, J_y * abs(n) * D_p, 0, 0, 0, 0])  # J counts along the shaft's sense
+    wrench = numbers(azimuth()(water, n, 0.0))
+    reduction = 1.0 if sense > 0 else -0.65
+    np.testing.assert_allclose(wrench[:2], [reduction * scale * K_x, scale * K_y], rtol=1e-12)

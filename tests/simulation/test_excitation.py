@@ -108,3 +108,20 @@ def test_wrong_orders_are_refused(call: Any, message: str) -> None:
     with pytest.raises(DocumentError, match=message) as caught:
         call()
     assert "\n" not in str(caught.value)
+
+
+def held(series: np.ndarray, step: float = 0.1) -> np.ndarray:
+    """Hold times [s] of all levels but the last, which the end cuts."""
+    changes = np.flatnonzero(np.diff(series) != 0) + 1
+    return np.diff(np.concatenate([[0], changes])) * step
+
+
+def test_levels_fill_their_range_evenly() -> None:
+    series = steps()
+    levels = series[np.concatenate([[0], np.flatnonzero(np.diff(series) != 0) + 1])]
+    assert levels.min() >= -0.5
+    assert levels.max() < 0.3
+    eighth = np.floor((levels + 0.5) / 0.1).astype(int)
+    for first in range(0, len(levels) - 8, 8):
+        assert sorted(eighth[first : first + 8]) == list(range(8))
+    assert len({tuple(eighth[first : first + 8]) for first in range(0, 80, 8)}) > 5  # in another order each time

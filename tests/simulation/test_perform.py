@@ -146,3 +146,12 @@ def test_a_zigzag_in_waves_still_turns_at_the_execute_heading() -> None:
 def test_what_does_not_fit_the_manoeuvres_is_refused(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ShipidError, match=message):
         perform(SHIP, [CIRCLE, CIRCLE.model_copy(update={"name": "other"})], **{"step": 0.1, **given})
+
+
+def test_execute_waits_and_orders_are_those_in_force() -> None:
+    frame = perform(SHIP, [TurningCircle(n_rpm=120, duration=20, execute_at=5, angle_deg=10, side="port")], step=0.1)
+    before = frame["t"] < 4.95
+    assert (frame.loc[before, "port.alpha"] == 0).all()
+    np.testing.assert_allclose(frame.loc[~before, "port.alpha"], 10 * DEGREE)
+    at_rest = np.abs(frame["r"].to_numpy())
+    assert at_rest[50] < 1e-9 < at_rest[51]

@@ -115,3 +115,18 @@ def test_a_sensor_needs_a_column(name: str, message: str) -> None:
 def test_wrong_blocks_are_refused(block: dict[str, Any]) -> None:
     with pytest.raises(DocumentError, match=next(iter(block))):
         Sensor(**block)
+
+
+def test_bias_is_constant_in_a_run_and_normal_over_runs() -> None:
+    runs = tuple(f"M{number:03d}" for number in range(400))
+    bias = measure(record(runs, rows=3), {"v": Sensor(bias=0.5)}, STEP, seed=3).groupby("run")["v"]
+    assert (bias.nunique() == 1).all()
+    assert bias.first().std() == pytest.approx(0.5, rel=0.12)
+    assert abs(bias.first().mean()) < 4 * 0.5 / np.sqrt(400)
+
+
+@pytest.mark.parametrize("interval", [0.5, 0.7, 3.0])
+def test_samples_are_held_until_the_next(interval: float) -> None:
+    log = measure(record(("M001",)), {"north": Sensor(interval=interval)}, 0.2, seed=1)
+    taken = np.floor(log["t"] / interval + 1e-6) * interval
+    np.testing.assert_allclose(log["north"], 3.0 * taken, atol=1e-9)

@@ -11,6 +11,7 @@ import pytest
 
 from shipid.engine.rollout import rollout
 from shipid.physics import TERMS, Term
+from shipid.physics.inertia import mass
 from shipid.vessel import dynamics as module
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
@@ -176,3 +177,20 @@ def test_another_function_under_the_name_of_a_term_is_another_model(seed: int, m
     assert scaled(factor) - rest == pytest.approx(factor * (before - rest))
     monkeypatch.undo()
     assert rates(vessel, u=speed)["u"] == before
+
+
+def mass_matrix(vessel: Vessel) -> np.ndarray:
+    inertia = {k: v for k, v in vessel.document["inertia"].items() if k != "source"}
+    added = {k: v for k, v in vessel.document["added_mass"].items() if k not in ("source", "coriolis")}
+    return np.array(mass(inertia, added))[np.ix_(vessel.axes, vessel.axes)]
+
+
+def test_without_coriolis_the_mass_does_not_turn() -> None:
+    """`[inertia] coriolis = "none"` leaves m v r and -m u r out."""
+    ship = load_vessel("gunnerus-28.9")
+    still = ship.with_values({"inertia.coriolis": "none"})
+    m, M = ship.document["inertia"]["m"], mass_matrix(ship)
+    v, r, u = 0.4, 0.05, 3.0
+    full, none = (rates(vessel, u=u, v=v, r=r) for vessel in (ship, still))
+    difference = np.array([full[name] - none[name] for name in ("u", "v", "r")])
+    np.testing.assert_allclose(M @ difference, [m * v * r, -m * u * r, 0], atol=1e-6 * m)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -118,3 +119,15 @@ def test_a_new_value_that_no_document_may_hold_is_named(path: str, value: object
     with pytest.raises(DocumentError) as raised:
         load_vessel("gunnerus-28.9").with_values({path: value})
     assert raised.value.path == path
+
+
+def test_a_block_of_another_kind_is_replaced_whole(tmp_path: Path) -> None:
+    """What stayed of the other kind was refused as an unknown key that the file does not have: a wind has one block."""
+    windy, geared = tmp_path / "windy.toml", tmp_path / "geared.toml"
+    shape = 'kind = "blendermann"\nC_Dt = 0.85\nC_Dl_bow = 0.55\nC_Dl_stern = 0.65\ndelta = 0.6\nkappa = 1.4\n'
+    sizes = "s_L = 0.5\ns_H = 2.5\nA_FW = 90.0\nA_LW = 190.0\nL_oa = 34.0\n"
+    windy.write_text(f'extends = "gunnerus-28.9"\n[wind]\n{shape}{sizes}')
+    assert load_vessel(windy).document["wind"] == tomllib.loads(shape + sizes)
+    geared.write_text('extends = "kvlcc2-l7"\n[thruster.rudder.actuator.delta]\nkind = "rate_limit"\nrate = 0.3\n')
+    below, above = (load_vessel(one).document["thruster"]["rudder"] for one in ("kvlcc2-l7", geared))
+    assert above == {**below, "actuator": {"delta": {"kind": "rate_limit", "rate": 0.3}}}

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError, ShipidError
+from shipid.physics.grammar import derivative
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Perturbation, Variant, draw, members, resolve, uniform
 
@@ -232,3 +233,23 @@ def test_a_member_is_a_whole_number() -> None:
             draw(family, odd, base)  # type: ignore[arg-type]
     with pytest.raises(ShipidError, match="counter must be a whole number"):
         draw(family, 1, base, counter=0.5)  # type: ignore[arg-type]
+
+
+def test_removal_is_zero_and_leaves_the_structure(base: Vessel, tmp_path: Path) -> None:
+    variant = draw(family({"remove": ["hull.derivatives.*[order >= 3]"]}, members=1), 0, base)
+    third = {path for path in base.parameters if "hull.d" in path and derivative(path.rsplit(".", 1)[-1]).order >= 3}
+    assert set(variant.values) == third
+    assert len(third) == 3 + 6 + 6
+    assert set(variant.values.values()) == {0.0}
+    assert {f"{factor:g}" for factor in variant.factors.values()} == {"0"}, "of negative numbers, too, not -0"
+    assert rebuilt(variant, tmp_path).structure == base.structure
+
+
+def test_a_changed_base_is_refused(base: Vessel, tmp_path: Path) -> None:
+    text = draw(HIGH, 0, base).document()
+    assert base.digest in text
+    file = tmp_path / "patch.toml"
+    file.write_text(text.replace(base.digest, "0" * 16))
+    with pytest.raises(DocumentError, match="has changed since") as caught:
+        load_vessel(str(file))
+    assert caught.value.path == "base_digest"
