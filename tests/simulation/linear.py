@@ -15,6 +15,7 @@ import numpy as np
 from shipid.vessel.load import Vessel
 
 AXES = "XYZKMN"
+EVERY = tuple(range(6))
 SPEEDS = "uvwpqr"
 GRAVITY = 9.81
 HEAVE, ROLL, PITCH = 2, 3, 4
