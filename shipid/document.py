@@ -5,26 +5,36 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
-import os
 import re
 import tomllib
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import date, time
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from shipid.errors import DocumentError, choices
+from shipid.files import open_file
 from shipid.units import plural
 
 Document = dict[str, Any]
 
 LARGEST = 20_000_000  # bytes of a document
-LONGEST_LINE = 80  # characters of a line that a message shows
+REMEDIES = {
+    r"\n.*\r": ": its lines end as on old Macs: save it with ends of line of Unix or Windows",
+    r"\n.*=\s*[-+]?\d+,\d": ": write decimals with a point",
+    r"^(Unescaped|Invalid hex|Escaped)": ": write / in a path, or the text in single quotes",
+}
+"""Pattern in the parser's message, or in the line behind it, -> what would be right."""
 DEEPEST = 40  # tables and lists inside one another
 MOST_NUMBER, MOST_INTEGER = 1e24, 10**15
 MUST, BE = "must ", "be "
+DRAFTS = {
+    "models": ("vessel", "vessel new"),
+    "studies": ("study", "study new"),
+    "studies/mappings": ("mapping", "data import --guess LOG"),
+}
+"""Kind of document -> its word, and the command that writes a first one."""
 REQUIRED = {
     "missing": "missing",
     "string_type": "must be text",
@@ -80,42 +90,35 @@ def find(name: str | Path, kind: str, relative_to: Path | None = None) -> Path:
     if not name:
         raise DocumentError("an empty name: give a bundled name, or the path of a document")
     if "/" in name or "\\" in name or name.endswith(".toml"):
-        for folder in filter(None, (relative_to, Path())):
-            try:
-                if (folder / name).is_file():
-                    return folder / name
-            except OSError as error:  # a name that is too long
-                raise DocumentError(f"cannot be read ({error.strerror})", file=name) from None
-        if any((folder / name).is_dir() for folder in filter(None, (relative_to, Path()))):
-            raise DocumentError("is a folder: name a document in it", file=name)
-        raise DocumentError("no such file", file=name)
+        places = [folder / name for folder in (relative_to, Path()) if folder]
+        try:
+            return next(place for place in places if place.is_file())
+        except OSError as error:  # a name that is too long
+            raise DocumentError(f"cannot be read ({error.strerror})", file=name) from None
+        except StopIteration:
+            fault = "is a folder: name a document in it" if any(map(Path.is_dir, places)) else "no such file"
+            raise DocumentError(fault, file=name) from None
     available = bundled(kind)
     if name not in available:
-        label, drafted = {
-            "models": ("vessel", "vessel new"),
-            "studies": ("study", "study new"),
-            "studies/mappings": ("mapping", "data import --guess LOG"),
-        }[kind]
-        if os.path.isfile(name):  # False, too, of a name that no file can have
-            words = f"is a file, and no {label}, which is a TOML document: `shipid {drafted}` writes a first one"
-        else:
-            words = f"no {label} of this name comes with shipid: {choices(name, available)}"
-        raise DocumentError(f"{words}; a path to another file needs a slash or the ending .toml", path=name)
+        label, draft = DRAFTS[kind]
+        words = f"no {label} of this name comes with shipid: {choices(name, available)}"
+        remedy = f"a path to another file needs a slash or the ending .toml; `shipid {draft}` writes a first one"
+        raise DocumentError(f"{words}; {remedy}", path=name)
     return available[name]
 
 
 def read(file: Path | str) -> Document:
     """Read a TOML document; DocumentError for invalid syntax, a wrong encoding, and what `check_values` refuses."""
     try:
-        if Path(file).exists() and not Path(file).is_file():
-            raise DocumentError("cannot be read: it is no file", file=file)
-        if Path(file).stat().st_size > LARGEST:
-            raise DocumentError(f"is larger than {LARGEST / 1e6:g} MB, the limit of a document", file=file)
-        text = Path(file).read_bytes().decode("utf-8").removeprefix("\ufeff")  # the mark that some editors write
+        with open_file(file) as stream:
+            content = stream.read(LARGEST + 1)
+        text = content.decode("utf-8").removeprefix("\ufeff")  # the mark that some editors write
     except UnicodeDecodeError as error:
         raise DocumentError(f"not UTF-8 text (byte {error.start}): save it as UTF-8", file=file) from None
     except OSError as error:
         raise DocumentError(f"cannot be read ({error.strerror})", file=file) from None
+    if len(content) > LARGEST:
+        raise DocumentError(f"is larger than {LARGEST / 1e6:g} MB, the limit of a document", file=file)
     document = loads(text, file)
     check_values(document, file)
     return document
@@ -127,14 +130,8 @@ def _wrong_line(text: str, message: str) -> str:
     if place is None or int(place[1]) > len(lines):
         return ""
     line = lines[int(place[1]) - 1].strip()
-    shown = line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
-    if "\r" in line:
-        return f": {shown!r}: its lines end as on old Macs: save it with ends of line of Unix or Windows"
-    if re.search(r"=\s*[-+]?\d+,\d", line):
-        return f": {shown!r}: write decimals with a point"
-    if re.match("Unescaped|Invalid hex|Escaped", message):
-        return f": {shown!r}: write / in a path, or the text in single quotes"
-    return f": {shown!r}"
+    remedy = next((right for pattern, right in REMEDIES.items() if re.search(pattern, f"{message}\n{line}")), "")
+    return f": {line!r}{remedy}"
 
 
 def loads(text: str, file: Path | str | None = None) -> Document:
@@ -154,8 +151,8 @@ def loads(text: str, file: Path | str | None = None) -> Document:
 def check_values(document: Any, file: Path | str | None) -> None:
     """Raise DocumentError for a value that no document may hold, with its dotted path.
 
-    That is None, a date, an object of Python that TOML has not, a number beyond 1e24 or below 1e-100, an integer beyond
-    1e15, a control character, and deep nesting.
+    That is None, a date or another object that no document uses, a number beyond 1e24 or below 1e-100, an integer
+    beyond 1e15, a control character, and deep nesting.
     """
     waiting: list[tuple[str, int, Any]] = [("", 0, document)]
     while waiting:
@@ -166,29 +163,27 @@ def check_values(document: Any, file: Path | str | None) -> None:
             entries = value.items() if isinstance(value, Mapping) else enumerate(value)
             for key, inner in entries:
                 inside = f"{path}.{key}" if path else str(key)
-                if any(unicodedata.category(sign) == "Cc" for sign in str(key)):
+                if _has_control(str(key)):
                     raise DocumentError("a name with a control character", file=file, path=inside)
                 waiting.append((inside, depth + 1, inner))
             continue
         fault = None
-        if value is None:
-            fault = "None: no value; leave the key out where there is none"
-        elif isinstance(value, date | time):
-            fault = f"{value}: a date, where none is used: write text in quotes"
-        elif not isinstance(value, str | int | float | complex):
-            fault = f"{value!r}: a {type(value).__name__}: give a number, a text, true or false, a list or a table"
+        if not isinstance(value, str | int | float | complex):
+            fault = f"{value}: a {type(value).__name__}: give a number, a text, true or false, a list or a table"
         elif isinstance(value, int) and abs(value) > MOST_INTEGER:
             fault = f"an integer of {value.bit_length() * 0.30103:.0f} digits: at most {MOST_INTEGER:.0e}"
         elif isinstance(value, float) and MOST_NUMBER < abs(value) < float("inf"):
             fault = f"{value:g}: larger than {MOST_NUMBER:.0e}: no quantity of a ship in SI units is so large"
         elif isinstance(value, float) and 0 < abs(value) < LEAST_NUMBER:
             fault = f"{value:g}: no quantity of a ship in SI units is so near to 0: write 0 or a larger number"
-        elif isinstance(value, str) and any(
-            unicodedata.category(sign) == "Cc" and sign not in "\n\r\t" for sign in value
-        ):
+        elif isinstance(value, str) and _has_control(value.translate({9: None, 10: None, 13: None})):
             fault = f"{value!r}: text with a control character"
         if fault is not None:
             raise DocumentError(fault, file=file, path=path)
+
+
+def _has_control(text: str) -> bool:
+    return any(unicodedata.category(sign) == "Cc" for sign in text)
 
 
 def digest(document: Any) -> str:
@@ -297,27 +292,17 @@ def replace(document: Any, changes: Mapping[str, Any], file: Path | str | None =
     """
     result = copy.copy(document)
     copied = {id(result)}
-    tables: dict[str, dict[str, Any]] = {}  # by path, copied already: most changes are several of one table
     for path, value in changes.items():
-        above, _, name = path.rpartition(".")
-        if above in tables and '"' not in name:
-            node, key = tables[above], name
-        else:
-            *parents, last = parts(path)
-            node = result
-            for place, part in enumerate(parents):
-                key = _key(node, part, parents[:place], path, file)
-                below = node[key] if isinstance(node, list) else node.setdefault(key, {})
-                if id(below) not in copied:
-                    node[key] = below = copy.copy(below)
-                    copied.add(id(below))
-                node = below
-            key = _key(node, last, parents, path, file)
-            if above and '"' not in name and isinstance(node, dict):
-                tables[above] = node
-        node[key] = value
-        if isinstance(value, dict | list):
-            tables.clear()  # it may have taken the place of one of them
+        *parents, last = parts(path)
+        node = result
+        for place, part in enumerate(parents):
+            key = _key(node, part, parents[:place], path, file)
+            below = node[key] if isinstance(node, list) else node.setdefault(key, {})
+            if id(below) not in copied:
+                node[key] = below = copy.copy(below)
+                copied.add(id(below))
+            node = below
+        node[_key(node, last, parents, path, file)] = value
     return result
 
 

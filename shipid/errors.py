@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Iterable
 from difflib import get_close_matches
 from os import PathLike
 
-LOOK_ALIKE = ("CYRILLIC", "GREEK", "FULLWIDTH")  # beginnings of the names of letters that look like those of ASCII
 LONGEST = 500  # characters of one part of a message
 
 
@@ -91,23 +89,12 @@ def legible(text: str) -> str:
 def choices(value: object, valid: Iterable[str], limit: int = 12) -> str:
     """Hint for an invalid name: `did you mean 'x'?`, or the first `limit` valid names.
 
-    The same name in other capitals is the closest. A letter that looks like another one, or like nothing, is named.
+    The same name in other capitals is the closest.
     """
     names = sorted(valid)
-    odd = next((sign for sign in str(value) if _seems_another(sign) and not any(sign in name for name in names)), None)
-    if odd is not None:
-        plain = "".join(" " if _seems_another(sign) else sign for sign in str(value))
-        return f"its '{visible(odd)}' is {unicodedata.name(odd, 'no letter')}: {choices(plain, names, limit)}"
     same = [name for name in names if name.casefold() == str(value).casefold()]
     close = same or get_close_matches(str(value), names, n=1)
     if close:
         return f"did you mean {close[0]!r}?"
     shown = ", ".join(names[:limit]) + (", ..." if len(names) > limit else "")
     return f"valid: {shown}" if names else "nothing is defined there"
-
-
-def _seems_another(sign: str) -> bool:
-    """Whether a sign may be taken for a letter of ASCII, or is not seen at all."""
-    if sign.isascii():
-        return False
-    return unicodedata.category(sign) in ("Cf", "Zs") or unicodedata.name(sign, "").startswith(LOOK_ALIKE)

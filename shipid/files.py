@@ -9,6 +9,7 @@ import os
 import shlex
 import shutil
 import socket
+import stat
 import tempfile
 import time
 import tokenize
@@ -43,9 +44,7 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
     target, which is made if it is absent. Data are synced to disk before the target is replaced, and the
     folder after it, so that a power cut leaves the old file or the new one. A process that is killed leaves a
     temporary folder, which the next one that writes there removes. A link stays, and the file that it leads to is
-    replaced. The new file has the group and the permissions of the old one. Where this user may not give it that group,
-    the group that it has gets no more than a new file gives it: `chmod g+s` on the folder keeps the group there, too.
-    In place of a file of another user, it also has the permissions of a new file.
+    replaced. The new file has the permissions of the old one, and the group of a new file.
 
     Raises OSError where the place cannot be written, and for a device or a pipe, which a file would replace.
     """
@@ -56,35 +55,20 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
         raise OSError(errno.EINVAL, "a device or a pipe: name a file to write", str(target))
     try:
         make_folder(target.parent)
-        before = target.stat() if target.is_file() else None
+        mode = stat.S_IMODE(target.stat().st_mode) if target.is_file() else None
         with temporary_folder(target.parent) as folder:
             temporary = folder / name
             yield temporary
             sync(temporary)
-            if before is not None:
-                _keep_mode(temporary, before)
+            if mode is not None:
+                with suppress(OSError):  # a file system without permissions
+                    temporary.chmod(mode)
             os.replace(temporary, target)
         sync(target.parent)
     except OSError as error:
         if error.errno is not None and TEMPORARY in str(error.filename or TEMPORARY):
             error.filename = str(target)  # a write that fails, as on a full disk, names no file, or the temporary one
         raise
-
-
-def _keep_mode(file: Path, before: os.stat_result) -> None:
-    """Give a file the group and permissions of the one that it replaces; where that is another user's, its own, too.
-
-    A group that was not that of the old file gets nothing that it did not have.
-    """
-    with suppress(OSError, AttributeError):  # a group that this user is not in; Windows
-        os.chown(file, -1, before.st_gid)
-    fresh = file.stat()
-    mode = before.st_mode | (fresh.st_mode if fresh.st_uid != before.st_uid else 0)
-    if fresh.st_gid != before.st_gid:
-        mode &= fresh.st_mode | ~0o070
-    if (mode ^ fresh.st_mode) & 0o777:
-        with suppress(OSError):  # a file system without permissions
-            file.chmod(mode & 0o777)
 
 
 def make_folder(folder: Path) -> None:
@@ -139,18 +123,14 @@ def sweep(folder: Path) -> None:
 
 
 def is_alive(process: int) -> bool:
-    """Whether a process of this machine runs, or may run; not one that has ended and is not yet waited for."""
+    """Whether a process of this machine runs, or may run."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):
-        return True
-    try:
-        status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
-    except OSError:  # no Linux
-        return True
-    return status.rpartition(")")[2].split()[:1] != ["Z"]  # behind the name, which may have any characters
+    except (OSError, OverflowError):  # one of another user
+        pass
+    return True
 
 
 def as_argument(file: str | os.PathLike[str]) -> str:

@@ -177,10 +177,6 @@ def rank_correlation(first: Array, second: Array) -> float:
     """Return Spearman's rank correlation of two samples (n,), ties sharing their mean rank; 0 if one is constant."""
     if np.ptp(first) == 0 or np.ptp(second) == 0:
         return 0.0
-    return float(np.corrcoef(_ranks(first), _ranks(second))[0, 1])
+    from scipy.stats import rankdata
 
-
-def _ranks(values: Array) -> Array:
-    _, place, counts = np.unique(values, return_inverse=True, return_counts=True)
-    ranks: Array = (np.cumsum(counts) - (counts - 1) / 2)[place]
-    return ranks
+    return float(np.corrcoef(rankdata(first), rankdata(second))[0, 1])

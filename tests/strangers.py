@@ -81,7 +81,7 @@ def _candidates(random: np.random.Generator, drive: str, name: str) -> Iterator[
         drawn = _ship(random, drive)
         try:
             vessel = check_vessel(drawn["document"], name)
-            n = shaft_speed(Controls.of(vessel), drawn["U"])
+            n = shaft_speed(Controls(vessel), drawn["U"])
             if _sails(vessel, n, drawn):
                 yield drawn, vessel, n
         except ShipidError:

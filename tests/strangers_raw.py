@@ -118,7 +118,7 @@ def raw_stranger(seed: int, folder: Path, runs: int | None = None) -> RawStrange
         drawn = draw_ship(random)
         try:
             vessel = check_vessel(drawn["document"], f"stranger-raw-{seed}.toml")
-            n = shaft_speed(Controls.of(vessel), drawn["U"])
+            n = shaft_speed(Controls(vessel), drawn["U"])
             if not sails(vessel, n, drawn):
                 continue
             style = _style(random, drawn)

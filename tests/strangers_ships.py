@@ -205,19 +205,13 @@ def known_of(random: Random, drawn: Mapping[str, Any], n: float) -> dict[str, fl
         known["shafts"] = 2
     elif "tunnel" in drawn["drive"]:
         known["tunnel-thruster"] = True
-    steered = next(block for block in blocks if {"delta", "alpha"} & set(block.get("actuator", {})))["actuator"]
-    rate = np.degrees(steered.get("delta", steered.get("alpha"))["rate"])
-    wind = drawn["document"]["wind"]
     more: dict[str, float | str] = {
         "speed": digits(drawn["U"] * random.uniform(0.97, 1.03), 2), "rpm": digits(60 * n, 2),
-        "propeller-diameter": digits(screw["D_p"], 3), "rudder-rate": digits(rate, 2), "density": drawn["rho"],
-        "ship-type": OPTION.get(drawn["type"], drawn["type"]), "frontal-area": digits(wind["A_FW"], 2),
-        "lateral-area": digits(wind["A_LW"], 2),
+        "propeller-diameter": digits(screw["D_p"], 3),
+        "ship-type": OPTION.get(drawn["type"], drawn["type"]),
     }  # fmt: skip
     if fin is not None:
         more["rudder-area"] = digits(fin["A_R"], 2)
-        if "H_R" in fin:
-            more["rudder-span"] = digits(fin["H_R"], 2)
     if drawn["model"]:
         more["scale"] = digits(drawn["scale"], 3)
     share = float(random.choice([0.25, 0.55, 0.9]))

@@ -29,28 +29,6 @@ def test_a_mistake_is_one_line_and_status_1() -> None:
     assert len(result.stderr.splitlines()) == 1
 
 
-HELP = "import gc, os, sys, shipid.__main__ as m; sys.argv = ['shipid', '--help']; sys.stdout = open(os.devnull, 'w')\n"
-
-
-def said_after_help(expression: str, **variables: str) -> str:
-    """What an expression is once the command has shown its help, in a process with these variables alone of a BLAS."""
-    clean = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
-    code = f"{HELP}try: m.run()\nfinally: sys.stderr.write(str({expression}))"
-    command = [sys.executable, "-c", code]
-    return subprocess.run(
-        command, env=clean | variables, capture_output=True, text=True, timeout=60, check=False
-    ).stderr
-
-
-def test_the_command_takes_one_thread_for_products_unless_the_user_says_more() -> None:
-    assert said_after_help("os.environ['OPENBLAS_NUM_THREADS']") == "1"
-    assert said_after_help("os.environ['OPENBLAS_NUM_THREADS']", OPENBLAS_NUM_THREADS="3") == "3"
-
-
-def test_imports_and_the_end_look_for_no_garbage() -> None:
-    assert said_after_help("(gc.get_threshold()[0] == m.FEW_LOOKS, gc.get_freeze_count() > 1000)") == "(True, True)"
-
-
 @pytest.mark.parametrize("stage", ["gc.set_threshold", "shipid.__main__.open_streams", "shipid.cli", "shipid.cli.main"])
 def test_ctrl_c_before_the_first_line_of_the_command_ends_quietly(stage: str) -> None:
     code = (

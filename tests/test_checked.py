@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import Any
 
 import pytest
@@ -61,9 +60,3 @@ def test_a_wrong_value_is_named(kind: Any, given: dict[str, Any], line: str) -> 
         kind(**given)
     assert str(caught.value).startswith(line)
     assert "\n" not in str(caught.value)
-
-
-def test_models_are_made_copied_and_pickled_as_before() -> None:
-    memory = Memory(history=(2.0, 4.0))
-    assert pickle.loads(pickle.dumps(memory)) == memory == memory.model_copy() == Memory(**memory.model_dump())
-    assert shipid.PathDrawn(memory=memory).memory is memory

@@ -6,7 +6,7 @@ import re
 import shutil
 from decimal import Decimal
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import pytest
 import tomlkit
@@ -14,18 +14,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from shipid import document as documents
 from shipid.errors import DocumentError, ShipidError
-from shipid.identification.settings import Identify
 from shipid.logs.mapping import read_mapping
-from shipid.simulation.truth import Truth
 from shipid.study.plan import read_plan
 from shipid.vessel.load import load_vessel
-from shipid.vessel.perturb import Family
+from tests.drawn import seeds
 
 NESTED: dict[str, Any] = {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
-
-
-def test_leaves_have_dotted_paths() -> None:
-    assert list(documents.leaves(NESTED)) == [("a.b", 1), ("a.c.0", 10), ("a.c.1.d", 2), ("e", "x")]
 
 
 def test_every_leaf_is_got_by_its_path() -> None:
@@ -39,7 +33,7 @@ def test_get_names_what_is_missing(path: str, part: str) -> None:
         documents.get(NESTED, path)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(5, 40))
 def test_changes_at_once_are_those_one_by_one(seed: int) -> None:
     """Paths of a few keys, in which a later change may take the place of a table that an earlier one changed."""
     rng = random.Random(seed)
@@ -62,12 +56,6 @@ def test_changes_at_once_are_those_one_by_one(seed: int) -> None:
     before = copy.deepcopy(document)
     assert documents.replace(document, changes) == expected
     assert document == before
-
-
-def test_replace_leaves_the_original_alone() -> None:
-    changed = documents.replace(NESTED, {"a.b": 5, "a.c.1.d": 6, "f.g.h": 7})
-    assert changed == {"a": {"b": 5, "c": [10, {"d": 6}]}, "e": "x", "f": {"g": {"h": 7}}}
-    assert NESTED == {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
 
 
 def test_entries_of_a_list_are_selected_by_name() -> None:
@@ -177,14 +165,6 @@ def test_find_corrects_names(kind: str) -> None:
         documents.find("nothing-like-it", kind)
 
 
-def test_find_says_what_writes_a_document_where_a_log_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`shipid data import log.csv`: that no mapping of this name comes with shipid helps nobody."""
-    (tmp_path / "log.csv").write_text("t,u\n0,1\n")
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(DocumentError, match=r"log.csv: is a file, and no mapping.*`shipid data import --guess LOG`"):
-        documents.find("log.csv", "studies/mappings")
-
-
 class Inner(BaseModel):
     model_config = ConfigDict(extra="forbid")
     speed: float = Field(gt=0)
@@ -266,34 +246,6 @@ def test_no_number_of_a_document_may_be_a_truth_value_or_a_text(kind: str, name:
                     READ[kind](str(file))
 
 
-class Fast(BaseModel):
-    kind: Literal["fast"]
-
-
-class Slow(BaseModel):
-    kind: Literal["slow"]
-
-
-class Named(BaseModel):
-    name: str = Field(pattern="^[a-z]+$")
-    pair: tuple[float, float] = (0.0, 1.0)
-    part: Annotated[Fast | Slow, Field(discriminator="kind")] | None = None
-
-
-@pytest.mark.parametrize(
-    ("data", "path", "message"),
-    [
-        ({"name": "A 1"}, "top.name", "'A 1': must match the pattern ^[a-z]+$"),
-        ({"name": "a", "pair": [1.0]}, "top.pair.1", "missing"),
-        ({"name": "a", "part": -1}, "top.part", "-1: must be a table"),
-    ],
-)
-def test_no_message_is_a_sentence_of_pydantic(data: Any, path: str, message: str) -> None:
-    with pytest.raises(DocumentError) as caught:
-        documents.parse(Named, data, "x.toml", "top")
-    assert (caught.value.path, caught.value.message) == (path, message)
-
-
 def test_a_quoted_key_may_hold_dots() -> None:
     document = documents.replace({"sensors": {}}, {'sensors."port.n".noise': 0.1})
     assert document == {"sensors": {"port.n": {"noise": 0.1}}}
@@ -303,8 +255,8 @@ def test_a_quoted_key_may_hold_dots() -> None:
 @pytest.mark.parametrize(
     ("text", "remedy"),
     [
-        ("a.b = 1979-05-27", "a.b: 1979-05-27: a date"),
-        ("a = [1, 07:32:00]", "a.1: 07:32:00: a date"),
+        ("a.b = 1979-05-27", "a.b: 1979-05-27: a date: give"),
+        ("a = [1, 07:32:00]", "a.1: 07:32:00: a time: give"),
         ("a = " + "[" * 60 + "]" * 60, "nested deeper than 40"),
         ("a = " + "[" * 2000 + "]" * 2000, "nested deeper than 40"),
         ("a = " + "9" * 400, "a: an integer of 400 digits"),
@@ -341,43 +293,8 @@ def test_values_that_documents_hold(value: str, tmp_path: Path) -> None:
 
 
 def test_what_has_no_end_is_no_document() -> None:
-    with pytest.raises(DocumentError, match="it is no file"):
+    with pytest.raises(DocumentError, match="a device or a pipe"):
         documents.read("/dev/zero")
-
-
-@pytest.mark.parametrize(
-    ("model", "data", "path", "message"),
-    [
-        (Truth, {"vessel": "mariner", "manoeuvres": 2}, "truth.duration", "missing (s"),
-        (Truth, {"vessel": "mariner", "duration": 9.0}, "truth.manoeuvres", "missing"),
-        (
-            Truth,
-            {"vessel": "mariner", "manoeuvres": 1, "duration": 9.0},
-            "truth.manoeuvres",
-            "1: must be at least 2",
-        ),
-        (Truth, {"vessel": "mariner", "manoevres": 3}, "truth.manoevres", "did you mean 'manoeuvres'?"),
-        (Family, {"name": "a/b"}, "family.name", "'a/b'"),
-        (Family, {"name": "a", "perturb": [{"parameters": ["*"], "factor": [2, 1]}]}, "family.perturb.0.factor", "low"),
-        (Family, {"name": "a", "perturb": [{"factr": 2}]}, "family.perturb.0.factr", "did you mean 'factor'?"),
-        (Identify, {"parameters": []}, "identify.parameters", "must be a list of 1 or more entries (it has 0)"),
-        (Identify, {"parameters": ["*"], "horizon": -1}, "identify.horizon", "-1"),
-        (Family, 3, "family", "3"),
-    ],
-)
-def test_public_models_answer_as_a_file_does(model: type[Any], data: Any, path: str, message: str) -> None:
-    """From Python as from a document: one line with path and remedy, not pydantic's list."""
-    with pytest.raises(DocumentError) as caught:
-        model.model_validate(data)
-    assert caught.value.path == path
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_public_model_takes_what_is_right() -> None:
-    family = Family.model_validate({"name": "a", "base": "mariner"})
-    assert Family.model_validate(family) is family
-    assert Family.model_validate(family.model_dump()) == family
 
 
 def test_names_are_as_short_as_is_clear() -> None:
@@ -385,14 +302,3 @@ def test_names_are_as_short_as_is_clear() -> None:
     assert documents.short_names(one_letter) == ("inertia.m", "K_T.J", "R_0")
     two_of_a_name = ["hull.derivatives.Y_v", "port.D_p", "starboard.D_p"]
     assert documents.short_names(two_of_a_name) == ("Y_v", "port.D_p", "starboard.D_p")
-
-
-def test_match_takes_many_stars_as_soon_as_few() -> None:
-    assert documents.match("*" * 3000 + "x", ["hull.derivatives.N_v|v|" * 3]) == []
-    assert documents.match("*.*e*" * 20 + "x", ["hull.derivatives.N_v|v|" * 3]) == []
-    assert documents.match("***u*l***", ["hull"]) == ["hull"]
-
-
-def test_a_path_that_is_too_long_is_no_document() -> None:
-    with pytest.raises(DocumentError, match="cannot be read"):
-        documents.find("./" + "a" * 5000 + ".toml", "models")

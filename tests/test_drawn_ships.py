@@ -13,7 +13,6 @@ from shipid.engine.rollout import Trajectories, rollout
 from shipid.export.blocks import Precision
 from shipid.export.c_vessel import vessel_files
 from shipid.physics import TERMS
-from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import term_blocks
 from tests.drawn_ships import GRAVITY, drawn_ship, extreme_inputs
@@ -21,7 +20,7 @@ from tests.export.compiled import SANITIZERS, run_example
 
 SHIPS = [(27, 6), (47, 3), (14, 6), (3, 4), (5, 3)]  # seed and degrees of freedom; all terms but those of waves
 ALL = pytest.mark.parametrize(("seed", "dof"), SHIPS)
-NEAR = {"native": 1e-9, "torch": 1e-9, "single": 2e-3}  # of the greatest value of each channel
+NEAR = {"native": 1e-9, "torch": 1e-9}  # of the greatest value of each channel
 SAMPLES, STEPS = 9, 8
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
@@ -89,34 +88,3 @@ def test_gradients_agree_and_are_finite(seed: int, dof: int) -> None:
 def test_exported_equations_run_without_a_warning(seed: int, dof: int, tmp_path: Any) -> None:
     vessel = drawn_ship(seed, dof)
     run_example(vessel_files(vessel, "ship", "rk4", Precision()), tmp_path, *SANITIZERS)
-
-
-@pytest.mark.parametrize("kind", ["propeller", "controllable_pitch", "four_quadrant", "quadratic"])
-@pytest.mark.parametrize("u", [-0.4, 0.7])
-def test_no_force_has_a_step_where_a_screw_before_a_rudder_stops(kind: str, u: float) -> None:
-    """Nor where its pitch goes through zero; the floors of speeds leave a hundredth of U^2 / L."""
-    found = 0
-    for seed in range(60):
-        if found == 3:
-            break
-        vessel = drawn_ship(seed)
-        model, sizes = dynamics(vessel), vessel.document["particulars"]
-        screws = [path.rsplit(".", 1)[-1] for path, key, _ in term_blocks(vessel.document) if key == f"thruster.{kind}"]
-        if not any(block.get("behind") in screws for block in vessel.document["thruster"].values()):
-            continue
-        found += 1
-        screw = next(name for name in screws if name in {b.get("behind") for b in vessel.document["thruster"].values()})
-        given = {name: values[0] for part in extreme_inputs(vessel, 1, seed).values() for name, values in part.items()}
-        given |= {"u": u * sizes["U_0"], "v": 0.1 * sizes["U_0"], "r": 0.0, "V_c": 0.0}
-        for signal in ("n", "pitch") if kind == "controllable_pitch" else ("n",):
-            across = [
-                np.array(model.rates(
-                    [given[name] for name in model.state],
-                    *([{**given, f"{screw}.{signal}": value}[name] for name in names]
-                      for names in (model.memory, model.commands, model.environment)),
-                    list(vessel.parameters.values()), np.zeros(3),
-                ))[3:] for value in (-1e-9, 1e-9)
-            ]  # fmt: skip
-            unit = np.array([1.0, 1.0, 1 / sizes["L_pp"]]) * sizes["U_0"] ** 2 / sizes["L_pp"]
-            assert (np.abs(across[1] - across[0]).ravel() < 0.03 * unit).all(), (seed, signal)
-    assert found == 3

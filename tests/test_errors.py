@@ -20,17 +20,6 @@ def test_one_line_with_file_path_and_message(error: type[ShipidError]) -> None:
 
 
 @ERRORS
-def test_several_errors_of_a_document_are_a_line_each(error: type[ShipidError]) -> None:
-    others = [DataError("second\nof two", file="a.toml", path="y"), ShipidError("third")]
-    raised = error("first", file="a.toml", path="x", others=others)
-    lines = ["a.toml: x: first", "a.toml: y: second of two", "third"]
-    assert str(raised).split("\n") == lines
-    again = pickle.loads(pickle.dumps(raised))
-    assert str(again).split("\n") == lines
-    assert [type(one) for one in again.others] == [DataError, ShipidError]
-
-
-@ERRORS
 def test_errors_come_home_from_workers(error: type[ShipidError]) -> None:
     raised = pickle.loads(pickle.dumps(error("message", file="a.toml", path="hull.x")))
     assert type(raised) is error
@@ -41,22 +30,6 @@ def test_choices_suggest_what_is_close() -> None:
     assert choices("derivativs", ["derivatives", "crossflow"]) == "did you mean 'derivatives'?"
     assert choices("KIND", ["behind", "kind"]) == "did you mean 'kind'?"
     assert choices("X_h", ["X_hh", "x_H"]) == "did you mean 'x_H'?"
-
-
-@pytest.mark.parametrize(
-    ("typed", "hint"),
-    [
-        ("fr\u043em", "its '\u043e' is CYRILLIC SMALL LETTER O: did you mean 'from'?"),
-        ("\uff4d/s", "its '\uff4d' is FULLWIDTH LATIN SMALL LETTER M: did you mean 'm/s'?"),
-        ("from\u200b", r"its '\u200b' is ZERO WIDTH SPACE: did you mean 'from'?"),
-        ("\u03b4", "its '\u03b4' is GREEK SMALL LETTER DELTA: valid: frame, from, m/s"),
-        ("fr\u00f6m", "did you mean 'from'?"),
-    ],
-)
-def test_a_letter_that_looks_like_another_is_named(typed: str, hint: str) -> None:
-    """Before, `from` with another alphabet's o was an unknown key, and nobody sees why."""
-    assert choices(typed, ["from", "frame", "m/s"]) == hint
-    assert choices("\u03b4 [deg]", ["\u03b4 [grad]", "\u03b4 rudder"]) == "did you mean '\u03b4 [grad]'?"
 
 
 def test_choices_list_what_is_valid() -> None:

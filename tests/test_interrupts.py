@@ -40,19 +40,6 @@ def test_it_is_raised_at_the_end_of_the_block() -> None:
     assert steps == ["end of the block"]
 
 
-def test_without_it_nothing_is_raised() -> None:
-    with uninterrupted() as held:
-        pass
-    assert held == []
-
-
-def test_behind_the_block_it_is_raised_at_once() -> None:
-    with uninterrupted():
-        pass
-    with pytest.raises(KeyboardInterrupt):
-        press()
-
-
 def test_the_outermost_block_holds() -> None:
     reached: list[int] = []
 
@@ -77,16 +64,6 @@ def test_it_is_raised_where_the_block_failed() -> None:
     with pytest.raises(KeyboardInterrupt) as caught:
         work()
     assert isinstance(caught.value.__context__, ValueError)
-
-
-def test_an_error_passes_and_the_next_block_holds_again() -> None:
-    def fail() -> None:
-        with uninterrupted():
-            raise ValueError("wrong arguments")
-
-    with pytest.raises(ValueError, match="wrong arguments"):
-        fail()
-    test_it_is_raised_at_the_end_of_the_block()
 
 
 def test_another_thread_changes_no_handler(handler: object) -> None:
@@ -149,31 +126,3 @@ def test_a_double_press_breaks_off_no_end(inside: bool, monkeypatch: pytest.Monk
     with pytest.raises(KeyboardInterrupt):
         work()
     assert steps == ["ended", "later"]
-
-
-def test_a_double_press_breaks_off_no_end_that_is_held_back() -> None:
-    """The second one was passed over, and raised all the same where the block of the end was left."""
-    steps: list[str] = []
-
-    def work() -> None:
-        with recognised():
-            try:
-                press()
-            finally:
-                with uninterrupted():
-                    press()
-                    steps.append("end of the block")
-                steps.append("behind the block")
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert steps == ["end of the block", "behind the block"]
-
-
-def test_without_a_handler_in_python_it_is_raised() -> None:
-    before = signal.signal(signal.SIGINT, signal.SIG_DFL)
-    try:
-        with pytest.raises(KeyboardInterrupt), uninterrupted():
-            press()
-    finally:
-        signal.signal(signal.SIGINT, before)

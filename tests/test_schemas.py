@@ -169,20 +169,6 @@ def test_schemas_and_parser_agree_on_every_document(
     agree(kind, name, 12 if kind == "study" else 40, 7, models, validators)
 
 
-def test_names_of_coefficients_and_tables_in_files(validators: dict[str, Any]) -> None:
-    document = document_of("vessel", "gunnerus-28.9")
-    for name, right in (("Y_v|r|", True), ("Y_vx", False), ("Q_v", False), ("Y_vdot", False)):
-        one = copy.deepcopy(document)
-        one["hull"]["derivatives"][name] = 1.0
-        assert validators["vessel"].is_valid(one) == right, name
-    patch = {"base": "mariner", "set": {"inertia.m": 1e7}}
-    assert validators["vessel"].is_valid(patch)
-    assert not validators["vessel"].is_valid({**patch, "dof": 3}), "a patch is no vessel"
-    assert not validators["vessel"].is_valid({"name": "nothing else"})
-    table = document_of("vessel", "gunnerus-28.9-6dof")
-    assert any(isinstance(block.get("table"), str) for block in table["waves"].values() if isinstance(block, dict))
-
-
 def test_a_draft_names_the_schema_beside_it(tmp_path: Path) -> None:
     """The path is relative, so that folder, document and schema travel together."""
     file = tmp_path / "new" / "ship.toml"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-import dataclasses
 import json
 import os
 import re
@@ -52,48 +50,6 @@ def test_public_names_load() -> None:
     with pytest.raises(AttributeError, match="public names: "):
         _ = shipid.nothing
     assert np.isfinite(len(shipid.__all__))
-
-
-ARRAYS = re.compile(r"Array|DataFrame|Windows|Instants|Dataset|Corrector|Bands|\bCase\b|Journal")
-
-
-def test_what_holds_arrays_or_tables_is_compared_by_identity(tiny_run: Path) -> None:
-    """`==` of a dataset read twice, or of two predictors of one file, ended in NumPy's error about its truth value."""
-    for kind in (getattr(shipid, name) for name in shipid.__all__):
-        if dataclasses.is_dataclass(kind) and any(ARRAYS.search(str(one.type)) for one in dataclasses.fields(kind)):
-            assert (kind.__eq__, kind.__hash__) == (object.__eq__, object.__hash__), kind
-    one, same = (shipid.read_dataset(tiny_run / "dataset.parquet") for _ in range(2))
-    assert one != same
-    assert len({one, same, one}) == 2
-
-
-def test_what_a_notebook_shows_of_an_object_is_short(tiny_run: Path) -> None:
-    """The last line of a cell printed up to 275,000 characters, such as every array of the windows."""
-    file = next((tiny_run / "cells").iterdir())
-    windows = shipid.cut_windows(shipid.read_dataset(tiny_run / "dataset.parquet"), horizon=10, step=1.0)
-    shown = (
-        windows,
-        windows.instants(),
-        shipid.Predictor.load(file),
-        shipid.read_plan("quick"),
-        shipid.load_vessel("otter"),
-    )
-    for one in shown:
-        assert repr(one).startswith(f"{type(one).__name__}(")
-        assert len(repr(one)) < 400, one
-
-
-def test_names_are_listed_while_typing() -> None:
-    """What `dir` lists, what is imported on first use and what a type checker sees are the same names."""
-    assert set(shipid.__all__) <= set(dir(shipid))
-    tree = ast.parse(Path(shipid.__file__).read_text(encoding="utf-8"))
-    (block,) = (node for node in tree.body if isinstance(node, ast.If))
-    typed = {(name.asname, node.module) for node in block.body for name in node.names}
-    assert typed == set(shipid._PUBLIC.items())
-
-
-def test_the_package_says_that_it_has_types() -> None:
-    assert (Path(shipid.__file__).parent / "py.typed").is_file()
 
 
 def test_the_library_says_nothing_unasked() -> None:

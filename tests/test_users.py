@@ -12,7 +12,7 @@ from shipid.errors import ShipidError
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.method import fit_all
 from shipid.physics import TERMS
-from shipid.users import begins_at, of_users, place_of, placed, written
+from shipid.users import of_users, place_of, placed, written
 
 
 class Called:
@@ -36,13 +36,6 @@ def test_functions_and_classes_of_a_user_are_known_in_any_dress() -> None:
     assert not any(map(of_users, (str.upper, np.ndarray.sum)))
     assert written(partial(plain)) is plain
     assert written(Called()) is Called
-
-
-def test_a_function_has_a_first_line() -> None:
-    assert begins_at(plain) == begins_at(partial(plain)) == f" in {__file__}, line {BEGIN}"
-    assert begins_at(fit_all) == ""
-    assert begins_at(Called) == ""
-    assert begins_at(str.upper) == ""
 
 
 @pytest.mark.parametrize("kind", [plain, Called])

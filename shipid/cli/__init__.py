@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import os
 import sys
 from collections.abc import Callable, Collection, Sequence
 from typing import Annotated, Any
@@ -35,21 +34,16 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 NAMELESS = {  # errors of the system that name no file -> what helps
     errno.EAGAIN: "this user has too many processes and threads: end some, raise `ulimit -u`, or take fewer --workers",
     errno.EMFILE: "raise `ulimit -n`",
-    errno.ENOENT: "set TMPDIR to a folder that can be written",
+    errno.ENOENT: "change to a working folder that is there, and set TMPDIR to a folder that can be written",
 }
-REMOVED = "the working folder was removed: change to another one"
 GROUPS = {"vessel": vessel.app, "data": data.app, "study": study.app}
 
 
 def main() -> None:
     """Run the command line: an error that the user can correct is one line, never a traceback."""
     try:
-        _check_umask()
         _check_utf_8(sys.argv[1:])
         _named(sys.argv[1:])()
-    except ShipidError as error:
-        sys.stderr.write(f"error: {error}\n")
-        sys.exit(1)
     except BrokenPipeError:
         sys.exit(141)
     except KeyboardInterrupt:
@@ -59,47 +53,29 @@ def main() -> None:
         if isinstance(getattr(end.__context__, "__cause__", None), KeyboardInterrupt):  # Typer ends without a word
             sys.stderr.write("interrupted\n")
         raise
-    except MemoryError:
-        sys.stderr.write("error: out of memory: longer steps, fewer runs, members or --workers take less\n")
-        sys.exit(1)
-    except ImportError as error:  # a compiled package for which memory is short, or of another system
-        if not str(error.path).endswith((".so", ".pyd")):
+    except Exception as error:
+        line = error_line(error)
+        if line is None:
             raise
-        sys.stderr.write(
-            f"error: {error.path}: cannot be loaded ({error.msg}): raise `ulimit -v`, or install it anew\n"
-        )
+        sys.stderr.write(f"error: {line}\n")
         sys.exit(1)
-    except RuntimeError as error:
-        if "start new thread" not in str(error):
-            raise
-        sys.stderr.write(f"error: system: {error}: {NAMELESS[errno.EAGAIN]}\n")
-        sys.exit(1)
-    except OSError as error:  # a full disk, a folder that is a file, a place where one may not write
+
+
+def error_line(error: Exception) -> str | None:
+    """What went wrong and what helps, for an error that the user can correct; None for a fault of shipid."""
+    if isinstance(error, ShipidError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "out of memory: longer steps, fewer runs, members or --workers take less"
+    if isinstance(error, ImportError) and str(error.path).endswith((".so", ".pyd")):  # memory is short, or foreign code
+        return f"{error.path}: cannot be loaded ({error.msg}): raise `ulimit -v`, or install it anew"
+    if isinstance(error, RuntimeError) and "start new thread" in str(error):
+        return f"system: {error}: {NAMELESS[errno.EAGAIN]}"
+    if isinstance(error, OSError):  # a full disk, a folder that is a file, a place where one may not write
         words = error.strerror or str(error)
-        if not error.filename and error.errno in NAMELESS:
-            lost = error.errno == errno.ENOENT and not _is_anywhere()
-            words = f"{words}: {REMOVED if lost else NAMELESS[error.errno]}"
-        sys.stderr.write(f"error: {error.filename or 'system'}: {words}\n")
-        sys.exit(1)
-
-
-def _is_anywhere() -> bool:
-    """Whether the working folder of this process is still there."""
-    try:
-        return bool(os.getcwd())
-    except FileNotFoundError:
-        return False
-
-
-def _check_umask() -> None:
-    """Raise ShipidError where this user could not use the files and folders that this process makes."""
-    if not hasattr(os, "geteuid") or os.geteuid() == 0:
-        return
-    mask = os.umask(0o077)
-    os.umask(mask)
-    if mask & 0o700:
-        message = "keeps you from the files that you make yourself: set another one, such as `umask 022`"
-        raise ShipidError(message, path=f"umask {mask:04o}")
+        remedy = NAMELESS.get(error.errno or 0) if not error.filename else None
+        return f"{error.filename or 'system'}: {words}" + (f": {remedy}" if remedy else "")
+    return None
 
 
 def _check_utf_8(arguments: Sequence[str]) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from shipid.cli.terminal import show
+from shipid.cli.terminal import digits, show, table
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -44,6 +44,28 @@ class Answer:
             self.contents[name] = rows.to_dict("records") if hasattr(rows, "to_dict") else [dict(row) for row in rows]
         elif shown is not None:
             show(shown)
+
+    def records(
+        self,
+        name: str,
+        rows: DataFrame | Sequence[Mapping[Any, Any]],
+        heads: Mapping[str, str] | None = None,
+        formats: Mapping[str, Callable[[Any], str]] | None = None,
+    ) -> None:
+        """Print dicts or rows of a frame, if there are any, as a table; programs get all of their columns.
+
+        heads : key -> heading of the columns to print; default: all, headed by their keys. formats : key -> how its
+        values are written; default: floats with four digits.
+        """
+        records: Any = rows.to_dict("records") if hasattr(rows, "to_dict") else rows
+        heads = heads or {key: key for record in records[:1] for key in record}
+        formats = dict.fromkeys(heads, _cell) | dict(formats or {})
+        cells = [[formats[key](record[key]) for key in heads] for record in records]
+        self.rows(name, rows, table(list(heads.values()), cells) if cells else None)
+
+
+def _cell(value: Any) -> str:
+    return digits(value) if isinstance(value, float) else str(value)
 
 
 @contextmanager

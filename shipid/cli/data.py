@@ -12,11 +12,12 @@ from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import beginning, bundled_or_file, files
 from shipid.cli.options import MappingName
 from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import criterion_table, measure_table, reading, table
+from shipid.cli.terminal import criterion_table, measure_table, steps, table
 from shipid.errors import ShipidError
 from shipid.units import percent, plural
 
 if TYPE_CHECKING:
+    from shipid.data.dataset import Dataset
     from shipid.logs.guess.pose import Frame
 
 app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
@@ -90,18 +91,23 @@ def data_import(
     check_output(out, [source, Path(mapping)], "--out")
     if source.is_dir():
         check_output(out, source.glob("*"), "--out")
-    with reading(source) as progress:
-        dataset = import_log(declared, source, without=without or (), progress=progress)
+    with steps() as say:
+        dataset = import_log(
+            declared,
+            source,
+            without=without or (),
+            progress=lambda share: say(f"{source.name}: {percent(share)} read"),
+        )
     file = write_dataset(dataset, out)
     repairs = dataset.metadata.get("repairs", [])
     with answering(as_json) as answer:
-        rows = ((r["kind"], r["column"], str(r["count"]), r["note"]) for r in repairs)
-        shown = table(["repair", "column", "count", "what was done"], rows)
-        answer.rows("repairs", repairs, shown if repairs else None)
-        counts = {"rows": len(dataset.frame), "runs": len(dataset.runs)}
-        answer.say(
-            f"{counts['rows']} rows in {counts['runs']} {plural(counts['runs'], 'run')} -> {file}", file=file, **counts
-        )
+        answer.records("repairs", repairs)
+        _say_size(answer, dataset, file)
+
+
+def _say_size(answer: Answer, dataset: Dataset, file: Path) -> None:
+    rows, runs = len(dataset.frame), len(dataset.runs)
+    answer.say(f"{rows} rows in {runs} {plural(runs, 'run')} -> {file}", file=file, rows=rows, runs=runs)
 
 
 def _draft(
@@ -125,23 +131,19 @@ def _draft(
         {"column": c.name, "from": c.source, "unit": c.unit, "sure": c.confidence, "why": c.evidence}
         for c in guessed.columns
     ]
-    shown = ((c.name, c.source, c.unit, percent(c.confidence), c.evidence) for c in guessed.columns)
-    answer.rows("columns", columns, table(["column", "from", "unit", "sure", "why"], shown))
+    answer.records("columns", columns, formats={"sure": percent})
     findings = [{"finding": f.kind, "sure": f.confidence, "what": f.sentence} for f in guessed.findings]
-    lines = ((f.kind, percent(f.confidence), f.sentence) for f in guessed.findings)
-    answer.rows("findings", findings, table(["finding", "sure", "what"], lines) if findings else None)
+    answer.records("findings", findings, formats={"sure": percent})
     source = guessed.source
     if source.pattern is not None:
         count = f"{source.held} runs" if source.parts else "as many runs"
         files = f"{len(source.files)} {plural(len(source.files), 'file')}"
         sentence = f"{files} {source.pattern!r}: one source of {count}"
         answer.say(sentence, files=len(source.files), pattern=source.pattern)
-    left = [{"left out": name, "because": why} for name, why in source.skipped.items()]
-    answer.rows("left_out", left, table(["left out", "because"], source.skipped.items()) if left else None)
+    answer.records("left_out", [{"left out": name, "because": why} for name, why in source.skipped.items()])
     notes = [f"note: {note}" for note in guessed.sniffed.notes]
     answer.say("\n".join(notes), notes=guessed.sniffed.notes)
-    unused = [{"not used": name, "because": why} for name, why in guessed.unused.items()]
-    answer.rows("unused", unused, table(["not used", "because"], guessed.unused.items()) if unused else None)
+    answer.records("unused", [{"not used": name, "because": why} for name, why in guessed.unused.items()])
     questions = [question.sentence for question in guessed.questions]
     answer.say("\n".join(f"? {question}" for question in questions), questions=questions)
     faults = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(NOT_YET)]
@@ -172,11 +174,8 @@ def data_segment(
     segments = segment_log(declared, log or fetch(mapping))
     write_new(segments_text(segments, unit), file)
     with answering(as_json) as answer:
-        answer.rows(
-            "segments",
-            [{"run": s.run, "start": s.start, "end": s.end} for s in segments],
-            table(["run", "start", "end"], ((s.run, moment(s.start, unit), moment(s.end, unit)) for s in segments)),
-        )
+        rows = [{"run": one.run, "start": one.start, "end": one.end} for one in segments]
+        answer.records("segments", rows, formats=dict.fromkeys(("start", "end"), lambda time: moment(time, unit)))
         answer.say(f"{len(segments)} segments -> {file}", file=file)
 
 
@@ -201,10 +200,7 @@ def data_join(
     file = write_dataset(joined, out)
     with answering(as_json) as answer:
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
-        counts = {"rows": len(joined.frame), "runs": len(joined.runs)}
-        answer.say(
-            f"{counts['rows']} rows in {counts['runs']} {plural(counts['runs'], 'run')} -> {file}", file=file, **counts
-        )
+        _say_size(answer, joined, file)
 
 
 @app.command("check")
@@ -246,13 +242,12 @@ def data_check(
             page = write_checks(check_content(dataset.stem, log, checks), html)
             answer.say(f"plots: {page}", page=page)
         counts = (
-            (str(name), str(len(group)), str(int((~group["ok"].astype(bool)).sum())))
-            for name, group in checks.groupby("check", sort=False)
+            (name, len(group), (~group["ok"].astype(bool)).sum()) for name, group in checks.groupby("check", sort=False)
         )
         answer.rows("checks", checks, table(["check", "runs", "failed"], counts))
         failed = int((~ok).sum())
         if failed:
-            rows = ((str(r.run), str(r.check), str(r.sentence)) for r in checks[~ok].itertuples())
+            rows = checks.loc[~ok, ["run", "check", "sentence"]].to_numpy()
             answer.rows("failed", checks[~ok], table(["run", "failed", "what to look at"], rows))
         answer.say(f"{len(checks) - failed} of {len(checks)} checks passed", passed=len(checks) - failed)
         notes = nothing_varies(log, log.runs)
@@ -284,8 +279,7 @@ def data_measures(
     with answering(as_json) as answer:
         answer.rows("measures", measures, measure_table(measures, ["run", "kind"]) if measures else None)
         answer.rows("criteria", criteria, criterion_table(criteria, ["run"]) if criteria else None)
-        shown = table(["run", "not measured, because"], result.left.items())
-        answer.rows("left", left, shown if left else None)
+        answer.records("left", left)
         measured = result.measures["run"].nunique() if measures else 0
         answer.say(f"{measured} {plural(measured, 'run')} measured, {len(left)} not")
         if csv is not None:

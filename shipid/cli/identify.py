@@ -11,11 +11,11 @@ import typer
 
 from shipid.cli.answer import Answer, Json, answering
 from shipid.cli.completion import files
-from shipid.cli.options import VesselName, command_line, pairs, parsed, stem
+from shipid.cli.options import VesselName, assignments, command_line, parsed, stem
 from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import digits, ended_by, iterations, steps, table
+from shipid.cli.terminal import digits, ended_by, motion_errors, steps, table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import interval_text, listed, percent, plural
+from shipid.units import interval_text, listed, plural
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
@@ -109,8 +109,8 @@ def identify(
         "parameters": parameters and _paths(parameters),
         "fixed": fixed and _paths(fixed),
         "together": together and [_paths([group]) for group in together],
-        "prior": prior and pairs(prior, "--prior", "paths=0.3"),
-        "bounds": bounds and pairs(bounds, "--bounds", "paths=[0.5,2]"),
+        "prior": prior and assignments(prior, "--prior", "paths=0.3"),
+        "bounds": bounds and assignments(bounds, "--bounds", "paths=[0.5,2]"),
         "nuisance": nuisance and _widths(nuisance),
         "horizon": horizon,
     }
@@ -134,10 +134,11 @@ def identify(
         if structures is not None:
             _compare(ship, log, declared, names, how, band, file, html, dataset, answer)
             return
-        with ended_by(), iterations() as progress:
+        with ended_by(), steps("cutting runs") as say:
             outcome = run_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or (),
-                programme=design, band=band, progress=progress,
+                programme=design, band=band,
+                progress=lambda count, objective: say(f"iteration {count}, objective {objective:.6g}"),
             )  # fmt: skip
         _show_identified(outcome, answer)
         write_patch(outcome, file)
@@ -203,8 +204,6 @@ def _compare(
 
 def _show_structures(compared: Compared, answer: Answer) -> None:
     """Print errors on runs held out, standard manoeuvres, and errors by side."""
-    from math import degrees
-
     from shipid.identification.sides import HEADS, shown
 
     length = f"of {compared.ahead:g} s" if compared.ahead else "as long as the runs"
@@ -215,7 +214,8 @@ def _show_structures(compared: Compared, answer: Answer) -> None:
         [
             row["structure"],
             str(row["numbers"]),
-            *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"], row["more"])),
+            *motion_errors(row),
+            digits(row["more"]),
             interval_text(row["low"], row["high"]) if row["low"] == row["low"] else "-",
             digits(row["test"]),
             row["note"],
@@ -285,7 +285,7 @@ def _widths(given: list[str]) -> list[str] | dict[str, Any]:
     from shipid.identification.settings import WIDE
 
     named = {name: WIDE.get(name, 1.0) for name in given if "=" not in name}
-    return named | pairs([name for name in given if "=" in name], "--nuisance", "current=0.3")
+    return named | assignments([name for name in given if "=" in name], "--nuisance", "current=0.3")
 
 
 def _show_nuisances(outcome: Identified, answer: Answer) -> None:
@@ -323,13 +323,9 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     answer.say("\n".join(f"profile: {sentence}" for sentence in profiles), profiles=profiles)
     if outcome.programme is not None:
         answer.say("To run next, by information per hour:")
-        ranked = [
-            [row["manoeuvre"], *(f"{row[name]:.2f}" for name in ("hours", "gain", "per_hour")), row["narrows"],
-             percent(1 - row['after'] / row['before'])]
-            for row in outcome.programme.head(10).to_dict("records")
-        ]  # fmt: skip
-        heads = ["manoeuvre", "h", "gain [bit]", "bit/h", "narrows most", "by"]
-        answer.rows("to_run_next", outcome.programme, table(heads, ranked))
+        heads = {"manoeuvre": "manoeuvre", "hours": "h", "gain": "gain [bit]", "per_hour": "bit/h"}
+        ranked = outcome.programme if answer.as_json else outcome.programme.head(10)
+        answer.records("to_run_next", ranked, heads | {"narrows": "narrows most"})
     answer.say(warnings=outcome.warnings)
     for warning in outcome.warnings:
         typer.echo(f"warning: {warning}", err=True)
@@ -372,16 +368,20 @@ def _show_estimates(outcome: Identified, answer: Answer) -> None:
 
 def _show_free_runs(outcome: Identified, answer: Answer) -> None:
     """Print errors of free runs, and of measured outputs, before the fit and after it."""
+    from shipid.identification.free_run import ALL
+
     answer.say(f"Free runs {f'of {outcome.ahead:g} s' if outcome.ahead else 'as long as the runs'}, root mean square:")
     heads = ["runs", "model", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
-    answer.rows("free_runs", outcome.errors, table(heads, _free_rows(outcome)))
+    sets = {"fit": f"{len(outcome.runs)} fitted", "test": f"{len(outcome.held_out)} held out"}
+    rows = [
+        [sets[row["set"]], row["model"], *motion_errors(row)]
+        for row in outcome.errors.to_dict("records")
+        if row["run"] == ALL
+    ]
+    answer.rows("free_runs", outcome.errors, table(heads, rows))
     if len(outcome.outputs):
-        levels = [
-            [row["output"], row["unit"], *(digits(row[name]) for name in ("measured", "before", "after"))]
-            for row in outcome.outputs.to_dict("records")
-        ]
-        heads = ["measured output", "unit", "rms", "error before", "after"]
-        answer.rows("outputs", outcome.outputs, table(heads, levels))
+        columns = {"output": "measured output", "unit": "unit", "measured": "rms", "before": "error before"}
+        answer.records("outputs", outcome.outputs, columns | {"after": "after"})
 
 
 def _show_manoeuvres(outcome: Identified, answer: Answer) -> None:
@@ -403,15 +403,3 @@ def _show_manoeuvres(outcome: Identified, answer: Answer) -> None:
         typer.echo(f"note: no {', '.join(titles)}: {note}", err=True)
     beyond = list(outcome.beyond)
     answer.say("\n".join(f"extrapolated: {sentence}" for sentence in beyond), extrapolated=beyond)
-
-
-def _free_rows(outcome: Identified) -> Iterator[list[str]]:
-    from math import degrees
-
-    from shipid.identification.free_run import ALL
-
-    for row in outcome.errors.to_dict("records"):
-        if row["run"] == ALL:
-            numbers = (row["u"], row["v"], degrees(row["r"]), row["position"])
-            named = {"fit": f"{len(outcome.runs)} fitted", "test": f"{len(outcome.held_out)} held out"}[row["set"]]
-            yield [named, row["model"], *(f"{value:.3g}" if value == value else "diverges" for value in numbers)]

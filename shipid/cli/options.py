@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import sys
 from pathlib import Path
@@ -32,36 +33,30 @@ Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler
 Device = Annotated[str, typer.Option(help="PyTorch device: cpu or cuda")]
 
 
+_ASSIGNMENT = re.compile(r"(.*?[^<>=])=(?!=)(.*)", re.DOTALL)  # not the sign of a comparison
+
+
 def parsed(changes: list[str] | None) -> dict[str, Any]:
     """Return path -> value of `path=value` texts; a value is read as TOML, or taken as text."""
+    return assignments(changes or [], "--set", "--set path=value, such as --set grid.N_D=[10,30]", text=True)
+
+
+def assignments(given: list[str], option: str, example: str, *, text: bool = False) -> dict[str, Any]:
+    """Return path -> value of `path=value` texts, the value TOML, or also text; paths may hold a comparison."""
     from shipid.document import check_values, loads
 
     result: dict[str, Any] = {}
-    for change in changes or []:
-        path, equals, text = change.partition("=")
-        if not equals or not path.strip():
-            raise DocumentError(f"{change!r}: write --set path=value, such as --set grid.N_D=[10,30]", path="--set")
-        try:
-            result[path.strip()] = loads(f"value = {text}")["value"]
-        except DocumentError:
-            result[path.strip()] = text
-        check_values(result, "--set")
-    return result
-
-
-def pairs(given: list[str], option: str, example: str) -> dict[str, Any]:
-    """`paths=value`, the value TOML; paths may hold a comparison."""
-    from shipid.document import loads
-
-    result = {}
     for pair in given:
-        path, equals, text = pair.rpartition("=")
+        match = _ASSIGNMENT.fullmatch(pair)
+        path = match[1].strip() if match else ""
         try:
-            if not equals or not path.strip():
-                raise ValueError
-            result[path.strip()] = loads(f"value = {text}")["value"]
-        except (ValueError, DocumentError):
-            raise DocumentError(f"{pair!r}: write {example}", path=option) from None
+            value = loads(f"value = {match[2]}")["value"] if match else None
+        except DocumentError:
+            value = match[2] if match and text else None
+        if not path or value is None:
+            raise DocumentError(f"{pair!r}: write {example}", path=option)
+        check_values({path: value}, option)
+        result[path] = value
     return result
 
 

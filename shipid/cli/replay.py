@@ -11,7 +11,7 @@ from shipid.cli.answer import Json, answering
 from shipid.cli.completion import files
 from shipid.cli.options import VesselName, command_line, stem
 from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import digits, table
+from shipid.cli.terminal import motion_errors, table
 from shipid.errors import ShipidError
 
 
@@ -32,8 +32,6 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Replay recorded runs on a vessel: from the measured state, with the recorded orders; errors, and a page."""
-    from math import degrees
-
     from shipid.data.dataset import read_dataset
     from shipid.data.windows import gaps_in_words
     from shipid.files import check_table, write_table
@@ -62,12 +60,7 @@ def replay(
     zero = unfelt(ship, log, settings, chosen)
     holes = gaps_in_words(log.select(chosen), step)
     late = late_commands(ship, log, chosen) if commands == "held" else None
-    rows = [
-        [row["run"], *(digits(value) for value in (row["u"], row["v"], degrees(row["r"]), row["position"]))]
-        if row["position"] == row["position"]
-        else [row["run"], "diverges", "", "", ""]
-        for row in replayed.errors.to_dict("records")
-    ]
+    rows = [[row["run"], *motion_errors(row)] for row in replayed.errors.to_dict("records")]
     timing = "; commands change between rows" if commands == "between" else ""
     content = ReplayContent(
         title=f"{ship.name}: recorded runs, replayed",

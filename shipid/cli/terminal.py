@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from shipid.errors import visible
-from shipid.units import length_text, percent
+from shipid.units import length_text
 
 if TYPE_CHECKING:
     from shipid.study.progress import Watch
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 
 SILENCE, LOOK = 15.0, 2.0  # s without a line before there is one; between looks at the searches on a terminal
-HANDLER = "command line"
-"""Name of the handler that writes log messages to standard error."""
 
 
 @dataclass(frozen=True)
@@ -90,33 +88,6 @@ def _width(text: str) -> int:
     return cell_len(text)
 
 
-@contextmanager
-def reading(log: Path) -> Iterator[Callable[[float], None]]:
-    """Give a function that says which share of a large log has been read (0 to 1), on standard error.
-
-    A terminal shows it in one line; elsewhere there is a line for every quarter.
-    """
-    last = [-1]
-    tty = sys.stderr.isatty()
-
-    def say(share: float) -> None:
-        step = int(100 * share) if tty else int(4 * share)
-        if step > last[0]:
-            last[0] = step
-            print(
-                f"{chr(13) if tty else ''}{log.name}: {percent(share)} read",
-                end="" if tty else "\n",
-                file=sys.stderr,
-                flush=True,
-            )
-
-    try:
-        yield say
-    finally:
-        if tty and last[0] >= 0:
-            print(file=sys.stderr)
-
-
 def show_reasons(choices: Iterable[Mapping[str, str]]) -> None:
     """Print choices, each with its path, value and reason why: a table on a terminal, else a line each."""
     if sys.stdout.isatty():
@@ -136,6 +107,12 @@ def digits(value: float) -> str:
     if abs(value) >= 1e6:  # a moment on a clock of dates
         return f"{value:.1f}"
     return "-" if value != value else f"{round(value, 4) + 0.0:.4g}"
+
+
+def motion_errors(row: Mapping[Any, Any]) -> list[str]:
+    """Errors of u, v [m/s], r [deg/s] and position [m] of a run; that it diverges, where it does."""
+    values = (row["u"], row["v"], math.degrees(row["r"]), row["position"])
+    return ["diverges" if value != value else digits(value) for value in values]
 
 
 def measure_table(rows: Iterable[Any], first: list[str]) -> Table:
@@ -186,48 +163,21 @@ def ended_by(interrupted: str = NOTHING) -> Iterator[None]:
 
 
 def counted(blocks: Iterable[Any], total: int, what: str = "members", interrupted: str = NOTHING) -> Iterator[Any]:
-    """Yield the blocks of rows unchanged; show how many of `total` rows are there, as a bar or, elsewhere, as lines.
+    """Yield the blocks of rows unchanged; show how many of `total` rows are there.
 
     interrupted : what Ctrl-C is answered with.
     """
-    with ended_by(interrupted):
-        if not sys.stderr.isatty():
-            yield from _said(blocks, total, what)
-            return
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=_console(stderr=True)) as progress:
-            task = progress.add_task(what, total=total)
-            for block in blocks:
-                progress.advance(task, len(block))
-                yield block
-
-
-def _said(blocks: Iterable[Any], total: int, what: str) -> Iterator[Any]:
-    """Yield the blocks; say every `SILENCE` seconds on standard error how many rows there are."""
-    import time
-
-    begun, count = time.monotonic(), 0
-
-    def say() -> None:
-        sys.stderr.write(f"{count} of {total} {what} after {time.monotonic() - begun:.0f} s\n")
-
-    with looking(say, SILENCE):
+    with ended_by(interrupted), steps() as show:
+        count = 0
+        show(f"{count} of {total} {what}")
         for block in blocks:
             count += len(block)
+            show(f"{count} of {total} {what}")
             yield block
 
 
 @contextmanager
-def iterations() -> Iterator[Any]:
-    """Give a function that `identify` calls after each iteration, to show how far it is."""
-    with steps("cutting runs") as show:
-        yield lambda count, objective: show(f"iteration {count}, objective {objective:.6g}")
-
-
-@contextmanager
-def steps(first: str = "") -> Iterator[Callable[[str], object]]:
+def steps(first: str = "") -> Iterator[Callable[[str], None]]:
     """Give a function that takes the step of a long calculation: shown on a terminal, else printed once if long."""
     if sys.stderr.isatty():
         with _console(stderr=True).status(first) as status:
@@ -358,12 +308,9 @@ def log_to_stderr(verbose: bool) -> None:
     import logging
 
     logger = logging.getLogger("shipid")
-    for before in [one for one in logger.handlers if one.name == HANDLER]:
-        logger.removeHandler(before)
     handler = logging.StreamHandler()
-    handler.name = HANDLER
     handler.setLevel(logging.DEBUG if verbose else logging.WARNING)
     handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
-    logger.addHandler(handler)
+    logger.handlers = [handler]
     if verbose:
         logger.setLevel(logging.DEBUG)

@@ -23,7 +23,7 @@ def vessel_list(as_json: Json = False) -> None:
 
     rows = [{"name": name, "vessel": read(file)["name"]} for name, file in bundled("models").items()]
     with answering(as_json) as answer:
-        answer.rows("vessels", rows, table(["name", "vessel"], (row.values() for row in rows)))
+        answer.records("vessels", rows)
 
 
 @app.command("show")
@@ -78,10 +78,6 @@ def vessel_new(
     shafts: Annotated[int | None, typer.Option(help="1 or 2; default: 1 with a rudder, else 2")] = None,
     propeller_diameter: Annotated[float | None, typer.Option(help="m; default: a guess")] = None,
     rudder_area: Annotated[float | None, typer.Option(help="m^2, of each rudder; default: a guess")] = None,
-    rudder_span: Annotated[float | None, typer.Option(help="m, its height; default: a guess")] = None,
-    rudder_rate: Annotated[
-        float | None, typer.Option(help="deg/s of steering gear or azimuth units; default: by SOLAS and scale")
-    ] = None,
     tunnel_thruster: Annotated[bool, typer.Option("--tunnel-thruster", help="there is one at the bow")] = False,
     scale: Annotated[
         float | None,
@@ -89,10 +85,7 @@ def vessel_new(
             help="of a model: ship length over model length; 1: a ship; default: that of a ship of 160 m if below 10 m"
         ),
     ] = None,
-    density: Annotated[float | None, typer.Option(help="kg/m^3 of the water; default: sea, fresh for a model")] = None,
     ship_type: Annotated[str, typer.Option(help="for the wind: cargo, tanker, research, ...")] = "cargo",
-    frontal_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
-    lateral_area: Annotated[float | None, typer.Option(help="m^2, to the wind; default: a guess")] = None,
     name: Annotated[str | None, typer.Option(help="for people; default: first guess and length")] = None,
     as_json: Json = False,
 ) -> None:
@@ -109,8 +102,8 @@ def vessel_new(
 
     check_values({"name": name or ""}, "vessel new")
     given = Particulars(
-        length, beam, draught, block, speed, propulsor, ship_type, frontal_area, lateral_area, rpm, shafts,
-        propeller_diameter, rudder_area, rudder_span, rudder_rate, tunnel_thruster, scale, density,
+        length, beam, draught, block, speed, propulsor, ship_type, rpm, shafts, propeller_diameter, rudder_area,
+        tunnel_thruster, scale,
     )  # fmt: skip
     guessed = first_guess(given, name or f"First guess, {length:g} m", str(out))
     write_text(out, with_schema(guessed.text, out, "vessel"))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import atexit
 import ctypes
-import errno
 import hashlib
 import logging
 import os
@@ -15,14 +14,13 @@ import signal
 import stat
 import subprocess
 import tempfile
-import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
-from shipid.errors import ShipidError, is_utf_8, visible
+from shipid.errors import ShipidError, visible
 from shipid.files import temporary_folder
 
 MOST_WORDS = 100_000  # characters of each output of a compiler
@@ -42,49 +40,25 @@ def run_compiler(arguments: Sequence[str], folder: Path | None = None, limit: fl
         that it leaves. Of what it prints the first `MOST_WORDS` characters are kept, so that none can fill the memory.
     """
     environment = os.environ | ({"TMPDIR": str(folder)} if folder else {})
-    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
-    try:
-        process = subprocess.Popen(
-            arguments, **pipes, text=True, errors="replace", env=environment, start_new_session=True
-        )
-    except OSError as error:
-        return f"cannot be started: {error.strerror}", ""
-    kept: list[list[str]] = [[], []]
-    readers = [
-        threading.Thread(target=_read, args=pair, daemon=True)
-        for pair in zip((process.stdout, process.stderr), kept, strict=True)
-    ]
-    try:
-        for reader in readers:
-            reader.start()
-        process.wait(timeout=limit)
-    except subprocess.TimeoutExpired:
-        return f"hangs: not done after {limit:g} s", ""
-    finally:
-        _end(process, readers)
-    printed, complaint = ("".join(parts) for parts in kept)
-    return (complaint.strip() or "it gave no reason") if process.returncode else None, printed
-
-
-def _read(pipe: IO[str], kept: list[str]) -> None:
-    """Read a pipe to its end; the first `MOST_WORDS` characters are kept."""
-    with pipe:
-        kept.append(pipe.read(MOST_WORDS))
-        while pipe.read(MOST_WORDS):
-            pass
-
-
-def _end(process: subprocess.Popen[str], readers: Sequence[threading.Thread]) -> None:
-    """End a process that still runs, and those that it started, which hold its pipes."""
-    if hasattr(os, "killpg"):
-        with suppress(OSError):  # all have ended
-            os.killpg(process.pid, signal.SIGKILL)
-    elif process.poll() is None:
-        process.kill()
-    process.wait()
-    for reader in readers:
-        if reader.is_alive():
-            reader.join(PROBE_LIMIT)  # not for ever: a process that left the group may hold the pipe
+    with tempfile.TemporaryFile(dir=folder) as printed, tempfile.TemporaryFile(dir=folder) as complaint:
+        try:
+            process = subprocess.Popen(
+                arguments, stdin=subprocess.DEVNULL, stdout=printed, stderr=complaint, env=environment, process_group=0
+            )
+            try:
+                process.wait(limit)
+            except subprocess.TimeoutExpired:
+                return f"hangs: not done after {limit:g} s", ""
+            finally:
+                with suppress(OSError):  # all have ended
+                    os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+        except OSError as error:
+            return f"cannot be started: {error.strerror}", ""
+        for stream in (printed, complaint):
+            stream.seek(0)
+        texts = [stream.read(MOST_WORDS).decode(errors="replace") for stream in (printed, complaint)]
+    return (texts[1].strip() or "it gave no reason") if process.returncode else None, texts[0]
 
 
 def build(command: Sequence[str], source: str, library: Path, limit: float = LIMIT) -> str | None:
@@ -140,48 +114,20 @@ def stranger(place: Path) -> str | None:
     """Why a file may be the work of another user, in words; None if only this user or the system can have written it.
 
     The file and its folder must belong to this user and be writable by no other. The folders above must belong to this
-    user or the system, and may be open to others only where nobody can rename what is another's (as in /tmp); a group
-    that is the user's alone is no other. FileNotFoundError if there is no such file.
+    user or the system, and may be open to others only where nobody can rename what is another's (as in /tmp).
+    FileNotFoundError if there is no such file.
     """
-    entry = os.lstat(place)
-    if not hasattr(os, "geteuid"):
-        return None
+    entry, user = os.lstat(place), os.geteuid()
     if not stat.S_ISREG(entry.st_mode):
         return f"{place} is no file"
-    user, trusted = os.geteuid(), {0, os.geteuid(), os.stat("/").st_uid}
-    for part in (place, place.parent):
-        status = os.stat(part)
-        if status.st_uid != user:
+    trusted = {0, user, os.stat("/").st_uid}
+    for part in (place, place.parent, *place.parent.resolve().parents):
+        status, own = os.stat(part), part in (place, place.parent)
+        if status.st_uid not in ({user} if own else trusted):
             return f"{part} belongs to another user"
-        if status.st_mode & 0o022:
+        if status.st_mode & (0o022 if own else 0o002) and (own or not status.st_mode & stat.S_ISVTX):
             return f"{part} can be written by other users"
-    for part in place.parent.resolve().parents:
-        status = os.stat(part)
-        if status.st_uid not in trusted:
-            return f"{part} belongs to another user"
-        if status.st_mode & stat.S_ISVTX:
-            continue
-        if status.st_mode & stat.S_IWOTH:
-            return f"{part} can be written by other users"
-        if status.st_mode & stat.S_IWGRP and not _is_own(status.st_gid, user):
-            return f"{part} can be written by its group: `chmod g-w` ends that"
     return None
-
-
-@cache
-def _is_own(group: int, user: int) -> bool:
-    """Whether a group is the system's or the user's own, of the same number or name and without another member."""
-    import grp
-    import pwd
-
-    if group == 0:
-        return True
-    name, known, members = "", "", set[str]()
-    with suppress(KeyError):  # a number without a name
-        name = pwd.getpwuid(user).pw_name
-    with suppress(KeyError):
-        known, members = grp.getgrgid(group).gr_name, set(grp.getgrgid(group).gr_mem)
-    return (group == user or (known != "" and known == name)) and members <= {name}
 
 
 @cache
@@ -195,9 +141,11 @@ def folder(wanted: str, probe: bytes) -> Path | None:
     reasons: list[str] = []
     for kept in (Path(wanted) / "shipid", None):
         try:
-            if not is_utf_8(str(kept or tempfile.gettempdir())):  # threadpoolctl ends where it meets such a library
-                raise OSError(errno.EILSEQ, "a name that is not UTF-8")
-            place = _passing() if kept is None else _kept(kept)
+            if kept is None:
+                temporary = tempfile.TemporaryDirectory(prefix="shipid-")
+                atexit.register(temporary.cleanup)
+            place = kept or Path(temporary.name)
+            place.mkdir(0o700, parents=True, exist_ok=True)
             with temporary_folder(place) as inside:
                 trial = inside / "probe.so"
                 trial.write_bytes(probe)
@@ -215,18 +163,3 @@ def folder(wanted: str, probe: bytes) -> Path | None:
         reasons.append(reason)
     log.warning("engine 'native' is not used, others are slower: %s", visible(reasons[-1]))
     return None
-
-
-def _kept(place: Path) -> Path:
-    """The folder at a place, made if it is absent, closed to others if it is this user's."""
-    place.mkdir(parents=True, exist_ok=True)
-    if hasattr(os, "geteuid") and place.stat().st_uid == os.geteuid():
-        place.chmod(0o700)
-    return place
-
-
-def _passing() -> Path:
-    """A temporary folder that is removed when this process ends."""
-    temporary = tempfile.TemporaryDirectory(prefix="shipid-")
-    atexit.register(temporary.cleanup)
-    return Path(temporary.name)

@@ -119,7 +119,7 @@ def candidates(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | No
 
 def _excitations(vessel: Vessel, speed: float, length: float, limits: Limits) -> Iterator[Candidate]:
     """A speed run and a multisine at one approach speed [m/s], with the largest amplitudes within the limits."""
-    n_rpm, passing = shaft_speed(Controls.of(vessel), speed) / RPM, length / speed
+    n_rpm, passing = shaft_speed(Controls(vessel), speed) / RPM, length / speed
     swing = min(SWING * n_rpm, limits.n_rpm - n_rpm)
     if swing <= 0:
         return
@@ -137,8 +137,8 @@ def allowed(manoeuvre: Approached, limits: Limits) -> bool:
 
     The rate limits apply to excitations only: in other manoeuvres the actuator model limits the rates.
     """
-    shaft = manoeuvre.greatest_shaft <= limits.n_rpm * (1 + 1e-9)
-    return shaft and manoeuvre.greatest_helm <= limits.angle_deg * (1 + 1e-9)
+    helm, shaft = manoeuvre.greatest_orders
+    return shaft <= limits.n_rpm * (1 + 1e-9) and helm <= limits.angle_deg * (1 + 1e-9)
 
 
 def informed(

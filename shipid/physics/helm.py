@@ -13,9 +13,8 @@ from shipid.physics.signals import steers, units
 if TYPE_CHECKING:
     from casadi import SX
 
-DAMPING = 1.0  # of station keeping: critical
-INTEGRAL = 0.1  # of station keeping: integral gain over omega x proportional gain (Fossen 2021, sec. 15.3)
-SMALL = 1e-9  # (rev/s)^4: below it a thrust has no direction
+DAMPING = 1.0  # of course keeping: critical
+INTEGRAL = 0.1  # of course keeping: integral gain over omega x proportional gain (Fossen 2021, sec. 15.3)
 
 Named = Mapping[str, Any]
 
@@ -126,67 +125,3 @@ def _wrapped(angle: SX) -> SX:
 def _steered(commands: Iterable[str], inputs: Named, share: SX) -> Named:
     """Order of each command: what it has with the largest helm, angles that steer times the share of that helm."""
     return {name: inputs[name] * share if steers(name) else inputs[name] for name in commands}
-
-
-@dataclass(frozen=True)
-class Unit:
-    """An azimuth unit in thrust allocation; its thrust is a constant times n^2 (cos alpha, sin alpha).
-
-    along, across : n^2 cos(alpha) and n^2 sin(alpha) [rev^2/s^2] per demanded acceleration (surge, sway, yaw).
-    bias : direction (along, across) of the bias thrust, by which the units push against each other.
-    """
-
-    name: str
-    along: tuple[float, float, float]
-    across: tuple[float, float, float]
-    bias: tuple[float, float]
-
-
-@lru_cache
-def station_keeping(units: tuple[Unit, ...], idle: tuple[str, ...]) -> Helmsman:
-    """Station keeping: a PID law for the acceleration, allocated to azimuth units; `idle` commands stay 0.
-
-    a = omega^2 (e + omega / 10 integral(e)) - 2 omega nu, e the error of position and heading in body axes. Inputs:
-    `north`, `east` [m] and `heading` [rad] to hold; `omega` [rad/s], the natural frequency; `n_bias` [rev/s], the shaft
-    speed of the bias thrust, which keeps the units from reversing; `n_max` [rev/s].
-    """
-
-    def error(signals: Named, inputs: Named) -> tuple[SX, SX, SX]:
-        turn = _wrapped(inputs["heading"] - signals["psi"])
-        return inputs["north"] - signals["north"], inputs["east"] - signals["east"], turn
-
-    def orders(signals: Named, inputs: Named, memory: Named) -> Named:
-        omega, c, s = inputs["omega"], ca.cos(signals["psi"]), ca.sin(signals["psi"])
-        now = zip(error(signals, inputs), ("north", "east", "heading"), strict=True)
-        north, east, yaw = (omega**2 * (e + INTEGRAL * omega * memory[name]) for e, name in now)
-        asked = (c * north + s * east, c * east - s * north, yaw)
-        damped = [a - 2 * DAMPING * omega * signals[name] for a, name in zip(asked, "uvr", strict=True)]
-        result: dict[str, Any] = dict.fromkeys(idle, 0.0)
-        for unit in units:
-            n, alpha = _thrust(unit, damped, inputs)
-            result |= {f"{unit.name}.n": n, f"{unit.name}.alpha": alpha}
-        return result
-
-    def advance(signals: Named, inputs: Named, memory: Named, dt: Any) -> Named:
-        now = error(signals, inputs)
-        return {name: value + e * dt for (name, value), e in zip(memory.items(), now, strict=True)}
-
-    inputs = {"north": "m", "east": "m", "heading": "rad", "omega": "rad/s", "n_bias": "rev/s", "n_max": "rev/s"}
-    memory = {"north": 0.0, "east": 0.0, "heading": 0.0}
-    return Helmsman("station keeping", inputs, memory, orders=orders, advance=advance)
-
-
-def _thrust(unit: Unit, acceleration: list[SX], inputs: Named) -> tuple[SX, SX]:
-    """Shaft speed [rev/s] and angle [rad] of a unit.
-
-    The angle is measured from the bias direction, so that its discontinuity is opposite to the bias.
-    """
-    b_x, b_y = unit.bias
-    along, across = (
-        sum(share * a for share, a in zip(shares, acceleration, strict=True)) + b * inputs["n_bias"] ** 2
-        for shares, b in ((unit.along, b_x), (unit.across, b_y))
-    )
-    with_bias, off_bias = b_x * along + b_y * across, b_x * across - b_y * along
-    square = along**2 + across**2
-    turned = ca.atan2(off_bias, ca.if_else(square < SMALL, 1, with_bias))
-    return ca.fmin((square + SMALL) ** 0.25, inputs["n_max"]), ca.atan2(b_y, b_x) + turned

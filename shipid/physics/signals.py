@@ -280,6 +280,7 @@ SIGNALS: dict[str, Signal] = {
     ),
 }
 """Name -> row. Columns of datasets and messages list signals in the order of this table."""
+_UNKNOWN = Signal("derived", "-", "")
 
 
 def signal_of(name: str) -> str:
@@ -290,6 +291,11 @@ def signal_of(name: str) -> str:
 def row_of(name: str) -> Signal | None:
     """Row of a command (`port.n`) or of another signal (`u`); None for an unknown name."""
     return SIGNALS.get(signal_of(name))
+
+
+def _row(name: str) -> Signal:
+    """Row of a command or another signal; one without any property for an unknown name."""
+    return row_of(name) or _UNKNOWN
 
 
 def named(role: Role) -> dict[str, Signal]:
@@ -327,20 +333,18 @@ def _is_of_component(name: str, role: Role) -> bool:
 
 def is_shaft(command: str) -> bool:
     """Whether a command is a shaft speed, such as `port.n`."""
-    row = row_of(command)
-    return row is not None and row.shaft
+    return _row(command).shaft
 
 
 def steers(command: str) -> bool:
     """Whether a command is an angle that turns the ship, such as `port.alpha` or `rudder.delta`."""
-    row = row_of(command)
-    return row is not None and row.turns != 0
+    return _row(command).turns != 0
 
 
 def turns_round(command: str) -> bool:
     """Whether a command is an angle of a unit that may turn all round, such as `port.alpha`; a rudder does not."""
-    row = row_of(command)
-    return row is not None and row.angle and row.reach[1] - row.reach[0] >= 2 * math.pi
+    row = _row(command)
+    return row.angle and row.reach[1] - row.reach[0] >= 2 * math.pi
 
 
 def wraps(name: str) -> bool:
@@ -350,20 +354,17 @@ def wraps(name: str) -> bool:
 
 def orders_thrust(name: str) -> bool:
     """Whether the last part of a name is a command that does not steer: a shaft speed or a pitch."""
-    row = row_of(name)
-    return row is not None and row.role == "command" and row.turns == 0
+    return _row(name).role == "command" and _row(name).turns == 0
 
 
 def neutral(command: str) -> float:
     """Default value [SI] of a command: helm amidships, shaft stopped, service pitch."""
-    row = row_of(command)
-    return 0.0 if row is None else row.neutral
+    return _row(command).neutral
 
 
 def mirror_sign(name: str) -> float:
     """Factor of a signal in the port-starboard mirror, 1 or -1."""
-    row = row_of(name)
-    return 1.0 if row is None else float(row.mirror)
+    return float(_row(name).mirror)
 
 
 def read_unit(name: str) -> tuple[str, float]:

@@ -1,4 +1,4 @@
-"""Approach of a manoeuvre: which commands drive and steer a ship, its steady speed, and thrust allocation.
+"""Approach of a manoeuvre: which commands drive and steer a ship, and its steady speed.
 
 All results come from numerical evaluation of the vessel's equations, so they hold for any vessel.
 """
@@ -6,9 +6,8 @@ All results come from numerical evaluation of the vessel's equations, so they ho
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +15,11 @@ from numpy.typing import NDArray
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
-from shipid.physics import TERMS
-from shipid.physics.helm import Unit, course_keeping
+from shipid.physics.helm import course_keeping
 from shipid.physics.signals import ACTUAL, is_shaft, neutral, steers
 from shipid.units import GRAVITY, listed
-from shipid.users import begins_at
 from shipid.vessel.dynamics import HELM, Dynamics, dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.schema import term_blocks
 
 Array = NDArray[np.float64]
 
@@ -41,7 +37,6 @@ KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
 LENGTH, FASTEST = 100.0, 100.0  # m, of a ship whose document does not say; m/s
 REMEDY = 'let a helmsman hold the course (approach = "helmsman"), or start from rest (approach = "rest")'
 SWINGING = {"w", "p", "q"}  # velocities that nothing but damping ends
-WORST_CONDITION = 1e5  # of the thrusts that the accelerations ask for
 
 
 @dataclass(frozen=True)
@@ -57,13 +52,6 @@ class Controls:
 
     vessel: Vessel
 
-    @classmethod
-    def of(cls, vessel: Vessel) -> Controls:
-        """Controls with their effects computed; DocumentError for a vessel that no command drives ahead or turns."""
-        controls = cls(vessel)
-        _ = controls.helm
-        return controls
-
     @property
     def commands(self) -> tuple[str, ...]:
         """Names of all commands of the vessel."""
@@ -75,10 +63,7 @@ class Controls:
         if not self._driving[0]:
             message = f"no command drives {self.vessel.name} ahead: a manoeuvre needs a shaft speed `n`"
             if self.commands:
-                message += (
-                    ", in the manoeuvres of a study ([[truth.manoeuvre]]) the kinds `turning` and `steps` order each "
-                    "command by itself"
-                )
+                message += ", the kinds `turning` and `steps` of a [[truth.manoeuvre]] order each command by itself"
             raise DocumentError(message, file=self.vessel.file, path="thruster")
         return self._driving[0]
 
@@ -94,8 +79,8 @@ class Controls:
             what = ": a manoeuvre needs that of a rudder or an azimuth unit"
             if self.differential:
                 what = (
-                    ", its shafts do: in the manoeuvres of a study ([[truth.manoeuvre]]) the kinds `turning` and "
-                    f"`steps` order each one ({self.drives[0]}_rpm)"
+                    ", it steers by its shafts: the kinds `turning` and `steps` of a [[truth.manoeuvre]] order each "
+                    f"one ({self.drives[0]}_rpm)"
                 )
             message = f"no angle command turns {self.vessel.name}{what}"
             raise DocumentError(message, file=self.vessel.file, path="thruster")
@@ -115,7 +100,7 @@ class Controls:
             weather = ", ".join(dynamics(vessel).environment)
             zeros = f" and {weather} 0, as where none is given" if weather else ""
             message = f"the forces on {vessel.name} are not finite at rest, with commands neutral{zeros}"
-            raise DocumentError(f"{message}: mend {_not_finite(vessel)} or its numbers", file=vessel.file)
+            raise DocumentError(f"{message}: mend its terms or their numbers", file=vessel.file)
         ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in self.commands if is_shaft(name)}
         drives = tuple(name for name, rates in ahead.items() if rates[0] - idle[0] > NOTHING)
         yaw = [ahead[name][2] - idle[2] for name in drives]
@@ -155,15 +140,6 @@ class Controls:
             name: angles.get(name, n if name in self.drives else np.full(len(n), neutral(name)))
             for name in self.commands
         }
-
-
-def _not_finite(vessel: Vessel) -> str:
-    """The term without which the forces at rest are finite, with the place of a user's; `the term` for none alone."""
-    for path, key, _ in term_blocks(vessel.document):
-        with suppress(DocumentError):  # others are behind it
-            if np.isfinite(acceleration(vessel.with_values({f"{path}.off": True}), 0.0, {})).all():
-                return f"{path}{begins_at(TERMS[key].function)}"
-    return "the term"
 
 
 def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Array:
@@ -246,30 +222,7 @@ def steady(controls: Controls, n: Array, *, step: float, method: Method, engine:
     ShipidError : it diverges, is steady neither after an hour nor after 200 ship lengths, or turns with the helm
         amidships (`NotStraight`).
     """
-    asked = _Asked(
-        dynamics(controls.vessel), tuple(controls.vessel.parameters.values()), _length(controls.vessel), controls
-    )
-    known = _steady(asked, tuple(map(float, n)), step, method, engine, held)
-    copies = (
-        {name: values.copy() for name, values in part.items()} for part in (known.state, known.memory, known.helm)
-    )
-    return Approach(*copies)
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """Controls that are equal where the equations, their numbers and the length [m] are."""
-
-    model: Dynamics
-    values: tuple[float, ...]
-    length: float
-    controls: Controls = field(compare=False)
-
-
-@lru_cache(maxsize=64)  # manoeuvres of one vessel have one approach
-def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Method, engine: str, held: bool) -> Approach:
-    controls, n = asked.controls, np.array(speeds)
-    vessel, count = controls.vessel, len(n)
+    vessel, count, speeds, length = controls.vessel, len(n), n.tolist(), _length(controls.vessel)
     helmsman = course_keeping(controls.commands) if held else None
     model = dynamics(vessel, helmsman)
     names = (*model.state, *model.hidden)
@@ -281,10 +234,10 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
         orders |= _course(controls, n)
     moving = np.arange(count)
     num_steps = max(round(CHUNK / step), 1)
-    of_one, reached = np.sqrt(GRAVITY * asked.length), np.array([_speed(controls, shaft) for shaft in speeds])
+    of_one, reached = np.sqrt(GRAVITY * length), np.array([_speed(controls, shaft) for shaft in speeds])
     reached = np.where(reached < AT_REST * of_one, CREEPING * of_one, reached)
-    longest = max(LONGEST, *(PASSING * asked.length / reached))
-    settled = np.minimum(SETTLED, SLOW * reached**2 / asked.length)
+    longest = max(LONGEST, *(PASSING * length / reached))
+    settled = np.minimum(SETTLED, SLOW * reached**2 / length)
     for _ in range(int(longest / CHUNK)):
         path = rollout(
             vessel,
@@ -317,8 +270,11 @@ def _steady(asked: _Asked, speeds: tuple[float, ...], step: float, method: Metho
         moving = moving[unsettled]  # steady samples are frozen: no result may depend on the other samples
         if not len(moving):
             if not held:
-                straight = np.minimum(SETTLED, STRAIGHT * reached / asked.length)
-                _check_straight(vessel, n, np.abs(state["r"]) >= straight)
+                straight = np.minimum(SETTLED, STRAIGHT * reached / length)
+                turning = np.abs(state["r"]) >= straight
+                if turning.any():
+                    words = f"turns with the helm amidships at {_rpm(n, turning)} rpm, so it has no straight approach"
+                    raise NotStraight(f"{vessel.name} {words}: {REMEDY}")
             helm = _held(controls, model, state, memory, orders) if held else {}
             anew = ("north", "east", "psi", *(name for name in model.hidden if name.startswith("waves.")))
             kept = {name: values for name, values in memory.items() if not name.startswith(f"{HELM}.")}
@@ -383,54 +339,5 @@ def _held(
     return {name: given[name] for name in controls.helm}
 
 
-def _check_straight(vessel: Vessel, n: Array, turning: NDArray[np.bool_]) -> None:
-    if turning.any():
-        raise NotStraight(
-            f"{vessel.name} turns with the helm amidships at {_rpm(n, turning)} rpm, so it has no straight approach: "
-            f"{REMEDY}"
-        )
-
-
 def _rpm(n: Array, faulty: NDArray[np.bool_]) -> str:
     return f"{60 * n[int(np.argmax(faulty))]:g}"
-
-
-def thrust_sharing(vessel: Vessel) -> tuple[Unit, ...]:
-    """Thrust allocation: shares of the azimuth units in a demanded acceleration; least sum of n^4, exact at rest.
-
-    Raises
-    ------
-    DocumentError : the vessel has no two azimuth units that can push it ahead, aside and round.
-    """
-    commands = dynamics(vessel).commands
-    names = [name.removesuffix(".alpha") for name in commands if name.endswith(".alpha")]
-    names = [name for name in names if f"{name}.n" in commands]
-    idle = acceleration(vessel, 0.0, {})
-    effects = [
-        acceleration(vessel, 0.0, {f"{name}.n": PROBE_SHAFT, f"{name}.alpha": alpha}) - idle
-        for name in names
-        for alpha in (0.0, np.pi / 2)
-    ]
-    matrix = np.array(effects).reshape(-1, 3).T / PROBE_SHAFT**2  # (3, 2 x units)
-    if len(names) < 2 or np.linalg.cond(matrix) > WORST_CONDITION:
-        message = f"station keeping needs two azimuth units that push ahead, aside and round; {vessel.name} has "
-        raise DocumentError(message + (", ".join(names) or "none"), file=vessel.file, path="thruster")
-    shares = np.linalg.pinv(matrix)  # (2 x units, 3)
-    bias = _against_each_other(vessel, names, np.eye(len(shares)) - shares @ matrix)
-    return tuple(
-        Unit(name, _triple(shares[2 * i]), _triple(shares[2 * i + 1]), (float(bias[i, 0]), float(bias[i, 1])))
-        for i, name in enumerate(names)
-    )
-
-
-def _triple(row: Array) -> tuple[float, float, float]:
-    a, b, c = row.tolist()
-    return a, b, c
-
-
-def _against_each_other(vessel: Vessel, names: list[str], without_effect: Array) -> Array:
-    """Directions (units, 2) of inward thrust with zero total force and moment: the propeller wash goes outwards."""
-    blocks = vessel.document["thruster"]
-    place = np.array([[blocks[name]["x"], blocks[name]["y"]] for name in names], dtype=float)
-    pushed = (without_effect @ (place.mean(axis=0) - place).ravel()).reshape(-1, 2)
-    return np.asarray(pushed / max(np.linalg.norm(pushed, axis=1).max(), NOTHING))

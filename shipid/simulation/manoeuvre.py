@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,9 @@ from shipid.measures.zigzag import zigzag
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman
 from shipid.physics.signals import SIGNALS, signal_of
-from shipid.simulation.approach import Controls, helm_effect, thrust_sharing
+from shipid.simulation.approach import Controls, helm_effect
 from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
-from shipid.simulation.request import Request, Side
+from shipid.simulation.request import Request, Side, in_rows
 from shipid.units import DEGREE, RPM
 from shipid.vessel.schema import term_blocks
 
@@ -118,6 +118,7 @@ class Ordered(Manoeuvre):
     one command (`bow.n_rpm`), which has priority. Every command needs an order.
     """
 
+    orders: dict[str, Any] = {}
     duration: Annotated[Positive, Field(description="s")]
     start_speed: Annotated[FiniteFloat, Field(description="m/s ahead at t = 0")] = 0.0
     actuators_at: Annotated[
@@ -134,18 +135,13 @@ class Ordered(Manoeuvre):
         """At `start_speed`, without an approach."""
         return Start(speed=self.start_speed, at_order=self.actuators_at == "order")
 
-    @property
-    @abstractmethod
-    def keys(self) -> tuple[str, ...]:
-        """Keys of the orders."""
-
     @abstractmethod
     def series(self, key: str, t: Array) -> Array:
         """Order of a key at times (T,) [s], in the unit of the key."""
 
     def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
         """Command -> (T,) [SI] at times t (T,) [s]; DocumentError for a command without order, or an unknown key."""
-        series = {key: self.series(key, t) for key in self.keys}
+        series = {key: self.series(key, t) for key in self.orders}
         chosen = {name: order_keys(name) for name in controls.commands}
         valid = [key for pair in chosen.values() for key in pair]
         unknown = next((key for key in series if key not in valid), None)
@@ -172,11 +168,6 @@ class Turning(Ordered):
 
     orders: Annotated[dict[str, FiniteFloat], Field(description="key -> order, in the unit of the key")] = {}
 
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Keys of the orders."""
-        return tuple(self.orders)
-
     def series(self, key: str, t: Array) -> Array:
         """Order at times (T,), constant."""
         return np.full(len(t), self.orders[key])
@@ -191,11 +182,6 @@ class Steps(Ordered):
     orders: Annotated[dict[str, Range], Field(description="key -> least and greatest level, in the unit of the key")]
     hold: Annotated[Hold, Field(description="s, least and greatest time of a level")] = (10.0, 40.0)
     seed: Annotated[int, Field(description="of levels and times")] = 0
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Keys of the orders."""
-        return tuple(self.orders)
 
     def series(self, key: str, t: Array) -> Array:
         """Order at times (T,), piecewise constant."""
@@ -223,14 +209,9 @@ class Approached(Manoeuvre):
         return inputs
 
     @property
-    def greatest_helm(self) -> float:
-        """Largest helm angle [deg] that the manoeuvre may order, to either side."""
-        return 0.0
-
-    @property
-    def greatest_shaft(self) -> float:
-        """Largest shaft speed [rpm] that the manoeuvre may order, ahead or astern."""
-        return abs(self.n_rpm)
+    def greatest_orders(self) -> tuple[float, float]:
+        """Largest helm angle [deg] and shaft speed [rpm] that the manoeuvre may order, to either side."""
+        return 0.0, abs(self.n_rpm)
 
     def shaft(self, t: Array) -> Array:
         """Ordered shaft speed [rev/s] at times (T,) [s]."""
@@ -246,7 +227,7 @@ class Approached(Manoeuvre):
 
     def check(self, controls: Controls) -> None:
         """Raise DocumentError for a vessel that no command drives ahead, or none turns where the manoeuvre moves it."""
-        controls.orders(np.zeros(1), np.full(1, self.greatest_helm * DEGREE))
+        controls.orders(np.zeros(1), np.full(1, self.greatest_orders[0] * DEGREE))
         self.helmsman(controls)
 
 
@@ -324,14 +305,18 @@ class HelmOver(Timed):
     side: Annotated[Side, Field(description="to which the ship turns first")] = "starboard"
 
     @property
-    def greatest_helm(self) -> float:
-        """Greatest angle [deg]."""
-        return self.angle_deg
+    def greatest_orders(self) -> tuple[float, float]:
+        """Helm of the turn [deg], and shaft speed [rpm]."""
+        return self.angle_deg, abs(self.n_rpm)
 
     @property
     def sense(self) -> float:
         """+1 to starboard, -1 to port."""
         return 1.0 if self.side == "starboard" else -1.0
+
+    def title(self, words: str) -> str:
+        """Title with the helm."""
+        return f"{words}, {self.angle_deg:g} deg of helm to {self.side}"
 
     def helm(self, t: Array) -> Array:
         """Helm angle [rad] at times (T,) [s]: amidships, then the first helm angle."""
@@ -350,10 +335,6 @@ class TurningCircle(HelmOver, Trial):
         """A turning circle of 60 ship lengths."""
         return cls(angle_deg=request.angle(35.0), side=request.side, duration=request.time(TURN), **request.keys)
 
-    def title(self, words: str) -> str:
-        """Title with the helm."""
-        return f"{words}, {self.angle_deg:g} deg of helm to {self.side}"
-
 
 class PullOut(HelmOver, Trial):
     """A turn, then the helm amidships: a stable ship's yaw rate decays to zero."""
@@ -370,14 +351,10 @@ class PullOut(HelmOver, Trial):
     def scaled(cls, request: Request) -> Self:
         """A turn of 30 ship lengths, then as many amidships or more: until the rate of a stable ship has decayed."""
         begin, end = request.keys["execute_at"], request.time(TURN)
-        turn = request.in_rows((end - begin) / 2)  # between two rows the log would show the release after it
+        turn = in_rows((end - begin) / 2, request.interval)  # between two rows the log would show the release after it
         if request.duration is None:
             end = begin + turn + request.passing * request.settling(TURN / 2)
         return cls(angle_deg=request.angle(20.0), side=request.side, turn=turn, duration=end, **request.keys)
-
-    def title(self, words: str) -> str:
-        """Title with the helm of the turn."""
-        return f"{words}, {self.angle_deg:g} deg of helm to {self.side}"
 
 
 class Zigzag(HelmOver, Trial):
@@ -435,9 +412,9 @@ class Spiral(Trial):
     hold: Annotated[Positive, Field(description="s that each is held")]
 
     @property
-    def greatest_helm(self) -> float:
-        """Greatest angle [deg]."""
-        return max(map(abs, self.angles_deg))
+    def greatest_orders(self) -> tuple[float, float]:
+        """Greatest angle of the levels [deg], and shaft speed [rpm]."""
+        return max(map(abs, self.angles_deg)), abs(self.n_rpm)
 
     @property
     def length(self) -> float:
@@ -474,9 +451,9 @@ class ReverseSpiral(Trial):
     angle_deg: Annotated[Positive, Field(le=MOST_HELM, description="deg: greatest helm")] = 35.0
 
     @property
-    def greatest_helm(self) -> float:
-        """Greatest angle [deg]."""
-        return self.angle_deg
+    def greatest_orders(self) -> tuple[float, float]:
+        """Limit of the helm [deg], and shaft speed [rpm]."""
+        return self.angle_deg, abs(self.n_rpm)
 
     @property
     def length(self) -> float:
@@ -535,9 +512,9 @@ class CrashStop(Timed, Trial):
             raise DocumentError(f"{message}, take a vessel with a propeller", file=vessel.file, path=about)
 
     @property
-    def greatest_shaft(self) -> float:
-        """Largest shaft speed [rpm], ahead or astern."""
-        return max(abs(self.n_rpm), self.astern_rpm)
+    def greatest_orders(self) -> tuple[float, float]:
+        """No helm, and the largest shaft speed [rpm], ahead or astern."""
+        return 0.0, max(abs(self.n_rpm), self.astern_rpm)
 
     def shaft(self, t: Array) -> Array:
         """Shaft speed [rev/s] at times (T,)."""
@@ -576,14 +553,9 @@ class Excitation(Timed):
     seed: Annotated[int, Field(description="of the levels, and of the search for phases")] = 0
 
     @property
-    def greatest_helm(self) -> float:
-        """Greatest angle [deg]."""
-        return self.angle_deg
-
-    @property
-    def greatest_shaft(self) -> float:
-        """Largest shaft speed [rpm]: mean plus amplitude."""
-        return abs(self.n_rpm) + self.amplitude_rpm
+    def greatest_orders(self) -> tuple[float, float]:
+        """Greatest angle [deg], and shaft speed [rpm]: mean plus amplitude."""
+        return self.angle_deg, abs(self.n_rpm) + self.amplitude_rpm
 
     def helm(self, t: Array) -> Array:
         """Helm angle [rad] at times (T,)."""
@@ -612,55 +584,6 @@ class Excitation(Timed):
         return np.asarray(limit_rate(np.concatenate([[0.0], series]), float(t[1] - t[0]), rate)[1:])
 
 
-class StationKeeping(Approached):
-    """Azimuth units hold a position and a heading from t = 0 on."""
-
-    n_rpm: FiniteFloat = 0.0
-    approach: Literal["steady", "helmsman", "rest"] = "rest"
-    duration: Annotated[Positive, Field(description="s")]
-    north: Annotated[FiniteFloat, Field(description="m, to hold")] = 0.0
-    east: Annotated[FiniteFloat, Field(description="m, to hold")] = 0.0
-    heading_deg: Annotated[FiniteFloat | None, Field(description="deg, to hold; absent: course_deg")] = None
-    natural_period: Annotated[Positive, Field(description="s, of the controlled ship; longer is softer")] = 60.0
-    bias_rpm: Annotated[Positive, Field(description="rpm at which the units push against each other")] = 60.0
-    most_rpm: Annotated[Positive, Field(description="rpm, limit of a unit")] = 200.0
-
-    @property
-    def greatest_helm(self) -> float:
-        """Largest azimuth angle [deg]: all directions."""
-        return 180.0
-
-    @property
-    def greatest_shaft(self) -> float:
-        """Largest shaft speed of a unit [rpm]."""
-        return max(abs(self.n_rpm), self.most_rpm)
-
-    @property
-    def length(self) -> float:
-        """Length of the log [s]."""
-        return self.duration
-
-    def helmsman(self, controls: Controls) -> Helmsman:
-        """The station-keeping controller of position and heading.
-
-        DocumentError for a vessel without two azimuth units that give surge, sway and yaw.
-        """
-        units = thrust_sharing(controls.vessel)
-        used = {f"{unit.name}.{signal}" for unit in units for signal in ("n", "alpha")}
-        return helm.station_keeping(units, tuple(name for name in controls.commands if name not in used))
-
-    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:  # noqa: ARG002
-        """Name -> (T,): position and heading to hold, natural frequency, bias and limit of the shaft speeds [SI]."""
-        heading = self.course_deg if self.heading_deg is None else self.heading_deg
-        values = {"north": self.north, "east": self.east, "heading": heading * DEGREE}
-        values |= {
-            "omega": 2 * np.pi / self.natural_period,
-            "n_bias": self.bias_rpm * RPM,
-            "n_max": self.most_rpm * RPM,
-        }
-        return {name: np.full(len(t), value) for name, value in values.items()}
-
-
 KINDS: dict[str, type[Manoeuvre]] = {
     "turning": Turning,
     "steps": Steps,
@@ -671,7 +594,6 @@ KINDS: dict[str, type[Manoeuvre]] = {
     "reverse_spiral": ReverseSpiral,
     "crash_stop": CrashStop,
     "excitation": Excitation,
-    "station_keeping": StationKeeping,
 }
 """Name -> class of every kind. To add one, write the class and name it here."""
 

@@ -55,10 +55,6 @@ class Request:
         """Time of a level [s]: as asked, else for a number of ship lengths."""
         return lengths * self.passing if self.duration is None else self.duration
 
-    def in_rows(self, time: float) -> float:
-        """The time [s] in whole intervals, rounded up."""
-        return in_rows(time, self.interval)
-
     def settling(self, least: float) -> float:
         """Ship lengths until a turn is steady, `least` or more: the rate of a nearly neutral ship takes long.
 

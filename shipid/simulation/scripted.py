@@ -6,7 +6,6 @@ import logging
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
@@ -15,8 +14,7 @@ from shipid.capacity import too_much
 from shipid.errors import DocumentError, ShipidError, choices
 from shipid.physics.signals import ACTUAL
 from shipid.simulation.approach import Controls
-from shipid.simulation.log import run_names
-from shipid.simulation.manoeuvre import KINDS, Executed, Manoeuvre
+from shipid.simulation.manoeuvre import KINDS, Manoeuvre
 from shipid.simulation.perform import perform
 from shipid.simulation.truth import LONGEST, Truth, simulate
 from shipid.units import plural
@@ -65,9 +63,6 @@ def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
         frame = perform(vessel, manoeuvres, step=script.step, interval=script.interval)
     except ShipidError as error:
         raise DocumentError(error.message, file=file, path=error.path) from None
-    named = zip(manoeuvres, run_names(len(manoeuvres)), strict=True)
-    later = [one.name or name for one, name in named if isinstance(one, Executed) and one.approach != "rest"]
-    _tell_of_starts(frame[frame["run"].isin(later)])
     return frame.drop(columns=[column for column in frame if str(column).startswith(ACTUAL)])
 
 
@@ -81,26 +76,6 @@ def _check_size(vessel: Vessel, count: int, length: float, step: float, path: st
     if fault := too_much(count * length / step * 2 * len(dynamics(vessel).commands)):
         words = f"{step:g} s: {count} {plural(count, 'run')} of {length:g} s {fault}"
         raise DocumentError(words, path=f"{path.rpartition('.')[0]}.step".removeprefix("."))
-
-
-def _tell_of_starts(frame: pd.DataFrame) -> None:
-    """Warn where an actuator has not reached its order in the first row: a reader of the log takes it for there.
-
-    frame : runs that can begin with a straight run at the helm of the approach.
-    """
-    first = frame.groupby("run", sort=False).first()
-    lags = [column for column in map(str, frame) if column.startswith(ACTUAL)]
-    ordered = first[[column.removeprefix(ACTUAL) for column in lags]].to_numpy()
-    late = ~np.isclose(first[lags].to_numpy(), ordered, rtol=1e-3, atol=1e-6)
-    runs, commands = first.index[late.any(axis=1)], [lags[place] for place in np.flatnonzero(late.any(axis=0))]
-    if len(runs):
-        more = f" and {len(runs) - 1} more {plural(len(runs) - 1, 'run')}" if len(runs) > 1 else ""
-        named, be, them = ", ".join(commands), plural(len(commands), "is", "are"), plural(len(commands), "it", "them")
-        log.warning(
-            f"{runs[0]}{more}: in the first row {named.replace(ACTUAL, '')} {be} not yet where the order is, and who "
-            f"reads the log takes {them} for there: to identify or predict from it, give execute_at = 20 (s) in each "
-            "[[manoeuvre]]"
-        )
 
 
 def _given(script: Script, vessel: Vessel) -> list[Manoeuvre]:

@@ -15,7 +15,7 @@ from shipid.errors import ShipidError, choices
 from shipid.simulation.approach import Controls, balanced_shaft, service_speed
 from shipid.simulation.manoeuvre import KINDS, MOST_HEADING, MOST_HELM, Trial
 from shipid.simulation.request import Request, Side, in_rows
-from shipid.units import DEGREE, RPM, plural
+from shipid.units import RPM, plural
 from shipid.vessel.load import Vessel
 
 log = logging.getLogger(__name__)
@@ -146,9 +146,6 @@ def _check_angles(name: str, angles: Sequence[float], wanted: Sequence[str]) -> 
         greatest = MOST_HEADING if place else MOST_HELM  # as much of a reverse spiral, in deg/s
         if not angle <= greatest:
             raise ShipidError(f"{angle:g} deg: give at most {greatest:g} deg", path="ANGLES")
-    if angles and wanted[0] == "helm" and angles[0] <= MOST_HELM * DEGREE:  # as every helm in rad is
-        inside = f"they are in deg, and {angles[0]:g} rad are {angles[0] / DEGREE:.2g} deg"
-        log.warning("ANGLES: %g deg of helm is little: %s", angles[0], inside)
 
 
 def shaft_speed(controls: Controls, speed: float) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
@@ -33,7 +32,6 @@ NotNegative = tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, 
 MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies of a vessel's tables
 WEATHER = ("V_w", "beta_w", "V_c", "beta_c")  # drawn from wind_speed, current_speed, and directions from anywhere
 LONGEST = 1e6  # s of a run: a longer one is a slip of unit or exponent
-MOVED = ("n_rpm", "alpha_deg", "start_speed", "actuators_at")  # keys of a manoeuvre
 
 
 class Truth(Checked, BaseModel):
@@ -66,13 +64,6 @@ class Truth(Checked, BaseModel):
     )
     manoeuvre: Annotated[list[Draw], Field(min_length=1, description="kinds, drawn by their shares")] = [Draw()]
 
-    @model_validator(mode="before")
-    @classmethod
-    def _moved(cls, data: Any) -> Any:
-        if isinstance(data, Mapping) and (moved := old_keys(data)):
-            raise ValueError(moved)
-        return data
-
     @model_validator(mode="after")
     def _fits(self) -> Truth:
         if not steps_in(self.interval, self.step):
@@ -89,13 +80,6 @@ class Truth(Checked, BaseModel):
     def length(self) -> float:
         """Length [s] of every log: run-up and duration, in whole intervals."""
         return int((self.run_up + self.duration) / self.interval + 1e-9) * self.interval
-
-
-def old_keys(block: Mapping[str, Any]) -> str:
-    """What to write instead of the keys of a manoeuvre that a [truth] of version 0.1 held; empty where it has none."""
-    moved = [key for key in MOVED if key in block]
-    instead = ", ".join(['[[truth.manoeuvre]], kind = "turning"', *(f"{key} = {block[key]!r}" for key in moved)])
-    return f"{' and '.join(moved)} belong to the manoeuvres: write {instead}" if moved else ""
 
 
 def check_truth(truth: Truth, vessel: Vessel) -> None:

@@ -15,7 +15,7 @@ from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DocumentError, choices
 from shipid.physics.signals import SIGNALS, named
 from shipid.predictor import MOST_STEPS
-from shipid.simulation.truth import Truth, old_keys
+from shipid.simulation.truth import Truth
 from shipid.vessel.perturb import Family
 
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
@@ -273,9 +273,6 @@ def _old_keys(document: Document) -> Iterator[tuple[str, str]]:
         yield "prediction.horizon", f"was a number of steps: write {seconds}, in seconds"
     if isinstance(prediction, dict) and "method" in prediction:
         yield "prediction.method", "is now called `integrator`"
-    truth = document.get("truth")
-    if isinstance(truth, dict) and (moved := old_keys(truth)):
-        yield "truth", moved
     families = document.get("family")
     for index, family in enumerate(families if isinstance(families, list) else []):
         if isinstance(family, dict) and "identify" in family and {"base", "perturb", "members"} & family.keys():

@@ -30,11 +30,11 @@ from shipid.vessel.schema import (
     actuators,
     behind,
     functions,
-    model_for,
     signals,
     structural,
     term_blocks,
     term_parameters,
+    vessel_model,
 )
 from shipid.vessel.schema import parameters as declared
 from shipid.vessel.terms import called, check_term, no_signal, states_of
@@ -135,7 +135,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     for _, key, _ in terms:  # a notebook may have put another into TERMS since the vessel was read
         check_term(key)
     if any(of_users(function) for held in functions(vessel.document).values() for function in held):
-        documents.parse(model_for(vessel.document), vessel.document, vessel.file)
+        documents.parse(vessel_model(), vessel.document, vessel.file)
         if (bindings(vessel.document), units_of(vessel.document)) != (vessel.bound, vessel.units):
             raise ShipidError("its terms take other numbers than when it was read: load it again", file=vessel.file)
     names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,7 +24,7 @@ from shipid.physics.inertia import mass
 from shipid.physics.signals import ACTUAL, row_of
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import Binding, bindings, units
-from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, contradiction, everywhere, first_of, out_of_range
+from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, contradiction, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
@@ -32,9 +32,9 @@ from shipid.vessel.schema import (
     behind,
     components,
     kinds,
-    model_for,
     term_blocks,
     term_model,
+    vessel_model,
 )
 
 if TYPE_CHECKING:
@@ -92,31 +92,23 @@ class Vessel:
         """Dotted path of every block that the equations use -> what binds its numbers to a physics function."""
         return bindings(self.document)
 
-    @property
+    @cached_property
     def units(self) -> dict[str, str]:
-        """Dotted path -> unit of every parameter, in document order of use; a copy, free to be changed."""
-        return dict(self._units)
+        """Dotted path -> unit of every parameter, in document order of use; not to be changed."""
+        return units(self.document)
 
-    @property
+    @cached_property
     def parameters(self) -> dict[str, float]:
-        """Dotted path -> value of every number that the equations use; a copy, free to be changed."""
-        return dict(self._parameters)
+        """Dotted path -> value of every number that the equations use; not to be changed."""
+        return {path: float(documents.get(self.document, path)) for path in self.units}
 
     @property
     def above_zero(self) -> frozenset[str]:
         """Dotted paths of the parameters that must be above 0, such as `inertia.m`."""
-        model = model_for(self.document)
+        model = vessel_model()
         return frozenset(
-            path for path in self._units if not documents.suits(model, documents.replace(self.document, {path: 0.0}))
+            path for path in self.units if not documents.suits(model, documents.replace(self.document, {path: 0.0}))
         )
-
-    @cached_property
-    def _units(self) -> dict[str, str]:
-        return units(self.document)
-
-    @cached_property
-    def _parameters(self) -> dict[str, float]:
-        return {path: float(documents.get(self.document, path)) for path in self._units}
 
     @property
     def mass(self) -> NDArray[np.float64]:
@@ -126,10 +118,9 @@ class Vessel:
         return np.array(self._mass)
 
     @cached_property
-    def _mass(self) -> list[list[Any]]:
-        """Rows of `mass`; its entries are arrays (members,) where the numbers are those of several."""
+    def _mass(self) -> list[list[float]]:
         numbers: list[dict[str, Any]] = [
-            {name: self._parameters[target] if isinstance(target, str) else target for name, target in block.items()}
+            {name: self.parameters[target] if isinstance(target, str) else target for name, target in block.items()}
             for block in (self.bound["inertia"], self.bound["added_mass"])
         ]
         M = mass(*numbers)
@@ -138,8 +129,8 @@ class Vessel:
     @cached_property
     def structure(self) -> str:
         """Digest of the document without its parameters' values: vessels of one structure compile once."""
-        without_values = documents.replace(_without_words(self.document), dict.fromkeys(self._parameters, 0))
-        return documents.digest([without_values, list(self._parameters)])  # the order is that of the input vector
+        without_values = documents.replace(_without_words(self.document), dict.fromkeys(self.parameters, 0))
+        return documents.digest([without_values, list(self.parameters)])  # the order is that of the input vector
 
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
         """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document.
@@ -159,40 +150,13 @@ class Vessel:
         documents.check_values(odd, self.file)
         document = documents.replace(self.document, values, self.file)
         numbers = all(type(value) in (float, int) for value in values.values())
-        if numbers and values.keys() <= self._units.keys() and documents.suits(model_for(document), document):
+        if numbers and values.keys() <= self.units.keys() and documents.suits(vessel_model(), document):
             vessel = Vessel(document, self.file)  # terms, names and units are as they were
-            vessel.__dict__.update(bound=self.bound, _units=self._units, structure=self.structure)
-            vessel.__dict__["_parameters"] = self._parameters | {path: float(value) for path, value in values.items()}
+            vessel.__dict__.update(bound=self.bound, units=self.units, structure=self.structure)
+            vessel.__dict__["parameters"] = self.parameters | {path: float(value) for path, value in values.items()}
             _check_numbers(vessel)
             return vessel
         return check_vessel(document, self.file)
-
-    def takes(self, values: Mapping[str, NDArray[np.float64]]) -> bool:
-        """Whether `with_values` takes every one of n members, checked together: dotted path -> their values (n,).
-
-        False says nothing of any member: `with_values` has to be asked for each.
-        """
-        import numpy as np
-
-        least, most = documents.LEAST_NUMBER, documents.MOST_NUMBER
-        apart = ("particulars.", "constants.")  # other checks read them in the document, and those of tables are by row
-        known = all(
-            path in self._units and not path.startswith(apart) and not path.rpartition(".")[2].isdecimal()
-            for path in values
-        )
-        if not known or not all(np.all((least < abs(v)) & (abs(v) < most)) for v in values.values()):
-            return False
-        for end in (np.min, np.max):  # the limits of a key of a block are those of an interval
-            document = documents.replace(self.document, {path: float(end(value)) for path, value in values.items()})
-            if not documents.suits(model_for(document), document):
-                return False
-        several = Vessel(self.document, self.file)
-        several.__dict__.update(bound=self.bound, _units=self._units, _parameters={**self._parameters, **values})
-        try:
-            _check_numbers(several)
-        except DocumentError:
-            return False
-        return True
 
 
 def load_vessel(name: str | Path, relative_to: str | Path | None = None) -> Vessel:
@@ -343,7 +307,7 @@ def check_vessel(document: Document, file: str) -> Vessel:
     """Check a complete document; DocumentError with file, dotted path and remedy for the first problem."""
     for path, group, block in components(document):
         _check_component(path, group, block, file)
-    documents.parse(model_for(document), document, file)
+    documents.parse(vessel_model(), document, file)
     vessel = Vessel(document, file)
     paths: dict[str, str] = {}
     for path, key, block in term_blocks(document):
@@ -363,7 +327,7 @@ def check_vessel(document: Document, file: str) -> Vessel:
 
 
 def _check_numbers(vessel: Vessel) -> None:
-    """Checks of the values of a document whose names are valid; of all members where the numbers are arrays."""
+    """Checks of the values of a document whose names are valid."""
     for path, key, block in term_blocks(vessel.document):
         _check_order(path, block, vessel.file)
         if key == "thruster.four_quadrant":
@@ -391,47 +355,29 @@ def _check_behind(vessel: Vessel) -> None:
 def _check_sense(vessel: Vessel) -> None:
     """DocumentError for impossible values: added mass of the wrong sign, a stern ahead of the bow, tonnes for kg."""
     values = vessel.parameters
-    for path, group, name in _with_a_sense(tuple(values)):
-        value = values[path]
-        if group == "added_mass" and not everywhere(value <= 0):
-            message = f"{first_of(value <= 0, value)[0]:g}: added mass is on the force side, so {name} is negative"
-            raise DocumentError(message, file=vessel.file, path=path)
-        if name in ("low", "high"):
-            _check_limit(path, value, values.get(f"{group}.low", -math.inf), vessel.file)
-        if name == "x_fwd" and not everywhere(ahead := value > values.get(f"{group}.x_aft", -math.inf)):
-            raise DocumentError(f"{first_of(ahead, value)[0]:g}: must be ahead of x_aft", file=vessel.file, path=path)
+    for path, value in values.items():
+        group, _, name = path.rpartition(".")
+        fault = ""
+        if group == "added_mass" and AXES[MOTIONS.index(name[2])] == name[0] and value > 0:
+            fault = f"{value:g}: added mass is on the force side, so {name} is negative"
+        elif ".actuator." in path and name in ("low", "high"):
+            row = row_of(path.rsplit(".", 2)[-2])
+            if row is not None and row.angle and abs(value) > MOST_RADIANS:
+                fault = f"{value:g}: is in rad, and that is more than a full turn"
+            elif name == "high" and value <= (low := values.get(f"{group}.low", -math.inf)):
+                fault = f"{value:g}: must be above low, {low:g}"
+        elif name == "x_fwd" and value <= values.get(f"{group}.x_aft", -math.inf):
+            fault = f"{value:g}: must be ahead of x_aft"
+        if fault:
+            raise DocumentError(fault, file=vessel.file, path=path)
     sizes = vessel.document.get("particulars", {})
     rho = vessel.document.get("constants", {}).get("rho")
     if rho is not None and {"L_pp", "B", "T"} <= sizes.keys():
-        shares = values["inertia.m"] / (rho * sizes["L_pp"] * sizes["B"] * sizes["T"])
-        usual = (shares > LEAST_BLOCK) & (shares < MOST_BLOCK)
-        if not everywhere(usual):
-            m, share = first_of(usual, values["inertia.m"], shares)
+        m = values["inertia.m"]
+        share = m / (rho * sizes["L_pp"] * sizes["B"] * sizes["T"])
+        if not LEAST_BLOCK < share < MOST_BLOCK:
             message = f"{m:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?"
             raise DocumentError(message, file=vessel.file, path="inertia.m")
-
-
-@lru_cache(maxsize=64)  # members of a family have the same numbers
-def _with_a_sense(paths: tuple[str, ...]) -> list[tuple[str, str, str]]:
-    """Path, group and name of those numbers that `_check_sense` looks at: added mass of an axis, limits, the bow."""
-    chosen = []
-    for path in paths:
-        group, _, name = path.rpartition(".")
-        axis = group == "added_mass" and AXES[MOTIONS.index(name[2])] == name[0]
-        if axis or name == "x_fwd" or (".actuator." in path and name in ("low", "high")):
-            chosen.append((path, group, name))
-    return chosen
-
-
-def _check_limit(path: str, value: float, low: float, file: str) -> None:
-    """DocumentError for limits of an actuator that leave no range, or for an angle in degrees."""
-    row = row_of(path.rsplit(".", 2)[-2])
-    if row is not None and row.angle and not everywhere(within := abs(value) <= MOST_RADIANS):
-        message = f"{first_of(within, value)[0]:g}: is in rad, and that is more than a full turn"
-        raise DocumentError(message, file=file, path=path)
-    if path.endswith(".high") and not everywhere(above := value > low):
-        high, low = first_of(above, value, low)
-        raise DocumentError(f"{high:g}: must be above low, {low:g}", file=file, path=path)
 
 
 def _check_component(path: str, group: str, block: Any, file: str) -> None:
@@ -518,12 +464,12 @@ def _check_inertia(vessel: Vessel) -> None:
         raise DocumentError(f"mass plus added mass is not positive: {remedy}", file=vessel.file, path="inertia")
 
 
-def _is_positive(M: list[list[Any]]) -> bool:
-    """Whether a matrix, or that of every member, is positive definite: all pivots of its symmetric part are above 0."""
+def _is_positive(M: list[list[float]]) -> bool:
+    """Whether a matrix is positive definite: all pivots of its symmetric part are above 0."""
     rows = [[M[i][j] + M[j][i] for j in range(len(M))] for i in range(len(M))]
     while rows:
         (pivot, *right), *below = rows
-        if not everywhere(pivot > 0):
+        if not pivot > 0:
             return False
         rows = [
             [entry - first / pivot * above for entry, above in zip(rest, right, strict=True)] for first, *rest in below

@@ -7,15 +7,15 @@ changes another draw.
 from __future__ import annotations
 
 import hashlib
+import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import tomlkit
 from pydantic import (
     AfterValidator,
@@ -38,13 +38,7 @@ from shipid.vessel.ranges import UNUSUAL
 
 _CONDITION = re.compile(r"(?P<pattern>[^\[\]]+)(?:\[\s*order\s*(?P<relation>>=|<=|==|>|<)\s*(?P<order>\d+)\s*\])?")
 _BETWEEN = "\x1f"  # of the parts of a key
-_RELATIONS: dict[str, Callable[[int, int], bool]] = {
-    ">=": lambda a, b: a >= b,
-    "<=": lambda a, b: a <= b,
-    "==": lambda a, b: a == b,
-    ">": lambda a, b: a > b,
-    "<": lambda a, b: a < b,
-}
+_RELATIONS = {">=": operator.ge, "<=": operator.le, "==": operator.eq, ">": operator.gt, "<": operator.lt}
 
 
 @dataclass(frozen=True)
@@ -306,7 +300,7 @@ def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str 
     member : from 0. counter : how often it was redrawn. Raises ShipidError where one of them is no whole number, and
     DocumentError for a path that the base lacks or a member that is no valid vessel.
     """
-    return _Drawn.of(family, base, file).members([member], counter)[0]
+    return _draw_members(family, base, file, [member], counter)[0]
 
 
 def members(
@@ -316,124 +310,70 @@ def members(
 
     Raises ShipidError for a number that is no whole number, and DocumentError as `draw` does.
     """
-    drawn = _Drawn.of(family, base, file)
-    if not isinstance(numbers, Iterable | None):
+    return _draw_members(family, base, file, range(family.members) if numbers is None else numbers)
+
+
+Step = tuple[str, Callable[[float, Any, float], float], Any, str | None]
+"""Dotted path of a number, change of a rule, argument of the rule, and the key of its draw; None where none is made."""
+
+
+def _draw_members(
+    family: Family, base: Vessel, file: str | Path | None, numbers: Iterable[int], counter: int = 0
+) -> list[Variant]:
+    """Members of these numbers from 0, each drawn again so often; DocumentError for one that is no valid vessel."""
+    steps, original, result = _draw_steps(family, base, file), base.parameters, []
+    counter = whole_number("counter", counter)
+    if not isinstance(numbers, Iterable):
         raise DocumentError(f"numbers must be several whole numbers, such as [0, 1], not {numbers!r}")
-    return drawn.members(range(family.members) if numbers is None else numbers)
+    for number in (whole_number("member", number) for number in numbers):  # of 1.0 is another hash
+        values: dict[str, float] = {}
+        for path, change, argument, key in steps:
+            u = 0.0 if key is None else uniform(family.seed, family.name, number, key, counter)
+            values[path] = change(values.get(path, original[path]), argument, u)
+        try:
+            base.with_values(values)
+        except DocumentError as error:
+            message = f"member {number + 1} would not be a valid vessel: {error.path}: {error.message}"
+            message += f": {WITHOUT}" if values.get(error.path or "") == 0 else ""
+            raise DocumentError(message, file=file, path=f"family.{family.name}") from None
+        changed = {path: value for path, value in values.items() if original[path] != 0}
+        factors = {path: value / original[path] + 0.0 for path, value in changed.items()}  # + 0.0: none is -0.0
+        name = family.name if family.members == 1 else f"{family.name}-{number + 1}"
+        of, digest = family.base or base.key, base.digest
+        result.append(Variant(name, family.name, number, of, digest, values, factors, counter, family.seed, original))
+    return result
 
 
-@dataclass(frozen=True)
-class _Change:
-    """One rule of one block with its paths looked up.
-
-    arguments : path -> argument of the rule for it. keys : path -> key of its draw, and how often it was used before.
-    """
-
-    rule: Rule
-    arguments: Mapping[str, Any]
-    keys: Mapping[str, tuple[str, int]]
-
-    def key(self, path: str) -> str:
-        """What the draw of a path depends on, beside its member."""
-        return _BETWEEN.join(map(str, self.keys.get(path, (path, 0))))
-
-
-def _changes(family: Family, base: Vessel, file: str | Path | None) -> list[_Change]:
-    """Perturbations of a family on its base; DocumentError for a path that the base does not have."""
+def _draw_steps(family: Family, base: Vessel, file: str | Path | None) -> list[Step]:
+    """What a member changes, in order; DocumentError for a path that the base does not have."""
     of_class("family", family, Family, "such as Family(name=..., perturb=[...])")
     of_class("base", base, Vessel, "as of `load_vessel`")
     if family.extends is not None:
         message = f"extends {family.extends!r}, whose perturbations come first: write them out, or use `resolve`"
         raise DocumentError(message, file=file, path=f"family.{family.name}.extends")
-    original, times, result = base.parameters, dict[str, int](), []
+    original, times, result = base.parameters, dict[str, int](), list[Step]()
     for index, block in enumerate(family.perturb, start=-family._inherited):
         place = f"perturb.{index}" if index >= 0 else f"extends.perturb.{index + family._inherited}"
         where = f"family.{family.name}.{place}"
         for key, argument in block.given.items():
             rule = RULES[key]
             if rule.places is not None:
-                result.append(_Change(rule, rule.places(argument, base, file, f"{where}.{key}"), {}))
+                chosen = rule.places(argument, base, file, f"{where}.{key}")
+                result += [(path, rule.change, of_path, None) for path, of_path in chosen.items()]
                 continue
             paths = select(block.parameters, original, file, f"{where}.parameters")
-            keys = {path: f"together {block.parameters[0]}" if block.together else path for path in paths}
-            times.update({name: times.get(name, -1) + 1 for name in keys.values()})
-            counted = {path: (name, times[name]) for path, name in keys.items()}
-            result.append(_Change(rule, dict.fromkeys(paths, argument), counted))
+            names = {path: f"together {block.parameters[0]}" if block.together else path for path in paths}
+            times.update({name: times.get(name, -1) + 1 for name in names.values()})
+            keys = {
+                path: f"{name}{_BETWEEN}{times[name]}" if rule.drawn(argument) else None for path, name in names.items()
+            }
+            result += [(path, rule.change, argument, keys[path]) for path in paths]
     return result
-
-
-@dataclass(frozen=True)
-class _Drawn:
-    """A family on its base, from which members are drawn. original : the numbers of the base, one dict for all."""
-
-    family: Family
-    base: Vessel
-    file: str | Path | None
-    changes: Sequence[_Change]
-    original: dict[str, float]
-
-    @classmethod
-    def of(cls, family: Family, base: Vessel, file: str | Path | None) -> _Drawn:
-        changes = _changes(family, base, file)
-        return cls(family, base, file, changes, base.parameters)
-
-    def members(self, numbers: Iterable[int], counter: int = 0) -> list[Variant]:
-        """Members of these numbers from 0, each drawn again so often."""
-        numbers = [whole_number("member", number) for number in numbers]  # of 1.0 is another hash
-        counter = whole_number("counter", counter)
-        drawn = {number: self._values(number, counter) for number in numbers}
-        self._check(drawn)
-        return [self._variant(number, drawn[number], counter) for number in numbers]
-
-    def _values(self, number: int, counter: int) -> dict[str, float]:
-        """Path -> value of everything that one member changes."""
-        original, values = self.original, dict[str, float]()
-        member = f"{self.family.seed}{_BETWEEN}{self.family.name}{_BETWEEN}{number}"
-        for path, change, argument, key in self._steps:
-            u = 0.0 if key is None else _fraction(f"{member}{_BETWEEN}{key}{_BETWEEN}{counter}")
-            values[path] = change(values.get(path, original[path]), argument, u)
-        return values
-
-    @cached_property
-    def _steps(self) -> list[tuple[str, Callable[[float, Any, float], float], Any, str | None]]:
-        """Path, rule, argument and key of its draw, if it is drawn, of everything that a member changes, in order."""
-        return [
-            (path, one.rule.change, argument, one.key(path) if one.rule.drawn(argument) else None)
-            for one in self.changes
-            for path, argument in one.arguments.items()
-        ]
-
-    def _variant(self, number: int, values: Mapping[str, float], counter: int) -> Variant:
-        family, base, original = self.family, self.base, self.original
-        changed = {path: value for path, value in values.items() if original[path] != 0}
-        factors = {path: value / original[path] + 0.0 for path, value in changed.items()}  # + 0.0: none is -0.0
-        name = family.name if family.members == 1 else f"{family.name}-{number + 1}"
-        of, digest = family.base or base.key, base.digest
-        return Variant(name, family.name, number, of, digest, values, factors, counter, family.seed, original)
-
-    def _check(self, drawn: Mapping[int, Mapping[str, float]]) -> None:
-        """DocumentError for the first member that is no valid vessel, such as one of negative mass."""
-        paths = next(iter(drawn.values()), {})  # all members change the same ones
-        if self.base.takes({path: np.array([values[path] for values in drawn.values()]) for path in paths}):
-            return
-        for number, values in drawn.items():
-            try:
-                self.base.with_values(values)
-            except DocumentError as error:
-                message = f"member {number + 1} would not be a valid vessel: {error.path}: {error.message}"
-                if values.get(error.path or "") == 0:
-                    message = f"{message}: {WITHOUT}"
-                raise DocumentError(message, file=self.file, path=f"family.{self.family.name}") from None
 
 
 def uniform(*key: Any) -> float:
     """A number in [0, 1) that depends on the key alone: the first 53 bits of its SHA-256."""
-    return _fraction(_BETWEEN.join(map(str, key)))
-
-
-def _fraction(key: str) -> float:
-    """As `uniform`, of a key whose parts are joined."""
-    digest = hashlib.sha256(key.encode()).digest()
+    digest = hashlib.sha256(_BETWEEN.join(map(str, key)).encode()).digest()
     return (int.from_bytes(digest[:8], "big") >> 11) / 2.0**53
 
 
@@ -443,11 +383,8 @@ def select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where
     for pattern in patterns:
         parsed = _CONDITION.fullmatch(pattern)
         if parsed is None:
-            raise DocumentError(
-                f"{pattern!r} is not a selection: write a dotted path with * and, if wanted, [order >= 3]",
-                file=file,
-                path=where,
-            )
+            message = f"{pattern!r} is not a selection: write a dotted path with * and, if wanted, [order >= 3]"
+            raise DocumentError(message, file=file, path=where)
         matching = documents.match(parsed["pattern"], list(paths))
         if parsed["order"] is not None:
             relation, limit = _RELATIONS[parsed["relation"]], int(parsed["order"])

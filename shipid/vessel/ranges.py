@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 from shipid import document as documents
@@ -93,38 +92,24 @@ def out_of_range(
 ) -> tuple[str, str] | None:
     """Dotted path of the first number that no ship has, and a sentence; None where all are usual.
 
-    values, units : of every number that the equations use, by dotted path; arrays (members,) are checked together.
+    values, units : of every number that the equations use, by dotted path.
     """
-    meant = document.get(UNUSUAL, [])
-    size = _size(document, values)
-    ranges, limited, tables = _judged(tuple(units.items()))
-    ends = [(limits.least(size), limits.most(size)) for limits in ranges]
-    for path, number in limited:
-        least, most = ends[number]
-        value = values[path]
-        usual = (least <= abs(value)) & (abs(value) <= most)
-        if not everywhere(usual) and not _is_meant(path, meant):
-            value, least, most = first_of(usual, value, least, most)
-            words = f"{value:g}: expected {ranges[number].words} ({least:.3g} to {most:.3g})"
-            return path, f"{words}; {_remedy(path)}"
-    for path, names in tables:
-        widest = max(abs(values[name]) for name in names)
-        if widest <= TURN and not _is_meant(path, meant):
-            return path, f"angles up to {widest:.3g}: expected degrees, are these radians? {_remedy(path)}"
+    meant, size = document.get(UNUSUAL, []), _size(document, values)
+    tables: dict[str, list[float]] = {}
+    for path, unit in units.items():
+        limits, value = _range(path, unit), abs(values[path])
+        if limits is not None:
+            least, most = limits.least(size), limits.most(size)
+            if not least <= value <= most and not _is_meant(path, meant):
+                words = f"{values[path]:g}: expected {limits.words} ({least:.3g} to {most:.3g})"
+                return path, f"{words}; {_remedy(path)}"
+        table, _, place = path.rpartition(".")
+        if unit == "deg" and place.isdecimal():
+            tables.setdefault(table, []).append(value)
+    for path, angles in tables.items():
+        if len(angles) > 1 and max(angles) <= TURN and not _is_meant(path, meant):
+            return path, f"angles up to {max(angles):.3g}: expected degrees, are these radians? {_remedy(path)}"
     return None
-
-
-def everywhere(holds: Any) -> bool:
-    """Whether something holds of all members: an array (members,) of truth values, or one of them for all."""
-    return bool(holds.all() if hasattr(holds, "all") else holds)
-
-
-def first_of(holds: Any, *numbers: Any) -> list[float]:
-    """Numbers of the first member of which something does not hold: each an array (members,), or one for all."""
-    import numpy as np  # a vessel alone is checked without
-
-    place = int(np.argmin(holds))
-    return [float(np.broadcast_to(number, np.shape(holds)).flat[place]) for number in numbers]
 
 
 def contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> tuple[str, str] | None:
@@ -231,29 +216,6 @@ def _wrong_place(name: str, screw: str, values: Mapping[str, float], near: float
         yield f"thruster.{name}.x", words
     if y * y_of < 0 and min(abs(y), abs(y_of)) > near / 5:
         yield f"thruster.{name}.behind", f"{screw!r} at y = {y_of:g} m is on the other side: this is at y = {y:g} m"
-
-
-@lru_cache(maxsize=64)
-def _judged(
-    units: tuple[tuple[str, str], ...],
-) -> tuple[list[Range], list[tuple[str, int]], list[tuple[str, list[str]]]]:
-    """What is judged of the numbers of these paths and units: once for all members of a family.
-
-    Ranges; paths, each with the place of its range among them; tables of angles, each with its paths.
-    """
-    ranges: list[Range] = []
-    limited: list[tuple[str, int]] = []
-    tables: dict[str, list[str]] = {}
-    for path, unit in units:
-        limits = _range(path, unit)
-        if limits is not None:
-            if limits not in ranges:
-                ranges.append(limits)
-            limited.append((path, ranges.index(limits)))
-        table, _, place = path.rpartition(".")
-        if unit == "deg" and place.isdecimal():
-            tables.setdefault(table, []).append(path)
-    return ranges, limited, [(table, paths) for table, paths in tables.items() if len(paths) > 1]
 
 
 def _range(path: str, unit: str) -> Range | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import GenericAlias
@@ -255,35 +255,24 @@ def _of_group(group: str) -> list[str]:
 
 
 def _named(group: str, of: Mapping[str, type[Block]]) -> Any:
-    models = [of[key] for key in _of_group(group) if key in of]
-    return _union(models) if models else Block
+    return _union([of[key] for key in _of_group(group)])
 
 
 def _fixed(group: str, of: Mapping[str, type[Block]]) -> Any:
-    fields: dict[str, Any] = {key.split(".")[1]: (of.get(key, Block) | None, None) for key in _of_group(group)}
+    fields: dict[str, Any] = {key.split(".")[1]: (of[key] | None, None) for key in _of_group(group)}
     return create_model(group, __base__=Block, **fields)
 
 
-def model_for(document: Mapping[str, Any]) -> type[BaseModel]:
-    """Pydantic model for one vessel document, with models of those terms alone that it has: others take their time."""
-    named = {name for off in (False, True) for path, key, _ in term_blocks(document, off) for name in (path, key)}
-    return vessel_model(named & TERMS.keys())
-
-
-def vessel_model(having: Collection[str] | None = None) -> type[BaseModel]:
-    """Pydantic model of a whole vessel document; its JSON schema serves editors.
-
-    having : kinds of term that the document may have, as keys of TERMS, which are all by default.
-    """
-    terms = tuple(TERMS)
-    split_keys(terms)  # refuses a key that is none
-    return _vessel_model(tuple((key, term_model(key) if having is None or key in having else None) for key in terms))
+def vessel_model() -> type[BaseModel]:
+    """Pydantic model of a whole vessel document; its JSON schema serves editors."""
+    return _vessel_model(tuple(TERMS.items()), tuple(ACTUATORS.items()), tuple(named("command")))
 
 
 @cache
-def _vessel_model(models: tuple[tuple[str, type[Block] | None], ...]) -> type[BaseModel]:
-    """Model of a vessel document from models of terms, by key of TERMS; None for a kind that it may not have."""
-    of = {key: model for key, model in models if model is not None}
+def _vessel_model(terms: tuple[tuple[str, Term], ...], *_: object) -> type[BaseModel]:
+    """Model of a vessel document with these terms; kept by all that it is made of, for a notebook may put in others."""
+    split_keys(tuple(key for key, _ in terms))
+    of = {key: term_model(key) for key, _ in terms}
     current: dict[str, Any] = {"kind": (Literal["uniform"], ...)}
     fields: dict[str, Any] = {
         "name": (str, ...),

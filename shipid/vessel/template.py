@@ -79,12 +79,9 @@ class Particulars:
     speed : service speed [m/s]. rpm : shaft speed of the screw at that speed [rpm].
     propulsor : `propeller-rudder`, `azimuth` or `differential`, two screws without a rudder.
     shafts : 1 or 2 of them; default 1 with a rudder, else 2.
-    propeller_diameter : [m]. rudder_area, rudder_span : of each rudder [m^2, m].
-    rudder_rate : of the steering gear, of azimuth units how fast they turn [deg/s].
+    propeller_diameter : [m]. rudder_area : of each rudder [m^2].
     tunnel_thruster : whether a tunnel thruster is at the bow.
     scale : length of the ship over that of this model, 1 for the ship. Default: 1 from 10 m on, else 160 m / length.
-    density : of the water [kg/m^3]; default: sea water, fresh water for a model.
-    frontal_area, lateral_area : to the wind [m^2].
     """
 
     length: float
@@ -94,17 +91,12 @@ class Particulars:
     speed: float | None = None
     propulsor: str = "propeller-rudder"
     ship_type: str = "cargo"
-    frontal_area: float | None = None
-    lateral_area: float | None = None
     rpm: float | None = None
     shafts: int | None = None
     propeller_diameter: float | None = None
     rudder_area: float | None = None
-    rudder_span: float | None = None
-    rudder_rate: float | None = None
     tunnel_thruster: bool = False
     scale: float | None = None
-    density: float | None = None
 
     @property
     def service(self) -> float:
@@ -130,8 +122,8 @@ class Particulars:
 
     @property
     def rho(self) -> float:
-        """Density of the water [kg/m^3]."""
-        return self.density or (RHO_SEA if self.reduction == 1.0 else RHO_FRESH)
+        """Density of the water [kg/m^3]: sea water, and fresh water for a model."""
+        return RHO_SEA if self.reduction == 1.0 else RHO_FRESH
 
     @property
     def faster(self) -> tuple[float, str]:
@@ -215,54 +207,36 @@ def _check(given: Particulars) -> None:
         raise ShipidError(
             "two screws steer by their difference: leave it out, or take another propulsor", path="--shafts"
         )
-    idle = {
-        "propeller-rudder": (),
-        "azimuth": ("rudder_area", "rudder_span"),
-        "differential": ("rudder_area", "rudder_span", "rudder_rate"),
-    }
-    for name in idle[given.propulsor]:
-        if getattr(given, name) is not None:
-            option = f"--{name.replace('_', '-')}"
-            raise ShipidError(f"there is none with {given.propulsor}: leave it out", path=option)
+    if given.rudder_area is not None and given.propulsor != "propeller-rudder":
+        raise ShipidError(f"there is none with {given.propulsor}: leave it out", path="--rudder-area")
     if given.ship_type not in WIND:
         raise ShipidError(f"ship type {given.ship_type!r}: {choices(given.ship_type, WIND)}")
     for what, value, low, high in _ranges(given):
-        if not low * (1 - ROUNDING) <= value <= high * (1 + ROUNDING):
-            raise ShipidError(
-                f"{what} = {value:.3g}: the formulae hold for {low:g} to {high:.3g}{SIMILAR.get(what, '')}"
-            )
+        if value is not None and not low * (1 - ROUNDING) <= value <= high * (1 + ROUNDING):
+            words = f"{what} = {value:.3g}: the formulae hold for {low:g} to {high:.3g}{SIMILAR.get(what, '')}"
+            raise ShipidError(words)
 
 
-def _ranges(given: Particulars) -> Iterator[tuple[str, float, float, float]]:
+def _ranges(given: Particulars) -> Iterator[tuple[str, float | None, float, float]]:
     """Name, value, lower and upper limit of each quantity; sizes before the ratios derived from them."""
-    yield "length [m]", given.length, 1.0, 450.0
-    yield "beam [m]", given.beam, 0.1, 80.0
-    yield "draught [m]", given.draught, 0.02, 30.0
-    yield "block", given.block, 0.4, 0.9
-    yield "length / beam", given.length / given.beam, 2.0, 9.0
-    yield "beam / draught", given.beam / given.draught, 1.8, 6.0
-    yield "block x beam / length", given.block * given.beam / given.length, 0.04, 0.3
-    yield "speed [m/s]", given.service, 0.1, 0.4 * math.sqrt(GRAVITY * given.length)
-    yield "shafts", given.units, 1, 2
-    for what, value, low, high in (
+    L, B, T, C_b = given.length, given.beam, given.draught, given.block
+    yield from (
+        ("length [m]", L, 1.0, 450.0),
+        ("beam [m]", B, 0.1, 80.0),
+        ("draught [m]", T, 0.02, 30.0),
+        ("block", C_b, 0.4, 0.9),
+    )
+    yield from (
+        ("length / beam", L / B, 2.0, 9.0),
+        ("beam / draught", B / T, 1.8, 6.0),
+        ("block x beam / length", C_b * B / L, 0.04, 0.3),
+        ("speed [m/s]", given.service, 0.1, 0.4 * math.sqrt(GRAVITY * L)),
+        ("shafts", given.units, 1, 2),
         ("scale", given.scale, 1.0, 400.0),
-        ("density [kg/m^3]", given.density, 950.0, 1050.0),
         ("rpm", given.rpm, 1.0, 20000.0),
-        ("propeller diameter [m]", given.propeller_diameter, 0.1 * given.draught, 1.2 * given.draught),
-        (
-            "rudder area [m^2]",
-            given.rudder_area,
-            2e-3 * given.length * given.draught,
-            0.1 * given.length * given.draught,
-        ),
-        ("rudder span [m]", given.rudder_span, 0.1 * given.draught, 1.2 * given.draught),
-        ("rudder rate [deg/s]", given.rudder_rate, 0.1, 500.0),
-    ):
-        if value is not None:
-            yield what, value, low, high
-    for what, area in (("frontal", given.frontal_area), ("lateral", given.lateral_area)):
-        if area is not None:
-            yield f"{what} area [m^2]", area, 1e-3, 4e4
+        ("propeller diameter [m]", given.propeller_diameter, 0.1 * T, 1.2 * T),
+        ("rudder area [m^2]", given.rudder_area, 2e-3 * L * T, 0.1 * L * T),
+    )
 
 
 def inertia(given: Particulars) -> Values:
@@ -375,22 +349,19 @@ def total_resistance(given: Particulars) -> float:
 
 
 def wind(given: Particulars) -> Values:
-    """Blendermann's coefficients of the type of ship; areas guessed where not given."""
+    """Blendermann's coefficients of the type of ship, and guessed areas."""
     B, L_oa = given.beam, 1.05 * given.length
     names = ("C_Dt", "C_Dl_bow", "C_Dl_stern", "delta", "kappa")
     coefficients = {
         name: Value(number, "-", f"Blendermann (1994), {given.ship_type}")
         for name, number in zip(names, WIND[given.ship_type], strict=True)
     }
-    frontal, lateral = given.frontal_area, given.lateral_area
-    A_F = Value(0.8 * B**2, "m^2", "0.8 B^2: a guess") if frontal is None else Value(frontal, "m^2", "given")
-    A_L = Value(0.5 * L_oa * B, "m^2", "0.5 L_oa B: a guess") if lateral is None else Value(lateral, "m^2", "given")
     return coefficients | {
-        "A_FW": A_F,
-        "A_LW": A_L,
+        "A_FW": Value(0.8 * B**2, "m^2", "0.8 B^2: a guess"),
+        "A_LW": Value(0.5 * L_oa * B, "m^2", "0.5 L_oa B: a guess"),
         "L_oa": Value(L_oa, "m", "1.05 L: a guess"),
         "s_L": Value(0.0, "m", "centroid of the lateral area amidships: a guess"),
-        "s_H": Value(0.5 * A_L.number / L_oa, "m", "half its mean height: a guess"),
+        "s_H": Value(0.25 * B, "m", "half its mean height: a guess"),
     }
 
 
@@ -507,14 +478,12 @@ def rudder(given: Particulars, side: int = 0) -> Values:
     share, words = (1.0, "") if given.units == 1 else (0.6, ", 0.6 of it each")
     area = share * L * T / 100 * (1 + 25 * (B / L) ** 2)
     A_R = given.rudder_area or area
-    H_R = given.rudder_span or min(math.sqrt(1.6 * A_R), 0.9 * T)
+    H_R = min(math.sqrt(1.6 * A_R), 0.9 * T)
     aspect = H_R**2 / A_R
     epsilon = 2.26 - 1.82 * (1 - _wake(given)[0])
     masumoto = "Yoshimura and Masumoto (2012)"
     gamma_R = Value(2.06 * C_b * B / L + 0.14, "-", f"2.06 C_b B / L + 0.14, {masumoto}")
-    rate, gear = given.rudder_rate or STEERING * given.faster[0], "given"
-    if given.rudder_rate is None:
-        gear = f"35 to -30 deg in 28 s, SOLAS II-1/29{given.faster[1]}"
+    gear = f"35 to -30 deg in 28 s, SOLAS II-1/29{given.faster[1]}"
     return {
         "x": Value(-0.5 * L, "m", "aft perpendicular"),
         **({"y": Value(side * 0.22 * B, "m", "behind its screw")} if side else {}),
@@ -524,7 +493,7 @@ def rudder(given: Particulars, side: int = 0) -> Values:
             "m^2",
             "given" if given.rudder_area else f"L T / 100 (1 + 25 (B / L)^2), Det Norske Veritas' least{words}",
         ),
-        "H_R": Value(H_R, "m", "given" if given.rudder_span else "aspect ratio 1.6, at most 0.9 T: a guess"),
+        "H_R": Value(H_R, "m", "aspect ratio 1.6, at most 0.9 T: a guess"),
         "f_alpha": Value(6.13 * aspect / (aspect + 2.25), "-", "6.13 a / (a + 2.25), a = H_R^2 / A_R, Fujii"),
         "epsilon": Value(epsilon, "-", f"2.26 - 1.82 (1 - w_P0), {masumoto}"),
         "kappa": Value(0.55 / epsilon, "-", f"0.55 / epsilon, {masumoto}"),
@@ -535,7 +504,7 @@ def rudder(given: Particulars, side: int = 0) -> Values:
         "a_H": Value(0.627 * C_b - 0.153, "-", "0.627 C_b - 0.153, Quadvlieg (2013)"),
         "x_H": Value(-0.45 * L, "m", "-0.45 L, Aoki et al. (2006)"),
         "actuator.delta.T": Value(1.0 / given.faster[0], "s", f"1 s of a ship: a guess{_over(given)}"),
-        "actuator.delta.rate": Value(math.radians(rate), "rad/s", gear),
+        "actuator.delta.rate": Value(math.radians(STEERING * given.faster[0]), "rad/s", gear),
     }
 
 
@@ -554,23 +523,19 @@ def azimuth(given: Particulars, side: int) -> Values:
         "D_p": Value(D, "m", size),
         "k_T": Value(k_T, "-", strength),
     }
-    copied: Values = {}
+    numbers: dict[str, float] = {}
     for name, number in unit.items():
-        if isinstance(number, float) and name not in placed:
-            copied[name] = Value(number, "-", "unit of R/V Gunnerus")
-        elif isinstance(number, Mapping):
-            copied |= {f'{name}."{key}"': Value(v, "-", "unit of R/V Gunnerus") for key, v in number.items()}
-    rate, gear = given.rudder_rate or AZIMUTHING * given.faster[0], "given"
-    if given.rudder_rate is None:
-        gear = f"two turns a minute: a guess{given.faster[1]}"
-    return (
-        placed
-        | copied
-        | {
-            "actuator.alpha.T": Value(0.5 / given.faster[0], "s", f"0.5 s of a ship: a guess{_over(given)}"),
-            "actuator.alpha.rate": Value(math.radians(rate), "rad/s", gear),
-        }
-    )
+        table = (
+            {f'{name}."{key}"': one for key, one in number.items()} if isinstance(number, Mapping) else {name: number}
+        )
+        numbers |= {key: one for key, one in table.items() if isinstance(one, float) and key not in placed}
+    copied = {name: Value(number, "-", "unit of R/V Gunnerus") for name, number in numbers.items()}
+    gear = f"two turns a minute: a guess{given.faster[1]}"
+    lag = {
+        "actuator.alpha.T": Value(0.5 / given.faster[0], "s", f"0.5 s of a ship: a guess{_over(given)}"),
+        "actuator.alpha.rate": Value(math.radians(AZIMUTHING * given.faster[0]), "rad/s", gear),
+    }
+    return placed | copied | lag
 
 
 def _azimuth_size(given: Particulars, unit: Mapping[str, Any]) -> tuple[float, float, str, str]:
@@ -629,7 +594,7 @@ def _blocks(given: Particulars, name: str) -> Iterator[str]:
     yield 'description = "A first guess from main particulars by regression formulae: no number of it is measured"'
     yield 'source = "shipid vessel new: the formula of each number is beside it"\ndof = 3\n'
     yield from _block("particulars", main)
-    water = "given" if given.density else "sea" if given.rho == RHO_SEA else "fresh water of a tank"
+    water = "sea" if given.rho == RHO_SEA else "fresh water of a tank"
     densities = {"rho": Value(given.rho, "kg m^-3", water), "rho_a": Value(RHO_AIR, "kg m^-3", "air")}
     yield from _block("constants", densities)
     yield from _block("inertia", inertia(given))

@@ -36,11 +36,8 @@ def _split(key: Any) -> tuple[str, str]:
     place = begins_at(entry.function) if isinstance(entry, Term) and callable(entry.function) else ""
     if isinstance(key, str) and group in GROUPS and re.fullmatch(NAME, kind) and kind not in RESERVED:
         return group, kind
-    if group in GROUPS and kind:
-        raise ShipidError(f"TERMS[{key!r}]: {kind!r} is no name for a kind: use letters, digits, _ and -{place}")
-    words = f"{group!r} is no block of a vessel document" if kind else "it names no block of a vessel document"
-    remedy = f"blocks are {listed(GROUPS)}: write TERMS['hull.{kind or group}'] or another"
-    raise ShipidError(f"TERMS[{key!r}]: {words}: {remedy}{place}")
+    remedy = f"write <block>.<kind>, such as TERMS['hull.drag'], with one of the blocks {listed(GROUPS)}"
+    raise ShipidError(f"TERMS[{key!r}]: no block of a vessel document and a kind in it: {remedy}{place}")
 
 
 def check_term(key: str) -> Term:

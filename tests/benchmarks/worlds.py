@@ -114,7 +114,7 @@ def _ship(name: str, seed: int) -> Ship:
     if model.name.startswith("R/V Gunnerus"):
         return Ship(truth, model, 4.13, 145.0)
     speed = float(model.document["particulars"]["U_0"])
-    return Ship(truth, model, speed, 60 * shaft_speed(Controls.of(model), speed))
+    return Ship(truth, model, speed, 60 * shaft_speed(Controls(model), speed))
 
 
 def _ranges(ship: Ship) -> dict[str, dict[str, Any]]:

@@ -41,19 +41,6 @@ def test_lists_and_one_vessel() -> None:
     assert all(isinstance(row["value"], float) for row in ship["parameters"])
 
 
-@pytest.mark.slow
-def test_a_draft_and_a_manoeuvre(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    sizes = ["--length", 60, "--beam", 12, "--draught", 4, "--block", 0.6]
-    draft = answered("vessel", "new", *sizes, "--out", "mine.toml")
-    assert draft["file"] == "mine.toml"
-    assert Path("mine.toml").read_text().startswith("#:schema ./.shipid/vessel.schema.json\n")
-    assert {row["verdict"] for row in draft["criteria"]} <= {"meets", "fails", "no limit", "met", "not met", ""}
-    done = answered("manoeuvre", "mariner", "zigzag", 10, 10, "--csv", "z.csv")
-    assert {"measures", "criteria", "page", "csv"} <= set(done)
-    assert len(pd.read_csv("z.csv")) == len(done["measures"])
-
-
 def test_studies(study: Path, tiny_run: Path) -> None:
     rows = answered("study", "variants", study)["foundations"]
     known = read_rows(tiny_run).drop_duplicates("foundation").set_index("foundation")["A"]

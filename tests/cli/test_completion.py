@@ -7,11 +7,10 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-from shipid.cli.completion import bundled_or_file, cells, files
+from shipid.cli.completion import bundled_or_file, files
 from shipid.document import bundled
 
 
@@ -52,10 +51,6 @@ def test_names_before_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert bundled_or_file("models")("gone/x") == []
     assert files(".txt")("n") == ["notes.txt"]
     assert files()("") == ["models/"]
-
-
-def test_cells_of_no_folder() -> None:
-    assert cells(SimpleNamespace(params={}, args=[]), "") == []  # type: ignore[arg-type]
 
 
 @pytest.mark.slow

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import get_args, get_type_hints
 
 import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
-from shipid.cli.data import data_import
 from shipid.data.dataset import read_dataset, write_dataset
-from shipid.logs.guess.pose import Frame
 from shipid.study.store import DATASET
 from tests.cli.running import BAD, ended, output_of
 from tests.logs.simulated import as_bridge, si_log
@@ -74,22 +71,6 @@ def test_data_fetch_from_the_folder(shared_data: Path, monkeypatch: pytest.Monke
     file = Path(output_of("data", "fetch", "gunnerus-2022").strip())
     assert file.is_file()
     assert shared_data in file.parents
-
-
-def test_a_draft_that_is_there_is_refused_before_another_is_made(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("shipid.logs.guess.columns.guess", None)
-    (tmp_path / "a.toml").write_text("mine")
-    status, _, error = ended("data", "import", "--guess", BAD / "logs" / "good.csv", "--out", tmp_path / "a.toml")
-    assert (status, (tmp_path / "a.toml").read_text()) == (1, "mine")
-    assert "a.toml: exists already and is not written over" in error
-
-
-def test_the_frames_of_the_command_are_those_of_the_draft() -> None:
-    """They are written twice: the help of the command does not load the draft."""
-    declared, _ = get_args(get_type_hints(data_import)["frame"])
-    assert get_args(declared) == get_args(Frame)
 
 
 def test_data_join_of_a_link_to_itself_is_refused(tmp_path: Path, tiny_run: Path) -> None:

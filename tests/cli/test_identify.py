@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -69,31 +68,3 @@ def test_the_answer_of_a_comparison_for_programs_has_all_that_is_shown(capsys: p
     assert answer.contents["warnings"] == said
     assert answer.contents["spread"] == [spread]
     assert capsys.readouterr().err.splitlines() == [f"warning: {one}" for one in said]
-
-
-def test_widths_of_nuisances() -> None:
-    from shipid.cli.identify import _widths
-    from shipid.identification.settings import WIDE
-
-    assert _widths(["current", "heading_bias"]) == ["current", "heading_bias"]
-    assert _widths(["current=0.3", "heading_bias"]) == {"current": 0.3, "heading_bias": WIDE.get("heading_bias", 1.0)}
-
-
-def test_the_look_before_the_fit_says_what_it_does_when_it_takes_long(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from shipid.cli import identify, terminal
-    from shipid.cli.answer import Answer
-    from shipid.errors import DataError
-    from shipid.study import first_look, new
-
-    def slow(*_: object, **__: object) -> None:
-        time.sleep(0.3)
-        raise DataError("enough")
-
-    monkeypatch.setattr(terminal, "SILENCE", 0.02)
-    monkeypatch.setattr(new, "proposed_horizon", lambda *_: (30.0, 1.0))
-    monkeypatch.setattr(first_look, "first_look", slow)
-    dataset = trials(load_vessel("gunnerus-28.9"), runs=2, steps=30)
-    identify._look(load_vessel("gunnerus-28.9"), dataset, (), (), Answer(False))
-    assert "comparing the vessel as it is with the runs, before the fit" in capsys.readouterr().err

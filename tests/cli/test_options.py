@@ -40,18 +40,10 @@ def test_changes_are_toml_or_text() -> None:
             parsed([wrong])
 
 
-def test_pairs_split_at_the_last_equals_sign() -> None:
-    """A selection of paths may hold a comparison."""
-    from shipid.cli.options import pairs
+def test_a_path_may_hold_a_comparison() -> None:
+    from shipid.cli.options import assignments
 
-    assert pairs(["hull.*[order >= 3]=0.2"], "--prior", "paths=0.3") == {"hull.*[order >= 3]": 0.2}
-
-
-def test_stem_keeps_the_dot_of_a_name() -> None:
-    from shipid.cli.options import stem
-
-    names = ("gunnerus-28.9", "a/b.toml", Path("x/log.parquet"))
-    assert [stem(name) for name in names] == ["gunnerus-28.9", "b", "log"]
+    assert assignments(["hull.*[order >= 3]=0.2"], "--prior", "paths=0.3") == {"hull.*[order >= 3]": 0.2}
 
 
 def test_the_command_line_can_be_typed_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,8 +86,7 @@ AFTER = {"out", "as_json", "html", "csv", "log", "save"}
 BAND = "--level 0.8 --kind zigzag --adaptive 0.03"
 THE_BAND = {"level": 0.8, "kind": "zigzag", "rate": 0.03}
 SIZES = {"length": 90.0, "beam": 15.0, "draught": 5.0, "block": 0.6, "speed": 6.0, "rpm": 150.0, "shafts": 2}
-SIZES |= {"propeller_diameter": 3.0, "rudder_area": 7.0, "rudder_span": 4.0, "rudder_rate": 3.5, "scale": 1.0}
-SIZES |= {"density": 1010.0, "frontal_area": 200.0, "lateral_area": 800.0}
+SIZES |= {"propeller_diameter": 3.0, "rudder_area": 7.0, "scale": 1.0}
 IDENTIFY = (
     f"identify {SHIP} log.parquet --runs A* --test B1 --parameters hull.*,inertia.m --fixed inertia.m --together a,b "
     "--prior hull.*=0.4 --bounds hull.*=[0.5,3] --nuisance current=0.2 --horizon 12 --set weights.u=0.07 "
@@ -224,9 +215,9 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
     ),
     "study screen": (
         "shipid.study.screen:screen",
-        f"study screen {STUDY} wrong --members 7 --single --set grid.N_D=[5] --device gpu",
+        f"study screen {STUDY} wrong --members 7 --set grid.N_D=[5] --device gpu",
         {"plan": is_changed, "wanted": lambda families: [one.name for one in families] == ["wrong"], "count": 7}
-        | {"device": "gpu", "engine": "single"},
+        | {"device": "gpu"},
     ),
     "study rotate": (
         "shipid.answer.rotate:rotate",

@@ -17,8 +17,6 @@ from shipid.document import bundled
 from shipid.errors import ShipidError
 from tests.cli.running import ended, output_of
 
-SHIP = "otter"
-
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -92,63 +90,6 @@ def test_what_cannot_be_written_is_refused_before_anything_is_computed(monkeypat
     check_output(Path("new/a.html"), [], "--out")
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        "manoeuvre ./ship.toml zigzag 20 20",
-        "replay ./ship.toml log.parquet",
-        "identify ./ship.toml log.parquet --parameters hull.abkowitz.N_r",
-        "simulate quick",
-        "simulate ./ship.toml --manoeuvres quick",
-        "study new --vessel ./ship.toml",
-        "data segment plain.toml good.csv",
-        "data import --guess good.csv",
-    ],
-)
-def test_what_is_written_by_default_is_refused_as_early(
-    words: str, there: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("plain.toml", "good.csv"):
-        shutil.copy(Path(__file__).parents[1] / "bad" / "logs" / name, there)
-    monkeypatch.setattr(os, "access", lambda folder, _: Path(folder) != there)
-    before = sorted(there.iterdir())
-    status, output, error = ended(*words.split())
-    assert (status, output) == (1, "")
-    assert "--out: is in a folder that this user may not write into: name another place to write" in error
-    assert sorted(there.iterdir()) == before
-
-
-@pytest.mark.usefixtures("there")
-def test_an_import_does_not_replace_the_log() -> None:
-    """The default name is that of the mapping, and a draft has the name of its log."""
-    Path("log.toml").write_text(
-        """name = "log"
-[format]
-kind = "parquet"
-[clock]
-from = "t"
-unit = "s"
-"""
-        + "".join(
-            f'[columns.{name}]\nfrom = "{name}"\nunit = "{unit}"\n'
-            for name, unit in (
-                ("north", "m"),
-                ("east", "m"),
-                ("psi", "rad"),
-                ("u", "m/s"),
-                ("v", "m/s"),
-                ("r", "rad/s"),
-            )
-        )
-    )
-    before = Path("log.parquet").read_bytes()
-    status, _, error = ended("data", "import", "log.toml", "log.parquet")
-    assert status == 1
-    assert "--out: is named twice" in error
-    assert Path("log.parquet").read_bytes() == before
-    assert "-> set.parquet" in output_of("data", "import", "log.toml", "log.parquet", "--out", "set.parquet")
-
-
 def test_no_file_of_results_is_written_over(there: Path) -> None:
     """A folder of results, whatever file it is: the seal would say that it was edited."""
     results = there / "results" / "quick"
@@ -159,14 +100,6 @@ def test_no_file_of_results_is_written_over(there: Path) -> None:
     assert status == 1
     assert "--csv: belongs to the results in" in error
     assert (results / "cells/a.parquet").read_text() == "sealed"
-
-
-def test_a_pipe_is_no_page(there: Path) -> None:
-    os.mkfifo(there / "pipe.html")
-    status, _, error = ended("manoeuvre", "./ship.toml", "zigzag", "10", "10", "--out", "pipe.html")
-    assert status == 1
-    assert "a device or a pipe" in error
-    assert not (there / "pipe.html").is_file()
 
 
 @pytest.mark.parametrize("value", ["inf", "-inf", "nan"])

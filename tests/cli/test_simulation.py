@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
@@ -11,7 +10,6 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import read_dataset
-from shipid.document import bundled
 from shipid.errors import ShipidError
 from tests.cli.running import ended, output_of
 
@@ -32,14 +30,6 @@ def test_manoeuvre_measures_what_it_writes(tmp_path: Path, monkeypatch: pytest.M
     assert "1 run measured, 0 not" in text
     again = pd.read_csv("again.csv").set_index("measure")
     pd.testing.assert_series_equal(again["value"], table["value"])
-
-
-def test_programs_get_the_approach_of_a_manoeuvre_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    answer = json.loads(output_of("manoeuvre", "gunnerus-28.9", "turning", 20, "--json"))
-    text = output_of("manoeuvre", "gunnerus-28.9", "turning", 20)
-    assert f"approach at {answer['speed']:.3g} m/s ({60 * answer['n']:.4g} rpm)" in text
-    assert answer["approach"] == "steady"
 
 
 def test_manoeuvres_that_cannot_be() -> None:
@@ -76,12 +66,3 @@ def test_simulate_writes_a_log_of_a_vessel(tmp_path: Path, monkeypatch: pytest.M
     assert np.abs(log["psi"]).max() > np.radians(20)
     with pytest.raises(ShipidError, match="changes a study"):
         output_of("simulate", "mariner", "--manoeuvres", "runs.toml", "--set", "step=1")
-
-
-def test_a_dataset_holds_a_thruster_with_a_hyphen_in_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    text = bundled("models")["mariner"].read_text().replace("[thruster.rudder", "[thruster.stern-rudder")
-    Path("ship.toml").write_text(text)
-    Path("runs.toml").write_text('[[manoeuvre]]\nkind = "zigzag"\nn_rpm = 80\nduration = 100\n')
-    output_of("simulate", "ship.toml", "--manoeuvres", "runs.toml", "--out", "log.parquet")
-    assert read_dataset(Path("log.parquet")).commands == ["propeller.n", "stern-rudder.delta"]

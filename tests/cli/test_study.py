@@ -12,12 +12,8 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from shipid.answer.compare import Comparison
 from shipid.cli import app
-from shipid.cli.answer import Answer
-from shipid.cli.study import _show_matched, _to_three_digits
 from shipid.document import bundled
-from shipid.engine import engines
 from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
@@ -76,12 +72,6 @@ def test_variants_of_a_chosen_observer_have_no_accuracy_yet(study: Path) -> None
     assert words.count("observer chosen from the runs of each cell, so A differs by cell") == 2
 
 
-def test_single_precision_needs_a_compiler(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engines, "compiler", lambda: None)
-    with pytest.raises(ShipidError, match="--single: needs a C compiler"):
-        output_of("study", "screen", study, "--single")
-
-
 def test_screen_writes_a_row_per_member(study: Path) -> None:
     text = output_of("study", "screen", study, "--members", "6")
     frame = pd.read_csv("tiny-screen.csv")
@@ -103,15 +93,6 @@ def test_screen_writes_a_row_per_member(study: Path) -> None:
     ):
         with pytest.raises(ShipidError, match=re.escape(remedy)):
             output_of("study", "screen", study, *arguments)
-
-
-def test_variants_shows_the_accuracy_that_the_run_has(study: Path, tiny_run: Path) -> None:
-    text = output_of("study", "variants", study)
-    rows = read_rows(tiny_run).drop_duplicates("foundation").set_index("foundation")
-    for name in ("right", "wrong-1", "wrong-2"):
-        shown = re.search(rf"^ *{name} +(\S+)", text, re.MULTILINE)
-        assert shown
-        assert float(shown[1]) == pytest.approx(rows.loc[name, "A"], abs=0.005)
 
 
 def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
@@ -203,33 +184,3 @@ def test_a_run_whose_lines_cannot_be_printed_gives_its_claims_back(
     assert (code, error) == (1, "error: system: No space left on device\n")
     assert taken[0].gi_frame is None, "the generator is closed"
     assert not (tmp_path / "run" / "claims").exists()
-
-
-def test_differences_of_a_ship_model_are_no_zeros_and_a_column_has_the_same_decimals(capsys) -> None:
-    row = {
-        "folder": "b",
-        "family": "a",
-        "method": "drawn",
-        "cells": 1,
-        "coverage_first": np.nan,
-        "coverage_other": np.nan,
-    }
-    small = {"N_D": 100, "first": 0.0004, "other": 0.0002, "difference": -0.0002, "low": -0.0003, "high": -0.0001}
-    large = {"N_D": 10, "first": 1.5, "other": 1.0, "difference": -0.5, "low": -0.6, "high": -0.4}
-    errors = pd.DataFrame([{**row, **numbers, "verdict": "lower"} for numbers in (large, small)])
-    _show_matched(Comparison(("a", "b"), pd.DataFrame(), errors, ()), Answer(as_json=False))
-    shown = [line.split()[4:] for line in capsys.readouterr().out.splitlines() if "drawn" in line]
-    assert shown == [
-        ["1.50000", "1.00000", "-0.50000", "[-0.60000,", "-0.40000]", "lower"],
-        ["0.00040", "0.00020", "-0.00020", "[-0.00030,", "-0.00010]", "lower"],
-    ]
-    _show_matched(Comparison(("a", "b"), pd.DataFrame(), errors[:1], ()), Answer(as_json=False))
-    assert " 1.500   1.000   -0.500 [-0.600, -0.400]" in capsys.readouterr().out
-
-
-def test_a_number_over_worlds_and_its_interval_have_the_same_decimals() -> None:
-    """They were 0.86 [0.812, 0.9] and 12.3 [-0.0451, 24.7]."""
-    assert _to_three_digits(0.86, 0.8121, 0.9) == "0.860 [0.812, 0.900]"
-    assert _to_three_digits(12.34, -0.0451, 24.66) == "12.3 [0.0, 24.7]"
-    assert _to_three_digits(1234.4, 1200.0, 1300.2) == "1234 [1200, 1300]"
-    assert _to_three_digits(0.0, np.nan, np.nan) == "0.00", "no interval from two worlds"

@@ -59,21 +59,8 @@ def test_a_vessel_beyond_the_formulae_is_one_line(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["two\nlines", 'quotes " and \\', "Ærø ⚓"])
-def test_any_name_is_written_as_toml_can_read_it(name: str, tmp_path: Path) -> None:
-    given = ("--length", 30, "--beam", 8, "--draught", 2.8, "--block", 0.55, "--out", tmp_path / "x.toml")
-    output_of("vessel", "new", *given, "--name", name)
-    assert load_vessel(tmp_path / "x.toml").document["name"] == name
-
-
 @pytest.mark.parametrize("name", ["\x1b[31mred", "del \x7f"])
 def test_a_name_that_no_document_may_hold_is_refused(name: str, tmp_path: Path) -> None:
     given = ("--length", 30, "--beam", 8, "--draught", 2.8, "--block", 0.55, "--out", tmp_path / "x.toml")
     assert "text with a control character" in ended("vessel", "new", *given, "--name", name)[2]
     assert not (tmp_path / "x.toml").exists()
-
-
-def test_no_shafts_are_refused(tmp_path: Path) -> None:
-    given = ("--length", 30, "--beam", 8, "--draught", 2.8, "--block", 0.55, "--out", tmp_path / "x.toml")
-    for shafts in (0, 3):
-        assert "1 to 2" in ended("vessel", "new", *given, "--shafts", shafts)[2]

@@ -6,7 +6,6 @@ import numpy as np
 
 from shipid.engine.casadi import BLOCK, memory_along, orders_of
 from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import load_vessel
 from tests.conftest import variety
 
 LAGGED = variety()["actuators"]
@@ -16,12 +15,6 @@ def stepped(num_rows: int) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """A step of every order of 0.1 after row 1, rows 0.5 s apart."""
     t = 0.5 * np.arange(num_rows)
     return {name: np.where(t > 0.25, 0.1, 0.0) for name in dynamics(LAGGED).commands}, t
-
-
-def test_a_vessel_without_actuators_has_no_memory() -> None:
-    vessel = load_vessel("gunnerus-28.9")
-    orders = {name: np.zeros(3) for name in dynamics(vessel).commands}
-    assert memory_along(vessel, orders, np.arange(3.0)) is None
 
 
 def test_states_begin_at_the_first_order_and_follow_the_lag() -> None:
@@ -35,12 +28,6 @@ def test_states_begin_at_the_first_order_and_follow_the_lag() -> None:
         assert 0 < state[2] <= 0.1
         assert (np.diff(state) >= -1e-15).all()
         assert abs(state[-1] - 0.1) < 1e-6
-
-
-def test_one_row_has_the_state_of_its_order() -> None:
-    states = memory_along(LAGGED, {name: np.full(1, 0.2) for name in dynamics(LAGGED).commands}, np.zeros(1))
-    assert states is not None
-    assert all(state.tolist() == [0.2] for state in states.values())
 
 
 def test_orders_of_many_samples_are_those_of_each() -> None:

@@ -71,11 +71,6 @@ def test_a_wrong_name_lists_all_engines(toy: str, draw_inputs: Draw) -> None:
         assert name in str(caught.value)
 
 
-def test_an_engine_of_the_cpu_names_those_of_a_device(toy: str, draw_inputs: Draw) -> None:
-    with pytest.raises(ShipidError, match="'drift' runs on the CPU: use 'compiled' or 'torch' on 'cuda'"):
-        rollout(SHIP, **draw_inputs(SHIP, 1), step=1.0, num_steps=1, engine=toy, device="cuda")
-
-
 @pytest.mark.parametrize(
     ("num_samples", "num_steps", "device", "has_compiler", "expected"),
     [
@@ -101,10 +96,3 @@ def test_auto_goes_by_size_and_by_what_there_is(
     empty: Any = np.zeros((1, 0, num_samples))
     batch = Batch(np.zeros((6, num_samples)), empty[0], empty, empty, empty, np.zeros((1, 3)))
     assert chosen(batch, Job(1.0, num_steps, "euler", 1, (0, 1), device)) is ENGINES[expected]
-
-
-def test_auto_takes_a_new_engine_that_prefers_a_load(monkeypatch: pytest.MonkeyPatch, draw_inputs: Draw) -> None:
-    monkeypatch.setattr(engines, "ENGINES", {"drift": Engine(drift, preferred=lambda load: load.width == 3), **ENGINES})
-    three, four = (rollout(SHIP, **draw_inputs(SHIP, n), step=1.0, num_steps=1) for n in (3, 4))
-    np.testing.assert_allclose(three["u"][1] - three["u"][0], 1.0)
-    assert (np.abs(four["u"][1] - four["u"][0] - 1) > 1e-3).any()

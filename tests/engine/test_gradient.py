@@ -113,35 +113,6 @@ def test_force_and_start_by_finite_differences(draw_inputs: Draw, method: Method
 
 
 @pytest.mark.parametrize("engine", ABLE)
-def test_held_commands_are_repeated_ones(draw_inputs: Draw, engine: str) -> None:
-    given, options = inputs(SHIP, draw_inputs, "euler")
-    varied = {group: dict(values) for group, values in given.items()}
-    for group in ("commands", "environment"):
-        varied[group] = {name: np.tile(column, (STEPS, 1)) for name, column in given[group].items()}
-    names = ("hull.learned.w_u.0", "hull.learned.c_N.2")
-    held, repeated = (gradient(SHIP, one, options, engine, names) for one in (given, varied))
-    np.testing.assert_allclose(held.parameters, repeated.parameters, rtol=1e-12)
-
-
-@pytest.mark.parametrize("group", ["commands", "environment"])
-@pytest.mark.parametrize("engine", ABLE)
-def test_a_series_of_one_group_beside_a_held_other(draw_inputs: Draw, engine: str, group: str) -> None:
-    """Either commands or weather change from step to step: the slope is that with the other repeated at each step."""
-    given, options = inputs(SHIP, draw_inputs, "euler")
-    factors = np.array([1.0, 0.5, 1.5, 0.7])[:, None]
-    tiled = {
-        key: {name: np.tile(x, (STEPS, 1)) for name, x in given[key].items()} for key in ("commands", "environment")
-    }
-    tiled[group] = {name: factors * values for name, values in tiled[group].items()}
-    names = ("hull.learned.w_u.0", "hull.learned.c_N.2")
-    both = gradient(SHIP, given | tiled, options, engine, names)
-    one = gradient(SHIP, given | {group: tiled[group]}, options, engine, names)
-    np.testing.assert_allclose(one.parameters, both.parameters, rtol=1e-12)
-    held = gradient(SHIP, given, options, engine, names)
-    assert not np.allclose(one.parameters, held.parameters, rtol=1e-6)
-
-
-@pytest.mark.parametrize("engine", ABLE)
 def test_a_diverged_sample_is_named_and_harms_no_other(draw_inputs: Draw, engine: str) -> None:
     given, options = inputs(SHIP, draw_inputs, "euler")
     names = tuple(SHIP.parameters)
@@ -176,12 +147,3 @@ def test_what_cannot_be_is_refused(draw_inputs: Draw, changes: dict[str, Any], m
     given, options = inputs(SHIP, draw_inputs, "euler")
     with pytest.raises(ShipidError, match=message):
         rollout_gradient(SHIP, **{**given, **options, "loss": LOSS, "keep": KEEP, "engine": "torch", **changes})
-
-
-def test_drawn_waves_are_refused(draw_inputs: Draw) -> None:
-    ship = load_vessel("gunnerus-28.9-6dof")
-    off = [path for path in ("waves.first_order", "waves.drift") if path.split(".")[1] in ship.document["waves"]]
-    waves = ship.with_values({f"{path}.off": False for path in off})
-    given, options = inputs(waves, draw_inputs, "euler")
-    with pytest.raises(ShipidError, match="draws its components and has no gradient: switch it off"):
-        gradient(waves, given, options, "torch", ())

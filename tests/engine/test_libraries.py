@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-import errno
 import logging
 import os
-import shutil
 import stat
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from shipid.engine import libraries, native
-from shipid.engine.libraries import MOST_WORDS, NoLibrary, build, load, run_compiler, stranger
+from shipid.engine.libraries import NoLibrary, build, load, run_compiler, stranger
 from shipid.engine.native import Target, compiler
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
-from shipid.hybrid.device import vectors
 from shipid.vessel.load import load_vessel
+from tests.drawn import seeds
 from tests.engine.conftest import QUICK
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
@@ -90,7 +86,7 @@ def test_a_truncated_library_is_never_loaded(kept: float, tmp_path: Path) -> Non
         load(library)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", seeds(4, 20))
 def test_a_library_with_another_byte_is_never_loaded(seed: int, tmp_path: Path) -> None:
     library = made(tmp_path / "a")
     content, rng = bytearray(library.read_bytes()), np.random.default_rng(seed)
@@ -98,13 +94,6 @@ def test_a_library_with_another_byte_is_never_loaded(seed: int, tmp_path: Path) 
     library.write_bytes(content)
     with pytest.raises(NoLibrary, match="is damaged"):
         load(library)
-
-
-def test_a_library_under_the_name_of_another_is_never_loaded(tmp_path: Path) -> None:
-    library = made(tmp_path / "a")
-    other = library.rename(library.with_name("other.so"))
-    with pytest.raises(NoLibrary, match="is damaged"):
-        load(other)
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no owners of files")
@@ -127,44 +116,6 @@ def test_the_work_of_others_is_never_loaded(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(os, "geteuid", lambda: 12345)
     with pytest.raises(NoLibrary, match="belongs to another user"):
         load(library)
-
-
-@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no owners of files")
-def test_a_folder_above_that_a_group_may_change_is_that_of_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its members could put another folder in the place of the cache."""
-    library = made(tmp_path / "a")
-    tmp_path.chmod(0o770)
-    for own in (False, True):
-        monkeypatch.setattr(libraries, "_is_own", lambda *_, own=own: own)
-        assert stranger(library) == (None if own else f"{tmp_path} can be written by its group: `chmod g-w` ends that")
-    monkeypatch.setattr(libraries, "_is_own", lambda *_: False)
-    tmp_path.chmod(0o1770)
-    assert stranger(library) is None
-
-
-@pytest.mark.parametrize(
-    ("group", "user", "own"),
-    [
-        (0, 1001, True),  # the system's
-        (1001, 1001, True),  # as most distributions make them, with the same number
-        (1002, 1001, True),  # or with the same name alone
-        (1003, 1003, False),  # with another member
-        (100, 1001, False),  # of all users
-        (5555, 5555, True),  # numbers without names, as in a container
-        (5556, 5555, False),
-    ],
-)
-def test_a_group_is_ones_own_by_number_or_name_and_without_others(
-    group: int, user: int, own: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    grp, pwd = pytest.importorskip("grp"), pytest.importorskip("pwd")
-    groups = {1001: ("ann", []), 1002: ("ann", ["ann"]), 1003: ("bob", ["ann"]), 100: ("users", [])}
-    users = {1001: "ann", 1003: "bob"}
-    monkeypatch.setattr(grp, "getgrgid", lambda one: SimpleNamespace(gr_name=groups[one][0], gr_mem=groups[one][1]))
-    monkeypatch.setattr(pwd, "getpwuid", lambda one: SimpleNamespace(pw_name=users[one]))
-    assert libraries._is_own.__wrapped__(group, user) == own
 
 
 @pytest.mark.slow
@@ -208,25 +159,6 @@ def test_a_folder_of_another_user_is_not_used(
     (line,) = [record.getMessage() for record in caplog.records]
     assert "not kept for the next run" in line
     assert "another user" in line
-
-
-def test_a_cache_that_others_can_write_is_closed(empty_cache: Path, numbers: Callable[..., np.ndarray]) -> None:
-    empty_cache.mkdir(parents=True)
-    empty_cache.chmod(0o777)
-    numbers()
-    assert stat.S_IMODE(empty_cache.stat().st_mode) == 0o700
-
-
-def test_a_cache_that_is_cleared_while_a_process_runs_is_filled_again(
-    empty_cache: Path, numbers: Callable[..., np.ndarray]
-) -> None:
-    """Before, the compiler was blamed, and every further ship was computed by a slower engine."""
-    expected = numbers()
-    shutil.rmtree(empty_cache.parent)
-    native._library.cache_clear()
-    np.testing.assert_array_equal(numbers(), expected)
-    (library,) = empty_cache.glob("*.so")
-    assert stranger(library) is None
 
 
 @pytest.mark.parametrize("everywhere", [False, True])
@@ -275,34 +207,7 @@ def test_a_full_disk_is_one_line(
     assert compiler() is None
 
 
-@pytest.mark.parametrize("cached", [True, False])
-def test_where_there_is_no_temporary_folder_the_cache_serves_or_a_line_says_so(
-    cached: bool,
-    tmp_path: Path,
-    numbers: Callable[..., np.ndarray],
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    """Before, the engine was not used there, and nothing said so."""
-    sound = numbers()
-    forget()
-
-    def none() -> str:
-        raise FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/tmp']")
-
-    monkeypatch.setattr(tempfile, "gettempdir", none)
-    if not cached:
-        (tmp_path / "file").touch()
-        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    with caplog.at_level(logging.WARNING):
-        np.testing.assert_allclose(numbers(), sound, rtol=1e-9)
-        assert native.engine().startswith("native" if cached else "casadi")
-    lines = [record.getMessage() for record in caplog.records]
-    assert [line[-45:] for line in lines] == ([] if cached else ["): set TMPDIR to a folder that can be written"])
-    assert not list(tmp_path.rglob(".shipid-*"))
-
-
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(1, 6))
 def test_what_a_strange_compiler_says_is_one_line_that_names_it_and_controls_no_terminal(
     seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -344,7 +249,10 @@ def test_a_compiler_that_never_returns_is_ended(
         np.testing.assert_allclose(numbers(), sound, rtol=1e-9)
     (line,) = [record.getMessage() for record in caplog.records]
     assert "hangs: not done after 0.5 s" in line
-    assert not _alive(int((tmp_path / "child").read_text()))
+    child, limit = int((tmp_path / "child").read_text()), time.monotonic() + 5.0
+    while _alive(child) and time.monotonic() < limit:
+        time.sleep(0.02)
+    assert not _alive(child)
 
 
 def _alive(number: int) -> bool:
@@ -352,18 +260,6 @@ def _alive(number: int) -> bool:
         return Path(f"/proc/{number}/stat").read_text().split()[2] != "Z"
     except OSError:
         return False
-
-
-def test_what_a_compiler_prints_without_an_end_does_not_fill_the_memory() -> None:
-    """It was kept whole: 2 GB in the ten seconds of a probe."""
-    reason, printed = run_compiler(["yes", "error: no such thing"], limit=0.5)
-    assert reason == "hangs: not done after 0.5 s"
-    assert printed == ""
-    reason, printed = run_compiler(["sh", "-c", "yes words | head -c 3000000; yes no | head -c 300000 >&2; exit 1"])
-    assert len(printed) == MOST_WORDS
-    assert reason is not None
-    assert len(reason) <= MOST_WORDS
-    assert reason.startswith("no\nno")
 
 
 def test_what_a_compiler_leaves_running_is_not_waited_for() -> None:
@@ -379,48 +275,8 @@ def test_a_compiler_that_cannot_be_started_is_a_reason(tmp_path: Path) -> None:
     assert reason.startswith("cannot be started")
 
 
-def test_what_a_killed_process_was_compiling_does_not_stay_in_the_cache(tmp_path: Path) -> None:
-    process = os.fork()
-    if not process:
-        build(["kill", "-9", str(os.getpid())], SOURCE, tmp_path / "model.so")
-    os.waitpid(process, 0)
-    assert [place.name for place in tmp_path.glob(".shipid-*/*")] == ["step.c"]
-    assert build(["cp", "{source}", "{library}"], SOURCE, tmp_path / "model.so") is None
-    assert [place.name for place in tmp_path.glob("*.so")] == ["model.so"]
-    assert not list(tmp_path.glob(".shipid-*"))
-
-
-def test_a_cache_whose_name_is_not_utf_8_is_not_used(
-    numbers: Callable[..., np.ndarray],
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-    tmp_path: Path,
-) -> None:
-    """Before, what limits the threads of a BLAS ended in a traceback: it reads the names of all libraries."""
-    monkeypatch.setenv("XDG_CACHE_HOME", f"{tmp_path}/j\udce4ger")
-    forget()
-    with caplog.at_level(logging.WARNING):
-        numbers()
-    (line,) = [record.getMessage() for record in caplog.records]
-    assert "not kept for the next run" in line
-    assert "a name that is not UTF-8" in line
-    assert "\udce4" not in Path("/proc/self/maps").read_text(errors="surrogateescape")
-    vectors()
-
-
-def test_a_relative_cache_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """As the specification of XDG_CACHE_HOME says: else each working folder would get a cache."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_CACHE_HOME", "cache")
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    forget()
-    assert native._folder() == tmp_path / "home" / ".cache" / "shipid"
-    assert not (tmp_path / "cache").exists()
-
-
-def test_without_a_home_it_works(numbers: Callable[..., np.ndarray], monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = numbers()
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setenv("HOME", "/dev/null")
-    forget()
-    np.testing.assert_array_equal(numbers(), sound)
+def test_a_library_under_the_name_of_another_is_never_loaded(tmp_path: Path) -> None:
+    library = made(tmp_path / "a")
+    other = library.rename(library.with_name("other.so"))
+    with pytest.raises(NoLibrary, match="is damaged"):
+        load(other)

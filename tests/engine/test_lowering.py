@@ -12,14 +12,12 @@ import pytest
 import torch
 
 from shipid.engine import torch as batched
-from shipid.engine.integrate import Job
 from shipid.engine.lowering import lower
 from shipid.engine.native import compiler
-from shipid.engine.rollout import Batch, Method, Trajectories, rollout
-from shipid.engine.torch import kernels, run_torch
+from shipid.engine.rollout import Method, Trajectories, rollout
+from shipid.engine.torch import kernels
 from shipid.simulation.sea import Sea, draw_components, wave_loads
-from shipid.vessel import dynamics as module
-from shipid.vessel.dynamics import SumOverComponents, dynamics
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, members
 from tests.conftest import structure
@@ -109,54 +107,6 @@ def test_rollout_equals_casadi(vessel: Vessel, draw_inputs: Draw, method: Method
         np.testing.assert_array_equal(other.diverged, one.diverged)
 
 
-def test_gradients_of_a_step_equal_casadi(vessel: Vessel, draw_inputs: Draw) -> None:
-    """d(rates)/d(state, commands, tau_extra, parameters) by autograd through the lowered function."""
-    model, inputs = dynamics(vessel), dynamics_inputs(vessel, draw_inputs, 1)
-    wanted = ("state", "commands", "tau_extra", "parameters")
-    symbols = {name: ca.SX.sym(name, len(inputs[name])) for name in (*module.INPUTS, "tau_extra")}
-    jacobian = ca.jacobian(model.rates(*symbols.values()), ca.vertcat(*(symbols[name] for name in wanted)))
-    function = ca.Function("jacobian", list(symbols.values()), [ca.densify(jacobian)])
-    exact = np.array(function(*(inputs[name] for name in symbols)))
-    leaves = {name: torch.tensor(inputs[name]).requires_grad_() for name in symbols}
-    lowered = lower(model.rates)
-    channels = lowered(*leaves.values())
-    rows = []
-    for channel in channels:
-        slopes = torch.autograd.grad(
-            channel.sum() if isinstance(channel, torch.Tensor) else channel + 0 * leaves["state"].sum(),
-            [leaves[name] for name in wanted],
-            retain_graph=True,
-            allow_unused=True,
-        )
-        pairs = zip(slopes, (leaves[name] for name in wanted), strict=True)
-        rows.append(np.concatenate([(torch.zeros_like(x) if g is None else g).numpy().ravel() for g, x in pairs]))
-    scale = np.maximum(np.abs(exact).max(axis=1, keepdims=True), 1e-12)
-    np.testing.assert_allclose(np.array(rows) / scale, exact / scale, atol=1e-11)
-
-
-def test_a_batch_is_its_samples_and_variants_one_by_one(vessel: Vessel, draw_inputs: Draw) -> None:
-    given, parameters = draw_inputs(vessel, 7), family(vessel, 2)
-    options: dict[str, Any] = {"step": 1.0, "num_steps": 5, "engine": "torch"}
-    together = rollout(vessel, **given, **options, parameters=parameters)
-    for sample in (0, 6):
-        single = {
-            group: {name: x[sample : sample + 1] for name, x in values.items()} for group, values in given.items()
-        }
-        for variant in (0, 1):
-            alone = rollout(vessel, **single, **options, parameters=parameters[variant])
-            np.testing.assert_allclose(
-                together.states[:, variant, sample], alone.states[:, 0, 0], rtol=1e-13, atol=1e-13
-            )
-
-
-def test_blocks_are_joined_seamlessly(draw_inputs: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
-    vessel = load_vessel("gunnerus-28.9")
-    given = draw_inputs(vessel, 21)
-    whole = rollout(vessel, **given, step=1.0, num_steps=4, engine="torch")
-    monkeypatch.setattr(batched, "EAGER_BLOCK", 8)  # two full blocks and a padded one
-    np.testing.assert_array_equal(rollout(vessel, **given, step=1.0, num_steps=4, engine="torch").states, whole.states)
-
-
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_diverged_member_spoils_no_other(draw_inputs: Draw, engine: Any) -> None:
     vessel = load_vessel("gunnerus-28.9")
@@ -177,99 +127,12 @@ def test_a_diverged_member_spoils_no_other(draw_inputs: Draw, engine: Any) -> No
     np.testing.assert_allclose(path.states[:, keep], sound.states[:, keep], rtol=1e-12)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("hidden", ["command", "wind", "parameter", "force"])
-def test_no_input_that_is_not_a_number_goes_unseen(draw_inputs: Draw, engine: Any, hidden: str) -> None:
-    """CasADi's fmin and fmax step over a NaN: the flag may not depend on the engine."""
-    vessel = load_vessel("gunnerus-28.9")
-    given, parameters = draw_inputs(vessel, 2), family(vessel, 1)
-    tau = np.zeros((2, 3))
-    {
-        "command": given["commands"]["port.n"],
-        "wind": given["environment"]["V_w"],
-        "parameter": parameters[0],
-        "force": tau[:, 0],
-    }[hidden][0] = np.nan
-    path = rollout(vessel, **given, step=1.0, num_steps=3, engine=engine, parameters=parameters, tau_extra=tau)
-    assert path.diverged[0].tolist() == [True, hidden == "parameter"]
-
-
-def test_truths_count_as_numbers_in_arithmetic() -> None:
-    """(x > 0) + (y > 0) is 2 in CasADi, and stays 2 where PyTorch would say `true`."""
-    x, p = ca.SX.sym("x", 2), ca.SX.sym("parameters", 1)
-    count = (x[0] > 0) + (x[1] > 0) - ca.logic_not(x[0] > p[0])
-    chosen = ca.if_else(ca.logic_and(x[0] > 0, x[1] > 0), 1e-6, -3.3)
-    either = ca.if_else(ca.logic_or(x[0] > p[0], p[0] > 0), x[1], 0)
-    function = ca.Function(
-        "truths", [x, p], [ca.vertcat(count, chosen, either, -(x[0] <= x[1]))], ["x", "parameters"], ["y"]
-    )
-    grid = np.array([[-1.0, 1.0, 1.0, 0.0], [1.0, -1.0, 2.0, 0.0]])
-    inputs = {"x": grid, "parameters": np.full((1, 4), 0.5)}
-    np.testing.assert_array_equal(evaluate(function, inputs), by_casadi(function, inputs))
-
-
 def test_every_printed_operation_has_casadis_value() -> None:
     x, p = ca.SX.sym("x", 2), ca.SX.sym("parameters", 2)
     function = ca.Function("f", [x, p], [ca.vertcat(*operations(x[0], x[1], p[0]))], ["x", "parameters"], ["y"])
     rng = np.random.default_rng(0)
     inputs = {"x": rng.uniform(-2, 2, (2, 50)), "parameters": np.tile([[0.7], [0.1]], (1, 50))}
     np.testing.assert_allclose(evaluate(function, inputs), by_casadi(function, inputs), rtol=1e-14, atol=1e-15)
-
-
-def test_an_operation_without_counterpart_is_refused() -> None:
-    x, p = ca.SX.sym("x"), ca.SX.sym("parameters")
-    with pytest.raises(ValueError, match="no counterpart"):
-        lower(ca.Function("f", [x, p], [ca.erf(x)], ["x", "parameters"], ["y"]))
-
-
-def test_what_depends_on_parameters_alone_is_hoisted() -> None:
-    x, p = ca.SX.sym("x"), ca.SX.sym("parameters", 2)
-    lowered = lower(ca.Function("f", [x, p], [ca.exp(p[0]) * p[1] * x], ["x", "parameters"], ["y"]))
-    assert lowered.num_instructions == 1
-    assert lowered.early[0](torch.tensor([[0.0], [3.0]], dtype=torch.float64)).tolist() == [[3.0]]
-
-
-def test_what_depends_on_commands_alone_is_computed_while_they_are_held() -> None:
-    x, c, p = ca.SX.sym("x"), ca.SX.sym("commands"), ca.SX.sym("parameters")
-    function = ca.Function("f", [x, c, p], [ca.cos(c) * p * x], ["x", "commands", "parameters"], ["y"])
-    lowered = lower(function)
-    assert lowered.num_instructions == 1
-    values = torch.tensor([[2.0, 3.0]], dtype=torch.float64)
-    first = lowered.early[0](torch.tensor([[5.0]], dtype=torch.float64))
-    np.testing.assert_allclose(lowered.early[1](values, first), 5 * np.cos([[2.0, 3.0]]), rtol=1e-15)
-
-
-@pytest.mark.parametrize("what", ["constant", "state", "component"])
-def test_a_sum_counts_every_component(what: str, draw_inputs: Draw) -> None:
-    """Also an entry of the wrench that does not know which component it is for."""
-    vessel = load_vessel("gunnerus-28.9")
-    model = dynamics(vessel)
-    sizes = [len(model.state), 0, len(model.commands), len(model.environment), len(model.parameters), 1]
-    inputs = [ca.SX.sym(name, size) for name, size in zip((*module.INPUTS, "component"), sizes, strict=True)]
-    X = {"constant": ca.SX(100.0), "state": 100 * inputs[0][3], "component": inputs[-1]}[what]
-    term = ca.Function("sum_0", inputs, [ca.vertcat(X, 0, 0)], [*module.INPUTS, "component"], ["tau"])
-    arrays = np.arange(40.0)[:, None]
-    summed = module.Dynamics(**{**vars(model), "sums": (SumOverComponents("sum", term, {"component": 1}, arrays),)})
-    given = draw_inputs(vessel, 3)
-    batch = Batch(
-        state=np.array(list(given["start"].values())),
-        memory=np.zeros((0, 3)),
-        commands=np.array([list(given["commands"].values())]),
-        environment=np.array([list(given["environment"].values())]),
-        tau_extra=np.zeros((1, 3, 3)),
-        parameters=np.array([list(vessel.parameters.values())]),
-    )
-    totals = {
-        "constant": np.full(3, 4000.0),
-        "state": 4000 * given["start"]["u"],
-        "component": np.full(3, arrays.sum()),
-    }
-    with_tau = np.zeros((1, 3, 3))
-    with_tau[0, 0] = totals[what]
-    pushed = Batch(**{**vars(batch), "tau_extra": with_tau})
-    computed, _ = run_torch(summed, batch, Job(1.0, 1, "euler", 1, tuple(range(6))), False)
-    expected, _ = run_torch(model, pushed, Job(1.0, 1, "euler", 1, tuple(range(6))), False)
-    np.testing.assert_allclose(computed, expected, rtol=1e-13)
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from shipid.engine import native
 from shipid.engine.integrate import Batch, Job
 from shipid.engine.native import NOTED, compiler, measure_native, run_native, target
 from shipid.engine.rollout import distances, prepared, rollout
-from shipid.engine.vectors import DOUBLE, Target
+from shipid.engine.vectors import Target
 from shipid.errors import ShipidError
 from shipid.metrics import position_error, tally
 from shipid.vessel import dynamics as module
@@ -84,15 +83,6 @@ def test_groups_and_remainders(count: int, draw_inputs: Callable[..., Any]) -> N
     np.testing.assert_array_equal(rollout(SHIP, **part, **options).states, whole[:, :, :count])
 
 
-@pytest.mark.parametrize("kind", [np.float64, np.float32, int])
-def test_a_step_may_be_a_number_of_numpy(kind: type, draw_inputs: Callable[..., Any]) -> None:
-    given, goal = draw_inputs(SHIP, 3), np.zeros((2, 3, 2))
-    for step in (1.0, kind(1)):
-        path = rollout(SHIP, **given, step=step, num_steps=2, keep=("north", "east"), engine="native")
-        far = distances(SHIP, **given, goal=goal, step=step, engine="native").total
-        np.testing.assert_allclose(far[0], position_error(path.states[1:, 0], goal).sum(axis=0))
-
-
 def test_a_library_is_made_once(empty_cache: Path, draw_inputs: Callable[..., Any]) -> None:
     """Another variant, size or number of steps needs no compilation; another step or method does."""
 
@@ -123,47 +113,6 @@ def test_a_compiler_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, draw
     with pytest.raises(ShipidError, match=r"the C compiler failed \(.*no-such-processor") as caught:
         rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
     assert "\n" not in str(caught.value)
-
-
-def test_it_runs_on_the_cpu_only(draw_inputs: Callable[..., Any]) -> None:
-    with pytest.raises(ShipidError, match="runs on the CPU"):
-        rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native", device="cuda")
-
-
-def test_a_broken_library_is_made_anew(
-    empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
-) -> None:
-    """What a full disk left behind, read by a later process: here another cache, as a loaded file stays loaded."""
-
-    def run() -> np.ndarray:
-        native._library.cache_clear()
-        return rollout(SHIP, **draw_inputs(SHIP, 3), step=1.0, num_steps=4, engine="native").states
-
-    sound = run()
-    (library,) = empty_cache.iterdir()
-    broken = tmp_path / "other" / "shipid" / library.name
-    broken.parent.mkdir(parents=True)
-    broken.write_bytes(b"")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
-    np.testing.assert_array_equal(run(), sound)
-    assert broken.stat().st_size > 0
-
-
-def test_threads_may_make_the_same_library_at_once(empty_cache: Path) -> None:
-    """Many at a time, as on a shared cache: each compiles for itself, and one file is left."""
-    model = dynamics(SHIP)
-    with ThreadPoolExecutor(3) as pool:
-        for future in [pool.submit(native._library.__wrapped__, model, 1.0, "euler", DOUBLE, ()) for _ in range(3)]:
-            future.result()
-    assert len(list(empty_cache.iterdir())) == 1
-
-
-def test_a_cache_that_cannot_be_written_is_no_obstacle(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]
-) -> None:
-    (tmp_path / "file").write_text("not a folder")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert not rollout(SHIP, **draw_inputs(SHIP, 3), step=1.0, num_steps=4, engine="native").diverged.any()
 
 
 @pytest.mark.parametrize("count", [1, 7, 8, 9, 70])
@@ -205,66 +154,6 @@ def test_distances_of_a_long_rollout_are_all_counted(count: int, every: int, dra
     assert np.abs(counts[0].astype(int) - tally(apart)).sum() <= 2  # a distance may be rounded into the next bin
 
 
-@pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "esso-190k"])
-def test_single_precision_follows_double(name: str, draw_inputs: Callable[..., Any]) -> None:
-    """Paths from the origin to a part in ten thousand, distances to a part in a hundred thousand."""
-    vessel = load_vessel(name)
-    given = {**draw_inputs(vessel, 37), "step": 1.0}
-    given["start"] = {**given["start"], "north": np.zeros(37), "east": np.zeros(37)}
-    double, single = (rollout(vessel, **given, num_steps=20, engine=engine) for engine in ("native", "single"))
-    path = double.states[:, 0, :, :2]
-    far = np.abs(path).max()
-    assert single.states.dtype == float
-    assert np.abs(single.states[:, 0, :, :2] - path).max() < 1e-4 * far
-    goal = path[1:] + 0.1 * far
-    exact, near = (distances(vessel, **given, goal=goal, engine=engine) for engine in ("native", "single"))
-    np.testing.assert_allclose(near.total, exact.total, rtol=1e-4)
-    np.testing.assert_allclose(near.total.sum(), exact.total.sum(), rtol=1e-5)
-    assert near.tally.sum() == exact.tally.sum() == 20 * 37
-    assert np.array_equal(near.diverged, exact.diverged)
-
-
-def test_a_large_ship_that_rolls_moves_in_single_precision(draw_inputs: Callable[..., Any]) -> None:
-    """The product of her four masses is beyond single precision: with it sway, roll and yaw stood still."""
-    large = {"inertia.m": 3e8, "inertia.I_x": 5e10, "inertia.I_z": 2e12}
-    size = {"particulars.L_pp": 350.0, "particulars.B": 50.0, "particulars.T": 17.0}
-    vessel = load_vessel("container-175").with_values(large | size)
-    given = draw_inputs(vessel, 5)
-    double, single = (
-        rollout(vessel, **given, step=1.0, num_steps=3, keep=("v", "p", "r"), engine=engine)
-        for engine in ("native", "single")
-    )
-    change, near = double.states[1:] - double.states[:1], single.states[1:] - single.states[:1]
-    assert (np.abs(change) > 0).all()
-    np.testing.assert_allclose(near, change, rtol=0.01, atol=1e-5)
-
-
-def test_one_divergence_harms_no_other_distance(draw_inputs: Callable[..., Any]) -> None:
-    given = draw_inputs(SHIP, 11)
-    goal = np.zeros((5, 11, 2))
-    sound = distances(SHIP, goal=goal, **given, step=1.0, engine="native")
-    given["start"]["u"] = np.where(np.arange(11) == 4, np.nan, given["start"]["u"])
-    harmed = distances(SHIP, goal=goal, **given, step=1.0, engine="native")
-    others = np.arange(11) != 4
-    assert (harmed.diverged[0] == ~others).all()
-    np.testing.assert_array_equal(harmed.total[:, others], sound.total[:, others])
-    assert harmed.tally.sum() == sound.tally.sum() == 55
-
-
-def test_a_machine_without_a_compiler_is_told_once(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    native._probed.cache_clear()
-    try:
-        with caplog.at_level("WARNING"):
-            assert native.engine() == native.engine() == "casadi"
-    finally:
-        native._probed.cache_clear()
-    (line,) = [record.getMessage() for record in caplog.records]
-    assert line == "engine 'native' is not used, others are slower: there is no C compiler (gcc, cc or clang)"
-
-
 def test_the_engine_of_a_process_is_the_one_that_it_has_by_now(
     libraries_kept: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -278,27 +167,3 @@ def test_the_engine_of_a_process_is_the_one_that_it_has_by_now(
     assert native.engine() == native.engine_so_far()
     native.refuse("the C compiler failed (Killed)")
     assert native.engine_so_far() == "casadi"
-
-
-def test_what_a_compiler_calls_itself_is_noted_in_short_and_printable(monkeypatch: pytest.MonkeyPatch) -> None:
-    if native.compiler() is None:
-        pytest.skip("no compiler")
-    said = "\033[31mgcc \x00\ufffd\x9b " + "9" * 200000 + "\nCopyright"
-    monkeypatch.setattr(native, "compiler_version", lambda _: said)
-    name = native.engine()
-    assert name.isprintable()
-    assert name.startswith("native, \\x1b[31mgcc")
-    assert len(name) < 120
-
-
-@pytest.mark.parametrize("found", [True, False])
-def test_the_engine_says_where_vector_functions_are_missing(found: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Others round otherwise: a run that goes on without them notes it, as it does for another compiler."""
-    if native.compiler() is None or not native.target().fused:
-        pytest.skip("no compiler, or no processor with vector functions")
-    monkeypatch.setattr(native, "build", lambda *_: None if found else "ld: cannot find -lmvec")
-    native.target.cache_clear()
-    try:
-        assert native.engine().endswith(" lanes" if found else " lanes, no libmvec")
-    finally:
-        native.target.cache_clear()

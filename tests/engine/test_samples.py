@@ -52,16 +52,6 @@ def test_c_and_the_virtual_machine_agree(count: int) -> None:
     np.testing.assert_allclose(many(*inputs(count))[0][1, 0], inputs(count)[0][1, 0] / inputs(count)[2][1] + 7.0)
 
 
-def test_a_sample_is_the_same_alone_and_among_others() -> None:
-    for expected in (1, 1e12):
-        run = on_samples(function(), expected, ["p"])
-        x, y, p, unused = inputs(21)
-        together = run(x, y, p, unused)
-        alone = run(x[:, 5:6], y[:, 5:6], p, unused[:, 5:6])
-        for whole, part in zip(together, alone, strict=True):
-            np.testing.assert_array_equal(whole[:, 5:6], part)
-
-
 def test_without_a_compiler_it_is_interpreted(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -79,13 +69,3 @@ def test_without_a_compiler_it_is_interpreted(
     for one, other in zip(run(*inputs(5)), on_samples(made, 1, ["p"])(*inputs(5)), strict=True):
         np.testing.assert_array_equal(one, other)
     assert native._refused == []  # rollouts keep their engine
-
-
-@pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
-def test_an_operation_without_a_counterpart_is_interpreted(caplog: pytest.LogCaptureFixture) -> None:
-    x = ca.SX.sym("x", 1)
-    made = ca.Function("f", [x], [ca.fmod(x, 0.7)], ["x"], ["y"])
-    with caplog.at_level("WARNING"):
-        (result,) = on_samples(made, 1e12)(np.array([[1.0, 2.0]]))
-    np.testing.assert_allclose(result, [[0.3, 0.6]])
-    assert "has no counterpart" in caplog.text

@@ -12,7 +12,7 @@ import pytest
 
 from shipid.engine import native
 from shipid.engine.integrate import Batch, Job
-from shipid.engine.native import compiler, run_native, run_single, target
+from shipid.engine.native import compiler, run_native, target
 from shipid.engine.tables import LEAST, Lookup, even_tables, find_tables
 from shipid.engine.vectors import Target
 from shipid.physics.wind import interpolate
@@ -43,20 +43,6 @@ def test_a_short_table_stays_a_sum(size: int) -> None:
     assert len(found) == (size > LEAST)
 
 
-def test_ramps_that_do_not_begin_at_zero_are_no_table() -> None:
-    x, grid, bends = ca.SX.sym("x"), ca.SX.sym("grid", LEAST + 1), ca.SX.sym("bends", LEAST + 1)
-
-    def ramps(*least: float) -> ca.Function:
-        total = 3 + bends[0] * (x - grid[0])
-        for i, each in enumerate(least, start=1):
-            total += bends[i] * ca.fmax(x - grid[i], each)
-        return ca.Function("f", [x, grid, bends], [total])
-
-    assert len(find_tables(ramps(*[0.0] * LEAST))) == 1
-    assert not find_tables(ramps(*[0.1] * LEAST))
-    assert not find_tables(ramps(*[0.0] * (LEAST - 2), 0.1, 0.0))
-
-
 def with_tables(size: int) -> Dynamics:
     """A motion whose rates are two tables of `size` knots of u, one of v on the same knots, and beyond the knots."""
     model = dynamics(SHIP)
@@ -77,7 +63,7 @@ def with_tables(size: int) -> Dynamics:
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 @pytest.mark.parametrize("way", ["of this processor", "lane by lane"])
-@pytest.mark.parametrize("size", [LEAST + 1, 16, 17, 18, 19, 33, 34, 50])
+@pytest.mark.parametrize("size", [LEAST + 1, 17, 18, 34])
 def test_a_lookup_has_the_values_of_the_ramps(
     size: int, way: str, libraries_kept: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -103,12 +89,11 @@ def test_a_lookup_has_the_values_of_the_ramps(
         batch = Batch(
             start, zeros((0, len(u))), zeros((1, 4, len(u))), zeros((1, 2, len(u))), zeros((1, 3, len(u))), together
         )
-        got, short = (way(model, batch, job)[0][1] - start.T for way in (run_native, run_single))
+        got = run_native(model, batch, job)[0][1] - start.T
         for v, numbers in enumerate(together):
             expected = np.array(rates(start, [], zeros((4, 1)), zeros((2, 1)), numbers, zeros((3, 1)))).T
             scale = np.abs(np.diff(numbers[size : 2 * size]) / np.diff(numbers[:size])).max()
             np.testing.assert_allclose(got[v], expected, rtol=1e-12, atol=1e-13 * scale)
-            np.testing.assert_allclose(short[v], expected, rtol=1e-4, atol=1e-4 * scale)
         nothing = replace(batch, state=np.full_like(start, np.nan))
         assert np.isnan(run_native(model, nothing, job)[0][1, :, :, :4]).all()
 

@@ -23,18 +23,6 @@ def test_blocks_cover_all_samples_with_little_padding(num_samples: int, compiled
     assert not compiled or width % engine.GRAIN == 0
 
 
-def test_a_constant_series_repeats_its_entry() -> None:
-    series = torch.tensor([[1.0], [2.0]])
-    assert engine._at(series, 1).item() == 2.0
-    assert engine._at(series[:1], 7).item() == 1.0
-
-
-def test_a_value_that_all_components_share_counts_for_each() -> None:
-    assert engine._sum(2.0, 3) == 6.0
-    assert engine._sum(torch.tensor([[2.0]]), 3).tolist() == [6.0]
-    assert engine._sum(torch.tensor([[1.0, 2.0, 4.0]]), 3).tolist() == [7.0]
-
-
 def test_a_rollout_agrees_with_casadi() -> None:
     ship = load_vessel("gunnerus-28.9")
     model = dynamics(ship)

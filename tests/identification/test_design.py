@@ -30,7 +30,6 @@ from shipid.simulation.manoeuvre import (
     PullOut,
     ReverseSpiral,
     Spiral,
-    StationKeeping,
     TurningCircle,
     Zigzag,
 )
@@ -159,12 +158,10 @@ def test_limits_of_the_actuators_hold() -> None:
         (ReverseSpiral(n_rpm=100, hold=60), 35, 100),
         (CrashStop(n_rpm=100, astern_rpm=130, duration=60), 0, 130),
         (Excitation(signal="aprbs", n_rpm=100, amplitude_rpm=20, angle_deg=12, duration=60), 12, 120),
-        (StationKeeping(duration=60), 180, 200),
     ],
 )
 def test_no_kind_orders_more_than_the_limits(manoeuvre: Approached, helm: float, rpm: float) -> None:
-    assert manoeuvre.greatest_helm == pytest.approx(helm)
-    assert manoeuvre.greatest_shaft == pytest.approx(rpm)
+    assert manoeuvre.greatest_orders == pytest.approx((helm, rpm))
     assert allowed(manoeuvre, Limits(angle_deg=helm, n_rpm=rpm))
     assert not allowed(manoeuvre, Limits(angle_deg=helm, n_rpm=0.99 * rpm))
     assert not helm or not allowed(manoeuvre, Limits(angle_deg=0.99 * helm))

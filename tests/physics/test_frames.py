@@ -6,7 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.frames import current, force_at, kinematics, rotation, skew, vector
+from shipid.physics.frames import current, force_at, kinematics, rotation, skew
+from tests.drawn import seeds
 
 
 def numbers(expression: Any) -> np.ndarray:
@@ -17,15 +18,7 @@ def dm(values: Any) -> ca.SX:
     return ca.SX(ca.DM(values))
 
 
-def test_kinematics_in_the_plane_is_the_planar_rotation() -> None:
-    """Method eq. (1): eta_dot = R(psi) nu."""
-    psi, u, v, r = 0.7, 3.0, -0.4, 0.05
-    rates = numbers(kinematics(dm([5.0, -2.0, 0, 0, 0, psi]), dm([u, v, 0, 0, 0, r]))).ravel()
-    planar = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), 0, 0, 0, r]
-    np.testing.assert_allclose(rates, planar, atol=1e-15)
-
-
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(2, 5))
 def test_rotation_is_orthonormal_and_right_handed(seed: int) -> None:
     R = numbers(rotation(*np.random.default_rng(seed).uniform(-1.5, 1.5, 3)))
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-14)
@@ -46,7 +39,7 @@ def test_rotation_is_yaw_then_pitch_then_roll() -> None:
     np.testing.assert_allclose(numbers(rotation(phi, theta, psi)), expected, atol=1e-15)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(2, 5))
 def test_euler_rates_agree_with_the_rate_of_the_rotation(seed: int) -> None:
     """dR/dt = R S(omega), with dR/dt by central differences along the angles' rates."""
     rng = np.random.default_rng(seed)
@@ -56,12 +49,7 @@ def test_euler_rates_agree_with_the_rate_of_the_rotation(seed: int) -> None:
     np.testing.assert_allclose(slope, numbers(rotation(*angles)) @ numbers(skew(dm(omega))), atol=1e-9)
 
 
-def test_skew_is_the_cross_product() -> None:
-    a, b = np.array([1.0, -2.0, 3.0]), np.array([0.4, 5.0, -6.0])
-    np.testing.assert_allclose(numbers(skew(dm(a))) @ b, np.cross(a, b))
-
-
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(2, 5))
 def test_rate_of_a_steady_current_is_its_derivative_along_the_motion(seed: int) -> None:
     rng = np.random.default_rng(seed)
     eta = ca.SX.sym("eta", 6)
@@ -75,36 +63,7 @@ def test_rate_of_a_steady_current_is_its_derivative_along_the_motion(seed: int) 
     assert np.abs(computed).max() > 1e-3
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_a_ship_that_rolls_and_does_not_heave_is_carried_as_the_water_is(seed: int) -> None:
-    """Her kinematics, with w = 0, of the current alone give its own velocity; the rate is the derivative of that."""
-    rng, still = np.random.default_rng(seed), dm(np.zeros(3))
-    eta = ca.SX.sym("eta", 6)
-    nu = dm([*rng.uniform(-3, 3, 2), 0, rng.uniform(-0.3, 0.3), 0, rng.uniform(-0.3, 0.3)])
-    nu_c, rate = current(eta, nu, ca.SX(0.8), ca.SX(2.1), heaves=False)
-    by_chain_rule = ca.jtimes(nu_c, eta, kinematics(eta, nu))
-    over_ground = kinematics(eta, ca.vertcat(nu_c[:3], still))[:2]
-    function = ca.Function("both", [eta], [rate, by_chain_rule, over_ground])
-    leaning = [0, 0, 0, rng.uniform(-0.6, 0.6), 0, rng.uniform(-3, 3)]
-    computed, expected, velocity = (np.array(x).ravel() for x in function(leaning))
-    np.testing.assert_allclose(computed, expected, atol=1e-14)
-    np.testing.assert_allclose(velocity, [0.8 * np.cos(2.1), 0.8 * np.sin(2.1)], atol=1e-14)
-    assert np.abs(computed).max() > 1e-3
-
-
-def test_current_rate_in_the_plane() -> None:
-    """Method section 2: d(nu_c)/dt = [r v_c, -r u_c, 0]."""
-    nu_c, rate = current(dm([0, 0, 0, 0, 0, 0.4]), dm([2.0, 0.1, 0, 0, 0, 0.07]), ca.SX(1.0), ca.SX(1.9))
-    u_c, v_c = numbers(nu_c).ravel()[:2]
-    np.testing.assert_allclose([u_c, v_c], [np.cos(1.5), np.sin(1.5)], atol=1e-15)
-    np.testing.assert_allclose(numbers(rate).ravel(), [0.07 * v_c, -0.07 * u_c, 0, 0, 0, 0], atol=1e-15)
-
-
 def test_force_at_a_point_is_force_and_lever_cross_force() -> None:
     point, force = np.array([-13.0, 2.7, 2.1]), np.array([10.0, -4.0, 0.0])
     wrench = numbers(force_at(*(ca.SX(x) for x in point), *(ca.SX(f) for f in force[:2]))).ravel()
     np.testing.assert_allclose(wrench, [*force, *np.cross(point, force)])
-
-
-def test_zeros_of_a_vector_are_structural() -> None:
-    assert vector(ca.SX.sym("x"), 0, 0.0).nnz() == 1

@@ -5,10 +5,7 @@ import pytest
 
 from shipid.physics.grammar import (
     ADDED_MASS,
-    ADVANCE,
-    CROSS_FLOWS,
     DERIVATIVES,
-    PRIME_DERIVATIVES,
     THRUST,
     acceleration_unit,
     derivative,
@@ -58,11 +55,6 @@ def test_two_names_of_one_monomial_are_refused(first: str, second: str, turned: 
         DERIVATIVES.check(["X_uu", *names, "N_r"])
     assert repr(first) in str(caught.value)
     assert repr(second) in str(caught.value)
-
-
-@pytest.mark.parametrize("names", [["Y_v|r|", "Y_|v|r"], ["Y_vv", "Y_v|v|"], ["Y_uv", "N_uv"], ["X_|u|", "X_u"]])
-def test_different_monomials_may_stand_together(names: list[str]) -> None:
-    DERIVATIVES.check(names)
 
 
 @pytest.mark.parametrize(
@@ -128,27 +120,3 @@ def test_what_is_no_thruster_coefficient_is_refused(name: str) -> None:
 )
 def test_prime_scale(name: str, expected: float) -> None:
     assert float(prime_scale(name, ca.SX(1000.0), ca.SX(20.0), ca.SX(4.0))) == pytest.approx(expected, rel=1e-14)
-
-
-def test_a_prime_derivative_is_distinguished_from_an_si_one() -> None:
-    assert PRIME_DERIVATIVES.unit("Y_v") == "prime"
-    with pytest.raises(ValueError, match="same monomial"):
-        PRIME_DERIVATIVES.check(["Y_rv", "Y_vr"])
-
-
-@pytest.mark.parametrize(
-    ("grammar", "name", "example"), [(ADVANCE, "Jy", "J|J|"), (THRUST, "v", "J|t|"), (CROSS_FLOWS, "J", "v|r|")]
-)
-def test_the_example_of_a_message_has_factors_of_its_table(grammar, name, example):
-    with pytest.raises(ValueError, match="like") as caught:
-        grammar.check([name])
-    assert f"like '{example}'" in str(caught.value)
-    grammar.check([example])
-
-
-def test_a_screw_behind_a_hull_has_no_flow_across():
-    """Before, a factor y or t in its K_T was taken, and was 0."""
-    ADVANCE.check(["1", "J", "JJ", "J|J|"])
-    for name in ("y", "Jt", "|y|"):
-        with pytest.raises(ValueError, match="factors of J, bare"):
-            ADVANCE.check([name])

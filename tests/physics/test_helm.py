@@ -8,26 +8,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.helm import Helmsman, Unit, course_keeping, station_keeping, yaw_rate, zigzag
-from shipid.physics.signals import steers
+from shipid.physics.helm import course_keeping, yaw_rate, zigzag
 
 COMMANDS = ("port.n", "port.alpha", "rudder.delta")
 
 
 def numbers(values: Any) -> dict[str, float]:
     return {name: float(ca.DM(value)) for name, value in values.items()}
-
-
-def test_angles_steer_and_shafts_do_not() -> None:
-    assert [steers(name) for name in COMMANDS] == [False, True, True]
-
-
-@pytest.mark.parametrize("make", [zigzag, yaw_rate, course_keeping])
-def test_one_helmsman_per_set_of_commands(make: Any) -> None:
-    """One object, one compilation; he gets every command."""
-    assert make(COMMANDS) is make(COMMANDS)
-    assert make(COMMANDS) != make(COMMANDS[:2])
-    assert dict(list(make(COMMANDS).inputs.items())[:3]) == dict(zip(COMMANDS, ("rev/s", "rad", "rad"), strict=True))
 
 
 @pytest.mark.parametrize("first", [1, -1])
@@ -45,19 +32,6 @@ def test_zigzag_reverses_at_the_execute_heading(first: int, turned: float, side:
     assert ordered == {"port.n": 2.0, "port.alpha": -0.3 * first * after, "rudder.delta": 0.4 * first * after}
     assert helmsman.advance is not None
     assert numbers(helmsman.advance(seen, inputs, memory, 0.1)) == {"side": after, "original": 1.0, "executed": 1.0}
-
-
-@pytest.mark.parametrize("psi", [-0.7, 0.0, 0.7])
-def test_zigzag_counts_from_the_heading_at_the_first_order(psi: float) -> None:
-    """However far wind has turned her before: nothing is reversed then, and the heading is kept from the order on."""
-    helmsman, seen = zigzag(COMMANDS), {"psi": ca.DM(psi)}
-    inputs = {"port.n": 2.0, "port.alpha": -0.3, "rudder.delta": 0.4, "execute_heading": 0.2}
-    memory = {name: ca.DM(value) for name, value in helmsman.memory.items()}
-    assert helmsman.advance is not None
-    for executed in (0.0, 1.0):
-        assert numbers(helmsman.orders(seen, inputs | {"executed": executed}, memory))["rudder.delta"] == 0.4
-        after = numbers(helmsman.advance(seen, inputs | {"executed": executed}, memory, 0.1))
-        assert after == {"side": 1.0, "original": psi, "executed": executed}
 
 
 def test_yaw_rate_law() -> None:
@@ -103,87 +77,3 @@ def test_course_keeping_is_the_pid_law_of_its_frequency() -> None:
         hard = {**inputs, "course": sign * 3.0, "effect": 1e-3}
         assert numbers(helmsman.orders(still, hard, {"integral": 0.0}))["rudder.delta"] == sign * 0.6
         assert numbers(helmsman.advance(still, hard, {"integral": 0.0}, 1e3)) == {"integral": sign}
-
-
-UNITS = (
-    Unit("port", (50.0, 0.0, -40.0), (0.0, 50.0, 3.0), (0.0, 1.0)),
-    Unit("starboard", (50.0, 0.0, 40.0), (0.0, 50.0, 3.0), (0.0, -1.0)),
-)
-ORDERS = {"north": 3.0, "east": 4.0, "heading": 0.5, "omega": 0.1, "n_bias": 1.0, "n_max": 3.0}
-
-
-def holding() -> Helmsman:
-    return station_keeping(UNITS, ("bow.n",))
-
-
-def thrusts(seen: dict[str, float], **changes: float) -> np.ndarray:
-    """n^2 (cos, sin) of each unit, (units, 2)."""
-    forces = numbers(holding().orders(seen, {**ORDERS, **changes}, dict.fromkeys(("north", "east", "heading"), 0.0)))
-    assert forces.pop("bow.n") == 0.0
-    polar = [(forces[f"{unit.name}.n"] ** 2, forces[f"{unit.name}.alpha"]) for unit in UNITS]
-    return np.array([[square * np.cos(angle), square * np.sin(angle)] for square, angle in polar])
-
-
-def at(**changes: float) -> dict[str, float]:
-    return {"north": 3.0, "east": 4.0, "psi": 0.5, "u": 0.0, "v": 0.0, "r": 0.0} | changes
-
-
-def test_on_station_only_the_bias_remains() -> None:
-    np.testing.assert_allclose(thrusts(at()), [[0, 1], [0, -1]], atol=1e-6)
-
-
-def test_an_error_is_turned_into_body_axes_and_shared() -> None:
-    """2 m to the north of the ship, seen from heading 0.5 rad: ahead and to port."""
-    acceleration = 0.1**2 * 2 * np.array([np.cos(0.5), -np.sin(0.5)])
-    shared = 50 * acceleration + np.array([[0, 1], [0, -1]])
-    np.testing.assert_allclose(thrusts(at(north=1.0)), shared, atol=1e-6)
-
-
-@pytest.mark.parametrize("bias", np.linspace(-3.0, 3.0, 7))
-def test_a_unit_may_have_its_bias_in_any_direction(bias: float) -> None:
-    """What is wanted and the bias n^2 in its direction, and the jump of the angle opposite to it."""
-    units = tuple(Unit(unit.name, unit.along, unit.across, (np.cos(bias), np.sin(bias))) for unit in UNITS)
-    still = dict.fromkeys(("north", "east", "heading"), 0.0)
-    ordered = numbers(station_keeping(units, ()).orders(at(north=1.0), {**ORDERS, "n_bias": 1.2}, still))
-    wanted = 50 * 0.1**2 * 2 * np.exp(-0.5j) + 1.2**2 * np.exp(1j * bias)
-    for unit in UNITS:
-        assert ordered[f"{unit.name}.n"] ** 2 * np.exp(1j * ordered[f"{unit.name}.alpha"]) == pytest.approx(wanted)
-        assert abs(ordered[f"{unit.name}.alpha"] - bias) <= np.pi
-
-
-def test_speed_is_damped_and_heading_takes_the_short_way() -> None:
-    np.testing.assert_allclose(thrusts(at(u=0.2))[:, 0], [-50 * 2 * 0.1 * 0.2] * 2, atol=1e-6)
-    short = thrusts(at(psi=3.0), heading=-3.0)  # 0.28 rad to starboard: the port unit pushes less than its bias astern
-    np.testing.assert_allclose(short[0, 0], -40 * 0.1**2 * (2 * np.pi - 6.0), atol=1e-6)
-
-
-def test_an_error_that_lasts_counts_by_its_integral() -> None:
-    """omega^2 (e + omega / 10 integral(e)): 5 m s to the north count as 0.05 m."""
-    lasting = {"north": 5.0, "east": 0.0, "heading": 0.0}
-    held = numbers(holding().orders(at(), ORDERS, lasting))
-    known = numbers(holding().orders(at(north=3.0 - 0.05), ORDERS, dict.fromkeys(lasting, 0.0)))
-    assert held == pytest.approx(known)
-    assert held["port.alpha"] != pytest.approx(np.pi / 2, abs=1e-3)
-
-
-def test_a_unit_keeps_to_its_greatest_speed() -> None:
-    far = numbers(holding().orders(at(north=-1e4), ORDERS, dict.fromkeys(("north", "east", "heading"), 0.0)))
-    assert far["port.n"] == far["starboard.n"] == 3.0
-
-
-def test_the_angle_is_continuous_through_zero_thrust_on_the_bias_side() -> None:
-    """From one side of the bias to the other; the jump lies opposite the bias."""
-    angles = [
-        numbers(holding().orders(at(u=u), ORDERS, dict.fromkeys(("north", "east", "heading"), 0.0)))["port.alpha"]
-        for u in np.linspace(-1, 1, 201)
-    ]
-    assert np.abs(np.diff(angles)).max() < 0.2
-    assert min(angles) < 0.2
-    assert max(angles) > np.pi - 0.2
-
-
-def test_memory_integrates_the_error() -> None:
-    helmsman = holding()
-    assert helmsman.advance is not None
-    after = numbers(helmsman.advance(at(north=1.0), ORDERS, {"north": 0.5, "east": 0.0, "heading": 0.0}, 0.1))
-    assert after == pytest.approx({"north": 0.7, "east": 0.0, "heading": 0.0})

@@ -46,13 +46,6 @@ def test_anything_else_is_named(value: Any, found: str) -> None:
         returned("mine", derivatives, value, [v], 2, "two")
 
 
-@pytest.mark.parametrize("given", [[v, C], [v, [C, 1.0]], [{"v": v}, C], [ca.vertcat(v, C) ** 2]])
-def test_symbols_that_were_given_in_any_form_are_known(given: list[Any]) -> None:
-    assert returned("mine", term, v * C, given, 1).shape == (1, 1)
-    with pytest.raises(ShipidError, match=r"^mine returns symbols of its own, k and m: "):
-        returned("mine", term, v * SX.sym("k") * SX.sym("m"), given, 1)
-
-
 def test_numbers_that_are_none_are_refused_and_infinite_ones_pass() -> None:
     with pytest.raises(ShipidError, match=r"^mine returns what is not a number \(NaN\)"):
         returned("mine", term, v * np.nan, [v], 1)

@@ -10,13 +10,10 @@ import pytest
 from shipid.logs.mapping import UNITS
 from shipid.physics.signals import (
     SIGNALS,
-    is_command,
-    is_output,
     is_shaft,
     mirror_sign,
     named,
     neutral,
-    read_unit,
     row_of,
     signal_of,
     steers,
@@ -60,37 +57,6 @@ def test_commands_are_recognised_by_their_last_name() -> None:
     assert [neutral(name) for name in commands] == [0.0, 0.0, 0.0, 0.8]
     assert units(commands) == dict(zip(commands, ("rev/s", "rad", "rad", "-"), strict=True))
     assert (signal_of("port.n"), signal_of("u")) == ("n", "u")
-
-
-@pytest.mark.parametrize(
-    ("name", "command"),
-    [
-        ("port.n", True),
-        ("p_2.alpha", True),
-        ("bow-thruster.n", True),
-        ("n", False),
-        ("port.u", False),
-        ("2.n", False),
-        ("a.b.n", False),
-        (".n", 0),
-    ],
-)
-def test_what_a_command_is_called(name: str, command: bool) -> None:
-    assert is_command(name) == command
-
-
-def test_outputs_are_no_commands() -> None:
-    assert [is_output(name) for name in ("port.thrust", "rudder.normal_force", "thrust", "port.n", "a b.thrust")] == [
-        True, True, False, False, False,
-    ]  # fmt: skip
-    assert not any(is_command(f"port.{name}") for name in named("output"))
-
-
-def test_units_of_sailors() -> None:
-    assert read_unit("r") == ("deg/s", pytest.approx(180 / np.pi))
-    assert read_unit("port.n") == ("rpm", pytest.approx(60.0))
-    assert read_unit("u_rw") == ("m/s", 1.0)
-    assert read_unit("cpp.pitch") == ("-", 1.0)
 
 
 @pytest.mark.parametrize(

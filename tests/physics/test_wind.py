@@ -6,7 +6,6 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.document import replace
 from shipid.physics import wind
 from shipid.vessel.load import load_vessel
 
@@ -33,17 +32,6 @@ def test_beam_wind_on_the_28_9_m_ship() -> None:
     np.testing.assert_allclose(numbers(from_starboard)[[1, 5]], -wrench[[1, 5]])
 
 
-@pytest.mark.parametrize("psi", [0.0, 1.0, -2.5])
-def test_head_wind_drives_back_and_stern_wind_ahead(psi: float) -> None:
-    given = parameters("gunnerus-28.9", 1.23)
-    q = 0.5 * 1.23 * 7.0**2
-    head = numbers(wind.table(AT_REST, ca.SX(psi), ca.SX(7.0), ca.SX(psi + np.pi), **given))
-    stern = numbers(wind.table(AT_REST, ca.SX(psi), ca.SX(7.0), ca.SX(psi), **given))
-    assert head[0] == pytest.approx(-0.53 * q * 81)
-    assert stern[0] == pytest.approx(0.62 * q * 81)
-    np.testing.assert_allclose([head[1], head[5], stern[1], stern[5]], 0, atol=1e-6)
-
-
 def test_relative_wind_follows_the_method() -> None:
     """Method eqs. (6)-(9), re-computed."""
     u, v, psi, V_w, beta_w = 3.0, -0.4, 0.6, 5.0, 2.2
@@ -51,13 +39,6 @@ def test_relative_wind_follows_the_method() -> None:
     u_rw, v_rw = u - V_w * np.cos(beta_w - psi), v - V_w * np.sin(beta_w - psi)
     assert float(square) == pytest.approx(u_rw**2 + v_rw**2)
     assert float(gamma) == pytest.approx(-np.arctan2(v_rw, u_rw))
-
-
-def test_a_ship_drifting_with_the_wind_feels_none() -> None:
-    drifting = ca.SX(ca.DM([2.0, 0, 0, 0, 0, 0]))
-    assert (
-        numbers(wind.table(drifting, ca.SX(0.3), ca.SX(2.0), ca.SX(0.3), **parameters("gunnerus-28.9", 1.23)))[0] == 0
-    )
 
 
 def test_interpolation_is_piecewise_linear_and_flat_beyond() -> None:
@@ -83,18 +64,3 @@ def test_blendermann_by_hand(gamma_deg: float) -> None:
     towards = ca.SX(np.pi - gamma)  # from gamma off the port bow
     forces = numbers(wind.blendermann(AT_REST, ca.SX(0), ca.SX(V_w), towards, **parameters("gunnerus-33.9", rho_a)))
     np.testing.assert_allclose(forces, [X, q * A_L * C_Y, 0, K, 0, N], rtol=1e-9, atol=1e-6)
-
-
-def test_blendermann_is_continuous_on_the_beam() -> None:
-    given = parameters("gunnerus-33.9", 1.224)
-    sides = [
-        numbers(wind.blendermann(AT_REST, ca.SX(0), ca.SX(10.0), ca.SX(np.pi / 2 + d), **given)) for d in (-1e-7, 1e-7)
-    ]
-    np.testing.assert_allclose(sides[0], sides[1], rtol=1e-5, atol=1e-2)
-
-
-def test_table_of_the_vessel_is_complete() -> None:
-    document = load_vessel("gunnerus-28.9").document
-    assert document["wind"]["gamma_deg"] == list(range(0, 181, 10))
-    assert replace(document, {"wind.C_X.0": 0.0})["wind"]["C_X"][0] == 0.0
-    assert document["wind"]["C_X"][0] == -0.53

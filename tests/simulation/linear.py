@@ -15,11 +15,11 @@ import numpy as np
 from shipid.vessel.load import Vessel
 
 AXES = "XYZKMN"
+EVERY = tuple(range(6))
 SPEEDS = "uvwpqr"
 GRAVITY = 9.81
 HEAVE, ROLL, PITCH = 2, 3, 4
 UPRIGHT = (HEAVE, ROLL, PITCH)
-EVERY = tuple(range(6))
 MIRROR = np.array([1, -1, 1, -1, 1, -1])
 
 

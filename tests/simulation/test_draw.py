@@ -11,11 +11,10 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
 from shipid.simulation.draw import Draw
-from shipid.simulation.manoeuvre import KINDS, Excitation, Spiral, Steps, Timed, Turning, Zigzag, order_keys
+from shipid.simulation.manoeuvre import KINDS, Spiral, Steps, Timed, Zigzag
 from shipid.simulation.truth import Truth, check_truth, draw_manoeuvres, simulate
 from shipid.units import DEGREE
-from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.load import load_vessel
 from tests.conftest import LAG
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -31,7 +30,6 @@ BLOCKS: dict[str, dict[str, Any]] = {
     "reverse_spiral": {**SHAFT, "hold": 8.0, "rates_deg": [1.0, -1.0]},
     "crash_stop": {**SHAFT, "astern_rpm": [50.0, 100.0], "execute_at": [0.0, 5.0]},
     "excitation": {**SHAFT, "signal": "aprbs", "angle_deg": 15.0, "hold": [2.0, 6.0]},
-    "station_keeping": {"north": [-1.0, 1.0], "most_rpm": 150.0},
 }
 
 
@@ -84,33 +82,6 @@ def test_a_first_order_after_the_end_of_the_run_is_refused(kind: str) -> None:
         assert caught.value.path == "truth.manoeuvre.0.execute_at"
 
 
-def test_an_unknown_key_beside_orders_may_be_a_misspelt_key_of_the_kind() -> None:
-    with pytest.raises(DocumentError, match="did you mean 'start_speed'"):
-        check_truth(truth({"kind": "turning", **BLOCKS["turning"], "START_SPEED": 3.0}), SHIP)
-
-
-def test_every_command_of_every_vessel_takes_orders(vessel: Vessel) -> None:
-    """Ranges by signal; without one, the line names the key that is missing."""
-    keys = {order_keys(name)[1]: [5.0, 10.0] for name in dynamics(vessel).commands}
-    for kind in ("turning", "steps"):
-        block = {"kind": kind, "start_speed": 1.0, **keys}
-        log = simulate(truth(block, manoeuvres=2, duration=1.0, step=0.01, wind_speed=(0, 0)), vessel)
-        assert set(dynamics(vessel).commands) <= set(log)
-        for missing in keys:
-            with pytest.raises(DocumentError, match=rf"give {missing} = \[low, high\]") as caught:
-                check_truth(truth({key: value for key, value in block.items() if key != missing}), vessel)
-            assert caught.value.path == f"truth.manoeuvre.0.{missing}"
-
-
-def test_one_command_may_have_separate_orders() -> None:
-    """The tunnel unit stays still while the azimuths run: `bow.n_rpm = 0` of TOML is a table."""
-    ship = SHIP.with_values({"thruster.bow.off": False})
-    for given in ({"bow.n_rpm": 0.0}, {"bow": {"n_rpm": 0.0}}):
-        log = simulate(truth({**BLOCKS["turning"], **given}), ship)
-        assert (log["bow.n"] == 0).all()
-        assert (log["port.n"] > 1).all()
-
-
 def test_a_kind_is_one_edit(monkeypatch: pytest.MonkeyPatch) -> None:
     """A class and its name: no other place knows the kinds."""
 
@@ -153,13 +124,6 @@ def test_quantities_of_a_run_are_drawn_apart_and_the_course_is_one_whether_given
     np.testing.assert_allclose([one.course_deg for one in given], 90 + drawn[:, 2] / 4, rtol=1e-12)
 
 
-def test_a_mixture_is_logged_in_one_frame() -> None:
-    blocks = [{"kind": kind, **BLOCKS[kind]} for kind in ("turning", "zigzag", "steps")]
-    mixed = truth(*blocks, manoeuvres=12, seed=6)
-    assert {type(one) for one in draw_manoeuvres(mixed)} == {Turning, Zigzag, Steps}
-    assert simulate(mixed, LAGGED).groupby("run").size().to_list() == [21] * 12
-
-
 def test_pairs_are_drawn_where_a_number_is_wanted() -> None:
     def at(place: float) -> Any:
         return lambda _: place
@@ -178,14 +142,6 @@ def test_pairs_are_drawn_where_a_number_is_wanted() -> None:
     steps = Draw(kind="steps", n_rpm=100, alpha_deg=[-10, 20]).manoeuvre(60.0, at(0.5))
     assert isinstance(steps, Steps)
     assert steps.orders == {"n_rpm": (100, 100), "alpha_deg": (-10, 20)}
-
-
-def test_seeds_are_drawn_unless_given() -> None:
-    block = {"kind": "excitation", **BLOCKS["excitation"]}
-    drawn = draw_manoeuvres(truth(block))
-    assert len({one.seed for one in drawn if isinstance(one, Excitation)}) == 3
-    same = draw_manoeuvres(truth({**block, "seed": 7}))
-    assert {one.seed for one in same if isinstance(one, Excitation)} == {7}
 
 
 @pytest.mark.parametrize(
@@ -213,7 +169,7 @@ def test_blocks_that_mean_nothing_are_refused(block: dict[str, Any], message: st
 
 def test_a_vessel_that_cannot_is_refused_beforehand() -> None:
     rudder = load_vessel("mariner")
-    blocks = {"kind": "zigzag", **SHAFT}, {"kind": "station_keeping", **BLOCKS["station_keeping"]}
-    with pytest.raises(DocumentError, match="station keeping needs two azimuth units") as caught:
+    blocks = {"kind": "zigzag", **SHAFT}, {"kind": "crash_stop", **BLOCKS["crash_stop"]}
+    with pytest.raises(DocumentError, match="cannot stop") as caught:
         check_truth(truth(*blocks), rudder)
     assert caught.value.path == "truth.manoeuvre.1"

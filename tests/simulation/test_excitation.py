@@ -54,14 +54,6 @@ def test_peaks_are_below_schroeders(name: str) -> None:
     assert crest_factor(sines(BANDS[name])) < min(0.95 * by_formula, REACHED[name])
 
 
-@every_band
-def test_it_begins_and_ends_at_zero(harmonics: tuple[int, ...]) -> None:
-    first, after, last = (sines(harmonics, np.array([t]))[0] for t in (0.0, 1e-3, PERIOD))
-    assert abs(first) < 1e-9
-    assert abs(last) < 1e-9
-    assert after > 0
-
-
 def test_dealt_commands_are_orthogonal_and_share_the_band() -> None:
     parts = deal(range(2, 30), 3)
     assert sorted(harmonic for part in parts for harmonic in part) == list(range(2, 30))
@@ -72,50 +64,8 @@ def test_dealt_commands_are_orthogonal_and_share_the_band() -> None:
     assert np.abs(off_diagonal).max() < 1e-12
 
 
-def test_one_sine_has_the_crest_factor_of_a_sine() -> None:
-    assert crest_factor(sines((4,))) == pytest.approx(np.sqrt(2), rel=1e-4)
-
-
-def test_phases_depend_on_the_key_alone() -> None:
-    harmonics = BANDS["successive"]
-    np.testing.assert_array_equal(sines(harmonics, key=(1, "a")), sines(harmonics, key=(1, "a")))
-    assert np.abs(sines(harmonics, key=(1, "a")) - sines(harmonics, key=(1, "b"))).max() > 0.01
-
-
 def steps(**changes: Any) -> np.ndarray:
     return aprbs(np.arange(20001) * 0.1, **{"hold": (4.0, 15.0), "levels": (-0.5, 0.3), "key": (7, 1), **changes})
-
-
-def held(series: np.ndarray, step: float = 0.1) -> np.ndarray:
-    """Hold times [s] of all levels but the last, which the end cuts."""
-    changes = np.flatnonzero(np.diff(series) != 0) + 1
-    return np.diff(np.concatenate([[0], changes])) * step
-
-
-def test_hold_times_fill_their_range() -> None:
-    """Within one sample, as changes show in the next row; uniform: mean within 4 standard errors."""
-    times = held(steps())
-    assert len(times) > 180
-    assert times.min() > 4.0 - 0.1 - 1e-9
-    assert times.max() < 15.0 + 0.1 + 1e-9
-    assert times.mean() == pytest.approx(9.5, abs=4 * 11 / np.sqrt(12 * len(times)))
-    assert times.min() < 4.5
-    assert times.max() > 14.5
-
-
-def test_a_fixed_hold_is_exact() -> None:
-    np.testing.assert_allclose(held(steps(hold=(0.3, 0.3))), 0.3)
-
-
-def test_levels_fill_their_range_evenly() -> None:
-    series = steps()
-    levels = series[np.concatenate([[0], np.flatnonzero(np.diff(series) != 0) + 1])]
-    assert levels.min() >= -0.5
-    assert levels.max() < 0.3
-    eighth = np.floor((levels + 0.5) / 0.1).astype(int)
-    for first in range(0, len(levels) - 8, 8):
-        assert sorted(eighth[first : first + 8]) == list(range(8))
-    assert len({tuple(eighth[first : first + 8]) for first in range(0, 80, 8)}) > 5  # in another order each time
 
 
 def test_a_longer_series_begins_with_the_shorter() -> None:
@@ -138,12 +88,6 @@ def test_rate_limit_is_respected_and_caught_up_with() -> None:
     np.testing.assert_allclose(executed[ends, 0], ordered[ends, 0])
 
 
-def test_a_slow_order_passes_the_rate_limit_unchanged() -> None:
-    slow = sines(BANDS["successive"])
-    fastest = np.abs(np.diff(slow)).max() / 0.05
-    np.testing.assert_allclose(limit_rate(slow, 0.05, 1.01 * fastest), slow, rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -164,3 +108,20 @@ def test_wrong_orders_are_refused(call: Any, message: str) -> None:
     with pytest.raises(DocumentError, match=message) as caught:
         call()
     assert "\n" not in str(caught.value)
+
+
+def held(series: np.ndarray, step: float = 0.1) -> np.ndarray:
+    """Hold times [s] of all levels but the last, which the end cuts."""
+    changes = np.flatnonzero(np.diff(series) != 0) + 1
+    return np.diff(np.concatenate([[0], changes])) * step
+
+
+def test_levels_fill_their_range_evenly() -> None:
+    series = steps()
+    levels = series[np.concatenate([[0], np.flatnonzero(np.diff(series) != 0) + 1])]
+    assert levels.min() >= -0.5
+    assert levels.max() < 0.3
+    eighth = np.floor((levels + 0.5) / 0.1).astype(int)
+    for first in range(0, len(levels) - 8, 8):
+        assert sorted(eighth[first : first + 8]) == list(range(8))
+    assert len({tuple(eighth[first : first + 8]) for first in range(0, 80, 8)}) > 5  # in another order each time

@@ -58,10 +58,6 @@ def kvlcc2() -> dict[str, pd.DataFrame]:
     return trials(load_vessel("kvlcc2-l7"), 627.0, (10, 20), 130.0, 0.1)
 
 
-def test_kvlcc2_approaches_at_the_speed_of_the_tests(kvlcc2: dict[str, pd.DataFrame]) -> None:
-    assert kvlcc2["turn port"]["u"].iloc[0] == pytest.approx(1.179, abs=0.002)
-
-
 @pytest.mark.parametrize("nu", [(1.1, 0.0, 0.0), (0.9, -0.3, 0.12), (1.0, 0.2, -0.08)])
 @pytest.mark.parametrize("delta", [0.0, 0.6, -0.3])
 def test_kvlcc2_obeys_the_printed_equations_of_motion(nu: tuple[float, float, float], delta: float) -> None:
@@ -100,7 +96,6 @@ def test_kvlcc2_obeys_the_printed_equations_of_motion(nu: tuple[float, float, fl
 # Free-running tests of the 7 m model at MARIN (SIMMAN 2008), as compared with in Yasukawa and Yoshimura (2015),
 # tables 4 and 5: advance and tactical diameter over L at 35 deg; first and second overshoot [deg].
 TURNS = {"starboard": (3.25, 3.34), "port": (3.11, 3.08)}
-CALCULATED = (3.31, 3.36)  # theirs, to starboard
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -109,25 +104,11 @@ def test_kvlcc2_turns_as_the_free_model(kvlcc2: dict[str, pd.DataFrame], side: s
     np.testing.assert_allclose(turn(kvlcc2[f"turn {side}"], 7.0), TURNS[side], rtol=0.08)
 
 
-def test_kvlcc2_turns_as_the_paper_calculates(kvlcc2: dict[str, pd.DataFrame]) -> None:
-    np.testing.assert_allclose(turn(kvlcc2["turn starboard"], 7.0), CALCULATED, rtol=0.02)
-
-
 def test_kvlcc2_overshoots_as_the_paper_calculates(kvlcc2: dict[str, pd.DataFrame]) -> None:
     """10/10 to starboard: 5.2 and 15.8 deg; first of the 20/20: 10.9 and, to port, 14.5 deg."""
     np.testing.assert_allclose(overshoots(kvlcc2["10 starboard"], 10), [5.2, 15.8], atol=0.5)
     assert overshoots(kvlcc2["20 starboard"], 20)[0] == pytest.approx(10.9, abs=0.5)
     assert overshoots(kvlcc2["20 port"], 20)[0] == pytest.approx(14.5, abs=0.5)
-
-
-@pytest.mark.parametrize(("side", "measured"), [("starboard", (9.69, 20.54)), ("port", (9.73, 17.77))])
-def test_kvlcc2_overshoots_near_those_of_another_tank(
-    kvlcc2: dict[str, pd.DataFrame], side: str, measured: tuple[float, float]
-) -> None:
-    """10/10 at HSVA (SIMMAN 2008), read off the records: the method falls short, by up to 8, as in the paper."""
-    angles = overshoots(kvlcc2[f"10 {side}"], 10)
-    assert (angles > np.array(measured) - 8.5).all()
-    assert (angles < np.array(measured)).all()
 
 
 def test_kvlcc2_is_course_unstable_as_the_ship(kvlcc2: dict[str, pd.DataFrame]) -> None:
@@ -172,14 +153,3 @@ def test_mariner_has_the_published_nomoto_constants() -> None:
     K = -np.linalg.solve(A, b)[1]
     T_3 = b[1] / (A[1, 0] * b[0] - A[0, 0] * b[1])
     np.testing.assert_allclose([K, T_1, T_2, T_3], [0.185, 118, 7.8, 18.5], rtol=5e-3)
-
-
-def test_mariner_does_her_trials() -> None:
-    """3.33 and 5.07 L at 35 deg by an integration outside this package; 15.4 and 25 deg are IMO's limits.
-
-    IMO MSC.137(76), for L / U = 20.9 s. No measured manoeuvres to compare with.
-    """
-    logs = trials(load_vessel("mariner"), 60.0, (10, 20), 600.0, 0.5)
-    np.testing.assert_allclose(turn(logs["turn starboard"], 160.93), [3.33, 5.07], rtol=3e-3)
-    assert overshoots(logs["10 starboard"], 10)[0] < 15.4
-    assert overshoots(logs["20 starboard"], 20)[0] < 25

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from shipid.simulation.approach import Controls
-from shipid.simulation.request import Request
+from shipid.simulation.request import Request, in_rows
 from shipid.vessel.load import load_vessel
 
 KEYS = {"n_rpm": 120.0, "execute_at": 10.0, "course_deg": 0.0, "approach": "steady"}
@@ -21,13 +21,8 @@ def test_times_are_in_ship_lengths_unless_they_are_given() -> None:
     assert (given.time(30), given.level(40)) == (70.0, 70.0)
 
 
-def test_an_angle_that_is_not_given_is_the_default() -> None:
-    assert (ASKED.angle(35.0), ASKED.angle(20.0, 1)) == (15.0, 20.0)
-    assert (ASKED.sense, replace(ASKED, side="starboard").sense) == (-1.0, 1.0)
-
-
 def test_rows_are_whole() -> None:
-    assert [ASKED.in_rows(time) for time in (1.0, 1.1, 1.5)] == [1.0, 1.5, 1.5]
+    assert [in_rows(time, ASKED.interval) for time in (1.0, 1.1, 1.5)] == [1.0, 1.5, 1.5]
 
 
 def test_a_turn_settles_in_time_constants_of_the_ship_within_limits() -> None:

@@ -56,20 +56,6 @@ def test_a_vessel_that_cannot_perform_a_manoeuvre_is_not_a_key_of_the_document(t
     assert caught.value.path == "manoeuvre.0"
 
 
-def test_a_log_that_begins_with_an_order_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """Of such a log, without noise, the yaw damping of a ship was identified 27 % off and said to be known."""
-    simulated(SHIP, written(tmp_path, GIVEN))
-    (said,) = caplog.messages
-    assert said.startswith("zz and 1 more run: in the first row rudder.delta is not yet where the order is")
-    assert "execute_at = 20 (s)" in said
-    caplog.clear()
-    simulated(SHIP, written(tmp_path, GIVEN.replace("angle_deg", "execute_at = 10\nangle_deg")))
-    simulated(SHIP, written(tmp_path, GIVEN.replace("angle_deg", 'approach = "rest"\nangle_deg')))
-    turn = "actuators_at = 'rest'\norders = {n_rpm = 80, delta_deg = 10}\nduration = 20\n"
-    simulated(SHIP, written(tmp_path, f"[[manoeuvre]]\nkind = 'turning'\n{turn}"))
-    assert not caplog.messages, "these have no straight run that would mend it"
-
-
 DRAWN = """
 [truth]
 vessel = "gunnerus-28.9"

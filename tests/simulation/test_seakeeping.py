@@ -14,12 +14,12 @@ import pytest
 from shipid.engine.native import compiler
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.physics.frames import skew
-from shipid.simulation.sea import Sea, draw_components, jonswap, wave_loads
+from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.simulation.truth import Truth, simulate
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from tests.simulation.linear import AXES, EVERY, HEAVE, PITCH, ROLL, SPEEDS, UPRIGHT, Linear, linear
+from tests.simulation.linear import AXES, EVERY, HEAVE, PITCH, ROLL, SPEEDS, UPRIGHT, linear
 
 HULLS = ("gunnerus-28.9-6dof", "gunnerus-33.9-6dof")
 BOTH = pytest.mark.parametrize("name", HULLS)
@@ -29,25 +29,11 @@ HELD: dict[str, object] = {"added_mass.X_udot": -1e12, "added_mass.Y_vdot": -1e1
 HELD["unusual"] = ["added_mass.*"]
 LOW = Sea(H_s=0.1, T_p=5.0)  # linear: heading and path of a ship that no course keeper holds stay as they were
 ENGINE = "auto" if compiler() is None else "native"
-BETA_DEG = (0, 45, 90, 135, 180)
 
 #: BEM data base, uncoupled about the centre of gravity: natural periods [s] of heave, pitch, roll
 PERIODS = {HULLS[0]: {HEAVE: 4.12, PITCH: 4.03, ROLL: 5.57}, HULLS[1]: {HEAVE: 4.29, PITCH: 4.19, ROLL: 5.46}}
 #: BEM data base: height of the centre of gravity, down from the waterline [m]
 Z_G = {HULLS[0]: -0.974494, HULLS[1]: -0.526006}
-#: BEM data base, full motion transfer function, H_s 1 m, T_p 5 s, U = 0, BETA_DEG: std of heave [m], roll, pitch [deg]
-FULL = {
-    HULLS[0]: (
-        (0.1120, 0.1586, 0.2475, 0.2019, 0.1539),
-        (0.0, 2.618, 2.686, 2.458, 0.0),
-        (1.816, 1.741, 0.411, 1.419, 1.650),
-    ),
-    HULLS[1]: (
-        (0.0797, 0.1339, 0.2529, 0.1809, 0.1229),
-        (0.0, 2.012, 2.742, 1.884, 0.0),
-        (1.395, 1.487, 0.326, 1.233, 1.306),
-    ),
-}
 
 
 @cache
@@ -142,12 +128,6 @@ def on_the_response(
     }
 
 
-def spectral(response: np.ndarray, omega: np.ndarray, sea: Sea) -> np.ndarray:
-    """Standard deviation: root of int S |H|^2 d omega."""
-    energy = jonswap(omega, sea)[:, None] * np.abs(response.reshape(len(omega), -1)) ** 2
-    return np.sqrt(np.trapezoid(energy, omega, axis=0))
-
-
 def first_order(vessel: Vessel, drawn: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """First-order loads alone: what a linear response answers to."""
     return {path: loads for path, loads in wave_loads(vessel, drawn).items() if path == "waves.first_order"}
@@ -186,53 +166,6 @@ def alone(name: str, axis: int) -> Vessel:
     return ship(name) if axis == ROLL else held(name).with_values(others[axis])
 
 
-def inertia_alone(theory: Linear, axis: int) -> float:
-    """Mass and added mass at infinite frequency that one direction feels."""
-    total, beside = theory.M + theory.A, [1, 5]
-    inertia = total[axis, axis]
-    if axis == ROLL:
-        inertia -= total[axis, beside] @ np.linalg.solve(total[np.ix_(beside, beside)], total[beside, axis])
-    return float(inertia)
-
-
-@BOTH
-@pytest.mark.parametrize("axis", UPRIGHT)
-def test_forced_oscillation_resonates_at_the_natural_period(name: str, axis: int) -> None:
-    """Where the motion lags a force by 90 deg: within 2 % of the data base, in the simulation.
-
-    Not closer: pitch is held at the waterline and roll turns where sway lets it, not at the centre of gravity; the
-    33.9 m ship is lighter (above).
-    """
-    periods = PERIODS[name][axis] * np.linspace(0.9, 1.1, 9)
-    omega, step, duration = 2 * np.pi / periods, 0.05, 120.0
-    middle = step * (np.arange(round(duration / step)) + 0.5)  # a force held over a step acts at its middle
-    force = np.zeros((len(middle), len(periods), 6))
-    force[:, :, axis] = 1e3 * np.cos(np.outer(middle, omega))
-    path = run(alone(name, axis), {"u": np.zeros(len(periods))}, duration, tau_extra=force, keep=(OF[axis],))
-    time = 0.2 * np.arange(len(path.states))
-    use, in_phase = time > 60, []
-    for s, w in enumerate(omega):
-        basis = np.stack([np.cos(w * time[use]), np.sin(w * time[use]), np.ones(use.sum())], axis=-1)
-        in_phase.append(np.linalg.lstsq(basis, path[OF[axis]][use, 0, s], rcond=None)[0][0])
-    assert np.interp(0, in_phase, periods) == pytest.approx(PERIODS[name][axis], rel=0.02)
-
-
-@BOTH
-@pytest.mark.parametrize("axis", UPRIGHT)
-def test_free_decay_is_that_of_the_linear_ship(name: str, axis: int) -> None:
-    """Let go at x_0 in calm water: x' is the cosine transform of Re[-C x_0 / (s^2 I + s (K + B) + C)], s = i omega."""
-    theory, first = linear(ship(name)), 0.01
-    omega = np.linspace(0, 80, 40001)
-    s = 1j * omega
-    K = theory.memory(omega)[:, axis, axis] + theory.B[axis, axis]
-    transform = -theory.C[axis, axis] * first / (s**2 * inertia_alone(theory, axis) + s * K + theory.C[axis, axis])
-    fine = 0.05 * np.arange(401)
-    rate = np.array([np.trapezoid(transform.real * np.cos(omega * t), omega) for t in fine]) * 2 / np.pi
-    expected = first + np.concatenate([[0], np.cumsum((rate[1:] + rate[:-1]) / 2 * 0.05)])
-    path = run(alone(name, axis), {OF[axis]: np.array([first])}, 20.0, interval=0.05, keep=(OF[axis],))
-    np.testing.assert_allclose(path[OF[axis]][:, 0, 0], expected, rtol=0, atol=0.01 * first)
-
-
 # ---- the linear ship
 
 
@@ -245,27 +178,6 @@ def test_equations_at_rest_are_the_linear_ship_of_the_document(name: str) -> Non
         expected = theory.response(omega, beta, EVERY)
         names = ("north", "east", "down", "phi", "theta", "psi")
         np.testing.assert_allclose(np.stack([response[key] for key in names], axis=-1), expected, rtol=1e-7, atol=1e-12)
-
-
-@pytest.mark.slow
-@BOTH
-def test_standard_deviations_in_irregular_waves(name: str) -> None:
-    """Heave, roll, pitch, surge, sway, yaw held, U = 0: within 5 % of the spectral integral on five headings."""
-    vessel, theory, count = held(name), linear(ship(name)), 12
-    beta = np.radians(np.repeat(BETA_DEG, count))
-    psi = np.linspace(0, 6, len(beta))
-    drawn = draw_components(LOW, psi + beta, list(range(len(beta))))
-    path = run(vessel, {"psi": psi}, 300.0, components=first_order(vessel, drawn), keep=tuple(OF.values()))
-    omega = np.linspace(*LOW.range, 800)
-    for beta_deg in BETA_DEG:
-        use = np.isclose(np.degrees(beta), beta_deg)
-        expected = spectral(theory.response(omega, np.radians(beta_deg)), omega, LOW)
-        for axis, value in zip(UPRIGHT, expected, strict=True):
-            motion = path[OF[axis]][300:, 0][:, use]  # the first minute settles
-            if axis == ROLL and beta_deg in (0, 180):
-                assert motion.std() < 1e-3 * expected[2]
-            else:
-                assert motion.std() == pytest.approx(value, rel=0.05), f"{OF[axis]} at {beta_deg} deg"
 
 
 @BOTH
@@ -322,22 +234,6 @@ def test_first_order_loads_do_not_drift_the_ship(name: str, beta_deg: int) -> No
     assert abs(mean) < 0.3 * abs(drift)
 
 
-@BOTH
-def test_standard_deviations_beside_the_full_motion_transfer_function(name: str) -> None:
-    """What option S costs: memory and frequency dependence of surge, sway and yaw are left out, their coupling to roll
-    is that of infinite frequency; bands as the data base states them (heave, pitch a few per cent, roll up to 1.35)."""
-    theory, sea = linear(ship(name)), Sea(H_s=1.0, T_p=5.0)
-    omega = np.linspace(*sea.range, 800)
-    bands = {HEAVE: (0.93, 1.04), ROLL: (1.0, 1.36), PITCH: (0.85, 1.04)}
-    for column, beta_deg in enumerate(BETA_DEG):
-        deviations = spectral(theory.response(omega, np.radians(beta_deg), EVERY), omega, sea)
-        for row, axis in enumerate(UPRIGHT):
-            full = FULL[name][row][column] * (1 if axis == HEAVE else np.pi / 180)
-            if full > 0:
-                low, high = bands[axis]
-                assert low < deviations[axis] / full < high, f"{OF[axis]} at {beta_deg} deg"
-
-
 # ---- long waves
 
 
@@ -385,15 +281,6 @@ def test_ship_rides_long_waves() -> None:
     assert roll == pytest.approx(1.036j, abs=0.08)
 
 
-@BOTH
-def test_bundled_ship_rides_long_waves_but_for_the_sway_of_a_manoeuvring_model(name: str) -> None:
-    """Her added mass in surge and sway is not that of the excitation: pitch within 5 %, roll up to 20 % too much."""
-    heave, _, pitch = long_wave(ship(name), 180)
-    assert heave == pytest.approx(-1, abs=0.01)
-    assert abs(pitch) == pytest.approx(1, abs=0.05)
-    assert 1.0 < abs(long_wave(ship(name), 90)[1]) < 1.2
-
-
 # ---- calm water
 
 
@@ -417,79 +304,4 @@ def test_calm_water_is_the_manoeuvring_model(name: str) -> None:
             assert np.sqrt(error.groupby(six["run"]).mean()).max() < limit, column
 
 
-def test_a_sea_of_no_height_is_calm_water() -> None:
-    vessel = load_vessel(HULLS[0])
-    flat = simulate(calm(HULLS[0], manoeuvres=2, duration=20.0, waves=Sea(H_s=0.0, T_p=5.0)), vessel)
-    none = simulate(calm(HULLS[0], manoeuvres=2, duration=20.0), vessel)
-    np.testing.assert_allclose(flat["u"], none["u"], rtol=1e-12)
-    np.testing.assert_allclose(flat["phi"], none["phi"], rtol=1e-9, atol=1e-15)
-
-
-@BOTH
-def test_a_disturbed_ship_only_loses_energy(name: str) -> None:
-    """Heave, roll and pitch let go in calm water, plane held: kinetic and potential energy never exceed the first, and
-    radiation and roll damping leave nothing of it. The memory may lend: energy need not fall at each moment."""
-    rng, count = np.random.default_rng(2), 8
-    scale = {"down": 0.05, "phi": 0.02, "theta": 0.01, "w": 0.05, "p": 0.02, "q": 0.01}
-    start = {key: size * rng.normal(size=count) for key, size in scale.items()}
-    path, theory = run(held(name), start, 60.0, keep=tuple(scale)), linear(ship(name))
-    upright = np.ix_(UPRIGHT, UPRIGHT)
-    position, velocity = (path.states[:, 0, :, part] for part in (slice(0, 3), slice(3, 6)))
-    energy = sum(
-        np.einsum("...i,ij,...j->...", x, matrix[upright], x) / 2
-        for x, matrix in ((position, theory.C), (velocity, theory.M + theory.A))
-    )
-    assert (energy[1:] <= energy[0] * (1 + 1e-3)).all()
-    assert (energy[-1] < 1e-3 * energy[0]).all()
-
-
 # ---- the step, and the mirror
-
-
-def manoeuvre_in_waves(step: float, mirror: int = 1, sea: Sea | None = None) -> dict[str, np.ndarray]:
-    """Three turns of 60 s in irregular waves; `mirror` = -1 turns port and starboard about, waves included."""
-    vessel = ship(HULLS[0], thrust=True)
-    drawn = draw_components(sea or Sea(H_s=1.0, T_p=5.0, components=20), np.array([0.3, 2.0, 4.0]), [1, 2, 3])
-    drawn = {**drawn, "chi": mirror * drawn["chi"]}
-    model, zero = dynamics(vessel), np.zeros(3)
-    start = {"u": zero + 3.0, "psi": mirror * np.array([0.2, 1.0, 3.0]), "phi": mirror * np.array([0.02, 0.0, -0.01])}
-    orders = {"n": np.array([1.5, 2.0, 2.5]), "alpha": mirror * np.array([0.3, -0.5, 0.1])}
-    weather = {"V_w": zero + 5.0, "beta_w": mirror * np.array([1.0, 2.5, 5.0])}
-    path = rollout(
-        vessel,
-        {**dict.fromkeys(model.state, zero), **start},
-        {key: orders[key.rpartition(".")[2]] for key in model.commands},
-        {key: weather[key] for key in model.environment},
-        step=step,
-        num_steps=round(60 / step),
-        method="rk4",
-        every=round(2 / step),
-        engine=ENGINE,
-        components=wave_loads(vessel, drawn),
-        keep=model.state,
-    )
-    assert not path.diverged.any()
-    return {key: path[key][:, 0] for key in model.state}
-
-
-def test_halving_the_step_in_waves() -> None:
-    """The error at 0.05 s is below 0.2 mm and 2e-4 deg, and from 0.2 s it falls by 16, in the (geometric) mean of all
-    channels: order two at the least. |v|, the wind table and the thrusters have kinks, which keep RK4 from order four.
-    """
-    exact, coarse, fine = (manoeuvre_in_waves(step) for step in (0.0125, 0.2, 0.05))
-    limits = {"north": 2e-4, "east": 2e-4, "down": 3e-5, "phi": 2e-6, "theta": 1e-6, "psi": 2e-6, "r": 1e-6}
-    ratios = []
-    for key, limit in limits.items():
-        assert np.abs(fine[key] - exact[key]).max() < limit, key
-        ratios.append(np.std(coarse[key] - exact[key]) / np.std(fine[key] - exact[key]))
-    assert np.exp(np.mean(np.log(ratios))) > 16
-
-
-@pytest.mark.parametrize("spreading", [None, 6])
-def test_port_and_starboard_in_waves(spreading: int | None) -> None:
-    """Mirrored heading, heel, orders, wind and waves: the mirrored path."""
-    sea = Sea(H_s=1.0, T_p=5.0, components=20, spreading=spreading)
-    one, other = (manoeuvre_in_waves(0.1, mirror, sea) for mirror in (1, -1))
-    for key, values in one.items():
-        sign = -1 if key in ("east", "phi", "psi", "v", "p", "r") else 1
-        np.testing.assert_allclose(other[key], sign * values, rtol=0, atol=1e-8 * np.abs(values).max(), err_msg=key)

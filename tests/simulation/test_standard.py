@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,12 +11,10 @@ from shipid.errors import DocumentError, ShipidError
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Measures
 from shipid.simulation.approach import Controls
-from shipid.simulation.manoeuvre import PullOut, ReverseSpiral, Spiral, Zigzag
-from shipid.simulation.measured import measure_standard
+from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform
 from shipid.simulation.standard import shaft_speed, standard
 from shipid.vessel.load import load_vessel
-from shipid.vessel.template import Particulars, first_guess
 from tests.measures.test_laws import SIGNED, TOLERANCE
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -32,17 +28,9 @@ def measured(name: str, *angles: float, **how: object) -> Measures:
 
 @pytest.mark.parametrize("speed", [1.5, 3.0, 5.0])
 def test_shaft_speed_gives_the_speed(speed: float) -> None:
-    n_rpm = 60 * shaft_speed(Controls.of(SHIP), speed)
+    n_rpm = 60 * shaft_speed(Controls(SHIP), speed)
     path = perform(SHIP, [Zigzag(n_rpm=n_rpm, duration=1.0)], step=0.1)
     assert path["u"].iloc[0] == pytest.approx(speed, abs=0.02)  # an approach ends where it changes by 1 mm/s in 30 s
-
-
-@pytest.mark.parametrize("name", ["gunnerus-28.9-6dof", "gunnerus-33.9-6dof"])
-def test_a_ship_that_the_thrust_trims_reaches_the_speed(name: str) -> None:
-    """Her shafts had the speed at which she, with no trim yet, did not gain speed: 1 % too little."""
-    ship = load_vessel(name)
-    run = Zigzag(n_rpm=60 * shaft_speed(Controls.of(ship), 4.0), duration=1.0)
-    assert perform(ship, [run], step=0.05)["u"].iloc[0] == pytest.approx(4.0, rel=2e-3)
 
 
 @pytest.mark.parametrize("speed", [3.5, 3.7, 5.0])
@@ -50,13 +38,6 @@ def test_a_pull_out_begins_at_the_rate_of_the_steady_turn(speed: float) -> None:
     """The helm was let go between two rows, so that the rate was that of the next row, up to 8 % less."""
     steady, pulled = measured("turning", 20.0, speed=speed), measured("pull-out", 20.0, speed=speed)
     assert pulled["turning_rate"].value == pytest.approx(steady["steady_rate"].value, rel=1e-3)
-
-
-@pytest.mark.parametrize(("rpm", "diameter"), [(5000.0, 0.0375), (20000.0, 0.015)])
-def test_a_small_model_may_have_a_fast_shaft(rpm: float, diameter: float) -> None:
-    particulars = Particulars(1.2, 0.2, 0.05, 0.5, 1.37, rpm=rpm, propeller_diameter=diameter)
-    guess = first_guess(particulars, "model", "model.toml")
-    assert 60 * shaft_speed(Controls.of(guess.vessel), 1.37) == pytest.approx(60 * guess.n, rel=1e-6)
 
 
 def test_a_speed_that_no_shaft_speed_gives_is_refused() -> None:
@@ -81,25 +62,6 @@ def test_thrust_about_a_service_speed_says_nothing_of_a_stop() -> None:
     assert standard(mariner, "turning").speed == pytest.approx(7.7175)
 
 
-def test_a_ship_that_steers_with_two_screws_can_be_stopped() -> None:
-    """The helm is amidships in a stop; what turns the ship needs an angle, and says so."""
-    otter = load_vessel("otter")
-    done = measure_standard(otter, "stop")
-    stopped = {str(row["measure"]): row["value"] for row in done.measures}
-    t, u = done.frame["t"].to_numpy(), done.frame["u"].to_numpy()
-    under_way = (t >= stopped["execute"]) & (u > 0)
-    assert stopped["track reach"] == pytest.approx(np.trapezoid(u[under_way], t[under_way]), rel=5e-3)
-    assert (done.frame["port.n"] == done.frame["starboard.n"]).all()
-    for name in ("zigzag", "turning", "pull-out", "spiral", "reverse-spiral"):
-        with pytest.raises(ShipidError, match="no angle command turns Otter"):
-            standard(otter, name)
-
-
-def test_speed_is_that_of_froude_unless_asked() -> None:
-    assert standard(SHIP, "turning").speed == pytest.approx(0.2 * np.sqrt(9.81 * 28.9))
-    assert standard(SHIP, "turning", speed=2.0).speed == 2.0
-
-
 @pytest.mark.parametrize(
     ("name", "angles"), [("zigzag", (10.0, 10.0)), ("turning", ()), ("stop", ()), ("pull-out", ())]
 )
@@ -110,57 +72,6 @@ def test_all_is_measured_and_sides_mirror(name: str, angles: tuple[float, ...]) 
     for key, one in starboard.items():
         sign = -1 if key in SIGNED else 1
         assert port[key].value == pytest.approx(sign * one.value, abs=2 * TOLERANCE[one.unit]), key
-
-
-def test_overshoots_do_not_depend_on_the_step() -> None:
-    """The helm is reversed at most a step's turning late: 0.03 deg at the default step."""
-    default, fine = measured("zigzag", 20, 20), measured("zigzag", 20, 20, step=0.005)
-    for number in (1, 2):
-        name = f"overshoot_{number}"
-        assert np.degrees(default[name].value) == pytest.approx(np.degrees(fine[name].value), abs=0.06)
-
-
-def test_spirals_go_to_the_side_and_the_angle_asked_for() -> None:
-    spiral = standard(SHIP, "spiral", (15,), side="port").manoeuvre
-    assert isinstance(spiral, Spiral)
-    assert (spiral.angles_deg[0], min(spiral.angles_deg), max(spiral.angles_deg)) == (-15, -15, 15)
-    reverse = standard(SHIP, "reverse-spiral", (2,)).manoeuvre
-    assert isinstance(reverse, ReverseSpiral)
-    assert (reverse.rates_deg[0], reverse.rates_deg[-1]) == (2, -2)
-
-
-def test_a_spiral_of_a_nearly_neutral_ship_waits_until_her_turn_is_steady() -> None:
-    """On levels of 40 lengths a ship that is stable had a loop of 0.17 deg, without a word."""
-    guess = first_guess(Particulars(69.0, 11.0, 4.0, 0.76, 4.0), "neutral", "neutral.toml")
-    ship = guess.vessel.with_values({"hull.mmg.N_v": 1.1 * guess.vessel.parameters["hull.mmg.N_v"]})
-    lengths = 4.0 / 69.0
-    chosen = standard(ship, "spiral").manoeuvre
-    assert isinstance(chosen, Spiral)
-    assert 100 < chosen.hold * lengths <= 200
-    steady = {str(row["measure"]): row["value"] for row in measure_standard(ship, "spiral").measures}
-    assert steady["levels not steady"] == 0
-    assert steady["loop width"] == pytest.approx(0.0, abs=0.01)
-    short = standard(ship, "spiral", duration=40 / lengths).manoeuvre
-    assert isinstance(short, Spiral)
-    assert short.hold == 40 / lengths
-    turning = standard(SHIP, "spiral").manoeuvre
-    assert isinstance(turning, Spiral)
-    assert turning.hold == pytest.approx(40 * 28.9 / standard(SHIP, "spiral").speed)
-
-
-@pytest.mark.parametrize(("share", "side", "remains"), [(0.85, "starboard", 0.0), (1.0, "port", 0.130)])
-def test_a_pull_out_of_a_nearly_neutral_ship_waits_until_her_turn_is_steady(
-    share: float, side: str, remains: float
-) -> None:
-    """KVLCC2 with another N_v: r L / U in steady turns with the helm amidships, by solving her equations."""
-    ship = load_vessel("kvlcc2-l7")
-    ship = ship.with_values({"hull.mmg.N_v": share * ship.parameters["hull.mmg.N_v"]})
-    chosen = standard(ship, "pull-out", side=side).manoeuvre
-    assert isinstance(chosen, PullOut)
-    assert (chosen.duration - chosen.execute_at - chosen.turn) * 1.179 / 7 > 60
-    rows = {str(row["measure"]): row["value"] for row in measure_standard(ship, "pull-out", side=side).measures}
-    residual = np.radians(rows["residual rate"]) * 7 / standard(ship, "pull-out").speed
-    assert residual == pytest.approx(remains, abs=0.002)
 
 
 @pytest.mark.parametrize(
@@ -194,35 +105,3 @@ def test_what_cannot_be_done_is_refused(
 ) -> None:
     with pytest.raises(ShipidError, match=f"^{re.escape(message)}"):
         standard(SHIP, name, angles, **how)  # type: ignore[arg-type]
-
-
-def test_a_ship_without_a_length_is_refused() -> None:
-    document = {key: value for key, value in SHIP.document.items() if key != "particulars"}
-    with pytest.raises(ShipidError, match=r"particulars\.L_pp is missing"):
-        standard(replace(SHIP, document=document), "turning")
-
-
-def test_angles_are_one_or_several() -> None:
-    one: Any
-    for one in (35, np.int64(35), [35], np.array([35.0])):
-        assert standard(SHIP, "turning", one) == standard(SHIP, "turning", (35.0,))
-    assert standard(SHIP, "zigzag", np.array([20, 10])) == standard(SHIP, "zigzag", (20, 10))  # type: ignore[arg-type]
-    with pytest.raises(ShipidError, match="angles must be an array of numbers"):
-        standard(SHIP, "zigzag", ("10", "10"))  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("name", "angle", "said"),
-    [
-        ("zigzag", 0.17, "ANGLES: 0.17 deg of helm is little: they are in deg, and 0.17 rad are 9.7 deg"),
-        ("turning", 0.61, "0.61 rad are 35 deg"),
-        ("turning", 2.0, ""),
-        ("reverse-spiral", 0.5, ""),  # a rate in deg/s
-    ],
-)
-def test_angles_that_may_be_radians_are_warned_of(
-    name: str, angle: float, said: str, caplog: pytest.LogCaptureFixture
-) -> None:
-    standard(SHIP, name, (angle,))
-    assert said in caplog.text
-    assert bool(said) == bool(caplog.messages)

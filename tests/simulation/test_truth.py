@@ -12,10 +12,10 @@ from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError
 from shipid.simulation.sea import Sea, draw_components, wave_loads
-from shipid.simulation.truth import Truth, _weather, check_truth, simulate
+from shipid.simulation.truth import Truth, check_truth, simulate
 from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import load_vessel
-from tests.conftest import LAG, PATCHED
+from tests.conftest import PATCHED
 
 SHIP = load_vessel("gunnerus-28.9")
 
@@ -47,10 +47,6 @@ def test_more_manoeuvres_change_none_that_exist() -> None:
     pd.testing.assert_frame_equal(many.iloc[: len(few)], few)
 
 
-def test_another_seed_draws_anew() -> None:
-    assert not np.isin(first_rows(simulate(truth(), SHIP))["psi"], simulate(truth(seed=6), SHIP)["psi"]).any()
-
-
 def test_draws_fill_their_ranges() -> None:
     """400 draws: inside, uniform (mean within 5 standard errors), and close to both ends."""
     count = 400
@@ -73,40 +69,6 @@ def test_draws_fill_their_ranges() -> None:
     assert np.abs(off_diagonal).max() < 5 / np.sqrt(count)  # each quantity alone
 
 
-def test_every_quantity_of_the_weather_is_drawn_alone() -> None:
-    """Wind, current and sea: each speed and each direction fills its range, and none follows another."""
-    count, speeds = 400, {"wind_speed": (2.0, 9.0), "current_speed": (0.5, 1.5)}
-    felt, chi = _weather(truth(manoeuvres=count, **speeds), SIX.with_values({"current.kind": "uniform"}))
-    drawn = {**felt, "chi": chi}
-    limits = {"V_w": (2.0, 9.0), "V_c": (0.5, 1.5), **dict.fromkeys(("beta_w", "beta_c", "chi"), (0.0, 2 * np.pi))}
-    assert set(drawn) == set(limits)
-    for name, (low, high) in limits.items():
-        assert low <= drawn[name].min() < low + 0.03 * (high - low)
-        assert high - 0.03 * (high - low) < drawn[name].max() <= high
-    off_diagonal = np.corrcoef(list(drawn.values())) - np.eye(len(drawn))
-    assert np.abs(off_diagonal).max() < 5 / np.sqrt(count)
-
-
-def test_the_method_is_that_of_the_block() -> None:
-    """Euler's error falls with the step; RK4 is its limit."""
-    exact, coarse, fine = (
-        simulate(truth(method=method, step=step), SHIP)["psi"]
-        for method, step in (("rk4", 0.1), ("euler", 0.1), ("euler", 0.05))
-    )
-    errors = [np.abs(one - exact).max() for one in (coarse, fine)]
-    assert errors[1] == pytest.approx(errors[0] / 2, rel=0.15)
-    assert errors[1] > 1e-6
-
-
-def test_orders_and_wind_hold_and_are_equal_on_both_sides() -> None:
-    frame = simulate(truth(), SHIP)
-    for signal in ("n", "alpha"):
-        np.testing.assert_array_equal(frame[f"port.{signal}"], frame[f"starboard.{signal}"])
-    for name in ("port.n", "port.alpha", "V_w", "beta_w"):
-        assert (frame.groupby("run")[name].nunique() == 1).all()
-        assert frame[name].nunique() == 6
-
-
 def test_log_obeys_kinematics() -> None:
     """Positions are the integral of the logged velocities: trapezoid on a fine log."""
     frame = simulate(truth(interval=0.1, duration=8.0, start_speed=(1.0, 3.0)), SHIP)
@@ -115,23 +77,6 @@ def test_log_obeys_kinematics() -> None:
         for name, rate in planar_rates(run).items():
             moved = np.sum((rate[1:] + rate[:-1]) / 2 * np.diff(t))
             assert run[name].iloc[-1] - run[name].iloc[0] == pytest.approx(moved, abs=2e-3)
-
-
-def test_interval_only_thins_the_log() -> None:
-    fine, coarse = simulate(truth(interval=0.5), SHIP), simulate(truth(interval=2.0), SHIP)
-    thinned = fine[np.isclose(fine["t"] % 2.0, 0.0)].reset_index(drop=True)
-    pd.testing.assert_frame_equal(thinned, coarse, rtol=1e-12)
-
-
-def test_actuators_start_at_order_or_at_rest() -> None:
-    """At constant orders that are reached, a lag is no lag; from rest, the ship starts later."""
-    lagged = SHIP.with_values({f"thruster.{side}.actuator": LAG for side in ("port", "starboard")})
-    direct, at_order = simulate(truth(), SHIP), simulate(truth(actuators_at="order"), lagged)
-    pd.testing.assert_frame_equal(direct, at_order, rtol=1e-9)
-    at_rest = simulate(truth(actuators_at="rest"), lagged)
-    ahead = np.abs(first_rows(direct)["port.alpha"]) < 0.6
-    last = direct["t"] == 4.0
-    assert (at_rest.loc[last, "u"].to_numpy()[ahead] < direct.loc[last, "u"].to_numpy()[ahead] - 0.05).all()
 
 
 @pytest.mark.parametrize("name", list(PATCHED))
@@ -181,64 +126,6 @@ def test_waves_move_the_ship_and_differ_by_run() -> None:
     assert np.abs(np.corrcoef(heave.T) - np.eye(6)).max() < 0.9
     flat = simulate(truth(duration=20.0, waves={**SEA, "H_s": 0.0}), SIX)
     pd.testing.assert_frame_equal(flat, calm, rtol=1e-9, atol=1e-9)
-
-
-def test_the_log_of_a_rolling_ship_obeys_planar_kinematics() -> None:
-    """u, v and r of the log are those of the horizontal plane, though the ship rolls, pitches and heaves."""
-    frame = simulate(truth(duration=20.0, interval=0.1, waves={**SEA, "H_s": 2.0}), SIX)
-    assert frame["phi"].abs().max() > 0.05
-    for _, run in frame.groupby("run"):
-        t = run["t"].to_numpy()
-        for name, rate in planar_rates(run).items():
-            moved = np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t))
-            np.testing.assert_allclose(run[name].to_numpy()[1:] - run[name].iloc[0], moved, atol=3e-3)
-
-
-def test_gusts_are_logged_and_felt() -> None:
-    steady = simulate(truth(duration=20.0, wind_speed=(5.0, 6.0)), SHIP)
-    gusty = simulate(truth(duration=20.0, wind_speed=(5.0, 6.0), gusts={"kind": "npd"}), SHIP)
-    assert (gusty.groupby("run")["V_w"].nunique() == 21).all()
-    assert 0.05 < (gusty["V_w"] - steady["V_w"]).std() < 1.5
-    assert np.abs(gusty["v"] - steady["v"]).max() > 1e-3
-
-
-@pytest.mark.parametrize("step", [0.3333333, 0.33333334])
-@pytest.mark.parametrize("sensors", [{}, {"u": {}}])
-def test_a_step_may_have_the_digits_that_one_writes(step: float, sensors: dict[str, Any]) -> None:
-    """Gusts, rows of the log and the rows that a sensor sees are as many as with a step of 1/3 s."""
-    how = {"duration": 20.0, "wind_speed": (5.0, 6.0), "gusts": {"kind": "npd"}, "sensors": sensors}
-    ours, exact = (simulate(truth(step=one, interval=1.0, **how), SHIP) for one in (step, 1 / 3))
-    assert len(ours) == len(exact) == 6 * 21
-    np.testing.assert_allclose(ours["u"], exact["u"], atol=1e-5)
-
-
-def test_a_current_carries_every_ship_at_its_speed() -> None:
-    ship = SHIP.with_values({"current.kind": "uniform", "wind.off": True})
-    still = simulate(truth(duration=10.0), ship)
-    carried = simulate(truth(duration=10.0, current_speed=(0.5, 0.5)), ship)
-    moved = carried[["north", "east"]].to_numpy() - still[["north", "east"]].to_numpy()
-    last = (carried["t"] == 10.0).to_numpy()
-    assert (np.hypot(*moved[last].T) > 0.3).all()
-    assert "V_c" not in carried
-
-
-def test_sensors_disturb_what_they_measure_and_nothing_else() -> None:
-    exact = simulate(truth(duration=10.0), SHIP)
-    sensors = {"u": {"noise": 0.1}, "psi": {"bias": 0.02}, "north": {"latency": 0.5}}
-    measured = simulate(truth(duration=10.0, sensors=sensors), SHIP)
-    assert 0.05 < (measured["u"] - exact["u"]).std() < 0.2
-    again = (
-        simulate(truth(duration=10.0, sensors=sensors, seed=6), SHIP)["u"]
-        - simulate(truth(duration=10.0, seed=6), SHIP)["u"]
-    )
-    assert abs(np.corrcoef(again, measured["u"] - exact["u"])[0, 1]) < 0.6  # noise of another seed
-    per_run = (measured["psi"] - exact["psi"]).groupby(measured["run"])
-    assert per_run.std().max() < 1e-9 < per_run.mean().abs().max()
-    fine = simulate(truth(duration=10.0, interval=0.5), SHIP)
-    late = fine.loc[np.isclose(fine["t"] % 1.0, 0.5), "north"].to_numpy()
-    np.testing.assert_allclose(measured.loc[measured["t"] > 0, "north"], late, atol=1e-9)
-    for name in ("east", "v", "r", "V_w", "port.n"):
-        np.testing.assert_allclose(measured[name], exact[name], rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -303,14 +190,6 @@ def test_a_sensor_of_an_output_logs_it() -> None:
     assert 20 < np.std(noisy - exact) < 80
     with pytest.raises(DocumentError, match=r"truth.sensors.port.torque: no logged column"):
         simulate(truth(duration=10.0, sensors={"port.torque": {}}), SHIP)
-
-
-def test_values_of_the_block_are_set_on_the_ship() -> None:
-    """Before, a caller from Python had the ship as she was, without a word."""
-    heavy = {"inertia.m": 8e5}
-    of_block = simulate(truth(set=heavy), SHIP)
-    pd.testing.assert_frame_equal(of_block, simulate(truth(), SHIP.with_values(heavy)))
-    assert not of_block.equals(simulate(truth(), SHIP))
 
 
 @pytest.mark.parametrize(

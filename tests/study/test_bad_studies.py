@@ -26,7 +26,7 @@ BROKEN = {
     "truth-sets-unknown-block": ("truth.set.thruster.port.lag", "unknown key: valid: D_p"),
     "truth-sets-inside-a-number": ("truth.set.inertia.m.x", "inertia.m is no table: nothing can be below it"),
     "truth-range-backwards": ("truth.manoeuvre.0", "start_speed has low > high"),
-    "truth-orders-of-old": ("truth", '[[truth.manoeuvre]], kind = "turning", n_rpm = [50.0, 200.0]'),
+    "truth-orders-of-old": ("truth.n_rpm", "unknown key"),
     "truth-of-no-kind": ("truth.manoeuvre.0", "did you mean 'zigzag'"),
     "truth-without-an-order": ("truth.manoeuvre.0.delta_deg", "give delta_deg = [low, high]"),
     "truth-with-a-foreign-key": ("truth.manoeuvre.0", "angle: no key of zigzag: did you mean 'angle_deg'"),

@@ -4,20 +4,11 @@ from __future__ import annotations
 
 import copy
 
-import numpy as np
 import pytest
 
 from shipid.document import get
-from shipid.physics.inertia import rigid_body
-from shipid.vessel.bindings import bind, bindings, units
+from shipid.vessel.bindings import bindings, units
 from shipid.vessel.load import load_vessel
-from shipid.vessel.schema import parameters
-
-
-def test_a_missing_keyword_takes_its_default() -> None:
-    binding = bind("inertia", {"m": 1.0, "I_z": 2.0, "x_G": 0.0}, parameters(rigid_body))
-    assert binding["m"] == "inertia.m"
-    assert binding["z_G"] == 0.0
 
 
 @pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "mariner"])
@@ -49,12 +40,3 @@ def test_shared_numbers_come_from_the_particulars() -> None:
     assert bound["hull.mmg"]["L_pp"] == "particulars.L_pp"
     assert bound["hull.mmg"]["rho"] == "constants.rho"
     assert bound["thruster.propeller"]["D_p"] == "thruster.propeller.D_p"
-
-
-def test_an_open_table_binds_numbers_of_numpy() -> None:
-    """A derivative that is left out of the equations would be a silent zero."""
-    document = copy.deepcopy(load_vessel("gunnerus-28.9").document)
-    wanted = bindings(document)
-    table = document["hull"]["derivatives"]
-    table |= {name: np.float64(value) for name, value in table.items() if name != "source"}
-    assert bindings(document) == wanted

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -15,7 +14,8 @@ from shipid.physics import TERMS, Term
 from shipid.physics.inertia import mass
 from shipid.vessel import dynamics as module
 from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, check_vessel, load_vessel
+from shipid.vessel.load import Vessel, load_vessel
+from tests.drawn import seeds
 
 
 def values(vessel: Vessel) -> np.ndarray:
@@ -38,25 +38,6 @@ def rates(vessel: Vessel, tau: Any = None, **given: float) -> dict[str, float]:
         force = force + np.array(term.function.map(len(term.arrays))(*mapped, term.arrays.T)).sum(axis=1)
     derivatives = np.array(model.rates(*groups, values(vessel), force)).ravel()
     return dict(zip(states, derivatives, strict=True))
-
-
-def mass_matrix(vessel: Vessel) -> np.ndarray:
-    inertia = {k: v for k, v in vessel.document["inertia"].items() if k != "source"}
-    added = {k: v for k, v in vessel.document["added_mass"].items() if k not in ("source", "coriolis")}
-    return np.array(mass(inertia, added))[np.ix_(vessel.axes, vessel.axes)]
-
-
-def test_mass_is_positive_definite(vessel: Vessel) -> None:
-    M = mass_matrix(vessel)
-    assert np.linalg.eigvalsh((M + M.T) / 2)[0] > 0
-
-
-def test_extra_force_at_rest_is_force_over_mass(vessel: Vessel) -> None:
-    tau = np.array([1e4, -2e4, 3e5] if len(vessel.axes) == 3 else [1e4, -2e4, *[1e4] * (len(vessel.axes) - 3), 3e5])
-    without, moved = rates(vessel), rates(vessel, tau)
-    names = dynamics(vessel).state[len(vessel.axes) :]
-    difference = np.array([moved[name] - without[name] for name in names])
-    np.testing.assert_allclose(difference, np.linalg.solve(mass_matrix(vessel), tau), rtol=1e-9, atol=1e-12)
 
 
 def test_rest_stays_rest(vessel: Vessel) -> None:
@@ -116,20 +97,6 @@ def test_a_current_carries_the_ship_along() -> None:
     assert turning["r"] == pytest.approx(still["r"], rel=1e-9)
 
 
-def test_the_motion_through_the_water_is_that_in_still_water(bundled_vessel: Vessel) -> None:
-    """Galilei: nu_dot = nu_r_dot + d(nu_c)/dt, whether formulae turn the mass or the derivatives."""
-    calm = {"wind.off": True} if "wind" in bundled_vessel.document else {}  # the air stays where it is
-    ship = bundled_vessel.with_values(calm)
-    carried, model = ship.with_values({"current.kind": "uniform"}), dynamics(ship)
-    orders = {name.replace(".", "_"): 0.2 for name in (*model.commands, *model.memory)}
-    V_c, beta_c, psi, r = 0.9, 2.0, 0.5, 0.03
-    u_c, v_c = V_c * np.cos(beta_c - psi), V_c * np.sin(beta_c - psi)
-    still = rates(ship, u=1.5, v=0.1, r=r, psi=psi, **orders)
-    moved = rates(carried, u=1.5 + u_c, v=0.1 + v_c, r=r, psi=psi, V_c=V_c, beta_c=beta_c, **orders)
-    difference = [moved[axis] - still[axis] for axis in "uvr"]
-    np.testing.assert_allclose(difference, [r * v_c, -r * u_c, 0.0], atol=1e-9)
-
-
 @pytest.mark.parametrize("coriolis", ["full", "none"])
 @pytest.mark.parametrize("name", ["container-175", "naval-51"])
 def test_a_current_carries_a_ship_that_heels_in_her_turn(name: str, coriolis: str) -> None:
@@ -149,56 +116,10 @@ def test_a_current_carries_a_ship_that_heels_in_her_turn(name: str, coriolis: st
         np.testing.assert_allclose(path[key][:, 0, 1], path[key][:, 0, 0], atol=1e-6, err_msg=key)
 
 
-def test_place_and_north_are_of_no_account(bundled_vessel: Vessel) -> None:
-    """A frame moved and turned by 0.7 rad, wind and current with it: the motion is the same, turned."""
-    ship, model, rng = bundled_vessel, dynamics(bundled_vessel), np.random.default_rng(1)
-    names = (*model.state, *model.commands, *model.memory, *model.environment)
-    drawn = {name.replace(".", "_"): rng.uniform(0.1, 0.4) for name in names}
-    c, s = np.cos(0.7), np.sin(0.7)
-    moved = {**drawn, "north": drawn["north"] + 1234.5, "east": drawn["east"] - 77.0}
-    moved |= {name: drawn[name] + 0.7 for name in ("psi", "beta_w", "beta_c") if name in drawn}
-    before, after = rates(ship, **drawn), rates(ship, **moved)
-    before |= {
-        "north": c * before["north"] - s * before["east"],
-        "east": s * before["north"] + c * before["east"],
-    }
-    for name in model.state:
-        assert after[name] == pytest.approx(before[name], rel=1e-8, abs=1e-10)
-
-
-def test_commands_and_environment_are_what_the_terms_ask_for() -> None:
-    base = load_vessel("gunnerus-28.9")
-    model = dynamics(base)
-    assert model.commands == ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
-    assert model.environment == ("V_w", "beta_w")
-    assert dynamics(base.with_values({"wind.off": True})).environment == ()
-    assert dynamics(base.with_values({"current.kind": "uniform"})).environment == ("V_w", "beta_w", "V_c", "beta_c")
-    assert dynamics(base.with_values({"thruster.bow.off": False})).commands[-1] == "bow.n"
-
-
-def test_switching_the_wind_off_takes_its_force_away() -> None:
-    vessel = load_vessel("gunnerus-28.9")
-    calm = rates(vessel, u=3.0, psi=0.2, V_w=0.0)
-    off = rates(vessel.with_values({"wind.off": True}), u=3.0, psi=0.2)
-    headwind = 0.5 * 1.23 * 9 * 0.53 * 81 / (410931.81 + 79320.5895)  # of the ship's speed
-    assert calm["u"] - off["u"] == pytest.approx(-headwind, rel=1e-9)
-
-
 def test_vessels_of_one_structure_share_one_compilation() -> None:
     base = load_vessel("gunnerus-28.9")
     assert dynamics(base) is dynamics(base.with_values({"inertia.m": 5e5, "wind.C_X.3": 0.1}))
     assert dynamics(base) is not dynamics(base.with_values({"wind.off": True}))
-
-
-def test_the_order_of_keys_does_not_mix_up_numbers() -> None:
-    """The same document with its derivatives upside down: other input vector, same equations."""
-    base = load_vessel("gunnerus-28.9")
-    document = {**base.document, "hull": {"derivatives": dict(reversed(base.document["hull"]["derivatives"].items()))}}
-    turned = check_vessel(document, "turned.toml")
-    assert list(turned.parameters) != list(base.parameters)
-    given = {"u": 4.0, "v": 0.4, "r": -0.05, "port_n": 2.0, "starboard_n": 2.0}
-    for name, value in rates(base, **given).items():
-        assert rates(turned, **given)[name] == pytest.approx(value, rel=1e-12)
 
 
 def test_written_out_sum_equals_mapped_sum(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -230,35 +151,6 @@ def test_actuator_memory_replaces_the_command(draw_inputs: Callable[..., Mapping
     assert after == pytest.approx(1.1 + (1.0 - 1.1) * np.exp(-0.5))
 
 
-def test_a_steering_gear_that_is_off_keeps_its_numbers_and_does_nothing() -> None:
-    ship = load_vessel("kvlcc2-l7")
-    off = ship.with_values({"thruster.rudder.actuator.delta.off": True})
-    assert dict(dynamics(ship).memory) == {"rudder.delta": "rad"}
-    assert dict(dynamics(off).memory) == {}
-    assert off.document["thruster"]["rudder"]["actuator"]["delta"]["T"] == 0.1
-    assert not [path for path in off.parameters if ".actuator." in path]
-    assert rates(off, u=1.0, rudder_delta=0.3)["r"] == rates(ship, u=1.0, rudder_delta=0.3)["r"] != 0
-
-
-def test_a_limit_holds_from_the_first_instant() -> None:
-    """An order beyond the stops of the rudder acts as the stops do, also where a run begins beyond them."""
-    gear = {"kind": "rate_limit", "rate": 0.3, "low": -0.6, "high": 0.5}
-    ship = load_vessel("kvlcc2-l7").with_values({"thruster.rudder.actuator.delta": gear})
-    for order, stop in ((0.9, 0.5), (-0.9, -0.6)):
-        assert rates(ship, u=1.0, rudder_delta=order)["r"] == rates(ship, u=1.0, rudder_delta=stop)["r"] != 0
-
-
-def test_without_coriolis_the_mass_does_not_turn() -> None:
-    """`[inertia] coriolis = "none"` leaves m v r and -m u r out."""
-    ship = load_vessel("gunnerus-28.9")
-    still = ship.with_values({"inertia.coriolis": "none"})
-    m, M = ship.document["inertia"]["m"], mass_matrix(ship)
-    v, r, u = 0.4, 0.05, 3.0
-    full, none = (rates(vessel, u=u, v=v, r=r) for vessel in (ship, still))
-    difference = np.array([full[name] - none[name] for name in ("u", "v", "r")])
-    np.testing.assert_allclose(M @ difference, [m * v * r, -m * u * r, 0], atol=1e-6 * m)
-
-
 @pytest.mark.parametrize("name", ["gunnerus-28.9-6dof", "gunnerus-33.9-6dof"])
 def test_heave_of_a_pitching_and_rolling_ship_does_not_drive_her(name: str) -> None:
     """Buoyancy stays vertical: w q gives no surge and w p no sway, but for drag, where a free body has q w and p w."""
@@ -269,17 +161,7 @@ def test_heave_of_a_pitching_and_rolling_ship_does_not_drive_her(name: str) -> N
         assert abs(both - turning - heaving[driven]) < 0.2 * w * angular
 
 
-def test_a_body_that_moves_steadily_has_no_added_mass_in_heave() -> None:
-    """A body that turns about all axes and keeps its velocity in space: nu_dot = -omega x v in its axes."""
-    rng = np.random.default_rng(0)
-    nu, M_A = rng.normal(size=6), np.diag([0.0, 0.0, 3.0, 0.0, 0.0, 0.0])
-    M_A[2, 4] = M_A[4, 2] = 0.7
-    nu_dot = np.append(-np.cross(nu[3:], nu[:3]), np.zeros(3))
-    force = ca.evalf(module._added_mass_force(ca.SX(M_A), ca.SX(nu), (0, 1, 5)))
-    np.testing.assert_allclose(np.array(force).ravel() - M_A @ nu_dot, 0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(1, 3))
 def test_another_function_under_the_name_of_a_term_is_another_model(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A notebook whose cell of a term runs again got the equations of the function before, without a word."""
     vessel, plain = load_vessel("gunnerus-28.9"), TERMS["hull.derivatives"].function
@@ -295,3 +177,20 @@ def test_another_function_under_the_name_of_a_term_is_another_model(seed: int, m
     assert scaled(factor) - rest == pytest.approx(factor * (before - rest))
     monkeypatch.undo()
     assert rates(vessel, u=speed)["u"] == before
+
+
+def mass_matrix(vessel: Vessel) -> np.ndarray:
+    inertia = {k: v for k, v in vessel.document["inertia"].items() if k != "source"}
+    added = {k: v for k, v in vessel.document["added_mass"].items() if k not in ("source", "coriolis")}
+    return np.array(mass(inertia, added))[np.ix_(vessel.axes, vessel.axes)]
+
+
+def test_without_coriolis_the_mass_does_not_turn() -> None:
+    """`[inertia] coriolis = "none"` leaves m v r and -m u r out."""
+    ship = load_vessel("gunnerus-28.9")
+    still = ship.with_values({"inertia.coriolis": "none"})
+    m, M = ship.document["inertia"]["m"], mass_matrix(ship)
+    v, r, u = 0.4, 0.05, 3.0
+    full, none = (rates(vessel, u=u, v=v, r=r) for vessel in (ship, still))
+    difference = np.array([full[name] - none[name] for name in ("u", "v", "r")])
+    np.testing.assert_allclose(M @ difference, [m * v * r, -m * u * r, 0], atol=1e-6 * m)

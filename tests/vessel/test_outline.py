@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from shipid.vessel.outline import ship_outline
 
@@ -12,8 +11,3 @@ def test_the_outline_is_to_scale_closed_and_symmetric():
     assert mirrored == set(map(tuple, outline.tolist()))
     bow = outline[outline[:, 0].argmax()]
     assert bow[1] == 0.0, "the bow is pointed and ahead"
-
-
-def test_a_small_boat_is_not_drawn_as_a_ship_of_30_m():
-    assert np.ptp(ship_outline({"L_pp": 3.2}), axis=0).tolist() == pytest.approx([3.2, 3.2 / 6])
-    assert np.ptp(ship_outline({}), axis=0).tolist() == pytest.approx([30.0, 5.0])

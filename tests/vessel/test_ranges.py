@@ -35,16 +35,6 @@ def test_nonsense_is_refused_and_may_be_meant(name: str) -> None:
     assert caught.value.path in (path, "inertia", "inertia.m")  # of the mass of a ship of another length
 
 
-@pytest.mark.parametrize("name", ["inertia of nothing", "thruster beyond the horizon", "area of a town"])
-def test_the_word_overrides(name: str) -> None:
-    path, value = NONSENSE[name]
-    ship = load_vessel("gunnerus-28.9")
-    with pytest.raises(DocumentError, match=f'write unusual = \\["{path}"\\]'):
-        ship.with_values({path: value})
-    meant = {path: value, "unusual": [path]} | ({"added_mass.N_rdot": -1e6} if "inertia" in path else {})
-    assert ship.with_values(meant).parameters[path] == value
-
-
 LIMITS = [  # of a ship of 100 m and 5e6 kg: path, unit, least and greatest magnitude that the message promises
     ("particulars.L_pp", "m", 0.05, 600.0),
     ("inertia.I_z", "kg m^2", 5e6 * 1.0**2, 5e6 * 100.0**2),
@@ -81,19 +71,6 @@ def test_limits_are_where_the_words_say(path: str, unit: str, least: float, most
         assert seen[0] == path
 
 
-def test_a_mass_is_judged_by_the_length_and_a_length_by_the_mass() -> None:
-    """Without a length, that of a ship of the mass counts: 92 m of 5,000 t, whose greatest lever is 462 m."""
-    least, most = 1e-4 * 1000 * 100.0**3, 0.5 * 1000 * 100.0**3
-    for mass, refused in ((0.99 * least, True), (1.01 * least, False), (0.99 * most, False), (1.01 * most, True)):
-        seen = out_of_range({"particulars": {"L_pp": 100.0}}, {"inertia.m": mass}, {"inertia.m": "kg"})
-        assert (seen is not None) == refused
-    for lever, refused in ((455.0, False), (470.0, True)):
-        seen = out_of_range(
-            {}, {"inertia.m": 5e6, "thruster.port.x": lever}, {"inertia.m": "kg", "thruster.port.x": "m"}
-        )
-        assert (seen is not None) == refused
-
-
 def test_a_wind_table_in_radians_is_seen() -> None:
     ship = load_vessel("gunnerus-28.9")
     degrees = ship.document["wind"]["gamma_deg"]
@@ -114,17 +91,6 @@ def test_the_remedy_of_the_message_helps(path: str) -> None:
 
 def test_every_bundled_vessel_is_usual(bundled_vessel: Vessel) -> None:
     assert "unusual" not in bundled_vessel.document
-
-
-def test_the_word_is_no_part_of_the_structure() -> None:
-    ship = load_vessel("gunnerus-28.9")
-    assert ship.with_values({"unusual": ["thruster.*"]}).structure == ship.structure
-
-
-def test_a_patch_may_mean_it(tmp_path: Path) -> None:
-    file = tmp_path / "far.toml"
-    file.write_text('base = "gunnerus-28.9"\nunusual = ["thruster.*.x"]\n[set]\n"thruster.port.x" = 1e6\n')
-    assert load_vessel(str(file)).parameters["thruster.port.x"] == 1e6
 
 
 CONTRADICTIONS: dict[str, tuple[str, float, str]] = {
@@ -197,24 +163,3 @@ def test_a_rudder_behind_the_screw_of_the_other_side_is_refused(tmp_path: Path) 
     (tmp_path / "twin.toml").write_text(swapped)
     with pytest.raises(DocumentError, match=r"starboard_rudder.behind: 'port' at y = .* is on the other side"):
         load_vessel(tmp_path / "twin.toml")
-
-
-@pytest.mark.parametrize("ends", [(0, 90), (30, 150), (90, 270), (0, 360), (-180, 180)])
-def test_a_wind_table_of_other_angles_is_refused_and_may_be_meant(ends: tuple[float, float], tmp_path: Path) -> None:
-    """With fewer a wind from astern would have the force of one abeam; of more the other side would not be used."""
-    gamma = np.linspace(*ends, 5)
-    side = np.where(gamma > 180, -1, np.sign(gamma))
-    columns = {
-        "gamma_deg": gamma,
-        "C_X": -0.6 * np.cos(np.radians(gamma)),
-        "C_Y": side * np.abs(np.sin(np.radians(gamma))),
-        "C_N": 0 * gamma,
-    }
-    wind = "[wind]\n" + "\n".join(f"{name} = {values.tolist()}" for name, values in columns.items())
-    file = tmp_path / "ship.toml"
-    file.write_text(f'extends = "gunnerus-28.9"\n{wind}\n')
-    with pytest.raises(DocumentError, match=f"from {ends[0]} to {ends[1]} deg: expected from 0") as caught:
-        load_vessel(file)
-    assert caught.value.path == "wind.gamma_deg"
-    file.write_text(f'extends = "gunnerus-28.9"\nunusual = ["wind.gamma_deg"]\n{wind}\n')
-    load_vessel(file)

@@ -6,21 +6,14 @@ from typing import Any
 import casadi as ca
 import pytest
 
-from shipid.document import bundled, parse, replace
-from shipid.errors import DocumentError
+from shipid.document import bundled
 from shipid.physics import ACTUATORS, GIVEN, MOTION, TERMS
-from shipid.physics.inertia import rigid_body
 from shipid.physics.signals import named
 from shipid.vessel.load import load_vessel
 from shipid.vessel.schema import (
-    actuators,
-    functions,
-    kinds,
-    model_for,
     parameters,
     signals,
     structural,
-    term_blocks,
     term_parameters,
     vessel_model,
 )
@@ -41,21 +34,6 @@ def test_every_argument_of_a_term_is_declared(key: str) -> None:
     assert set(signals(term.function)) <= given
     known = {"return", *signals(term.function), *(p.name for p in parameters(term.function))}
     assert known == set(term.function.__annotations__)
-
-
-def test_parameters_are_read_off_the_signature() -> None:
-    by_name = {p.name: p for p in parameters(rigid_body)}
-    assert list(by_name) == ["m", "I_z", "x_G", "z_G", "I_x", "I_y"]
-    assert (by_name["m"].unit, by_name["m"].positive, by_name["m"].default) == ("kg", True, None)
-    assert (by_name["z_G"].unit, by_name["z_G"].positive, by_name["z_G"].default) == ("m", False, 0.0)
-
-
-def test_kinds_of_a_group() -> None:
-    driving = ["azimuth", "tunnel", "propeller", "controllable_pitch", "four_quadrant", "quadratic", "service_speed"]
-    rudders = ["rudder", "rudder_polynomial", "rudder_coefficients", "rudder_derivatives"]
-    assert kinds("thruster") == [*driving, *rudders]
-    assert kinds("wind") == ["table", "blendermann"]
-    assert kinds("rocket") == []
 
 
 def _properties(schema: dict[str, Any], node: dict[str, Any]) -> list[dict[str, Any]]:
@@ -98,22 +76,6 @@ def test_json_schema_knows_the_keys_of_bundled_vessels(name: str) -> None:
     assert _unknown(schema, schema, spoilt, "") == [f".thruster.{thruster}.D"]
 
 
-def test_json_schema_carries_units() -> None:
-    schema = vessel_model().model_json_schema()
-    assert schema["$defs"]["inertia"]["properties"]["m"]["description"] == "kg"
-    assert schema["$defs"]["inertia"]["properties"]["m"]["exclusiveMinimum"] == 0
-
-
-def test_term_blocks_name_path_and_kind() -> None:
-    document = load_vessel("gunnerus-28.9").document
-    assert [(path, key) for path, key, _ in term_blocks(document)] == [
-        ("hull.derivatives", "hull.derivatives"),
-        ("wind", "wind.table"),
-        ("thruster.port", "thruster.azimuth"),
-        ("thruster.starboard", "thruster.azimuth"),
-    ]
-
-
 @pytest.mark.parametrize("kind", list(ACTUATORS))
 def test_an_actuator_is_a_pair_of_pure_functions(kind: str) -> None:
     """`output(state)` and `advance(command, state, dt)`; a reached command stays reached."""
@@ -134,29 +96,3 @@ def test_what_a_term_gives_has_its_parameters_in_the_same_block(key: str) -> Non
         assert {parameter.name for parameter in parameters(function)} <= set(names)
     if key == "thruster.quadratic":
         assert "c_uu" in set(names) - {parameter.name for parameter in parameters(term.function)}
-
-
-@pytest.mark.parametrize("name", list(bundled("models")))
-def test_a_model_for_one_document_says_what_the_whole_one_says(name: str) -> None:
-    """It knows the terms that the document has, and refuses an unknown key in each of them with the same words."""
-    document = load_vessel(name).document
-    assert model_for(document) is model_for(dict(document))
-    for path, _, _ in term_blocks(document):
-        spoilt = replace(document, {f"{path}.actuators": 1.0})
-        with pytest.raises(DocumentError) as whole:
-            parse(vessel_model(), spoilt, name)
-        with pytest.raises(DocumentError) as one:
-            parse(model_for(spoilt), spoilt, name)
-        assert str(one.value) == str(whole.value)
-
-
-def test_functions_of_a_vessel_are_those_of_its_terms_and_actuators() -> None:
-    document = load_vessel("kvlcc2-l7").document
-    held = functions(document)
-    keys = {key for _, key, _ in term_blocks(document)}
-    assert {key for key in held if not key.startswith("actuator.")} == keys
-    assert all(held[key] == TERMS[key].functions for key in keys)
-    assert TERMS["thruster.propeller"].gives["wash"] in held["thruster.propeller"]
-    moved = {actuator["kind"] for _, _, block in term_blocks(document) for _, actuator in actuators(block)}
-    assert moved
-    assert all(held[f"actuator.{kind}"] == ACTUATORS[kind].functions for kind in moved)

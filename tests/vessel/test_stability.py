@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.document import bundled
 from shipid.engine.rollout import rollout
 from shipid.simulation.approach import Controls, balanced_shaft
 from shipid.vessel.dynamics import dynamics
@@ -39,13 +38,6 @@ def test_it_is_the_root_of_the_equations_of_sway_and_yaw(N_v: float) -> None:
     slopes = np.array([[Y_V, Y_R - M * U], [N_v, N_R]]) / np.array([[M - Y_VDOT], [I_Z - N_RDOT]])
     expected = np.linalg.eigvals(slopes).real.max()
     assert growth(vessel, U, {"screw.n": 1.0}) == pytest.approx(expected, rel=1e-6)
-
-
-@pytest.mark.parametrize("name", sorted(bundled("models")))
-def test_every_bundled_ship_has_one(name: str) -> None:
-    vessel = load_vessel(name)
-    speed = 0.2 * np.sqrt(9.81 * (vessel.length or 30.0))
-    assert np.isfinite(growth(vessel, speed, dict.fromkeys(dynamics(vessel).commands, 0.0)))
 
 
 @pytest.mark.parametrize("name", ["gunnerus-28.9", "gunnerus-33.9"])
