@@ -20,7 +20,7 @@ from tests.export.compiled import SANITIZERS, run_example
 
 SHIPS = [(27, 6), (47, 3), (14, 6), (3, 4), (5, 3)]  # seed and degrees of freedom; all terms but those of waves
 ALL = pytest.mark.parametrize(("seed", "dof"), SHIPS)
-NEAR = {"native": 1e-9, "torch": 1e-9}  # of the greatest value of each channel
+NEAR = {"native": 1e-9, "torch": 1e-9, "single": 2e-3}  # of the greatest value of each channel
 SAMPLES, STEPS = 9, 8
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")

@@ -164,21 +164,29 @@ def study_screen(
     out: Annotated[
         Path | None, typer.Option(help="file for a row per member: .csv or .parquet; default: <study>-screen.csv")
     ] = None,
+    single: Annotated[
+        bool, typer.Option("--single", help="single precision: half the time, A to about six digits")
+    ] = False,
     changes: Changes = None,
     device: Device = "cpu",
     as_json: Json = False,
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
+    from shipid.engine.engines import ENGINES, REPEATED, named
     from shipid.files import write_table
     from shipid.study import screen
     from shipid.study.prepare import obtain, partition
 
+    engine = "single" if single else REPEATED
+    named(engine, device)
+    if single and not ENGINES[engine].available():
+        raise ShipidError("needs a C compiler, and there is none: install gcc, or leave it out", path="--single")
     plan, file = _before_work(study, changes, device, out, "screen")
     wanted, dataset = screen.families(plan, family), obtain(plan)
     cut = partition(plan, dataset)
     for note in screen.notes(plan, cut, wanted):
         typer.echo(note, err=True)
-    blocks = counted(screen.screen(plan, dataset, wanted, members, device, cut=cut), members * len(wanted))
+    blocks = counted(screen.screen(plan, dataset, wanted, members, device, engine, cut), members * len(wanted))
     frame = screen.joined(list(blocks))
     write_table(file, frame)
     spread = screen.spread(frame)

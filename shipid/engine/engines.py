@@ -13,7 +13,7 @@ from shipid.engine.adjoint import Adjoint, Loss, gradient_native
 from shipid.engine.casadi import run_casadi
 from shipid.engine.integrate import Array, Batch, Job
 from shipid.engine.libraries import NoLibrary
-from shipid.engine.native import compiler, measure_native, refuse, run_native
+from shipid.engine.native import compiler, measure_native, measure_single, refuse, run_native, run_single
 from shipid.errors import ShipidError, choices
 from shipid.vessel.dynamics import Dynamics
 
@@ -97,6 +97,7 @@ ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
         gradient=gradient_native,
         checks=True,
     ),
+    "single": Engine(run_single, available=_has_compiler, measure=measure_single, checks=True),
     "casadi": Engine(run_casadi, preferred=lambda load: load.device == "cpu" and load.width < BATCH_FROM),
     "compiled": Engine(
         _compiled, preferred=lambda load: load.device != "cpu" and load.work > KERNEL_FROM, any_device=True

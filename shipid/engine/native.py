@@ -29,9 +29,9 @@ from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_com
 from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, Printed, print_function
 from shipid.engine.tables import Table, even_tables, find_tables
 from shipid.engine.threads import in_parallel, threaded
-from shipid.engine.vectors import Target, head
+from shipid.engine.vectors import DOUBLE, SINGLE, Precision, Target, head
 from shipid.errors import visible
-from shipid.metrics import BINS, FIRST, LEAST, MOST, SHIFT
+from shipid.metrics import BINS, BINS_AN_OCTAVE, LEAST, OCTAVES, SHIFT
 from shipid.vessel.dynamics import Dynamics
 
 log = logging.getLogger(__name__)
@@ -172,21 +172,21 @@ def _processor() -> frozenset[str]:
 
 
 @cache
-def target() -> Target:
+def target(precision: Precision = DOUBLE) -> Target:
     """Widest vectors of this processor, with the vector functions of glibc if they can be linked."""
-    command, x86 = compiler(), platform.machine() in ("x86_64", "AMD64")
+    command, x86, wide = compiler(), platform.machine() in ("x86_64", "AMD64"), 64 // precision.bits
     if x86 and "avx512f" in _processor():
         flags = ("-march=native", "-mprefer-vector-width=512")
-        best = Target(8, flags, "_ZGVeN8", fused=True)
+        best = Target(8 * wide, flags, f"_ZGVeN{8 * wide}", fused=True, precision=precision)
     elif x86 and {"avx2", "fma"} <= _processor():
         flags = ("-march=native", "-mtune=haswell")  # tuned for later AMD, GCC splits a * b + c: 12 % slower
-        best = Target(4, flags, "_ZGVdN4", fused=True)
+        best = Target(4 * wide, flags, f"_ZGVdN{4 * wide}", fused=True, precision=precision)
     else:
-        best = Target(2)
+        best = Target(2 * wide, precision=precision)
     if command is None or not best.prefix:
         return best
-    called = f"{best.prefix}v_tanh"
-    probe = f"typedef double V __attribute__((vector_size({8 * best.lanes}))); "
+    called = f"{best.prefix}v_tanh{precision.letter}"
+    probe = f"typedef {precision.real} V __attribute__((vector_size({precision.bits // 8 * best.lanes}))); "
     probe += f"V {called}(V); V run(V x) {{ return {called}(x); }}"
     with tempfile.TemporaryDirectory() as folder:
         failure = build(_command(command, best), probe, Path(folder) / "probe.so", PROBE_LIMIT)
@@ -205,8 +205,11 @@ def compiler_version(command: str) -> str:
     return run_compiler([command, "--version"], limit=PROBE_LIMIT)[1]
 
 
-def _measure() -> str:
+def _measure(of: Precision) -> str:
     """C functions: distances of a group, noted and later tallied. A number without its last bits is its bin's."""
+    shift = SHIFT - DOUBLE.mantissa + of.mantissa
+    first = ((1 << of.bits - of.mantissa - 2) - 1 + OCTAVES[0]) * BINS_AN_OCTAVE
+    most = float(np.nextafter(of.dtype.type(2.0 ** OCTAVES[1]), 0))
     return f"""
 typedef struct {{ long count; unsigned short bins[{NOTED}][W]; }} Notes;
 static __attribute__((noinline)) void count(Notes *notes, unsigned *tally) {{
@@ -217,7 +220,7 @@ static __attribute__((noinline)) void count(Notes *notes, unsigned *tally) {{
 static inline V measured(V north, V east, long samples, Notes *notes, unsigned *tally) {{
   typedef unsigned short Bins __attribute__((vector_size(2 * W), aligned(2)));
   V distance = v_sqrt(north * north + east * east);
-  M bins = ((M)v_min(v_max(distance, K({LEAST!r})), K({MOST!r})) >> {SHIFT}) - {FIRST};
+  M bins = ((M)v_min(v_max(distance, K({LEAST!r})), K({most!r})) >> {shift}) - {first};
   if (samples < W) {{
     for (int i = 0; i < samples; ++i) ++tally[bins[i]];
   }} else {{
@@ -424,7 +427,7 @@ if (tally) count(&notes, tally);"""
         return f"""{_FOR_GCC}{head(wanted)}
 {wanted.lookup.head() if wanted.lookup else ""}
 {self.functions()}
-{_measure()}
+{_measure(wanted.precision)}
 #define AT(array, row) ((U *)((array) + (row) * stride + g * W))
 #define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
 #define ROW(i) (rows[i] < {nx} ? x[rows[i]] : m[rows[i] - {nx}])
@@ -435,16 +438,18 @@ if (tally) count(&notes, tally);"""
 
 
 @lru_cache(maxsize=64)
-def _library(model: Dynamics, step: float, method: Method, looked_up: Sequence[int]) -> Any:
+def _library(model: Dynamics, step: float, method: Method, precision: Precision, looked_up: Sequence[int]) -> Any:
     """The compiled function `run` of a model, from the cache if possible; some of its tables are looked up."""
     tables = {k: find_tables(_rates(model))[k] for k in looked_up}
-    return compiled_for(lambda: _Source(model, step, method, target(), tables).text())
+    return compiled_for(lambda: _Source(model, step, method, target(precision), tables).text())
 
 
 def compiled_for(source: Callable[[], str]) -> Any:
     """The compiled function `run` of C source; NoLibrary if there is no compiler or it fails."""
     if compiler() is None:
-        raise NoLibrary("engine 'native' needs a C compiler, and there is none: install gcc, or use 'torch'")
+        raise NoLibrary(
+            "engines 'native' and 'single' need a C compiler, and there is none: install gcc, or use 'torch'"
+        )
     try:
         return compiled(source())
     except NoLibrary as error:
@@ -477,83 +482,96 @@ def compiled(source: str, further: Sequence[str] = ()) -> Any:
         raise NoLibrary(f"{library} is gone ({error.strerror})") from None
 
 
-def padded(array: Array, wide: int) -> Array:
+def padded(array: Array, wide: int, precision: Precision = DOUBLE) -> Array:
     """Pad samples to whole vectors: (..., S) -> (..., wide), the last sample repeated."""
     fill = wide - array.shape[-1]
     filled = np.concatenate([array, np.repeat(array[..., -1:], fill, axis=-1)], axis=-1) if fill else array
-    return np.ascontiguousarray(filled, dtype=float)
+    return np.ascontiguousarray(filled, dtype=precision.dtype)
 
 
-def _packed(array: Array, lanes: int) -> Array:
+def _packed(array: Array, lanes: int, precision: Precision) -> Array:
     """(component, entry, S) -> (groups, component, entry, lanes): what one group reads at every step lies together."""
     count, entries, num_samples = array.shape
     groups = -(-num_samples // lanes)
-    filled = padded(array, groups * lanes).reshape(count, entries, groups, lanes)
+    filled = padded(array, groups * lanes, precision).reshape(count, entries, groups, lanes)
     return np.ascontiguousarray(filled.transpose(2, 0, 1, 3))
 
 
-def run_native(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+def run_native(model: Dynamics, batch: Batch, job: Job, precision: Precision = DOUBLE) -> tuple[Array, Array]:
     """Records (R, V, S, C) and the greatest speed (V, S)."""
     num_samples = batch.state.shape[1]
-    records, worst = packed_records(model, batch, job)
+    records, worst = packed_records(model, batch, job, precision)
     return records.transpose(1, 0, 3, 2)[:, :, :num_samples], worst[:, :num_samples]
 
 
-def packed_records(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+def packed_records(model: Dynamics, batch: Batch, job: Job, precision: Precision = DOUBLE) -> tuple[Array, Array]:
     """Records (V, R, C, width) and the greatest speed (V, width) as C writes them, whole vectors of samples."""
-    num_variants, wide = len(batch.parameters), width(batch)
-    records = np.empty((num_variants, job.num_steps // job.every + 1, len(job.rows), wide), float)
-    worst = np.empty((num_variants, wide), float)
-    _run(model, batch, job, worst=worst, records=records)
+    num_variants, wide = len(batch.parameters), width(batch, precision)
+    records = np.empty((num_variants, job.num_steps // job.every + 1, len(job.rows), wide), precision.dtype)
+    worst = np.empty((num_variants, wide), precision.dtype)
+    _run(model, batch, job, precision, worst=worst, records=records)
     return records, worst
 
 
-def measure_native(model: Dynamics, batch: Batch, job: Job, goal: Array) -> tuple[Array, Array, Array]:
+def measure_native(
+    model: Dynamics, batch: Batch, job: Job, goal: Array, precision: Precision = DOUBLE
+) -> tuple[Array, Array, Array]:
     """Sum of distances (V, S), tally of distances (V, BINS) and the greatest speed (V, S), with no path kept.
 
     The distances are those of the job's two channels to `goal` (T, 2, S), after every step.
     """
-    num_samples, num_variants, wide = batch.state.shape[1], len(batch.parameters), width(batch)
-    sums, worst = (np.empty((num_variants, wide), float) for _ in range(2))
-    tally = np.zeros((num_variants, num_parts(batch), BINS), dtype=np.uint32)
-    there = _packed(goal, target().lanes)
-    _run(model, batch, job, worst=worst, goal=there, sums=sums, tally=tally)
+    num_samples, num_variants, wide = batch.state.shape[1], len(batch.parameters), width(batch, precision)
+    sums, worst = (np.empty((num_variants, wide), precision.dtype) for _ in range(2))
+    tally = np.zeros((num_variants, num_parts(batch, precision), BINS), dtype=np.uint32)
+    there = _packed(goal, target(precision).lanes, precision)
+    _run(model, batch, job, precision, worst=worst, goal=there, sums=sums, tally=tally)
     whole = tally[:, 0] if tally.shape[1] == 1 else tally.sum(axis=1, dtype=np.uint32)
-    return sums[:, :num_samples], whole, worst[:, :num_samples]
+    return sums[:, :num_samples].astype(float, copy=False), whole, worst[:, :num_samples]
 
 
-def width(batch: Batch) -> int:
+def run_single(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+    """As `run_native`, in single precision."""
+    records, worst = run_native(model, batch, job, SINGLE)
+    return records.astype(float), worst
+
+
+def measure_single(model: Dynamics, batch: Batch, job: Job, goal: Array) -> tuple[Array, Array, Array]:
+    """As `measure_native`, in single precision."""
+    return measure_native(model, batch, job, goal, SINGLE)
+
+
+def width(batch: Batch, precision: Precision = DOUBLE) -> int:
     """Number of samples, rounded up to whole vectors."""
-    lanes = target().lanes
+    lanes = target(precision).lanes
     return -(-int(batch.state.shape[1]) // lanes) * lanes
 
 
-def num_parts(batch: Batch) -> int:
+def num_parts(batch: Batch, precision: Precision = DOUBLE) -> int:
     """Number of parts of the samples of a variant, each a task: enough for an even load on all cores."""
-    return min(PARTS * num_threads() // len(batch.parameters) + 1, width(batch) // target().lanes)
+    return min(PARTS * num_threads() // len(batch.parameters) + 1, width(batch, precision) // target(precision).lanes)
 
 
-def _run(model: Dynamics, batch: Batch, job: Job, **wanted: Array) -> None:
+def _run(model: Dynamics, batch: Batch, job: Job, precision: Precision, **wanted: Array) -> None:
     """Run a job and fill the arrays in `wanted`: `worst`, and `records`, or `sums` and `tally` for a `goal`."""
-    lanes, wide, parts = target().lanes, width(batch), num_parts(batch)
-    series = {name: padded(getattr(batch, name), wide) for name in ("commands", "environment")}
-    series["extra"] = padded(batch.tau_extra, wide)
-    drawn = [_packed(part.transpose(2, 0, 1), lanes) for part in batch.components]
+    lanes, wide, parts = target(precision).lanes, width(batch, precision), num_parts(batch, precision)
+    series = {name: padded(getattr(batch, name), wide, precision) for name in ("commands", "environment")}
+    series["extra"] = padded(batch.tau_extra, wide, precision)
+    drawn = [_packed(part.transpose(2, 0, 1), lanes, precision) for part in batch.components]
     arrays: dict[str, Array] = {
         "lengths": longs(len(part) for part in series.values()),
         "counts": longs(part.shape[1] for part in drawn),
         "rows": longs(job.rows),
         "drawn": np.array([part.ctypes.data for part in drawn], dtype=np.uintp),
-        "values": np.ascontiguousarray(batch.parameters, dtype=float),
-        "start": padded(batch.state, wide),
-        "memory": padded(batch.memory, wide),
+        "values": np.ascontiguousarray(batch.parameters, dtype=precision.dtype),
+        "start": padded(batch.state, wide, precision),
+        "memory": padded(batch.memory, wide, precision),
         **series,
         **wanted,
     }
     sizes = (parts, wide, batch.state.shape[1], job.num_steps, job.every, len(job.rows))
     work = wide / lanes / parts * job.num_steps * (1 + sum(part.shape[1] for part in drawn))
-    looked_up = tuple(even_tables(_rates(model), batch.parameters)) if target().lookup else ()
-    run = _library(model, job.step, job.method, looked_up)
+    looked_up = tuple(even_tables(_rates(model), batch.parameters)) if target(precision).lookup else ()
+    run = _library(model, job.step, job.method, precision, looked_up)
     in_parallel(run, sizes, (arrays.get(name) for name in _ARRAYS), parts * len(batch.parameters), work)
 
 

@@ -3,7 +3,7 @@
 `shipid.physics.wind.interpolate` writes a table as a sum of ramps, which every engine can compute and differentiate:
 y_0 + b_0 (x - k_0) + sum_i (b_i - b_(i-1)) max(x - k_i, 0). That is three operations for each knot. In C the interval
 of x is computed once for all tables with the same knots. Then ordinate and slope are read: lane by lane, or, where a
-processor permutes vectors (AVX-512), by one instruction for each 16 intervals. The values are
+processor permutes vectors (AVX-512), by one instruction for each 16 intervals (32 in single precision). The values are
 those of the ramps to rounding. This needs knots that are evenly apart; with others the ramps are as fast.
 """
 
@@ -113,28 +113,30 @@ static inline V v_value(const V *table, int rows, M place, V along) {
 
 @dataclass(frozen=True)
 class Permuted(Lookup):
-    """C that looks up all lanes at once, by the instructions `vpermt2pd` (AVX-512): each picks from two vectors.
+    """C that looks up all lanes at once, by the instructions `vpermt2{packed}` (AVX-512): each picks from two vectors.
 
     Ordinates of a table, then slopes, lie in an even number of vectors each.
     """
+
+    packed: str
 
     apart: ClassVar = (1, "rows * W / 2")
 
     def reading(self) -> str:
         """C of `v_value`: the value of a table so far `along` the interval at `place`."""
-        return """
-static inline V v_picked(const V *table, M place, int rows) {
+        return f"""
+static inline V v_picked(const V *table, M place, int rows) {{
   V all = K(0);
-  for (int i = 0; i < rows; i += 2) {
+  for (int i = 0; i < rows; i += 2) {{
     V r = table[i];
-    __asm__("vpermt2pd %2, %1, %0" : "+v"(r) : "v"(place), "vm"(table[i + 1]));
+    __asm__("vpermt2{self.packed} %2, %1, %0" : "+v"(r) : "v"(place), "vm"(table[i + 1]));
     all = i ? v_pick(place >= i * W, r, all) : r;
-  }
+  }}
   return all;
-}
-static inline V v_value(const V *table, int rows, M place, V along) {
+}}
+static inline V v_value(const V *table, int rows, M place, V along) {{
   return v_picked(table, place, rows / 2) + along * v_picked(table + rows / 2, place, rows / 2);
-}
+}}
 """
 
     def part(self, size: int) -> int:

@@ -72,7 +72,7 @@ def screen(
     the member diverged (A is NaN then), and a column per drawn parameter: its factor on the base. Members are those
     that the study itself draws, none redrawn. A_90 comes from a tally and is exact to 0.2 %.
 
-    engine : as of `rollout`.
+    engine : as of `rollout`; "single" takes half the time and gives A to about six digits.
     cut : the windows of the study as of `partition`, where they are cut already.
 
     Raises ShipidError for a plan or a dataset that is none, and an engine that does not exist.

@@ -215,9 +215,9 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
     ),
     "study screen": (
         "shipid.study.screen:screen",
-        f"study screen {STUDY} wrong --members 7 --set grid.N_D=[5] --device gpu",
+        f"study screen {STUDY} wrong --members 7 --single --set grid.N_D=[5] --device gpu",
         {"plan": is_changed, "wanted": lambda families: [one.name for one in families] == ["wrong"], "count": 7}
-        | {"device": "gpu"},
+        | {"device": "gpu", "engine": "single"},
     ),
     "study rotate": (
         "shipid.answer.rotate:rotate",

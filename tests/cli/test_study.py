@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.document import bundled
+from shipid.engine import engines
 from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
 from shipid.vessel.load import load_vessel
@@ -70,6 +71,12 @@ def test_variants_of_a_chosen_observer_have_no_accuracy_yet(study: Path) -> None
     words = " ".join(output_of("study", "variants", study).split())
     assert re.search(r" seen-1 - \d+ ", words)
     assert words.count("observer chosen from the runs of each cell, so A differs by cell") == 2
+
+
+def test_single_precision_needs_a_compiler(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engines, "compiler", lambda: None)
+    with pytest.raises(ShipidError, match="--single: needs a C compiler"):
+        output_of("study", "screen", study, "--single")
 
 
 def test_screen_writes_a_row_per_member(study: Path) -> None:

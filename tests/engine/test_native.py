@@ -154,6 +154,25 @@ def test_distances_of_a_long_rollout_are_all_counted(count: int, every: int, dra
     assert np.abs(counts[0].astype(int) - tally(apart)).sum() <= 2  # a distance may be rounded into the next bin
 
 
+@pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "esso-190k"])
+def test_single_precision_follows_double(name: str, draw_inputs: Callable[..., Any]) -> None:
+    """Paths from the origin to a part in ten thousand, distances to a part in a hundred thousand."""
+    vessel = load_vessel(name)
+    given = {**draw_inputs(vessel, 37), "step": 1.0}
+    given["start"] = {**given["start"], "north": np.zeros(37), "east": np.zeros(37)}
+    double, single = (rollout(vessel, **given, num_steps=20, engine=engine) for engine in ("native", "single"))
+    path = double.states[:, 0, :, :2]
+    far = np.abs(path).max()
+    assert single.states.dtype == float
+    assert np.abs(single.states[:, 0, :, :2] - path).max() < 1e-4 * far
+    goal = path[1:] + 0.1 * far
+    exact, near = (distances(vessel, **given, goal=goal, engine=engine) for engine in ("native", "single"))
+    np.testing.assert_allclose(near.total, exact.total, rtol=1e-4)
+    np.testing.assert_allclose(near.total.sum(), exact.total.sum(), rtol=1e-5)
+    assert near.tally.sum() == exact.tally.sum() == 20 * 37
+    assert np.array_equal(near.diverged, exact.diverged)
+
+
 def test_the_engine_of_a_process_is_the_one_that_it_has_by_now(
     libraries_kept: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -182,7 +182,7 @@ def test_extra_force_enters_as_force(engine: Any, shape: str) -> None:
     np.testing.assert_allclose(path["u"][:, 0, 1], gained * np.array(expected), rtol=1e-3, atol=1e-9)
 
 
-@pytest.mark.parametrize("engine", ["native", "casadi", "torch"])
+@pytest.mark.parametrize("engine", ["native", "single", "casadi", "torch"])
 @pytest.mark.parametrize(
     "where", ["start", "memory", "commands", "late command", "environment", "tau", "parameters", "drawn"]
 )
@@ -190,7 +190,7 @@ def test_an_input_that_is_no_number_is_reported_though_a_limit_hides_it(
     draw_inputs: Draw, engine: Any, where: str
 ) -> None:
     """Its samples alone, in paths and in distances; the last sample shares no vector with the first."""
-    if engine == "native" and compiler() is None:
+    if engine in ("native", "single") and compiler() is None:
         pytest.skip("no C compiler on this machine")
     limits = {f"thruster.port.actuator.{name}": {**LAG, "low": -3.0, "high": 3.0} for name in ("n", "alpha")}
     vessel = load_vessel("gunnerus-28.9-6dof" if where == "drawn" else "gunnerus-28.9").with_values(limits)

@@ -1,4 +1,4 @@
-"""The functions on vectors: close to the truth, odd and even to the bit, no number from none."""
+"""The functions on vectors, in both precisions: close to the truth, odd and even to the bit, no number from none."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from shipid.engine import native
 from shipid.engine.native import compiled, compiler, target
 from shipid.engine.threads import in_parallel, threaded
-from shipid.engine.vectors import Target, head
+from shipid.engine.vectors import SINGLE, Target, head
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 
@@ -31,6 +31,8 @@ TARGETS: dict[str, Callable[[], Target]] = {  # looked at when a test runs, sinc
     "glibc": lambda: replace(target(), fused=False),
     "lane by lane": lambda: replace(target(), fused=False, prefix=""),
     "half as wide": _half,
+    "single": lambda: target(SINGLE),
+    "single, glibc": lambda: replace(target(SINGLE), fused=False),
 }
 
 
@@ -51,53 +53,54 @@ def call(wanted: Target, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Array
         source = head(wanted) + threaded(["n"], {"a": "const U", "out": "U"}, task)
         size = len(arguments[0])
         groups = -(-size // wanted.lanes)
-        given = np.zeros((len(arguments), groups * wanted.lanes))
+        given = np.zeros((len(arguments), groups * wanted.lanes), wanted.precision.dtype)
         given[:, :size] = arguments
-        out = np.empty(groups * wanted.lanes)
+        out = np.empty(groups * wanted.lanes, wanted.precision.dtype)
         in_parallel(compiled(source), [groups], [given, out], 1, 1.0)
         return out[:size]
 
     return called
 
 
-def arguments(name: str) -> tuple[Array, ...]:
+def arguments(name: str, of: Target) -> tuple[Array, ...]:
     """Arguments of all sizes; for the sine and cosine also close to multiples of a quarter of a turn."""
     rng = np.random.default_rng(0)
     near = rng.uniform(-10, 10, 4000)
+    tiny, wide, far, turns = (-300, 150, 1e9, 60000) if of.precision is not SINGLE else (-37, 15, 1e4, 600)
     if name == "tanh":
-        given = [np.concatenate([near, 10 ** rng.uniform(-300, 3, 4000) * rng.choice([-1, 1], 4000)])]
+        given = [np.concatenate([near, 10 ** rng.uniform(tiny, 3, 4000) * rng.choice([-1, 1], 4000)])]
     elif name == "atan2":
-        sizes = 10 ** rng.uniform(-150, 150, (2, 4000)) * rng.choice([-1, 1], (2, 4000))
+        sizes = 10 ** rng.uniform(-wide, wide, (2, 4000)) * rng.choice([-1, 1], (2, 4000))
         given = list(np.concatenate([rng.normal(size=(2, 4000)), sizes], axis=1))
     else:
-        quarters = rng.integers(-60000, 60000, 4000) * (np.pi / 2)
-        given = [np.concatenate([near, rng.uniform(-1e9, 1e9, 4000), quarters])]
-    return tuple(given)
+        quarters = rng.integers(-turns, turns, 4000) * (np.pi / 2)
+        given = [np.concatenate([near, rng.uniform(-far, far, 4000), quarters])]
+    return tuple(values.astype(of.precision.dtype) for values in given)
 
 
 @pytest.mark.skipif(np.finfo(np.longdouble).nmant < 63, reason="no number with more digits here")
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_close_to_the_true_value(name: str, call: Callable[..., Array]) -> None:
-    given = arguments(name)
+def test_close_to_the_true_value(name: str, wanted: Target, call: Callable[..., Array]) -> None:
+    given = arguments(name, wanted)
     true = FUNCTIONS[name](*(values.astype(np.longdouble) for values in given))
-    error = np.abs(call(name, *given) - true) / np.spacing(np.abs(true.astype(float)))
+    error = np.abs(call(name, *given) - true) / np.spacing(np.abs(true.astype(wanted.precision.dtype)))
     assert error.max() <= WORST
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_odd_and_even_to_the_bit(name: str, call: Callable[..., Array]) -> None:
+def test_odd_and_even_to_the_bit(name: str, wanted: Target, call: Callable[..., Array]) -> None:
     """A ship and its mirror image stay mirror images; glibc's cosine of -x may differ from that of x."""
     if not wanted.fused:
         pytest.skip("the functions of a library")
-    first, *others = arguments(name)
+    first, *others = arguments(name, wanted)
     mirrored = call(name, -first, *others)
     assert np.array_equal(mirrored, call(name, first, *others) * (1 if name == "cos" else -1))
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_what_is_no_number_gives_none(name: str, call: Callable[..., Array]) -> None:
+def test_what_is_no_number_gives_none(name: str, wanted: Target, call: Callable[..., Array]) -> None:
     special = np.array([0.0, -0.0, np.nan, 1.0, -1.0])
-    given = [np.array(values) for values in zip(*product(special, repeat=2), strict=True)]
+    given = [np.array(values, wanted.precision.dtype) for values in zip(*product(special, repeat=2), strict=True)]
     given = given if name == "atan2" else given[:1]
     true, got = FUNCTIONS[name](*given), call(name, *given)
     assert np.array_equal(np.isnan(got), np.isnan(true))

@@ -65,6 +65,18 @@ def test_numbers_are_those_of_the_paths(plan: Plan, compiled: bool, monkeypatch:
         assert row["factors"] == {path: screened_row[path] for path in row["factors"]}
 
 
+@pytest.mark.skipif(native.compiler() is None, reason="no C compiler on this machine")
+def test_single_precision_gives_six_digits(plan: Plan) -> None:
+    double, single = (
+        joined(list(screen(plan, obtain(plan), families(plan, "wrong"), 5, engine=engine)))
+        for engine in ("repeated", "single")
+    )
+    assert not np.array_equal(double["A"], single["A"])
+    np.testing.assert_allclose(single["A"], double["A"], rtol=1e-5)
+    np.testing.assert_allclose(single["A_90"], double["A_90"], rtol=0.005)
+    pd.testing.assert_frame_equal(single.drop(columns=["A", "A_90"]), double.drop(columns=["A", "A_90"]))
+
+
 def test_members_are_those_of_the_study(plan: Plan) -> None:
     """A member keeps its number and draw whatever the size of the family."""
     prepared = prepare(plan, obtain(plan))
