@@ -314,7 +314,8 @@ def _headline(case: AnswerCase) -> Iterator[str]:
     pure = case.rows[(case.rows["family"] == NO_MODEL) & (case.rows["N_D"] == largest)]
     without = f" Without physics: {case.H(NO_MODEL, largest)}." if len(pure) else ""
     if case.best is None:
-        text = f"no trial of the method {judged_method(case.results.plan)!r} has a value, so no model is {BEST}. Mean errors "
+        method = judged_method(case.results.plan)
+        text = f"no trial of the method {method!r} has a value, so no model is {BEST}. Mean errors "
         text += f"{_horizon_in_words(case.results)} ahead{_least_errors(rows['H'])}"
     else:
         alone, worst = (length_in_metres(float(rows[name][case.best])) for name in ("A", "H_90"))
