@@ -380,8 +380,8 @@ def _show_free_runs(outcome: Identified, answer: Answer) -> None:
     ]
     answer.rows("free_runs", outcome.errors, table(heads, rows))
     if len(outcome.outputs):
-        heads = {"measured": "rms", "before": "error before", "after": "after"}
-        answer.records("outputs", outcome.outputs, {"output": "measured output", "unit": "unit"} | heads)
+        columns = {"output": "measured output", "unit": "unit", "measured": "rms", "before": "error before"}
+        answer.records("outputs", outcome.outputs, columns | {"after": "after"})
 
 
 def _show_manoeuvres(outcome: Identified, answer: Answer) -> None:

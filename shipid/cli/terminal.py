@@ -109,7 +109,7 @@ def digits(value: float) -> str:
     return "-" if value != value else f"{round(value, 4) + 0.0:.4g}"
 
 
-def motion_errors(row: Mapping[str, Any]) -> list[str]:
+def motion_errors(row: Mapping[Any, Any]) -> list[str]:
     """Errors of u, v [m/s], r [deg/s] and position [m] of a run; that it diverges, where it does."""
     values = (row["u"], row["v"], math.degrees(row["r"]), row["position"])
     return ["diverges" if value != value else digits(value) for value in values]

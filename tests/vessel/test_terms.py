@@ -224,7 +224,7 @@ FAULTS: dict[str, tuple[str, str, str, str]] = {
         "hul.drag",
         DRAG.format("return wrench(Y)"),
         "begins",
-        "TERMS['hul.drag']: no block of a vessel document and a kind in it: write <block>.<kind>, such as TERMS['hull.drag']",
+        "TERMS['hul.drag']: no block of a vessel document and a kind in it: write <block>.<kind>, such as TERMS[",
     ),
     "no block": ("drag", DRAG.format("return wrench(Y)"), "begins", "TERMS['drag']: no block of"),
     "a kind with a dot": (
