@@ -14,7 +14,8 @@ from shipid.data.windows import Instants
 from shipid.export.c import Files
 from shipid.export.model import Model
 
-FLAGS = ("-std=c99", "-include", "stdbool.h", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
+FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
+GENERATED = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused-parameter")
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
@@ -34,16 +35,22 @@ def write(files: Files, folder: Path) -> Path:
 
 
 def compile_(command: list[str], folder: Path, *arguments: str) -> None:
-    """Run a compiler in an empty environment; the test fails with its message."""
-    result = subprocess.run(
-        [*command, *FLAGS, *arguments, "-lm"],
-        cwd=folder, capture_output=True, text=True, env={"PATH": "/usr/bin:/bin", "TMPDIR": str(folder)},
-    )  # fmt: skip
-    assert result.returncode == 0, result.stderr[:2000]
-    assert not result.stderr
+    """Run a compiler in an empty environment, CasADi's sources apart; the test fails with its message."""
+    generated = [one for one in arguments if one.endswith("_casadi.c")]
+    others = [one.replace("_casadi.c", "_casadi.o") for one in arguments]
+    options = [one for one in arguments if one[0] == "-" and one not in ("-o", "-shared", "-Wsign-conversion")]
+    calls = [[*command, *GENERATED, *options, "-c", one, "-o", one[:-1] + "o"] for one in generated]
+    for call in (*calls, [*command, *FLAGS, *others, "-lm"]):
+        environment = {"PATH": "/usr/bin:/bin", "TMPDIR": str(folder)}
+        result = subprocess.run(call, cwd=folder, capture_output=True, text=True, env=environment)
+        assert (result.returncode, result.stderr[:2000]) == (0, "")
 
 
 _BUILT: dict[tuple[object, ...], Path] = {}  # text and options -> the library of the first test that compiled them
+
+
+def sources(files: Files) -> list[str]:
+    return [name for name in files.texts if name.endswith(".c") and name != "main.c"]
 
 
 def library(files: Files, folder: Path, *options: str) -> ctypes.CDLL:
@@ -51,7 +58,7 @@ def library(files: Files, folder: Path, *options: str) -> ctypes.CDLL:
     write(files, folder)
     key = (files.name, *sorted(files.texts.items()), *options)
     if key not in _BUILT:
-        compile_([compiler()], folder, *(options or ("-O0",)), "-shared", "-fPIC", "-o", "model.so", f"{files.name}.c")
+        compile_([compiler()], folder, *(options or ("-O0",)), "-shared", "-fPIC", "-o", "model.so", *sources(files))
         _BUILT[key] = folder / "model.so"
     return ctypes.CDLL(str(_BUILT[key]))
 
@@ -59,7 +66,7 @@ def library(files: Files, folder: Path, *options: str) -> ctypes.CDLL:
 def run_example(files: Files, folder: Path, *options: str) -> str:
     """Output of the example."""
     write(files, folder)
-    compile_([compiler()], folder, *(options or ("-O0",)), "-o", "example", "main.c", f"{files.name}.c")
+    compile_([compiler()], folder, *(options or ("-O0",)), "-o", "example", "main.c", *sources(files))
     result = subprocess.run([folder / "example"], capture_output=True, text=True)
     assert result.returncode == 0, result.stdout + result.stderr
     return result.stdout
@@ -76,20 +83,25 @@ def paths(
     given = {key: np.ascontiguousarray(values, dtype=kind) for key, values in model.inputs(instants).items()}
     function = getattr(loaded, f"{name}_path")
     predicted = np.zeros((len(instants), model.layout.horizon, 2), dtype=kind)
+    work = np.zeros(1_000_000)
     results = [
-        function(*(pointer(given[key][i]) for key in model.layout.sizes), pointer(predicted[i]))
+        function(*(pointer(given[key][i]) for key in model.layout.sizes), pointer(predicted[i]), pointer(work))
         for i in range(len(instants))
     ]
     return predicted.swapaxes(0, 1), np.array(results)
 
 
 def bands(
-    loaded: ctypes.CDLL, name: str, model: Model, instants: Instants, path: np.ndarray, *asked: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (T, S, 4) of the band around paths (T, S, 2) for level, pointwise, kind, and results (S,)."""
-    now = np.ascontiguousarray(model.inputs(instants)["now"], dtype=float)
-    function, around = getattr(loaded, f"{name}_band"), np.ascontiguousarray(path.swapaxes(0, 1))
-    function.argtypes = [ctypes.c_void_p] * 2 + [ctypes.c_double] + [ctypes.c_int] * 2 + [ctypes.c_void_p]
-    regions = np.zeros((len(instants), model.layout.horizon, 4))
-    results = [function(pointer(now[i]), pointer(around[i]), *asked, pointer(regions[i])) for i in range(len(instants))]
-    return regions.swapaxes(0, 1), np.array(results)
+    loaded: ctypes.CDLL, name: str, model: Model, instants: Instants, *asked: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Paths (T, S, 2) and rows (T, S, 4) of their bands for level, pointwise, kind, and results (S,)."""
+    given = {key: np.ascontiguousarray(values, dtype=float) for key, values in model.inputs(instants).items()}
+    function, size = getattr(loaded, f"{name}_path_band"), (len(instants), model.layout.horizon)
+    function.argtypes = [ctypes.c_void_p] * 6 + [ctypes.c_double] + [ctypes.c_int] * 2 + [ctypes.c_void_p] * 3
+    predicted, regions, work = np.zeros((*size, 2)), np.zeros((*size, 4)), np.zeros(1_000_000)
+    results = [
+        function(*(pointer(given[key][i]) for key in model.layout.sizes), *asked,
+                 *map(pointer, (predicted[i], regions[i], work)))
+        for i in range(len(instants))
+    ]  # fmt: skip
+    return predicted.swapaxes(0, 1), regions.swapaxes(0, 1), np.array(results)

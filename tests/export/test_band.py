@@ -12,7 +12,7 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.export.band import band_graph, radii
-from shipid.export.blocks import Precision, c_functions
+from shipid.export.c import Precision
 from shipid.export.c_predictor import predictor_files
 from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
@@ -205,7 +205,7 @@ def test_the_recorder_gives_path_and_band(tmp_path):
     loaded.odd_predict_band.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *around]
     kept, path, band = np.zeros(1_000_000), np.zeros((horizon, 2)), np.zeros((horizon, 4))
     loaded.odd_init(pointer(kept))
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    order = exported.layout.now
     columns = strange.instants.columns
 
     def result(level):

@@ -17,8 +17,7 @@ from shipid.data.dataset import Dataset, sample
 from shipid.data.windows import Instants, past_of
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
-from shipid.export.blocks import Precision
-from shipid.export.c import Files, c_name, comment, strings
+from shipid.export.c import Files, Precision, c_name, comment, strings
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.casadi import predictor_function
@@ -94,10 +93,10 @@ def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
     exported = model(strange.predictor)
     loaded = library(predictor_files(exported, "odd", Precision()), tmp_path)
     given = {key: np.ascontiguousarray(values[0]) for key, values in exported.inputs(strange.instants).items()}
-    path = np.zeros((exported.layout.horizon, 2))
+    path, work = np.zeros((exported.layout.horizon, 2)), np.zeros(1_000_000)
 
     def result(**changed):
-        return loaded.odd_path(*(pointer({**given, **changed}[key]) for key in exported.layout.sizes), pointer(path))
+        return loaded.odd_path(*(pointer({**given, **changed}[key]) for key in exported.layout.sizes), pointer(path), pointer(work))
 
     assert result() & ~OUTSIDE == 0
     for group in ("now", "past", "planned", "parameters"):
@@ -196,7 +195,7 @@ def path_after(exported, t, log, folder):
     loaded = library(files, folder)
     loaded.odd_init(pointer(kept))
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    order = exported.layout.now
     for at, row in zip(t, log[list(order)].to_numpy(dtype=float), strict=True):
         assert loaded.odd_record(pointer(kept), at, pointer(np.ascontiguousarray(row))) == 0
     assert loaded.odd_predict(pointer(kept), None, pointer(path)) == 0
@@ -244,7 +243,7 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, longest, tmp_pa
     loaded.odd_init(pointer(kept))
     path = np.zeros((physics.horizon, 2))
     assert loaded.odd_predict(pointer(kept), None, pointer(path)) == NO_PAST
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    order = exported.layout.now
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
     predicted, alarms = [], []
     for i in range(len(t)):
@@ -352,7 +351,7 @@ def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
     loaded, path = library(files, tmp_path), np.zeros((5, 2))
     loaded.odd_init(pointer(kept))
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    order = exported.layout.now
     predicted = []
     for t, row in zip(rows["t"], rows[list(order)].to_numpy(dtype=float), strict=True):
         assert loaded.odd_record(pointer(kept), t, pointer(np.ascontiguousarray(row))) == 0
@@ -376,7 +375,7 @@ def test_after_a_pause_an_observer_begins_anew_aboard_and_in_python(step, tmp_pa
     files = predictor_files(exported, "odd", Precision())
     size, loaded = _size_of_struct(files, tmp_path) + 64, library(files, tmp_path)
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    order = exported.layout.now
     path = np.zeros((5, 2))
     for seed, every in enumerate((0.3, 1.0, 4.0, 15.0)):
         rng = np.random.default_rng(seed)
@@ -446,7 +445,7 @@ def test_the_past_begins_anew_before_the_observer_does(tmp_path):
     files = predictor_files(exported, "odd", Precision())
     kept, loaded = np.zeros(_size_of_struct(files, tmp_path) + 64, dtype=np.uint8), library(files, tmp_path)
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    order = exported.layout.now
     expected, path = predictor.predict(instants), np.zeros((5, 2))
     loaded.odd_init(pointer(kept))
     for i, row in enumerate(frame[list(order)].to_numpy(dtype=float)):
@@ -488,7 +487,7 @@ def test_angles_may_wrap(kind, low, high, angles, least, tmp_path):
     files = predictor_files(exported, "odd", Precision())
     size, loaded = _size_of_struct(files, tmp_path) + 64, library(files, tmp_path)
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    order = exported.layout.now
     plan = np.tile(rows[list(exported.layout.planned)].to_numpy()[-1], (5, 1))
     place = exported.layout.planned.index("port.alpha")
     plan[:, place] += np.radians(0.2 * (high - low) * np.linspace(0, 1, 5)) * (-1 if angles[-1] > 0 else 1)
@@ -542,7 +541,7 @@ def test_no_compiler_warns_of_a_conversion(program, single, tmp_path):
     every = [vessel_files(drawn_ship(100, 4), "odd", "rk4", precision)]
     every += [predictor_files(model(drawn(kind, 100).predictor), "odd", precision) for kind in ("forest", "recurrent")]
     for files in every:
-        compile_([program], write(files, tmp_path), "-O0", "-Wsign-conversion", "-o", "example", "main.c", "odd.c")
+        compile_([program], write(files, tmp_path), "-O0", "-Wsign-conversion", "-o", "example", "main.c", "odd.c", "odd_casadi.c")
 
 
 def test_the_example_ends_with_the_result_of_a_row_that_is_refused(tmp_path):
@@ -552,7 +551,7 @@ def test_the_example_ends_with_the_result_of_a_row_that_is_refused(tmp_path):
     assert first is not None
     broken = {**files.texts, "main.c": text.replace(first[0], first[0].replace(first[1], "0.0 / 0.0"), 1)}
     write(replace(files, texts=broken), tmp_path)
-    compile_([compiler()], tmp_path, "-O0", "-o", "example", "main.c", "odd.c")
+    compile_([compiler()], tmp_path, "-O0", "-o", "example", "main.c", "odd.c", "odd_casadi.c")
     result = subprocess.run([tmp_path / "example"], capture_output=True, text=True)
     assert (result.returncode, result.stdout) == (INVALID, f"row 0 is refused: result {INVALID}\n")
 
@@ -658,7 +657,7 @@ def test_a_long_way_costs_single_precision_no_digits(tmp_path):
     files = predictor_files(exported, "odd", Precision(single=True))
     size, loaded = _size_of_struct(files, tmp_path) + 64, library(files, tmp_path)
     loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-    order = ("north", "east", *(name for name in exported.layout.now if name not in ("north", "east")))
+    order = exported.layout.now
 
     def path_after(fast):
         """Path where so many rows of 2 km/s came before those of 7 m/s."""
@@ -697,8 +696,7 @@ def test_the_header_says_that_deviations_of_a_log_are_no_entry(observer):
 
 def test_states_that_terms_keep_have_units():
     """Before, the header said that the states of radiation and the time of the waves have none."""
-    parts = VesselParts(load_vessel("gunnerus-28.9-6dof"), "six", "rk4", Precision())
-    units = {name: parts.unit("carry", name) for name in parts.groups()["carry"]}
+    units = VesselParts(load_vessel("gunnerus-28.9-6dof"), "rk4").units()["carry"]
     assert "-" not in units.values()
     kept = ("heave_pitch.w0c", "heave_pitch.q2s", "roll.p1c")
     assert [units[f"radiation.{name}"] for name in kept] == ["m", "rad", "rad"]

@@ -11,7 +11,7 @@ import pytest
 
 from shipid.data.windows import Instants
 from shipid.engine.casadi import memory_along
-from shipid.export.blocks import Precision
+from shipid.export.c import Precision
 from shipid.export.c_predictor import predictor_files
 from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
@@ -43,8 +43,7 @@ class Recorder:
         size = int(subprocess.run([folder / "size"], capture_output=True, text=True, check=True).stdout)
         self.loaded = library(files, folder)
         self.loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-        others = (name for name in self.model.layout.now if name not in ("north", "east"))
-        self.row = ("north", "east", *others)
+        self.row = self.model.layout.now
         self.kept = np.zeros(size + 64, dtype=np.uint8)
         self.begin()
 
