@@ -273,6 +273,16 @@ def filter_function(model: Dynamics) -> ca.Function:
     )
 
 
+def filters_function(model: Dynamics, num_filters: int) -> ca.Function:
+    """`filter_function` for the states (n, K) and numbers (., K) of K filters; their other inputs are the same."""
+    one, count = filter_function(model), num_filters
+    each = {"state": count, "numbers": count}
+    inputs = [ca.MX.sym(name, one.size1_in(name), each.get(name, 1)) for name in one.name_in()]
+    repeated = [part if part.shape[1] == count else ca.MX(0, count) if part.is_empty() else ca.repmat(part, 1, count)
+                for part in inputs]  # fmt: skip
+    return ca.Function("filters", inputs, one.map(count)(*repeated))
+
+
 @lru_cache(maxsize=16)
 def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
     """The whole observer's step as a pure function of CasADi, for K filters: `observe` and exports in C do the same.
@@ -286,8 +296,7 @@ def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
     inputs = [ca.MX.sym(one.name_in(i), one.size1_in(i)) for i in range(one.n_in())]
     inputs[0] = ca.MX.sym("states", one.size1_in(0), num_filters)
     inputs[6] = ca.MX.sym("numbers", one.size1_in(6), num_filters)
-    given = [part if i in (0, 6) else ca.repmat(part, 1, num_filters) for i, part in enumerate(inputs)]
-    after, estimate, innovation, spread = one.map(num_filters)(*given)
+    after, estimate, innovation, spread = filters_function(model, num_filters)(*inputs)
     sound = ca.sum1(ca.fabs(after) < DIVERGED) > after.size1() - 0.5  # false for what is not a number, too
     after = _finite(after)
     likelihood = after[-1, :] * sound - DIVERGED * (1 - sound)

@@ -37,7 +37,7 @@ WORDS = frozenset(
     typeof typeof_unqual const_cast dynamic_cast reinterpret_cast static_cast co_await co_return co_yield
     stdin stdout stderr errno assert random select
     above_zero are_finite choose evaluate follow free_memory get_memory guid identifier is_ours kinds no_band
-    past_rows planned_turns predict_from refuse say self set start_values sum_of t va_list
+    past_rows path_at planned_turns predict_from refuse say self set start_values sum_of t va_list
     """.split()
 )
 """Keywords of C99, C23 and C++20, names of C's library and headers and of the sources themselves.
@@ -116,8 +116,10 @@ def generated(functions: Mapping[str, ca.Function], name: str, precision: Precis
     text = generator.dump()
     keys = ("arg", "res", "iw", "w")
     most = (max(1, *(int(size) for size in re.findall(rf"\*sz_{key} = (\d+);", text))) for key in keys)
-    declared = f'#ifdef __cplusplus\nextern "C" {{\n#endif\n{declared}\n#ifdef __cplusplus\n}}\n#endif'
-    return Generated(text, declared, *most)
+    return Generated(_AS_C.format(text), _AS_C.format(declared), *most)
+
+
+_AS_C = '#ifdef __cplusplus\nextern "C" {{\n#endif\n{}\n#ifdef __cplusplus\n}}\n#endif\n'
 
 
 def filled(text: str, name: str, values: Mapping[str, str]) -> str:

@@ -388,24 +388,23 @@ int @_record(@ *self, double t, const @_real *row)
 #if $HAS_OBSERVER
     {
         double parts = fmax(ceil((double)dt / $LONGEST - $ROUNDING), 1); /* nothing is measured on the way */
-        real part = (real)((double)dt / parts), seen = 0, *states = self->work + $WORK;
+        real part = (real)((double)dt / parts), *states = self->work + $WORK;
         res[0] = states;
-        res[1] = self->estimates;
-        arg[0] = kept;
-        if (!self->count) @_casadi_begin(arg, res, iw, self->work, 0);
         arg[0] = self->filters;
         arg[1] = last;
         arg[2] = kept;
         arg[3] = moved;
-        arg[5] = &seen;
-        arg[6] = &part;
-        for (; self->count && parts > 0; parts -= 1) {
-            arg[4] = self->parameters;
-            seen = parts < 1.5;
-            @_casadi_observe(arg, res, iw, self->work, 0);
+        arg[4] = self->parameters;
+        arg[5] = &part;
+        for (; self->count && parts > 1.5; parts -= 1) {
+            @_casadi_between(arg, res, iw, self->work, 0);
             memcpy(self->filters, states, sizeof self->filters);
             arg[3] = 0;
         }
+        res[1] = self->estimates; /* a call works with what follows its own places */
+        if (self->count) @_casadi_observe(arg, res, iw, self->work, 0);
+        arg[0] = kept;
+        if (!self->count) @_casadi_begin(arg, res, iw, self->work, 0);
         memcpy(self->filters, states, sizeof self->filters);
     }
 #endif

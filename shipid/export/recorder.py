@@ -12,7 +12,7 @@ from casadi import MX
 from shipid.export.equations import Equations, by_name
 from shipid.export.known import PLACE, stacked, turned
 from shipid.export.model import Model
-from shipid.observer import LOW, MEASURED, Bank, bank, begin, observer_function, sizes
+from shipid.observer import LOW, MEASURED, Bank, bank, begin, filters_function, observer_function, sizes
 from shipid.physics.signals import SIGNALS, row_of, turns_round
 
 TURN = 2 * np.pi
@@ -28,7 +28,7 @@ def filters_of(model: Model) -> Bank | None:
 
 
 def recorder_functions(model: Model) -> dict[str, ca.Function]:
-    """Functions by name: `keep`; where the model has them `past`, `plan`, `begin` and `observe`."""
+    """Functions by name: `keep`; where the model has them `past`, `plan`, `begin`, `between` and `observe`."""
     functions = {"keep": keep_function(model)}
     if model.layout.num_past:
         functions["past"] = past_function(model)
@@ -36,7 +36,8 @@ def recorder_functions(model: Model) -> dict[str, ca.Function]:
         functions["plan"] = plan_function(model)
     filters = filters_of(model)
     if filters is not None:
-        functions |= {"begin": begin_function(model, filters), "observe": observe_function(model, filters)}
+        functions["begin"] = begin_function(model, filters)
+        functions |= {name: observer_step(model, filters, name) for name in ("between", "observe")}
     return functions
 
 
@@ -147,30 +148,38 @@ def begin_function(model: Model, filters: Bank) -> ca.Function:
     return _function("begin", {"row": symbol}, results)
 
 
-def observe_function(model: Model, filters: Bank) -> ca.Function:
-    """(states, last, row, moved, parameters, seen, dt) -> states and estimates of the observer after dt [s].
+def observer_step(model: Model, filters: Bank, name: str) -> ca.Function:
+    """(states, last, row, moved, parameters, dt) -> states of the observer after dt [s], and with `observe` estimates.
 
-    last, row : kept rows, the new one measured where `seen` is 1. moved : what was added to the rows before.
+    last, row : kept rows. moved : what was added to the rows before. Where the filters divide the time between two
+    rows, `between` carries each on without a measurement: `observe` alone, the last part, knows the new row.
     """
     every, count, inner = kept_names(model), filters.num_filters, filters.model
-    size = sum(sizes(inner))
-    symbols = {key: MX.sym(key, len(every)) for key in ("last", "row", "moved")}
-    states, parameters = MX.sym("states", size * count), MX.sym("parameters", len(model.layout.parameters))
-    seen, dt = MX.sym("seen"), MX.sym("dt")
-    last, row, moved = (by_name(every, symbol) for symbol in symbols.values())
-    places = np.cumsum([0, *sizes(inner)])
-    shift = {places[2] + k: moved[name] for k, name in enumerate(inner.memory) if name in angles_of(inner.memory)}
-    shift |= {places[4] + k: moved[name] for k, name in enumerate(inner.commands) if name in angles_of(inner.commands)}
-    shifts = ca.vertcat(*(shift.get(k, MX(0)) for k in range(size)))
-    wanted = {name: ca.if_else(seen, row[name], np.nan) for name in filters.settings.measured}
-    measured = ca.vertcat(*(wanted.get(name, MX(np.nan)) for name in MEASURED))
-    numbers = parameters[[model.layout.parameters.index(name) for name in inner.parameters]]
-    result = observer_function(inner, count)(
-        ca.reshape(states, size, count) + ca.repmat(shifts, 1, count), stacked(last, inner.commands),
-        stacked(last, inner.environment), numbers, measured, ca.DM(filters.noise), ca.DM(filters.numbers.T), dt,
-    )  # fmt: skip
-    inputs = {"states": states, **symbols, "parameters": parameters, "seen": seen, "dt": dt}
-    return _function("observe", inputs, {"after": ca.vec(result[0]), "estimates": result[1]})
+    size, places = sum(sizes(inner)), np.cumsum([0, *sizes(inner)])
+    symbols = {"states": MX.sym("states", size * count)}
+    symbols |= {key: MX.sym(key, len(every)) for key in ("last", "row", "moved")}
+    symbols |= {"parameters": MX.sym("parameters", len(model.layout.parameters)), "dt": MX.sym("dt")}
+    last, row = (by_name(every, symbols[key]) for key in ("last", "row"))
+    turns = ca.DM(size, len(every))  # which orders and positions in a state move with the angles of the past
+    for first, group in ((places[2], tuple(inner.memory)), (places[4], inner.commands)):
+        for key in angles_of(group):
+            turns[first + group.index(key), every.index(key)] = 1
+    measured = {key: row[key] for key in filters.settings.measured if name == "observe"}
+    given = [
+        ca.reshape(symbols["states"], size, count) + ca.repmat(ca.mtimes(turns, symbols["moved"]), 1, count),
+        stacked(last, inner.commands),
+        stacked(last, inner.environment),
+        symbols["parameters"][[model.layout.parameters.index(key) for key in inner.parameters]],
+        ca.vertcat(*(measured.get(key, MX(np.nan)) for key in MEASURED)),
+        MX(ca.DM(filters.noise)),
+        MX(ca.DM(filters.numbers.T)),
+        symbols["dt"],
+    ]
+    if name == "observe":
+        after, estimates, *_ = observer_function(inner, count)(*given)
+        return _function(name, symbols, {"after": ca.vec(after), "estimates": estimates})
+    after, *_ = filters_function(inner, count)(*given)
+    return _function(name, symbols, {"after": ca.vec(after)})
 
 
 def nearest_turn(angle: MX, goal: Any) -> MX:
