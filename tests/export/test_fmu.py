@@ -379,7 +379,18 @@ def test_a_compiler_of_cplusplus_takes_the_sources(program, ship, aboard, tmp_pa
     for unit in (ship, aboard):
         with zipfile.ZipFile(unit) as archive:
             archive.extractall(tmp_path)
-        command = [program, "-x", "c++", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused-parameter", "-shared", "-fPIC"]
+        command = [
+            program,
+            "-x",
+            "c++",
+            "-Wall",
+            "-Wextra",
+            "-Wpedantic",
+            "-Werror",
+            "-Wno-unused-parameter",
+            "-shared",
+            "-fPIC",
+        ]
         command += [f"{unit.stem}.c", f"{unit.stem}_casadi.c", "-o", "unit.so"]
         result = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True)
         assert result.returncode == 0, result.stderr[:1000]
