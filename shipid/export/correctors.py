@@ -202,8 +202,8 @@ def stepped(known: Known, added: Added, kept: MX | None = None) -> MX:
     start, weather = stacked(known.now, (*MOTIONS, "psi")), measurable(names.now)
     step = corrected_step(known, kept.numel(), added)
     carry, path = ca.vertcat(start, MX(np.zeros(2)), kept), []
-    commands, columns = known.commands(names.commands)
-    orders = ca.horzsplit(commands) * (names.horizon // columns)
+    commands = known.commands(names.commands)
+    orders = ca.horzsplit(commands) * (names.horizon // commands.shape[1])
     reached = reached_at_starts(known, known.inputs["reached"], None)
     fixed = stacked(known.now, weather), known.now["psi"], known.inputs["parameters"]
     for k in range(names.horizon):

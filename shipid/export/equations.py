@@ -106,20 +106,14 @@ class Equations:
         return ca.vertcat(*horizontal(by_name((*self.states, *self.model.memory), carries), ca).values())
 
 
-def rolled_out(step: ca.Function, carry: MX, each: Sequence[tuple[MX, int]], parameters: MX) -> MX:
+def rolled_out(step: ca.Function, carry: MX, inputs: Sequence[MX], parameters: MX, count: int) -> MX:
     """Carries (num_carry, T) after 1 ... T steps.
 
-    each : commands, environment and tau_extra, each with its number of columns: one for each step, or one for all.
+    inputs : commands, environment and tau_extra, each with a column for every step, or one for all.
     """
-    count = max(columns for _, columns in each)
-    series = [ca.horzsplit(value) * (count // columns) for value, columns in each]
+    series = [ca.horzsplit(value) * (count // value.shape[1]) for value in inputs]
     records = []
-    for k in range(count):
-        carry = step(carry, *(columns[k] for columns in series), parameters)
+    for columns in zip(*series, strict=True):
+        carry = step(carry, *columns, parameters)
         records.append(carry)
     return ca.horzcat(*records)
-
-
-def calm(model: Dynamics) -> tuple[MX, int]:
-    """No extra force in any step."""
-    return MX(np.zeros(model.num_dof)), 1

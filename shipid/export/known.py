@@ -12,7 +12,7 @@ import numpy as np
 from casadi import MX
 
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.export.equations import Equations, by_name, calm, rolled_out
+from shipid.export.equations import Equations, by_name, rolled_out
 from shipid.hybrid.features import MOTIONS, PARTS, Inputs, steps_of
 from shipid.hybrid.physics import Physics
 from shipid.observer import COLUMNS, bank, moves_start
@@ -138,32 +138,28 @@ class Known:
         """One step of the physics."""
         return self.equations.step(self.physics.integrator, self.physics.step)
 
-    def commands(self, names: Sequence[str]) -> tuple[MX, int]:
-        """Commands (n, T) over the horizon, or (n, 1) where they are held, and the number of columns."""
-        layout_ = self.names
-        if not layout_.planned:
-            return stacked(self.now, names), 1
-        rows = ca.reshape(self.inputs["planned"], len(layout_.planned), layout_.horizon)
-        return rows[[layout_.planned.index(name) for name in names], :], layout_.horizon
+    def commands(self, names: Sequence[str]) -> MX:
+        """Commands (n, T) over the horizon, or (n, 1) where they are held."""
+        every, horizon = self.names.planned, self.names.horizon
+        if not every:
+            return stacked(self.now, names)
+        return ca.reshape(self.inputs["planned"], len(every), horizon)[[every.index(name) for name in names], :]
 
     def _begun(self, row: Expressions) -> MX:
         """State of the vessel at a measured row, at the origin; hidden states of terms are 0."""
         known = {name: value for name, value in row.items() if name not in PLACE}
         return self.equations.aboard(stacked(known, self.equations.states))
 
-    def _rolled_out(self, begun: MX, environment: MX, tau: tuple[MX, int]) -> MX:
-        model, carry = self.equations.model, ca.vertcat(begun, self.inputs["reached"])
-        commands, columns = self.commands(model.commands)
-        if max(columns, tau[1]) == 1:
-            commands, columns = ca.repmat(commands, 1, self.names.horizon), self.names.horizon
-        each = [(commands, columns), (environment, 1), tau]
-        return rolled_out(self.step, carry, each, self.inputs["parameters"])
+    def _rolled_out(self, begun: MX, environment: MX, tau: MX) -> MX:
+        inputs = [self.commands(self.equations.model.commands), environment, tau]
+        carry = ca.vertcat(begun, self.inputs["reached"])
+        return rolled_out(self.step, carry, inputs, self.inputs["parameters"], self.names.horizon)
 
     @cached_property
     def measured_records(self) -> MX:
         """Carries (n, T) of the physics after each step from the measured state, without an observer."""
         model = self.equations.model
-        return self._rolled_out(self._begun(self.now), stacked(self.now, model.environment), calm(model))
+        return self._rolled_out(self._begun(self.now), stacked(self.now, model.environment), MX(np.zeros(model.num_dof)))
 
     @cached_property
     def records(self) -> MX:
@@ -175,7 +171,7 @@ class Known:
         """Estimates of the observer by their names in `shipid.observer.COLUMNS`."""
         return by_name(COLUMNS, self.inputs["estimates"])
 
-    def _observed(self) -> tuple[MX, MX, tuple[MX, int]]:
+    def _observed(self) -> tuple[MX, MX, MX]:
         """State, environment and slow force over the horizon, as `shipid.observer.observed_start`."""
         physics, model, now, seen = self.physics, self.equations.model, self.now, self.seen
         assert physics.vessel is not None
@@ -196,7 +192,7 @@ class Known:
         ages = (np.arange(physics.horizon) + 0.5) * physics.step
         faded = np.exp(-ages / filters.fade) if filters.fade > 0 else np.zeros(physics.horizon)
         force = ca.DM(filters.mass) @ stacked(seen, "XYN")
-        tau = force @ ca.DM(faded).T, physics.horizon
+        tau = force @ ca.DM(faded).T
         return stacked(state, self.equations.states), stacked(weather, model.environment), tau
 
     @cached_property
@@ -220,8 +216,8 @@ class Known:
         model, rows = self.equations.model, self.past[self.names.before(steps) :]
         carry = ca.vertcat(self._begun(rows[0]), stacked(rows[0], tuple(model.memory)))
         commands = ca.horzcat(*(stacked(row, model.commands) for row in rows))
-        each = [(commands, steps), (stacked(rows[0], model.environment), 1), calm(model)]
-        return rolled_out(self.step, carry, each, self.inputs["parameters"])
+        inputs = [commands, stacked(rows[0], model.environment), MX(np.zeros(model.num_dof))]
+        return rolled_out(self.step, carry, inputs, self.inputs["parameters"], steps)
 
     def _past_error(self, seconds: float) -> MX:
         """x, y, u, v, r of `shipid.hybrid.features.past_error`."""
@@ -258,7 +254,7 @@ class Known:
         if not self.names.planned:
             return {}
         table, horizon = {}, self.names.horizon
-        for name, orders in by_name(inputs.commands, self.commands(inputs.commands)[0]).items():
+        for name, orders in by_name(inputs.commands, self.commands(inputs.commands)).items():
             component, _, signal = name.rpartition(".")
             for number, part in enumerate(np.array_split(np.arange(horizon), min(PARTS, horizon)), start=1):
                 mean = ca.sum2(orders[:, part[0] : part[-1] + 1]) / len(part)

@@ -48,7 +48,7 @@ def test_the_folder_of_c_holds_four_files(simple, tmp_path):
     files = simple.export("c", tmp_path / "my-ship")
     assert {file.name for file in files} == {"my_ship.c", "my_ship_casadi.c", "my_ship.h", "main.c"}
     assert all(file.is_file() for file in files)
-    again = simple.export("c", tmp_path / "other", name="my ship", single=True)
+    simple.export("c", tmp_path / "other", name="my ship", single=True)
     assert "typedef float my_ship_real;" in (tmp_path / "other" / "my_ship.h").read_text()
 
 
