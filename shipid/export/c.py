@@ -36,7 +36,7 @@ WORDS = frozenset(
     alignas alignof concept consteval constexpr constinit decltype noexcept nullptr requires static_assert thread_local
     typeof typeof_unqual const_cast dynamic_cast reinterpret_cast static_cast co_await co_return co_yield
     stdin stdout stderr errno assert random select
-    above_zero are_finite begin_within choose evaluate follow free_memory get_memory guid identifier is_ours kinds no_band
+    above_zero are_finite begin_within choose evaluate follow free_memory get_memory guid identifier is_ours kinds
     past_rows path_at planned_turns predict_from refuse say self set start_values sum_of t va_list
     """.split()
 )
@@ -104,7 +104,9 @@ class Generated:
 
 def generated(functions: Mapping[str, ca.Function], name: str, precision: Precision) -> Generated:
     """CasADi's C of functions, key -> function; what is in it but its public functions has a name of its own."""
-    generator = ca.CodeGenerator(f"{name}_casadi", {"casadi_real": precision.real, "with_header": False, "avoid_stack": True})
+    generator = ca.CodeGenerator(
+        f"{name}_casadi", {"casadi_real": precision.real, "with_header": False, "avoid_stack": True}
+    )
     called = {key: f"{name}_casadi_{key}" for key in functions}
     for key, function in functions.items():
         inputs = function.mx_in()

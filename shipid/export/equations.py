@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import casadi as ca
-import numpy as np
 from casadi import MX, SX
 
 from shipid.engine.casadi import summed_rates

@@ -159,7 +159,9 @@ class Known:
     def measured_records(self) -> MX:
         """Carries (n, T) of the physics after each step from the measured state, without an observer."""
         model = self.equations.model
-        return self._rolled_out(self._begun(self.now), stacked(self.now, model.environment), MX(np.zeros(model.num_dof)))
+        return self._rolled_out(
+            self._begun(self.now), stacked(self.now, model.environment), MX(np.zeros(model.num_dof))
+        )
 
     @cached_property
     def records(self) -> MX:

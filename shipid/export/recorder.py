@@ -166,7 +166,8 @@ def observer_step(model: Model, filters: Bank, name: str) -> ca.Function:
             turns[first + group.index(key), every.index(key)] = 1
     measured = {key: row[key] for key in filters.settings.measured if name == "observe"}
     given = [
-        ca.reshape(symbols["states"], size, count) + ca.repmat(ca.mtimes(turns, symbols["moved"]), 1, count),
+        ca.reshape(symbols["states"], size, count)
+        + ca.repmat(ca.densify(ca.mtimes(turns, symbols["moved"])), 1, count),
         stacked(last, inner.commands),
         stacked(last, inner.environment),
         symbols["parameters"][[model.layout.parameters.index(key) for key in inner.parameters]],
