@@ -545,11 +545,6 @@ def tau_extra(filters: Bank, columns: Mapping[str, Array], horizon: int, step: f
     return np.asarray(faded[:, None, None] * now)
 
 
-def start(columns: Mapping[str, Array]) -> dict[str, Array]:
-    """Filtered state in place of the measured one: the columns given (S,), with north ... r replaced."""
-    return {**columns, **{name: columns[f"observer.{name}"] for name in MEASURED}}
-
-
 @dataclass(frozen=True, eq=False)
 class ObservedStart:
     """What the physics starts from with an observer, for S instants and T steps.
@@ -586,7 +581,7 @@ def observed_start(
     path : as in `cut_windows`: with "velocity" the true path starts where the ship is, whatever its filtered position.
     """
     model, zero = filters.model, np.zeros(len(columns["u"]))
-    begun = start(columns)
+    begun = {**columns, **{name: columns[f"observer.{name}"] for name in MEASURED}}
     if not moves_start(filters.settings, path):
         begun |= {name: columns.get(name, zero) for name in ("north", "east")}
     north, east, psi = columns["observer.current_north"], columns["observer.current_east"], begun["psi"]
@@ -662,7 +657,8 @@ def tune_observer(
         place = int(np.argmin(losses))
         return losses[place], options[place]
 
-    levels = {"waves": _each(first.waves), "current": (0.0,), "change": _each(first.change)}
+    waves, change = ([(one,) for one in several] if len(several) > 1 else [] for several in (first.waves, first.change))
+    levels: dict[str, Sequence[Any]] = {"waves": waves, "current": (0.0,), "change": change}
     samples = (1 + sum(map(len, levels.values()))) * bank(vessel, first).num_filters
     least, best = faded(first, "as given")
     for name, values in levels.items():
@@ -672,8 +668,3 @@ def tune_observer(
                 error, one = faded(begun.model_copy(update={name: value}), f"{name} {value}")
                 least, best = (error, one) if error < least else (least, best)
     return best, tried
-
-
-def _each(levels: tuple[float, ...]) -> list[tuple[float, ...]]:
-    """Every level alone, where there are several."""
-    return [(level,) for level in levels] if len(levels) > 1 else []

@@ -10,6 +10,7 @@ import numpy as np
 from casadi import MX
 
 from shipid.export.correctors import nearest
+from shipid.export.equations import named_function, symbols_of
 from shipid.export.known import stacked
 from shipid.hybrid.bands import FEWEST, LEVELS, Bands
 
@@ -84,7 +85,8 @@ def is_promised(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
 
 def factor_function(bands: Bands) -> ca.Function:
     """(miss, level, kind) -> how much wider than calibrated an adaptive band is, as `shipid.hybrid.bands.factor`."""
-    miss, level, kind = MX.sym("miss"), MX.sym("level"), MX.sym("kind")
+    inputs = symbols_of({"miss": 1, "level": 1, "kind": 1})
+    miss, level, kind = inputs.values()
     whole = np.vstack([bands.whole[None], bands.by_kind.reshape(-1, len(LEVELS))])
     most = float(LEVELS[-1])
 
@@ -97,4 +99,4 @@ def factor_function(bands: Bands) -> ca.Function:
     known = ca.mmax(kind == ca.DM(range(len(whole))))
     known = ca.logic_and(known, ca.logic_and(level > 0, level < 1))
     result = ca.if_else(ca.logic_and(known, ca.fabs(miss) < np.inf), grown, np.nan)
-    return ca.Function("factor", [miss, level, kind], [result], ["miss", "level", "kind"], ["factor"])
+    return named_function("factor", inputs, {"factor": result})

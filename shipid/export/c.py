@@ -109,9 +109,7 @@ def generated(functions: Mapping[str, ca.Function], name: str, precision: Precis
     )
     called = {key: f"{name}_casadi_{key}" for key in functions}
     for key, function in functions.items():
-        inputs = function.mx_in()
-        names = [function.name_in(), function.name_out()]
-        generator.add(ca.Function(called[key], inputs, function.call(inputs), *names))
+        generator.add(renamed(function, called[key]))
     declared = "\n".join(
         f"int {one}(const real **arg, real **res, long long *iw, real *w, int mem);" for one in called.values()
     )
@@ -122,6 +120,13 @@ def generated(functions: Mapping[str, ca.Function], name: str, precision: Precis
 
 
 _AS_C = '#ifdef __cplusplus\nextern "C" {{\n#endif\n{}\n#ifdef __cplusplus\n}}\n#endif\n'
+
+
+def renamed(function: ca.Function, name: str) -> ca.Function:
+    """The same function under another name."""
+    inputs, options = function.mx_in(), {"is_diff_out": function.is_diff_out()}
+    results = function.call(inputs, True, False)
+    return ca.Function(name, inputs, results, function.name_in(), function.name_out(), options)
 
 
 def filled(text: str, name: str, values: Mapping[str, str]) -> str:

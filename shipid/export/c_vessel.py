@@ -24,7 +24,7 @@ from shipid.export.c import (
     places_above_zero,
     tables_of,
 )
-from shipid.export.equations import Equations
+from shipid.export.equations import Equations, named_function, symbols_of
 from shipid.physics.grammar import AXES
 from shipid.physics.signals import ACTUAL, SIGNALS, row_of, signal_of
 from shipid.simulation.log import column_of
@@ -71,17 +71,16 @@ class VesselParts:
     def functions(self) -> dict[str, ca.Function]:
         """`step`: (carry, commands, environment, loads, parameters, dt) -> carry after dt; `rates` and `begin` of a carry."""
         equations, groups = self.equations, self.groups()
-        symbols = {key: MX.sym(key, len(names)) for key, names in groups.items()}
-        carry, commands, environment, loads, parameters = symbols.values()
-        dt, count = MX.sym("dt"), len(equations.states)
+        inputs, count = symbols_of({key: len(names) for key, names in groups.items()}), len(equations.states)
+        carry, commands, environment, loads, parameters = inputs.values()
+        dt = MX.sym("dt")
         after = equations.step(self.method)(carry, commands, environment, loads, parameters, dt)
         rates = equations.rates(carry[:count], carry[count:], commands, environment, parameters, loads)
         begun = ca.vertcat(carry[:count], equations.begun(commands, parameters))
-        inputs = [*symbols.values()]
         return {
-            "step": ca.Function("step", [*inputs, dt], [after], [*symbols, "dt"], ["after"]),
-            "rates": ca.Function("rates", inputs, [rates], [*symbols], ["rates"]),
-            "begin": ca.Function("begin", inputs, [begun], [*symbols], ["begun"]),
+            "step": named_function("step", {**inputs, "dt": dt}, {"after": after}),
+            "rates": named_function("rates", inputs, {"rates": rates}),
+            "begin": named_function("begin", inputs, {"begun": begun}),
         }
 
 

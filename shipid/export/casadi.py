@@ -11,6 +11,7 @@ import casadi as ca
 
 from shipid.engine.integrate import Method
 from shipid.export.band import CHOICE, COLUMNS
+from shipid.export.c import renamed
 from shipid.export.c_vessel import VesselParts
 from shipid.export.model import Model
 from shipid.files import json_text, write_together
@@ -22,7 +23,7 @@ def vessel_function(vessel: Vessel, name: str, method: Method) -> tuple[ca.Funct
     """(carry, commands, environment, loads, parameters, dt) -> carry after dt, and the names of the entries."""
     parts = VesselParts(vessel, method)
     described = {key: _entries(units) for key, units in parts.units().items()}
-    return _renamed(parts.functions["step"], name), {
+    return renamed(parts.functions["step"], name), {
         "what": f"one step of {vessel.name} by {method}",
         "inputs": {**described, "dt": _entries({"dt": "s"})},
         "outputs": {"after": described["carry"]},
@@ -49,20 +50,11 @@ def predictor_function(model: Model, name: str) -> tuple[ca.Function, dict[str, 
         described["kinds"] = {kind: [number, count] for number, (kind, count) in enumerate(bands.kinds.items(), 1)}
     described |= {"inputs": {key: _entries(units) for key, units in inputs.items()}}
     described |= {"outputs": {key: _entries(units) for key, units in outputs.items()}}
-    return _renamed(model.function, name), described
+    return renamed(model.function, name), described
 
 
 def _entries(units: Mapping[str, str]) -> list[dict[str, str]]:
     return [{"name": name, "unit": unit} for name, unit in units.items()]
-
-
-def _renamed(function: ca.Function, name: str) -> ca.Function:
-    """The function under the name of a file."""
-    inputs = function.mx_in()
-    smooth = {"is_diff_out": function.is_diff_out()}
-    return ca.Function(
-        name, inputs, function.call(inputs, True, False), function.name_in(), function.name_out(), smooth
-    )
 
 
 def write_function(function: ca.Function, names: Mapping[str, Any], file: Path) -> list[Path]:

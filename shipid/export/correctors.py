@@ -12,7 +12,7 @@ import numpy as np
 from casadi import MX
 
 from shipid.errors import ShipidError
-from shipid.export.equations import Equations, by_name
+from shipid.export.equations import Equations, by_name, named_function, symbols_of
 from shipid.export.known import Known, feature_table, stacked, turned, within
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.calibrator import Calibrated, TrajectoryInputs
@@ -226,7 +226,7 @@ def corrected_step(known: Known, num_kept: int, added: Added) -> ca.Function:
     weather = measurable(names.now)
     sizes = {"carry": 6 + num_kept, "commands": len(names.commands), "reached": len(names.reached)}
     sizes |= {"weather": len(weather), "psi0": 1, "parameters": len(names.parameters)}
-    symbols = {name: MX.sym(name, size) for name, size in sizes.items()}
+    symbols = symbols_of(sizes)
     carry, first = symbols["carry"], symbols["psi0"]
     nu, psi, place = carry[:3], carry[3], carry[4:6]
     row = by_name((*MOTIONS, "psi"), carry[:4])
@@ -244,7 +244,7 @@ def corrected_step(known: Known, num_kept: int, added: Added) -> ca.Function:
         turned_by = h / 2 * (nu[2] + then[2])
         shift = h / 2 * (turned(nu[:2], psi - first) + turned(then[:2], psi + turned_by - first))
     after_all = ca.vertcat(then, psi + turned_by, place + shift, kept)
-    return ca.Function("corrected_step", [*symbols.values()], [after_all], [*symbols], ["after"])
+    return named_function("corrected_step", symbols, {"after": after_all})
 
 
 def free(known: Known, equations: Equations, start: Start, parameters: MX) -> tuple[MX, MX]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -20,6 +20,17 @@ from shipid.vessel.load import Vessel
 def by_name(names: Sequence[str], vector: Any) -> dict[str, Any]:
     """Entries of a vector, or rows of a matrix, by name."""
     return dict(zip(names, ca.vertsplit(vector), strict=True)) if names else {}
+
+
+def symbols_of(sizes: Mapping[str, int]) -> dict[str, MX]:
+    """A symbol for each name, a vector of its size."""
+    return {name: MX.sym(name, size) for name, size in sizes.items()}
+
+
+def named_function(name: str, inputs: Mapping[str, Any], outputs: Mapping[str, Any], **options: Any) -> ca.Function:
+    """A function of inputs and outputs by name; outputs are dense."""
+    dense = [ca.densify(value) for value in outputs.values()]
+    return ca.Function(name, [*inputs.values()], dense, [*inputs], [*outputs], options)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +66,8 @@ class Equations:
         """(state, memory, commands, environment, parameters, tau_extra) -> d(state)/dt."""
         inputs, tau = self._symbols(), SX.sym("tau_extra", self.model.num_dof)
         calm = replace(self.model, sums=tuple(term for term in self.model.sums if term.arrays is not None))
-        result = ca.densify(SX(summed_rates(calm, inputs, tau, {})))
-        return ca.Function("rates", [*inputs, tau], [result], [*INPUTS, "tau_extra"], ["rates"], {"cse": True})
+        given = dict(zip((*INPUTS, "tau_extra"), (*inputs, tau), strict=True))
+        return named_function("rates", given, {"rates": SX(summed_rates(calm, inputs, tau, {}))}, cse=True)
 
     @cached_property
     def advance(self) -> ca.Function:
@@ -65,17 +76,15 @@ class Equations:
         dt = SX.sym("dt")
         after = self.model.advance(0 * state, memory, commands, 0 * environment, parameters, dt)
         inputs = {"memory": memory, "commands": commands, "parameters": parameters, "dt": dt}
-        return ca.Function("advance", [*inputs.values()], [ca.densify(SX(after))], [*inputs], ["after"], {"cse": True})
+        return named_function("advance", inputs, {"after": SX(after)}, cse=True)
 
     def step(self, method: Method, step: float | None = None) -> ca.Function:
         """(carry, commands, environment, tau_extra, parameters) -> carry after `step` [s], or after an input `dt`."""
-        model = self.model
-        sizes = {"commands": len(model.commands), "environment": len(model.environment)}
-        sizes |= {"tau_extra": model.num_dof, "parameters": len(model.parameters)}
-        carry, dt = MX.sym("carry", self.num_carry), MX.sym("dt")
-        inputs = {"carry": carry, **{name: MX.sym(name, size) for name, size in sizes.items()}}
-        inputs |= {} if step is not None else {"dt": dt}
-        commands, environment, tau, parameters = (inputs[name] for name in sizes)
+        model, states = self.model, len(self.states)
+        sizes = {"carry": self.num_carry, "commands": len(model.commands), "environment": len(model.environment)}
+        sizes |= {"tau_extra": model.num_dof, "parameters": len(model.parameters)} | ({} if step else {"dt": 1})
+        inputs = symbols_of(sizes)
+        carry, commands, environment, tau, parameters = (*inputs.values(),)[:5]
 
         def rates(x: MX, m: MX) -> MX:
             return self.rates(x, m, commands, environment, parameters, tau)
@@ -83,10 +92,9 @@ class Equations:
         def advance(m: MX, after: Any) -> MX:
             return self.advance(m, commands, parameters, after) if model.memory else m
 
-        state, memory = carry[: len(self.states)], carry[len(self.states) :]
-        length: Any = dt if step is None else step
-        after = ca.vertcat(*integrate(rates, advance, lambda x, a, k: x + a * k, state, memory, length, method))
-        return ca.Function("step", [*inputs.values()], [after], [*inputs], ["after"])
+        length: Any = step or inputs["dt"]
+        after = integrate(rates, advance, lambda x, a, k: x + a * k, carry[:states], carry[states:], length, method)
+        return named_function("step", inputs, {"after": ca.vertcat(*after)})
 
     def begun(self, commands: MX, parameters: MX) -> MX:
         """Memories that have reached their orders, as far as their stops let them."""

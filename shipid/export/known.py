@@ -12,7 +12,7 @@ import numpy as np
 from casadi import MX
 
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.export.equations import Equations, by_name, rolled_out
+from shipid.export.equations import Equations, by_name, rolled_out, symbols_of
 from shipid.hybrid.features import MOTIONS, PARTS, Inputs, steps_of
 from shipid.hybrid.physics import Physics
 from shipid.observer import COLUMNS, bank, moves_start
@@ -122,7 +122,7 @@ class Known:
 
     def __init__(self, physics: Physics, names: Layout) -> None:
         self.physics, self.names = physics, names
-        self.inputs = {name: MX.sym(name, size) for name, size in names.sizes.items()}
+        self.inputs = symbols_of(names.sizes)
         self.now = by_name(names.now, self.inputs["now"])
         rows = ca.reshape(self.inputs["past"], len(names.past), names.num_past)
         self.past = [by_name(names.past, row) for row in ca.horzsplit(rows)] if names.past else []

@@ -15,6 +15,7 @@ from shipid.data.windows import Instants
 from shipid.errors import ShipidError
 from shipid.export.band import CHOICE, band_rows, is_promised, radii_at
 from shipid.export.correctors import CORRECTORS, inputs_of
+from shipid.export.equations import named_function, symbols_of
 from shipid.export.known import Known, Layout, layout
 from shipid.hybrid.bands import Bands
 from shipid.hybrid.learned_force import ForceCorrector
@@ -94,13 +95,12 @@ class Model:
             ) from error
         inputs, outputs = dict(known.inputs), {"path": path, "outside": self._outside(known.now)}
         if bands is not None:
-            choice = {name: MX.sym(name) for name in CHOICE}
+            choice = symbols_of(dict.fromkeys(CHOICE, 1))
             promised = is_promised(bands, **choice)
             rows = band_rows(bands, known.now, path, self.physics.step, radii_at(bands, **choice))
             inputs |= choice
             outputs |= {"band": ca.if_else(promised, rows, np.nan), "promised": promised}
-        smooth = {"is_diff_out": [name == "path" for name in outputs]}
-        return ca.Function("predict", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs], smooth)
+        return named_function("predict", inputs, outputs, is_diff_out=[name == "path" for name in outputs])
 
     def _check_size(self) -> None:
         bands = self.predictor.bands

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from shipid.export.equations import Equations, by_name
+from shipid.export.equations import Equations, by_name, named_function, symbols_of
 from shipid.export.known import PLACE, stacked, turned
 from shipid.export.model import Model
 from shipid.observer import LOW, MEASURED, Bank, bank, begin, filters_function, observer_function, sizes
@@ -58,13 +58,10 @@ def keep_function(model: Model) -> ca.Function:
     last : the newest kept row. anew : 1 for a row before which nothing is known. Angles go on by the turn of
     `same_turn`; headings and directions by the nearest one.
     """
-    names, size = model.layout, len(model.layout.now) + len(KEPT)
-    symbols = {"last": MX.sym("last", size), "row": MX.sym("row", len(names.now))}
-    symbols |= {
-        "reached": MX.sym("reached", len(names.reached)),
-        "parameters": MX.sym("parameters", len(names.parameters)),
-    }
-    dt, anew = MX.sym("dt"), MX.sym("anew")
+    names = model.layout
+    sizes_ = {"last": len(kept_names(model)), "row": len(names.now), "reached": len(names.reached)}
+    symbols = symbols_of(sizes_ | {"parameters": len(names.parameters), "dt": 1, "anew": 1})
+    dt, anew = symbols["dt"], symbols["anew"]
     last, row = by_name(kept_names(model), symbols["last"]), by_name(names.now, symbols["row"])
     numbers, moved = by_name(names.parameters, symbols["parameters"]), dict[str, MX]()
     for name in angles_of(names.now):
@@ -86,7 +83,7 @@ def keep_function(model: Model) -> ca.Function:
         reached = equations.advance(reached, orders, symbols["parameters"], dt)
     results = {"kept": kept, "moved": ca.if_else(anew, 0, shift)}
     results["after"] = ca.if_else(anew, stacked(row, names.reached), reached)
-    return _function("keep", symbols | {"dt": dt, "anew": anew}, results)
+    return named_function("keep", symbols, results)
 
 
 def past_function(model: Model) -> ca.Function:
@@ -95,9 +92,10 @@ def past_function(model: Model) -> ca.Function:
     order : the kept row whose orders are in force. since : time from `before` [s]. share : of the time to `after`.
     """
     names, every = model.layout, kept_names(model)
-    symbols = {key: MX.sym(key, len(every)) for key in ("before", "after", "order", "newest")}
-    since, share = MX.sym("since"), MX.sym("share")
-    before, after, order, newest = (by_name(every, symbols[key]) for key in symbols)
+    rows = ("before", "after", "order", "newest")
+    symbols = symbols_of({**dict.fromkeys(rows, len(every)), "since": 1, "share": 1})
+    before, after, order, newest = (by_name(every, symbols[key]) for key in rows)
+    since, share = symbols["since"], symbols["share"]
     row = {name: before[name] + share * (after[name] - before[name]) for name in every}
     if model.physics.path == "velocity":  # the trapezoid of linear rates, exact between rows
         way, rate = stacked(before, KEPT[:2]), stacked(before, KEPT[2:])
@@ -106,8 +104,7 @@ def past_function(model: Model) -> ca.Function:
         place = stacked(row, PLACE) - stacked(newest, PLACE)
     row |= {name: order[name] for name in every if "." in name}
     row |= by_name("xy", turned(place, -newest["psi"]))
-    inputs = symbols | {"since": since, "share": share}
-    return _function("past", inputs, {"past": stacked(row, names.past)})
+    return named_function("past", symbols, {"past": stacked(row, names.past)})
 
 
 def plan_function(model: Model) -> ca.Function:
@@ -117,15 +114,14 @@ def plan_function(model: Model) -> ca.Function:
     """
     names, every = model.layout, kept_names(model)
     sizes_ = {"planned": len(names.planned), "before": len(names.planned), "newest": len(every)}
-    sizes_ |= {"parameters": len(names.parameters), "first": 1}
-    symbols = {key: MX.sym(key, size) for key, size in sizes_.items()}
+    symbols = symbols_of(sizes_ | {"parameters": len(names.parameters), "first": 1})
     orders, before = by_name(names.planned, symbols["planned"]), by_name(names.planned, symbols["before"])
     newest, numbers = by_name(every, symbols["newest"]), by_name(names.parameters, symbols["parameters"])
     for name in angles_of(names.planned):
         limits = model.limits.get(name, (-np.inf, np.inf))
         last = ca.if_else(symbols["first"], newest[name], before[name])
         orders[name], _ = same_turn(name, orders[name], last, limits, stops_of(model, name, numbers), movable=False)
-    return _function("plan", symbols, {"orders": stacked(orders, names.planned)})
+    return named_function("plan", symbols, {"orders": stacked(orders, names.planned)})
 
 
 def begin_function(model: Model, filters: Bank) -> ca.Function:
@@ -145,7 +141,7 @@ def begin_function(model: Model, filters: Bank) -> ca.Function:
         "states": states,
         "estimates": ca.vertcat(stacked(estimates, MEASURED), MX(np.zeros(LOW - len(MEASURED)))),
     }
-    return _function("begin", {"row": symbol}, results)
+    return named_function("begin", {"row": symbol}, results)
 
 
 def observer_step(model: Model, filters: Bank, name: str) -> ca.Function:
@@ -156,9 +152,8 @@ def observer_step(model: Model, filters: Bank, name: str) -> ca.Function:
     """
     every, count, inner = kept_names(model), filters.num_filters, filters.model
     size, places = sum(sizes(inner)), np.cumsum([0, *sizes(inner)])
-    symbols = {"states": MX.sym("states", size * count)}
-    symbols |= {key: MX.sym(key, len(every)) for key in ("last", "row", "moved")}
-    symbols |= {"parameters": MX.sym("parameters", len(model.layout.parameters)), "dt": MX.sym("dt")}
+    rows = dict.fromkeys(("last", "row", "moved"), len(every))
+    symbols = symbols_of({"states": size * count, **rows, "parameters": len(model.layout.parameters), "dt": 1})
     last, row = (by_name(every, symbols[key]) for key in ("last", "row"))
     turns = ca.DM(size, len(every))  # which orders and positions in a state move with the angles of the past
     for first, group in ((places[2], tuple(inner.memory)), (places[4], inner.commands)):
@@ -178,9 +173,9 @@ def observer_step(model: Model, filters: Bank, name: str) -> ca.Function:
     ]
     if name == "observe":
         after, estimates, *_ = observer_function(inner, count)(*given)
-        return _function(name, symbols, {"after": ca.vec(after), "estimates": estimates})
+        return named_function(name, symbols, {"after": ca.vec(after), "estimates": estimates})
     after, *_ = filters_function(inner, count)(*given)
-    return _function(name, symbols, {"after": ca.vec(after)})
+    return named_function(name, symbols, {"after": ca.vec(after)})
 
 
 def nearest_turn(angle: MX, goal: Any) -> MX:
@@ -245,7 +240,3 @@ def same_turn(
 
 def _between(value: MX, low: Any, high: Any) -> MX:
     return ca.logic_and(value >= low, value <= high)
-
-
-def _function(name: str, inputs: Mapping[str, MX], outputs: Mapping[str, MX]) -> ca.Function:
-    return ca.Function(name, [*inputs.values()], [*map(ca.densify, outputs.values())], [*inputs], [*outputs])
