@@ -280,7 +280,7 @@ def filters_function(model: Dynamics, num_filters: int) -> ca.Function:
     inputs = [ca.MX.sym(name, one.size1_in(name), each.get(name, 1)) for name in one.name_in()]
     repeated = [part if part.shape[1] == count else ca.MX(0, count) if part.is_empty() else ca.repmat(part, 1, count)
                 for part in inputs]  # fmt: skip
-    return ca.Function("filters", inputs, one.map(count)(*repeated))
+    return ca.Function("filters", inputs, one.map(count).call(repeated))
 
 
 @lru_cache(maxsize=16)

@@ -71,7 +71,7 @@ def _growth(bands: Bands, path: MX, r: MX, step: float, nearest_: MX) -> MX:
     )
     seen = ca.fmin(ca.fmax(traits, ca.DM(bands.low)), ca.DM(bands.high))
     harder = ca.dot((seen - ca.DM(bands.middle)) / ca.DM(bands.deviation), ca.DM(bands.slopes))
-    return ca.exp(harder) * ca.fmax(away / bands.far, 1)
+    return MX(ca.exp(harder) * ca.fmax(away / bands.far, 1))
 
 
 def is_promised(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:

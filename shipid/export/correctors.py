@@ -141,7 +141,7 @@ def greatest_left(threshold: Array) -> Array:
     low = threshold.astype(np.float32)
     low = np.where(low > threshold, np.nextafter(low, np.float32(-np.inf)), low)
     middle = (low.astype(float) + np.nextafter(low, np.float32(np.inf)).astype(float)) / 2
-    return np.where(middle.astype(np.float32) == low, middle, np.nextafter(middle, -np.inf))
+    return np.asarray(np.where(middle.astype(np.float32) == low, middle, np.nextafter(middle, -np.inf)))
 
 
 def recurrent(known: Known, corrector: RecurrentCorrector) -> MX:

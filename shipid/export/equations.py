@@ -99,18 +99,18 @@ class Equations:
     def begun(self, commands: MX, parameters: MX) -> MX:
         """Memories that have reached their orders, as far as their stops let them."""
         places = [self.model.commands.index(name) for name in self.model.memory]
-        return self.advance(commands[places], commands, parameters, 0) if places else MX(0, 1)
+        return MX(self.advance(commands[places], commands, parameters, 0)) if places else MX(0, 1)
 
     def aboard(self, state: MX) -> MX:
         """State with velocities along the ship's axes from one with horizontal u, v, r, as a log has them."""
         if set(self.model.state).isdisjoint(LEANING):
             return state
         now = by_name(self.states, state)
-        return ca.vertcat(*(now | aboard(now, ca)).values())
+        return MX(ca.vertcat(*(now | aboard(now, ca)).values()))
 
     def horizontal(self, carries: MX) -> MX:
         """u, v, r in the horizontal plane of one carry, or of a column for each step."""
-        return ca.vertcat(*horizontal(by_name((*self.states, *self.model.memory), carries), ca).values())
+        return MX(ca.vertcat(*horizontal(by_name((*self.states, *self.model.memory), carries), ca).values()))
 
 
 def rolled_out(step: ca.Function, carry: MX, inputs: Sequence[MX], parameters: MX, count: int) -> MX:

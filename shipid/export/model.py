@@ -145,7 +145,7 @@ class Model:
         past = {"down": instants.past.get("z", np.zeros((names.num_past, count))), **instants.past}
         orders = {name: planned.get(name, [columns.get(name)])[0] for name in names.reached}
         hidden = instants.hidden or orders
-        groups = {
+        groups: dict[str, list[Any]] = {
             "now": [columns.get(name, zero) for name in names.now],
             "reached": [hidden[name] for name in names.reached],
             "past": [

@@ -136,7 +136,7 @@ def begin_function(model: Model, filters: Bank) -> ca.Function:
     row = by_name(kept_names(model), symbol)
     given = ca.vertcat(stacked(row, MEASURED), stacked(row, commands))
     states = ca.DM(still) + ca.mtimes(ca.sparsify(ca.DM(np.stack(slopes, axis=1))), given)
-    estimates = {name: row[name] for name in measured}
+    estimates: dict[str, MX] = {name: row[name] for name in measured}
     results = {
         "states": states,
         "estimates": ca.vertcat(stacked(estimates, MEASURED), MX(np.zeros(LOW - len(MEASURED)))),
@@ -180,7 +180,7 @@ def observer_step(model: Model, filters: Bank, name: str) -> ca.Function:
 
 def nearest_turn(angle: MX, goal: Any) -> MX:
     """Of all angles that differ by whole turns, the one nearest to a goal."""
-    return angle + TURN * ca.floor(0.5 + (goal - angle) / TURN)
+    return MX(angle + TURN * ca.floor(0.5 + (goal - angle) / TURN))
 
 
 def first_turn(angle: MX, limits: tuple[float, float]) -> MX:
@@ -239,4 +239,4 @@ def same_turn(
 
 
 def _between(value: MX, low: Any, high: Any) -> MX:
-    return ca.logic_and(value >= low, value <= high)
+    return MX(ca.logic_and(value >= low, value <= high))
