@@ -581,7 +581,8 @@ def observed_start(
     path : as in `cut_windows`: with "velocity" the true path starts where the ship is, whatever its filtered position.
     """
     model, zero = filters.model, np.zeros(len(columns["u"]))
-    begun = {**columns, **{name: columns[f"observer.{name}"] for name in MEASURED}}
+    begun: dict[str, Array] = {**columns}
+    begun |= {name: columns[f"observer.{name}"] for name in MEASURED}
     if not moves_start(filters.settings, path):
         begun |= {name: columns.get(name, zero) for name in ("north", "east")}
     north, east, psi = columns["observer.current_north"], columns["observer.current_east"], begun["psi"]

@@ -274,7 +274,7 @@ def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
     np.testing.assert_allclose(found, predictor.predict(Instants(columns, estimates=estimates)), rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("step", [0.4, 5.0])
+@pytest.mark.parametrize("step", [0.4, pytest.param(5.0, marks=pytest.mark.slow)])
 def test_after_a_pause_an_observer_begins_anew_aboard_and_in_python(step, tmp_path):
     """Row by row over drawn logs with pauses, those after which the past alone begins anew aboard among them."""
     vessel = variety()["actuators"]
@@ -305,7 +305,7 @@ def test_after_a_pause_an_observer_begins_anew_aboard_and_in_python(step, tmp_pa
     assert 5 < anew < 30
 
 
-@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("single", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_an_observer_begins_anew_after_rows_as_far_apart_as_python_refuses(single, tmp_path):
     """A clock in micro- or nanoseconds: else a row would take minutes, or would never end."""
     vessel = variety()["gunnerus-28.9"]
