@@ -273,6 +273,16 @@ def filter_function(model: Dynamics) -> ca.Function:
     )
 
 
+def filters_function(model: Dynamics, num_filters: int) -> ca.Function:
+    """`filter_function` for the states (n, K) and numbers (., K) of K filters; their other inputs are the same."""
+    one, count = filter_function(model), num_filters
+    each = {"state": count, "numbers": count}
+    inputs = [ca.MX.sym(name, one.size1_in(name), each.get(name, 1)) for name in one.name_in()]
+    repeated = [part if part.shape[1] == count else ca.MX(0, count) if part.is_empty() else ca.repmat(part, 1, count)
+                for part in inputs]  # fmt: skip
+    return ca.Function("filters", inputs, one.map(count).call(repeated))
+
+
 @lru_cache(maxsize=16)
 def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
     """The whole observer's step as a pure function of CasADi, for K filters: `observe` and exports in C do the same.
@@ -286,8 +296,7 @@ def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
     inputs = [ca.MX.sym(one.name_in(i), one.size1_in(i)) for i in range(one.n_in())]
     inputs[0] = ca.MX.sym("states", one.size1_in(0), num_filters)
     inputs[6] = ca.MX.sym("numbers", one.size1_in(6), num_filters)
-    given = [part if i in (0, 6) else ca.repmat(part, 1, num_filters) for i, part in enumerate(inputs)]
-    after, estimate, innovation, spread = one.map(num_filters)(*given)
+    after, estimate, innovation, spread = filters_function(model, num_filters)(*inputs)
     sound = ca.sum1(ca.fabs(after) < DIVERGED) > after.size1() - 0.5  # false for what is not a number, too
     after = _finite(after)
     likelihood = after[-1, :] * sound - DIVERGED * (1 - sound)
@@ -536,11 +545,6 @@ def tau_extra(filters: Bank, columns: Mapping[str, Array], horizon: int, step: f
     return np.asarray(faded[:, None, None] * now)
 
 
-def start(columns: Mapping[str, Array]) -> dict[str, Array]:
-    """Filtered state in place of the measured one: the columns given (S,), with north ... r replaced."""
-    return {**columns, **{name: columns[f"observer.{name}"] for name in MEASURED}}
-
-
 @dataclass(frozen=True, eq=False)
 class ObservedStart:
     """What the physics starts from with an observer, for S instants and T steps.
@@ -577,7 +581,8 @@ def observed_start(
     path : as in `cut_windows`: with "velocity" the true path starts where the ship is, whatever its filtered position.
     """
     model, zero = filters.model, np.zeros(len(columns["u"]))
-    begun = start(columns)
+    begun: dict[str, Array] = {**columns}
+    begun |= {name: columns[f"observer.{name}"] for name in MEASURED}
     if not moves_start(filters.settings, path):
         begun |= {name: columns.get(name, zero) for name in ("north", "east")}
     north, east, psi = columns["observer.current_north"], columns["observer.current_east"], begun["psi"]
@@ -653,7 +658,8 @@ def tune_observer(
         place = int(np.argmin(losses))
         return losses[place], options[place]
 
-    levels = {"waves": _each(first.waves), "current": (0.0,), "change": _each(first.change)}
+    waves, change = ([(one,) for one in several] if len(several) > 1 else [] for several in (first.waves, first.change))
+    levels: dict[str, Sequence[Any]] = {"waves": waves, "current": (0.0,), "change": change}
     samples = (1 + sum(map(len, levels.values()))) * bank(vessel, first).num_filters
     least, best = faded(first, "as given")
     for name, values in levels.items():
@@ -663,8 +669,3 @@ def tune_observer(
                 error, one = faded(begun.model_copy(update={name: value}), f"{name} {value}")
                 least, best = (error, one) if error < least else (least, best)
     return best, tried
-
-
-def _each(levels: tuple[float, ...]) -> list[tuple[float, ...]]:
-    """Every level alone, where there are several."""
-    return [(level,) for level in levels] if len(levels) > 1 else []

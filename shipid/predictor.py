@@ -281,6 +281,7 @@ class Predictor:
         DataError : the method gives what could not be read back, such as an array with NaN.
         """
         target = path_of("file", file, ResultError)
+        corrector, arrays = self._corrector_parts()
         header = {
             "format": FORMAT,
             "vessel": None if self.vessel is None else {"document": self.vessel.document, "file": self.vessel.file},
@@ -295,23 +296,25 @@ class Predictor:
             "run_up": self.run_up,
             "provenance": plain(self.provenance),
             "method": self.method,
-            "corrector": self._corrector_header(),
+            "corrector": corrector,
             "bands": None if self.bands is None else self.bands.header(),
         }
         if target.is_dir():
             raise ResultError("is a folder: name a file to write", file=target)
-        arrays = {"header": np.array(json.dumps(header, default=str)), **self._corrector_arrays()}
+        arrays["header"] = np.array(json.dumps(header, default=str))
         if self.bands is not None:
             arrays |= {BANDS + name: values for name, values in self.bands.arrays().items()}
         write_arrays(target, arrays)  # not compressed: weights do not shrink
         return target
 
-    def _corrector_header(self) -> dict[str, Any]:
-        """What the method keeps beside its arrays; DataError for what would not be read back as it is."""
-        home = type(self.corrector)
+    def _corrector_parts(self) -> tuple[dict[str, Any], dict[str, Array]]:
+        """Header and arrays of the method; DataError for what would not be read back as it is."""
+        home, what = type(self.corrector), f"of the method {self.method!r}"
         with placed(f"{home.__name__}.header", home):
             header = plain(self.corrector.header())
-        wrong = f"the header of the method {self.method!r} must be a table of texts, numbers and lists of them"
+        with placed(f"{home.__name__}.arrays", home):
+            given = self.corrector.arrays()
+        wrong = f"the header {what} must be a table of texts, numbers and lists of them"
         if not isinstance(header, dict):
             raise DataError(f"{wrong}, not {type(header).__name__}")
         try:
@@ -319,8 +322,18 @@ class Predictor:
         except (TypeError, ValueError) as error:
             raise DataError(f"{wrong} ({error})") from None
         if not _named(header):
-            raise DataError(f"the header of the method {self.method!r}: {' and '.join(NAMES)} must be lists of texts")
-        return header
+            raise DataError(f"the header {what}: {' and '.join(NAMES)} must be lists of texts")
+        if not isinstance(given, Mapping):
+            raise DataError(f"the arrays {what} must be a table, not {type(given).__name__}")
+        try:
+            arrays = {str(name): np.asarray(values) for name, values in given.items()}
+        except (TypeError, ValueError) as error:
+            raise DataError(f"arrays {what}: {error}") from None
+        taken = next((name for name in arrays if name == "header" or name.startswith(BANDS)), None)
+        fault = _fault_of(arrays) if taken is None else f"{taken!r} is a name that is taken: use another"
+        if fault:
+            raise DataError(f"arrays {what}: {fault}")
+        return header, arrays
 
     def check_restored(self, instants: Instants, paths: Array, kind: type[Any]) -> None:
         """Raise ShipidError where the method of a user, read back from what `save` writes, predicts something else.
@@ -330,10 +343,9 @@ class Predictor:
         home = type(self.corrector)
         if home.__module__.startswith("shipid."):  # the tests of shipid say so
             return
-        header = json.loads(json.dumps(self._corrector_header(), default=str))
-        arrays = self._corrector_arrays()
+        header, arrays = self._corrector_parts()
         with placed(f"{kind.__name__}.from_arrays", kind):
-            corrector = kind.from_arrays(header, arrays)
+            corrector = kind.from_arrays(json.loads(json.dumps(header)), arrays)
         if fault := fault_of_corrector(corrector):
             raise ShipidError(f"`from_arrays` of {named(kind)} must return a corrector: {fault}")
         one, first = instants.select(np.arange(1)), paths[:, :1]
@@ -344,23 +356,6 @@ class Predictor:
                 f"the method {self.method!r}, saved and read back, predicts places {away:.2g} m away: `header`, "
                 "`arrays` and `from_arrays` must keep all that `predict` uses, and `predict` may draw nothing at random"
             )
-
-    def _corrector_arrays(self) -> dict[str, Array]:
-        """The arrays of the method; DataError for what would not be read back."""
-        home = type(self.corrector)
-        with placed(f"{home.__name__}.arrays", home):
-            given = self.corrector.arrays()
-        if not isinstance(given, Mapping):
-            raise DataError(f"the arrays of the method {self.method!r} must be a table, not {type(given).__name__}")
-        try:
-            arrays = {str(name): np.asarray(values) for name, values in given.items()}
-        except (TypeError, ValueError) as error:
-            raise DataError(f"arrays of the method {self.method!r}: {error}") from None
-        taken = next((name for name in arrays if name == "header" or name.startswith(BANDS)), None)
-        fault = _fault_of(arrays) if taken is None else f"{taken!r} is a name that is taken: use another"
-        if fault:
-            raise DataError(f"arrays of the method {self.method!r}: {fault}")
-        return arrays
 
     def export(
         self, to: str, out: str | os.PathLike[str], *, single: bool = False, name: str | None = None
@@ -397,10 +392,9 @@ class Predictor:
             raise ResultError(f"damaged: {fault}: run the study again", file=file)
         if not _named([header.get("corrector"), header.get("bands")]):
             raise ResultError("damaged: run the study again", file=file)
-        band = {name.removeprefix(BANDS): arrays.pop(name) for name in [*arrays] if name.startswith(BANDS)}
         try:
-            known = _Header.model_validate(header)
-            vessel, bands = header["vessel"], header.get("bands")
+            known, vessel = _Header.model_validate(header), header["vessel"]
+            bands = _read_bands(header.get("bands"), arrays)
             loaded = cls(
                 physics=Physics(
                     None if vessel is None else check_vessel(vessel["document"], vessel["file"]),
@@ -416,7 +410,7 @@ class Predictor:
                 provenance=known.provenance,
                 commands=known.commands,
                 causal=tuple(known.causal),
-                bands=None if bands is None else Bands.from_arrays(bands, band),
+                bands=bands,
                 run_up=known.run_up,
             )
             if not 0 <= loaded.past <= MOST_STEPS:
@@ -600,9 +594,13 @@ def read_bands(file: str | os.PathLike[str]) -> tuple[Bands | None, str]:
     """Read the bands of a saved predictor alone, and why it has none if it has none; a damaged file as it comes."""
     arrays = read_arrays(file, "header", BANDS)
     header = json.loads(str(arrays.pop("header")))
-    band = {name.removeprefix(BANDS): values for name, values in arrays.items()}
-    known = header["bands"]
-    return None if known is None else Bands.from_arrays(known, band), _no_band(header["provenance"])
+    return _read_bands(header["bands"], arrays), _no_band(header["provenance"])
+
+
+def _read_bands(header: Any, arrays: dict[str, Array]) -> Bands | None:
+    """Bands from their header, which is None where there are none, and their arrays, which are taken out."""
+    taken = {name.removeprefix(BANDS): arrays.pop(name) for name in [*arrays] if name.startswith(BANDS)}
+    return None if header is None else Bands.from_arrays(header, taken)
 
 
 def checked_bands(bands: Bands | None, reason: str, level: float, kind: str | None = None) -> Bands:

@@ -10,7 +10,7 @@ import pytest
 from shipid.engine.gradient import rollout_gradient, squared_distance
 from shipid.engine.native import compiler
 from shipid.engine.rollout import Trajectories, rollout
-from shipid.export.blocks import Precision
+from shipid.export.c import Precision
 from shipid.export.c_vessel import vessel_files
 from shipid.physics import TERMS
 from shipid.vessel.load import Vessel

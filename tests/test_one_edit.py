@@ -21,7 +21,7 @@ from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Instants, cut_windows
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError, ShipidError
-from shipid.export.correctors import taken
+from shipid.export.correctors import inputs_of
 from shipid.export.model import model
 from shipid.export.write import export_predictor
 from shipid.hybrid.features import choose_features, group_of
@@ -296,7 +296,7 @@ def test_physics_feels_the_depth_and_methods_see_it(depth: Vessel, tmp_path: Pat
     assert np.abs(stepped - free(physics, deep)).max() > 1e-3
     assert group_of("depth") == "wind"
     predictor = fit(OneStep(trials=2, units=8), replace(physics, vessel=load_vessel("gunnerus-28.9")), windows)
-    assert "depth" in taken(predictor.corrector).environment
+    assert "depth" in inputs_of(predictor.corrector).environment
     assert predictor.limits["depth"] == (log["depth"].min(), log["depth"].max())
     few = instants.select(slice(4))
     expected, given = predictor.predict(few), model(predictor).inputs(few)

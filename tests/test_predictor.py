@@ -148,13 +148,6 @@ def test_outside_flags_each_column(predictor: Predictor) -> None:
         assert predictor.outside(one).tolist() == [False, True]
 
 
-def test_what_was_trained_on_is_inside(tiny_run: Path, predictor: Predictor) -> None:
-    frame = read_dataset(tiny_run / DATASET).frame
-    trained = frame[frame["run"].isin(predictor.provenance["runs"]) & (frame["t"] <= 15.0)]
-    assert len(trained) == 6 * 16
-    assert not predictor.outside({str(name): trained[name].to_numpy() for name in trained if name != "run"}).any()
-
-
 # Files that are no predictors.
 
 

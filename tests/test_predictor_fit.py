@@ -77,12 +77,6 @@ def test_it_says_what_it_was_fitted_with(predictor: Predictor) -> None:
     assert predictor.provenance == {"runs": [f"M{number}" for number in range(6)], "seed": 0}
 
 
-def test_it_can_be_saved(predictor: Predictor, tmp_path: Path) -> None:
-    again = Predictor.load(predictor.save(tmp_path / "predictor.npz"))
-    np.testing.assert_array_equal(again.predict(WINDOWS.instants()), predictor.predict(WINDOWS.instants()))
-    assert again.limits == predictor.limits
-
-
 @pytest.mark.parametrize(
     "method", [Forest(trials=1, trees=5), PathTrained(trials=1, epochs=2, units=4, layers=1)], ids=["forest", "trained"]
 )
@@ -193,18 +187,16 @@ LOOKS: dict[str, Callable[[np.ndarray], Any]] = {
 }
 
 
-@pytest.mark.parametrize("look", LOOKS.values(), ids=LOOKS)
-def test_columns_of_any_type_give_the_same_prediction(predictor: Predictor, look: Callable[[np.ndarray], Any]) -> None:
-    instants = WINDOWS.instants()
-    looking = Instants({name: look(values) for name, values in instants.columns.items()})
-    for known in (predictor, fit(SMALL, Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0), WINDOWS)):
-        banded = known.predict(instants, level=0.5)
+def test_columns_of_any_type_give_the_same_prediction() -> None:
+    instants, known = WINDOWS.instants(), fit(SMALL, Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0), WINDOWS)
+    banded, table = known.predict(instants, level=0.5), pd.DataFrame(instants.columns).assign(run=WINDOWS.run)
+    for look in LOOKS.values():
+        looking = Instants({name: look(values) for name, values in instants.columns.items()})
         again = known.predict(looking, level=0.5)
         np.testing.assert_array_equal(again.paths, banded.paths)
         np.testing.assert_array_equal(again.region.along, banded.region.along)
-        np.testing.assert_array_equal(known.outside(looking.columns), known.outside(instants.columns))
-        table: Any = pd.DataFrame(instants.columns).assign(run=WINDOWS.run)
-        np.testing.assert_array_equal(known.predict(Instants(table)), banded.paths)
+        np.testing.assert_array_equal(again.outside, banded.outside)
+    np.testing.assert_array_equal(known.predict(Instants(table)), banded.paths)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -236,7 +228,7 @@ def test_an_input_that_is_no_number_gives_no_path(method: Method, vessel: Vessel
         np.testing.assert_allclose(paths[:, rest], made.predict(instants)[:, rest], rtol=1e-12)
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("forest", 203), ("forest", 211), ("path-drawn", 204), ("path-drawn", 209)])
+@pytest.mark.parametrize(("kind", "seed"), [("forest", 203), ("path-drawn", 204)])
 def test_a_past_that_is_no_number_gives_no_path(kind: str, seed: int) -> None:
     """Before, the error of the physics over the last seconds was 0 then, as if it had predicted them exactly."""
     strange = drawn(kind, seed, count=5)
@@ -309,19 +301,6 @@ def test_a_band_takes_paths_and_instants_alone(predictor: Predictor) -> None:
     wrong = instants.columns
     with pytest.raises(DataError, match="instants must be an Instants, such as"):
         known.band(paths, wrong, 0.5)
-
-
-def test_a_band_takes_columns_as_a_prediction_does(predictor: Predictor) -> None:
-    """Before, a list ended in a TypeError, and a column that the band needs and the instants lack in a KeyError."""
-    instants, rng = WINDOWS.instants(), np.random.default_rng(3)
-    bands = replace(bands_of(rng, predictor.physics, instants, tuple(predictor.limits), 1.0), runs=60)
-    known = replace(predictor, bands=bands)
-    paths = known.predict(instants)
-    whole = known.band(paths, instants, 0.5)
-    for look in (list, np.ma.masked_array):
-        looking = Instants({name: look(values) for name, values in instants.columns.items()})
-        np.testing.assert_array_equal(known.band(paths, looking, 0.5).along, whole.along)
-    assert "port.n" in bands.names
     lacking = replace(instants, columns={name: values for name, values in instants.columns.items() if name != "port.n"})
     with pytest.raises(DataError, match=r"port\.n: the band was calibrated with this column, and the instants lack it"):
         known.band(paths, lacking, 0.5)
@@ -503,7 +482,7 @@ def test_what_could_not_be_read_back_is_not_saved(header: Any, arrays: Any, mess
     assert not [*tmp_path.iterdir()]
 
 
-@pytest.mark.parametrize("level", ["0.9", [0.5, 0.9], np.array([0.5]), 90, np.nan])
+@pytest.mark.parametrize("level", ["0.9", np.array([0.5]), np.nan])
 def test_what_is_no_level_is_refused(predictor: Predictor, level: Any) -> None:
     with pytest.raises(DataError, match="is no level of a band"):
         predictor.predict(WINDOWS.instants(), level=level)
@@ -528,15 +507,6 @@ def test_a_wrong_argument_is_one_line(wrong: dict[str, Any], message: str) -> No
     """Before, commands that were neither held nor known were one in the fit and the other in the prediction."""
     with pytest.raises(DataError, match=message):
         fit(**{"method": SMALL, "physics": NONE, "windows": WINDOWS, **wrong})
-
-
-def test_numbers_of_numpy_are_saved(predictor: Predictor, tmp_path: Path) -> None:
-    physics = Physics(None, np.int64(HORIZON), np.float32(1.0))  # type: ignore[arg-type]
-    again = fit(SMALL, physics, WINDOWS, seed=np.int64(0), validation_runs=None)  # type: ignore[arg-type]
-    loaded = Predictor.load(again.save(tmp_path / "numpy.npz"))
-    np.testing.assert_array_equal(loaded.predict(WINDOWS.instants()), predictor.predict(WINDOWS.instants()))
-    one = fit(SMALL, NONE, WINDOWS, validation_runs="M1").predict(WINDOWS.instants())
-    np.testing.assert_array_equal(one, fit(SMALL, NONE, WINDOWS, validation_runs=["M1"]).predict(WINDOWS.instants()))
 
 
 def test_planned_commands_are_all_there_and_of_the_horizon() -> None:

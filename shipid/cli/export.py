@@ -24,13 +24,13 @@ def export(
     """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""
     from shipid.document import bundled
     from shipid.errors import DocumentError, choices
-    from shipid.export.casadi import files_of
+    from shipid.export.casadi import listing_of
     from shipid.export.write import EXAMPLE, export_predictor, export_vessel
     from shipid.study.store import read_predictor
     from shipid.vessel.load import load_vessel
 
     if to == "casadi" and out.name:
-        for file in files_of(out):
+        for file in (out, listing_of(out)):
             check_output(file, [Path(what)], "--out")
     if what.endswith(".npz") or (what not in bundled("models") and Path(what).is_dir()):
         if integrator is not None:

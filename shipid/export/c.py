@@ -1,4 +1,4 @@
-"""Text of C99: names, strings, comments and tables that every exported source is made of."""
+"""Text of C99: names, strings, comments and tables of a wrapper, and the C that CasADi writes of its functions."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from string import Template
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from shipid.errors import visible
-from shipid.export.blocks import Precision
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
@@ -35,8 +36,8 @@ WORDS = frozenset(
     alignas alignof concept consteval constexpr constinit decltype noexcept nullptr requires static_assert thread_local
     typeof typeof_unqual const_cast dynamic_cast reinterpret_cast static_cast co_await co_return co_yield
     stdin stdout stderr errno assert random select
-    begin_filters begin_within first_turn follow free_memory get_memory go_filters guid identifier is_ours kind_of kinds
-    nearest_turn no no_band predict_from radius_of refuse same_turn say self set start_values sum_of t va_list
+    above_zero are_finite begin_within choose evaluate follow free_memory get_memory guid identifier is_ours kinds
+    past_rows path_at planned_turns predict_from refuse say self set start_values sum_of t va_list
     """.split()
 )
 """Keywords of C99, C23 and C++20, names of C's library and headers and of the sources themselves.
@@ -52,10 +53,91 @@ class Files:
     texts: dict[str, str]
 
 
+@dataclass(frozen=True)
+class Precision:
+    """How C writes numbers: in `double` or in `single` precision."""
+
+    single: bool = False
+
+    @property
+    def real(self) -> str:
+        """Type of a number in C."""
+        return "float" if self.single else "double"
+
+    def number(self, value: float) -> str:
+        """A literal that reads back as the value, rounded to the precision."""
+        if self.single:
+            with np.errstate(over="ignore", under="ignore"):
+                value = float(str(np.float32(value)))
+        if np.isinf(value):
+            return "INFINITY" if value > 0 else "(-INFINITY)"
+        return repr(float(value)) + ("f" if self.single else "")
+
+    def table(self, values: Array) -> str:
+        """Literals of an array in a row, without needless zeros."""
+        return ",".join(self.number(value).removesuffix(".0") for value in np.asarray(values, dtype=float).ravel())
+
+
+@dataclass(frozen=True)
+class Generated:
+    """C that CasADi writes of some functions, each called `NAME_casadi_KEY`, and what a wrapper must know of it.
+
+    text : of the file. declared : lines of C that declare the functions, on numbers of the type `real`.
+    num_arg, num_res, num_iw, num_w : of the arrays that every call needs.
+    """
+
+    text: str
+    declared: str
+    num_arg: int
+    num_res: int
+    num_iw: int
+    num_w: int
+
+    @property
+    def arrays(self) -> str:
+        """C that declares the arrays of a call but for its numbers."""
+        return (
+            f"const real *arg[{self.num_arg}] = {{0}};\n"
+            f"    real *res[{self.num_res}] = {{0}};\n    long long iw[{self.num_iw}] = {{0}};"
+        )
+
+
+def generated(functions: Mapping[str, ca.Function], name: str, precision: Precision) -> Generated:
+    """CasADi's C of functions, key -> function; what is in it but its public functions has a name of its own."""
+    generator = ca.CodeGenerator(
+        f"{name}_casadi", {"casadi_real": precision.real, "with_header": False, "avoid_stack": True}
+    )
+    called = {key: f"{name}_casadi_{key}" for key in functions}
+    for key, function in functions.items():
+        generator.add(renamed(function, called[key]))
+    declared = "\n".join(
+        f"int {one}(const real **arg, real **res, long long *iw, real *w, int mem);" for one in called.values()
+    )
+    text = generator.dump()
+    keys = ("arg", "res", "iw", "w")
+    most = (max(1, *(int(size) for size in re.findall(rf"\*sz_{key} = (\d+);", text))) for key in keys)
+    return Generated(_AS_C.format(text), _AS_C.format(declared), *most)
+
+
+_AS_C = '#ifdef __cplusplus\nextern "C" {{\n#endif\n{}\n#ifdef __cplusplus\n}}\n#endif\n'
+
+
+def renamed(function: ca.Function, name: str) -> ca.Function:
+    """The same function under another name."""
+    inputs, options = function.mx_in(), {"is_diff_out": function.is_diff_out()}
+    results = function.call(inputs, True, False)
+    return ca.Function(name, inputs, results, function.name_in(), function.name_out(), options)
+
+
+def filled(text: str, name: str, values: Mapping[str, str]) -> str:
+    """A text in which @ is the name that begins every public name, and $KEY a value."""
+    return Template(text.replace("@", name)).substitute(values)
+
+
 def c_name(text: str) -> str:
     """A name for C from any text: letters, digits and _, with a letter first."""
     name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower() or "model"
-    taken = name in WORDS or name.endswith("_t") or re.fullmatch(r"f\d+(_.*)?", name)  # types of POSIX; functions
+    taken = name in WORDS or name.endswith("_t") or name.startswith("casadi")  # types of POSIX; names of CasADi
     return f"m_{name}" if taken or name[0].isdigit() else name
 
 
@@ -74,10 +156,7 @@ def comment(lines: Sequence[str]) -> str:
     return "\n".join(["/*", *(f" * {line}".rstrip() for line in kept), " */"])
 
 
-def source_head(name: str, precision: Precision) -> str:
-    """The first lines of a source: what it includes, its type of numbers, and M, which names the functions of libm."""
-    suffix = "name ## f" if precision.single else "name"
-    return f"""#include "{name}.h"
+SOURCE_HEAD = """#include "@.h"
 
 #include <math.h>
 #include <string.h>
@@ -86,42 +165,46 @@ def source_head(name: str, precision: Precision) -> str:
 #error "compile without -ffast-math, -Ofast and /fp:fast: they take out the checks of values that are not finite"
 #endif
 
-typedef {name}_real real;
-#define M(name) {suffix}
+typedef @_real real;
+"""
+"""First lines of a source; @ stands for the name that begins every public name."""
+
+ARE_FINITE = """static int are_finite(const real *values, int count)
+{
+    int i;
+    for (i = 0; i < count; ++i) if (!isfinite(values[i])) return 0;
+    return 1;
+}
 """
 
 
-def array_of(kind: str, name: str, size: int, body: str) -> str:
+def array_of(kind: str, name: str, values: Sequence[Any] | Array, body: str | None = None) -> str:
     """A constant array in C; one of a single 0 where it has no entry, as C has no empty arrays."""
-    return f"const {kind} {name}[{max(1, size)}] = {{{body or '0'}}};"
+    text = ", ".join(map(str, values)) if body is None else body
+    return f"const {kind} {name}[{max(1, np.size(values))}] = {{{text or '0'}}};"
 
 
-def tables_of_names(prefix: str, group: str, names: Sequence[str], unit: Mapping[str, str]) -> tuple[str, str]:
-    """Declarations and definitions of the names and units of a group."""
-    count = max(1, len(names))
-    declared, defined = [], []
-    for what, texts in (("names", list(names)), ("units", [unit[name] for name in names])):
-        declared.append(f"extern const char *const {prefix}_{group}_{what}[{count}];")
-        defined.append(f"const char *const {prefix}_{group}_{what}[{count}] = {{\n    {strings(texts)}}};")
+def tables_of(
+    prefix: str, groups: Mapping[str, Mapping[str, str]], numbers: Mapping[str, Array], precision: Precision
+) -> tuple[str, str]:
+    """Declarations and definitions of tables: names and units of groups, entry -> unit, and arrays of numbers."""
+    defined = []
+    for group, units in groups.items():
+        for what, texts in (("names", list(units)), ("units", list(units.values()))):
+            defined.append(array_of("char *const", f"{prefix}_{group}_{what}", texts, f"\n    {strings(texts)}"))
+    for key, values in numbers.items():
+        defined.append(array_of(f"{prefix}_real", f"{prefix}_{key}", values, precision.table(values)))
+    declared = [f"extern {one.partition(' = ')[0]};" for one in defined]
     return "\n".join(declared), "\n".join(defined)
 
 
-def refusals(parameters: Sequence[str], vessel: Vessel | None, result: str) -> list[str]:
-    """Lines of C that return a result where a parameter that must be above 0 is not; none where there is none."""
+def places_above_zero(parameters: Sequence[str], vessel: Vessel | None) -> list[int]:
+    """Places of the parameters that must be above 0."""
     above_zero = frozenset() if vessel is None else vessel.above_zero
-    places = [str(place) for place, name in enumerate(parameters) if name in above_zero]
-    if not places:
-        return []
-    return [
-        f"static const int above_zero[{len(places)}] = {{{', '.join(places)}}};",
-        f"for (i = 0; i < {len(places)}; ++i) if (!(parameters[above_zero[i]] > 0)) return {result};",
-    ]
+    return [place for place, name in enumerate(parameters) if name in above_zero]
 
 
 def provenance_lines(what: Mapping[str, Any]) -> list[str]:
     """Plain lines of what is known of an origin, for a comment."""
-    lines = []
-    for key, value in what.items():
-        text = json.dumps(value, default=str, ensure_ascii=True)
-        lines.append(f"{key}: {text if len(text) <= 400 else text[:400] + ' ...'}")
-    return lines
+    texts = {key: json.dumps(value, default=str, ensure_ascii=True) for key, value in what.items()}
+    return [f"{key}: {text if len(text) <= 400 else text[:400] + ' ...'}" for key, text in texts.items()]

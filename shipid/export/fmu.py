@@ -10,6 +10,7 @@ import re
 import sys
 import uuid
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from xml.sax import saxutils
@@ -20,15 +21,15 @@ from shipid.engine.integrate import Method
 from shipid.engine.libraries import run_compiler
 from shipid.engine.native import compiler
 from shipid.errors import ShipidError
-from shipid.export.blocks import Precision
-from shipid.export.c import Files
-from shipid.export.c_predictor import PredictorParts, predictor_files
+from shipid.export.c import Files, Precision
+from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.fmu_c import Variable, predictor_wrapper, vessel_wrapper
 from shipid.export.model import Model
 from shipid.files import whole
 from shipid.physics.signals import ACTUAL, SIGNALS, neutral
 from shipid.version import __version__
+from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import Vessel
 
 BINARIES = {("Linux", "x86_64"): ("linux64", ".so"), ("Darwin", "x86_64"): ("darwin64", ".dylib")}
@@ -67,89 +68,90 @@ def described(name: str) -> str:
     return f"{word}, {component}" if component else word
 
 
-def vessel_unit(vessel: Vessel, name: str, method: Method) -> Packed:
-    """The FMU of a vessel: commands, weather and loads in, motion out."""
-    parts = VesselParts(vessel, name, method, Precision())
-    groups = parts.groups()
-    largest = round(LARGEST_STEP * min(1.0, ((vessel.length or 30.0) / 30.0) ** 0.5), 4)
-    variables = []
-    for key in groups["carry"]:
-        order, lags = key.removeprefix(ACTUAL), key.startswith(ACTUAL)
-        text = described(order)
-        text = f"reached: {text}; begins at its order, within its stops, unless a start value is set" if lags else text
-        variables.append(Variable(key, "output", "continuous", parts.unit("carry", key), text, 0.0, lags))
-    variables += [
-        Variable(key, "input", "continuous", parts.unit("commands", key), f"order: {described(key)}", neutral(key))
-        for key in groups["commands"]
-    ]
-    variables += [
-        Variable(key, "input", "continuous", parts.unit("environment", key), described(key), 0.0)
-        for key in groups["environment"]
-    ]
-    variables += [
-        Variable(
-            f"load.{key}", "input", "continuous", parts.unit("loads", key), f"added {key}, such as waves or a tug", 0.0
-        )
-        for key in groups["loads"]
-    ]
-    above_zero, text = vessel.above_zero, "number of the vessel document"
-    variables += [
+def _inputs(rows: Mapping[str, tuple[str, str, float]]) -> list[Variable]:
+    """Inputs of an FMU: name -> unit, words, start."""
+    return [Variable(name, "input", "continuous", *row) for name, row in rows.items()]
+
+
+def _outputs(rows: Mapping[str, tuple[str, str]]) -> list[Variable]:
+    """Outputs that are calculated: name -> unit, words."""
+    return [Variable(name, "output", "continuous", *row, None) for name, row in rows.items()]
+
+
+def _settings(rows: Mapping[str, tuple[str, float]]) -> list[Variable]:
+    """Parameters without a unit: name -> words, start."""
+    return [Variable(name, "parameter", "tunable", "-", *row) for name, row in rows.items()]
+
+
+def _numbers(vessel: Vessel | None) -> list[Variable]:
+    """Parameters: the numbers of a vessel document."""
+    if vessel is None:
+        return []
+    text, above_zero = "number of the vessel document", vessel.above_zero
+    return [
         Variable(key, "parameter", "tunable", vessel.units[key], text, value, above_zero=key in above_zero)
         for key, value in vessel.parameters.items()
     ]
-    variables.append(
-        Variable("solver.step", "parameter", "tunable", "s", f"largest internal step of {method}", largest)
+
+
+def vessel_unit(vessel: Vessel, name: str, method: Method) -> Packed:
+    """The FMU of a vessel: commands, weather and loads in, motion out."""
+    units = VesselParts(vessel, method).units()
+    largest = round(LARGEST_STEP * min(1.0, ((vessel.length or 30.0) / 30.0) ** 0.5), 4)
+    begins = "; begins at its order, within its stops, unless a start value is set"
+    variables = []
+    for key, unit in units["carry"].items():
+        order, lags = key.removeprefix(ACTUAL), key.startswith(ACTUAL)
+        text = f"reached: {described(order)}{begins}" if lags else described(order)
+        variables.append(Variable(key, "output", "continuous", unit, text, 0.0, lags))
+    variables += _inputs(
+        {key: (unit, f"order: {described(key)}", neutral(key)) for key, unit in units["commands"].items()}
+        | {key: (unit, described(key), 0.0) for key, unit in units["environment"].items()}
+        | {f"load.{key}": (unit, f"added {key}, such as waves or a tug", 0.0) for key, unit in units["loads"].items()}
     )
-    sizes = {group: len(names) for group, names in groups.items()}
+    solver = Variable("solver.step", "parameter", "tunable", "s", f"largest internal step of {method}", largest)
+    variables += [*_numbers(vessel), solver]
+    sizes, num_reached = {group: len(names) for group, names in units.items()}, len(dynamics(vessel).memory)
     return Packed(
         name, vessel.name, tuple(variables), vessel_files(vessel, name, method, Precision()),
-        vessel_wrapper(name, sizes, parts.equations.num_states, variables), None,
+        vessel_wrapper(name, sizes, sizes["carry"] - num_reached, variables), None,
     )  # fmt: skip
 
 
 def predictor_unit(model: Model, name: str) -> Packed:
     """The FMU of a predictor: motion, weather and commands in, path, band and alarm out."""
-    parts, names = PredictorParts(model, name, Precision()), model.layout
-    variables = []
-    for key in parts.row:
-        low, high = model.limits.get(key, (0.0, 0.0))
-        start = (low + high) / 2 if np.isfinite(low + high) else 0.0
-        variables.append(Variable(key, "input", "continuous", model.unit(key), described(key), start))
-    for k in range(names.horizon if names.planned else 0):
-        for key in names.planned:
-            text = f"order in force in step {k + 1} of the horizon: {described(key)}"
-            variables.append(Variable(f"planned[{k + 1}].{key}", "input", "continuous", model.unit(key), text, 0.0))
-    step = model.physics.step
-    for axis, word in (("x", "ahead"), ("y", "to starboard")):
-        for k in range(names.horizon):
-            text = f"way {word} after {step * (k + 1):g} s, in body axes at the instant of prediction"
-            variables.append(Variable(f"{axis}[{k + 1}]", "output", "continuous", "m", text, None))
-    bands = model.predictor.bands
-    for key, (unit, word) in _BAND.items() if bands is not None else ():
-        for k in range(names.horizon):
-            text = f"band after {step * (k + 1):g} s: {word}"
-            variables.append(Variable(f"{key}[{k + 1}]", "output", "continuous", unit, text, None))
-    variables.append(
-        Variable("instant", "output", "continuous", "s", "time of the row that the path starts from", None)
-    )
-    above_zero = frozenset() if model.vessel is None else model.vessel.above_zero
-    for key, value in zip(names.parameters, model.parameters, strict=True):
-        text, positive = "number of the vessel document", key in above_zero
-        variables.append(
-            Variable(key, "parameter", "tunable", model.unit(key), text, float(value), above_zero=positive)
+    names, step, bands = model.layout, model.physics.step, model.predictor.bands
+    steps = range(names.horizon)
+    ends = {key: sum(model.limits.get(key, (0.0, 0.0))) / 2 for key in names.now}
+    rows = {key: (model.unit(key), described(key), ends[key] if np.isfinite(ends[key]) else 0.0) for key in names.now}
+    planned = {
+        f"planned[{k + 1}].{key}": (
+            model.unit(key), f"order in force in step {k + 1} of the horizon: {described(key)}", 0.0
         )
+        for k in steps
+        for key in names.planned
+    }  # fmt: skip
+    shown = {
+        f"{axis}[{k + 1}]": ("m", f"way {word} after {step * (k + 1):g} s, in body axes at the instant of prediction")
+        for axis, word in (("x", "ahead"), ("y", "to starboard"))
+        for k in steps
+    }
+    shown |= {
+        f"{key}[{k + 1}]": (unit, f"band after {step * (k + 1):g} s: {word}")
+        for key, (unit, word) in (_BAND.items() if bands is not None else ())
+        for k in steps
+    }
+    shown["instant"] = "s", "time of the row that the path starts from"
+    settings = {}
     if names.planned:
-        text = "1: orders stay as they are over the horizon; 0: as in planned[...]"
-        variables.append(Variable("held", "parameter", "tunable", "-", text, 1.0))
+        settings["held"] = "1: orders stay as they are over the horizon; 0: as in planned[...]", 1.0
     if bands is not None:
         kinds = ", ".join(f"{number}: {kind}" for number, kind in enumerate(("any", *bands.kinds)))
         usual = next(level for level in (0.9, 0.8, 0.5) if bands.promises(level) or level == 0.5)
-        for key, text, value in (
-            ("level", "share of whole paths that the band holds, above 0 to 0.99", usual),
-            ("pointwise", "1: the share is that of positions at each step alone", 0.0),
-            ("kind", f"of the manoeuvre under way: {kinds}", 0.0),
-        ):
-            variables.append(Variable(key, "parameter", "tunable", "-", text, value))
+        settings["level"] = "share of whole paths that the band holds, above 0 to 0.99", usual
+        settings["pointwise"] = "1: the share is that of positions at each step alone", 0.0
+        settings["kind"] = f"of the manoeuvre under way: {kinds}", 0.0
+    variables = [*_inputs(rows | planned), *_outputs(shown), *_numbers(model.vessel), *_settings(settings)]
     what = "no physics" if model.vessel is None else model.vessel.name
     return Packed(
         name, f"{what}, {model.predictor.method}", tuple(variables), predictor_files(model, name, Precision()),
@@ -160,24 +162,24 @@ def predictor_unit(model: Model, name: str) -> Packed:
 
 def write_fmu(unit: Packed, file: Path) -> list[str]:
     """Write the FMU; the platforms of the binaries in it. ShipidError where the compiler fails."""
-    source = unit.files.texts[f"{unit.files.name}.c"] + "\n" + unit.wrapper
-    texts = {
-        f"sources/{unit.files.name}.h": unit.files.texts[f"{unit.files.name}.h"],
-        f"sources/{unit.files.name}.c": source,
-        "documentation/index.html": _documentation(unit),
+    name = unit.identifier
+    sources = {key: text for key, text in unit.files.texts.items() if key != "main.c"}
+    sources[f"{name}.c"] += "\n" + unit.wrapper
+    texts = {f"sources/{key}": text for key, text in sources.items()} | {
+        "documentation/index.html": _documentation(unit)
     }
-    digest = uuid.uuid5(uuid.NAMESPACE_URL, unit.title + "".join(texts.values()))
-    texts["modelDescription.xml"] = description(unit, f"{{{digest}}}")
-    texts[f"sources/{unit.files.name}.c"] = source.replace("@GUID@", f"{{{digest}}}")
+    guid = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, unit.title + ''.join(texts.values()))}}}"
+    texts["modelDescription.xml"] = description(unit, guid)
+    texts[f"sources/{name}.c"] = sources[f"{name}.c"].replace("@GUID@", guid)
     place = BINARIES.get((platform.system(), platform.machine())) if compiler() is not None else None
     with whole(file) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, text in texts.items():
-            archive.writestr(_entry(name), text)
+        for key, text in texts.items():
+            archive.writestr(_entry(key), text)
         if place is not None:
-            for name in (f"{unit.files.name}.c", f"{unit.files.name}.h"):
-                (temporary.parent / name).write_text(texts[f"sources/{name}"], encoding="utf-8")
-            built = _compiled(temporary.parent, unit.files.name)
-            archive.writestr(_entry(f"binaries/{place[0]}/{unit.identifier}{place[1]}", 0o755), built.read_bytes())
+            for key in sources:
+                (temporary.parent / key).write_text(texts[f"sources/{key}"], encoding="utf-8")
+            built = _compiled(temporary.parent, name)
+            archive.writestr(_entry(f"binaries/{place[0]}/{name}{place[1]}", 0o755), built.read_bytes())
     return [] if place is None else [place[0]]
 
 
@@ -193,7 +195,8 @@ def _compiled(folder: Path, name: str) -> Path:
     assert command is not None
     options = ["-std=c99", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-s"]
     built = folder / f"{name}.so"
-    complaint, _ = run_compiler([command, *options, "-o", str(built), str(folder / f"{name}.c"), "-lm"], folder)
+    sources = [str(folder / f"{name}{part}.c") for part in ("", "_casadi")]
+    complaint, _ = run_compiler([command, *options, "-o", str(built), *sources, "-lm"], folder)
     if complaint is not None:
         raise ShipidError(f"the C compiler failed ({complaint.splitlines()[0]})")
     return built
@@ -244,7 +247,8 @@ def description(unit: Packed, guid: str) -> str:
   <CoSimulation modelIdentifier="{unit.identifier}" canHandleVariableCommunicationStepSize="true"
     canGetAndSetFMUstate="true" canSerializeFMUstate="true">
     <SourceFiles>
-      <File name="{unit.files.name}.c"/>
+      <File name="{unit.identifier}.c"/>
+      <File name="{unit.identifier}_casadi.c"/>
     </SourceFiles>
   </CoSimulation>
   <UnitDefinitions>

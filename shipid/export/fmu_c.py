@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipid.export.band import CHOICE, COLUMNS
-from shipid.export.blocks import Precision
+from shipid.export.c import Precision
 
 MOST_STEPS = 1_000_000  # of the solver in a communication step: some seconds
 
@@ -118,7 +118,6 @@ static int Model_boolean(const Model *self, unsigned reference)
 
 def predictor_wrapper(name: str, horizon: int, num_parameters: int, variables: Sequence[Variable]) -> str:
     """Return the C of a predictor of `horizon` steps; the row that it records is the first of the variables."""
-    banded = any(variable.name == CHOICE[0] for variable in variables)
     return f"""
 #define NUM_REALS {len(variables)}
 #define NUM_BOOLEANS 1
@@ -141,14 +140,13 @@ static void Model_init(Model *self)
     {name}_init(&self->kept);
 }}
 
-{_KIND_OF if banded else ""}
-{_predict_from(name, horizon, num_parameters, {variable.name: place for place, variable in enumerate(variables)})}
+{_path_at(name, horizon, num_parameters, {variable.name: place for place, variable in enumerate(variables)})}
 /* The path at the start: from a copy, since the first step keeps this row. */
 static const char *Model_begin(Model *self, const unsigned char *set, double t)
 {{
     (void)set;
     self->trial = self->kept;
-    return predict_from(self, &self->trial, t);
+    return path_at(self, &self->trial, t);
 }}
 
 static const char *Model_unfit(const Model *self, double h)
@@ -161,7 +159,7 @@ static const char *Model_unfit(const Model *self, double h)
 static const char *Model_step(Model *self, double t, double h)
 {{
     (void)h;
-    return predict_from(self, &self->kept, t);
+    return path_at(self, &self->kept, t);
 }}
 
 static int Model_boolean(const Model *self, unsigned reference)
@@ -172,38 +170,25 @@ static int Model_boolean(const Model *self, unsigned reference)
 {_FMI_BODY}"""
 
 
-_KIND_OF = """
-/* A whole number, or -1, which is no kind. */
-static int kind_of(double value)
-{
-    return value >= 0 && value < 1e9 && floor(value) == value ? (int)value : -1;
-}
-"""
-
-
-def _predict_from(name: str, horizon: int, num_parameters: int, at: Mapping[str, int]) -> str:
+def _path_at(name: str, horizon: int, num_parameters: int, at: Mapping[str, int]) -> str:
     """C that records the row of the variables and predicts from it; `at`: place of each variable by name."""
     first_planned = next((place for key, place in at.items() if key.startswith("planned[")), 0)
     plan = f"self->values[{at['held']}] != 0 ? 0 : self->values + {first_planned}" if "held" in at else "0"
-    own = f"memcpy(kept->parameters, self->values + {at['instant'] + 1}, {num_parameters} * sizeof(double));"
-    declared, shown = "", ""
-    call = f"{name}_predict(kept, {plan}, path)"
+    choice, shown = "0", ""
     if CHOICE[0] in at:
-        level, pointwise, kind = (f"self->values[{at[key]}]" for key in CHOICE)
-        call = f"{name}_predict_band(kept, {plan}, {level}, {pointwise} != 0, kind_of({kind}), path, band)"
-        declared = f"    double band[{len(COLUMNS)} * {horizon}];\n"
+        choice = f"self->values + {at[CHOICE[0]]}"
         shown = "\n".join(
             f"        self->values[{at[f'{key}[1]']} + k] = band[{len(COLUMNS)} * k + {place}];"
             for place, key in enumerate(COLUMNS)
         )
-    return f"""static const char *predict_from(Model *self, {name} *kept, double t)
+    return f"""static const char *path_at(Model *self, {name} *kept, double t)
 {{
-    double path[2 * {horizon}];
-{declared}    int k;
-    {own if num_parameters else ""}
+    double path[2 * {horizon}], band[{len(COLUMNS)} * {horizon}];
+    int k;
+    memcpy(kept->parameters, self->values + {at["instant"] + 1}, {num_parameters} * sizeof(double));
     k = {name}_record(kept, t, self->values); /* refused: status and alarm stay those of the path that is there */
     if (k) return k == {name}_TIME ? "time does not go on" : "an input is not finite";
-    self->status = {call};
+    self->status = predict_from(kept, {plan}, {choice}, path, band);
     for (k = 0; k < {horizon}; ++k) {{
         self->values[{at["x[1]"]} + k] = path[2 * k];
         self->values[{at["y[1]"]} + k] = path[2 * k + 1];

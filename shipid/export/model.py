@@ -1,4 +1,4 @@
-"""A predictor as one graph of blocks, with the names, units and limits of what goes in and comes out."""
+"""A predictor as one CasADi function, with the names, units and limits of what goes in and comes out."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
+import casadi as ca
 import numpy as np
+from casadi import MX
 
 from shipid.data.windows import Instants
 from shipid.errors import ShipidError
-from shipid.export.band import Radii, band_graph, radii
-from shipid.export.blocks import Graph, num_numbers
-from shipid.export.correctors import CORRECTORS, taken
+from shipid.export.band import CHOICE, band_rows, is_promised, radii_at
+from shipid.export.correctors import CORRECTORS, inputs_of
+from shipid.export.equations import named_function, symbols_of
 from shipid.export.known import Known, Layout, layout
 from shipid.hybrid.bands import Bands
 from shipid.hybrid.learned_force import ForceCorrector
@@ -26,8 +28,8 @@ from shipid.vessel.load import Vessel
 Array = np.ndarray
 ESTIMATES = {"X": "m/s^2", "Y": "m/s^2", "N": "rad/s^2"}
 """Slow force of the observer over the mass -> unit; its other estimates are velocities."""
-MOST_NUMBERS = 250_000
-"""Numbers in the tables of an exported predictor, at most: about 5 MB of source, 2 MB compiled in double."""
+MOST_NUMBERS = 300_000
+"""Numbers in the arrays of an exported predictor, at most: 8 MB of source, 2.4 MB compiled in double precision."""
 
 
 class Exportable(Protocol):
@@ -61,8 +63,7 @@ class Exportable(Protocol):
 class Model:
     """A predictor that is ready to be written.
 
-    physics : with the terms of the method. layout : names of the inputs. limits : entries of `now` -> (least, greatest)
-    seen in training, with the slack of `Predictor.outside`.
+    physics : with the terms of the method. layout : names of the inputs.
     """
 
     predictor: Exportable
@@ -75,40 +76,48 @@ class Model:
         return self.physics.vessel
 
     @cached_property
-    def graph(self) -> Graph:
-        """(now, reached, past, planned, estimates, parameters) -> path (T, 2), row by row."""
-        known, corrector = Known(self.physics, self.layout), self.predictor.corrector
+    def function(self) -> ca.Function:
+        """The inputs of `Layout.sizes` and a choice of a band -> path, outside, band, promised.
+
+        path : (2, T) x and y [m] in body axes at the instant. outside : 1 for the alarm. band : (4, T), see
+        `shipid.export.band.COLUMNS`; where `promised` is 0 it is not a number. The choice of a band and the last two
+        outputs are there where the predictor has bands; a band has no derivative.
+
+        ShipidError for a method whose parts do not fit together, or are too large.
+        """
+        self._check_size()
+        known, corrector, bands = Known(self.physics, self.layout), self.predictor.corrector, self.predictor.bands
         try:
             path = CORRECTORS[type(corrector)].path(known, corrector)
         except (LookupError, ValueError, TypeError, AttributeError, RuntimeError, AssertionError) as error:
             raise ShipidError(
                 f"the parts of the method {self.predictor.method!r} do not fit together ({error}): its file is damaged"
             ) from error
-        graph = known.graph.finish(path)
-        count = num_numbers(graph) + (0 if self.band is None else num_numbers(self.band))
+        inputs, outputs = dict(known.inputs), {"path": path, "outside": self._outside(known.now)}
+        if bands is not None:
+            choice = symbols_of(dict.fromkeys(CHOICE, 1))
+            promised = is_promised(bands, **choice)
+            rows = band_rows(bands, known.now, path, self.physics.step, radii_at(bands, **choice))
+            inputs |= choice
+            outputs |= {"band": ca.if_else(promised, rows, np.nan), "promised": promised}
+        return named_function("predict", inputs, outputs, is_diff_out=[name == "path" for name in outputs])
+
+    def _check_size(self) -> None:
+        bands = self.predictor.bands
+        arrays = [*self.predictor.corrector.arrays().values(), *([] if bands is None else bands.arrays().values())]
+        count = sum(np.size(array) for array in arrays)
         if count > MOST_NUMBERS:
             raise ShipidError(
                 f"the tables of {self.predictor.method} hold {count} numbers, an export at most {MOST_NUMBERS}: "
                 "use fewer trees or units, larger leaves, or the method path-drawn"
             )
-        return graph
 
-    @cached_property
-    def radii(self) -> Radii | None:
-        """(level, pointwise, kind) -> radius (T,) of the band; None where the predictor has none."""
-        return None if self.predictor.bands is None else radii(self.predictor.bands)
-
-    @cached_property
-    def band(self) -> Graph | None:
-        """(now, path, level, pointwise, kind) -> band, a row for each step, see `shipid.export.band.COLUMNS`."""
-        if self.radii is None or self.predictor.bands is None:
-            return None
-        return band_graph(self.predictor.bands, self.layout.now, self.physics.step, self.radii)
-
-    @property
-    def no_band(self) -> str:
-        """Why there is no band."""
-        return self.predictor.no_band
+    def _outside(self, now: Mapping[str, MX]) -> MX:
+        """Whether the instant is outside of what training has seen, as `Predictor.outside` without a run-up."""
+        inside = MX(1 if self.predictor.limits else 0)
+        for name, (low, high) in self.limits.items():
+            inside = ca.logic_and(inside, ca.logic_and(now[name] >= low, now[name] <= high))
+        return ca.logic_not(inside)
 
     @property
     def parameters(self) -> Array:
@@ -117,7 +126,7 @@ class Model:
 
     @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:
-        """Entry of `now` -> least and greatest value without an alarm."""
+        """Entry of `now` -> least and greatest value without an alarm, with the slack of `Predictor.outside`."""
         given = {name: widened(*ends) for name, ends in self.predictor.limits.items() if name in self.layout.now}
         return {name: (float(low), float(high)) for name, (low, high) in given.items()}
 
@@ -129,42 +138,43 @@ class Model:
         return ESTIMATES.get(signal_of(name), "m/s") if row is None else row.unit
 
     def inputs(self, instants: Instants) -> dict[str, Array]:
-        """The inputs of the graph for S instants, name -> (S, entries); what a log does not hold is 0."""
+        """The inputs of the function for S instants, name -> (S, entries); what a log does not hold is 0."""
         names, count, zero = self.layout, len(instants), np.zeros(len(instants))
+        planned = instants.planned or {}
         columns: Mapping[str, Array] = {"down": instants.columns.get("z", zero), **instants.columns}
-        now = [np.asarray(columns.get(name, zero), dtype=float) for name in names.now]
-        past = []
-        for row in range(names.num_past):
-            at = len(next(iter(instants.past.values()))) - names.num_past + row
-            rows = {"down": instants.past.get("z", np.zeros((at + 1, count))), **instants.past}
-            past += [np.asarray(rows[name][at]) if name in rows else zero for name in names.past]
-        planned = [
-            np.asarray((instants.planned or {})[name][k]) for k in range(names.horizon) for name in names.planned
-        ]
-        orders = {name: (instants.planned or {}).get(name, [columns.get(name)])[0] for name in names.reached}
-        reached = [np.asarray((instants.hidden or orders)[name], dtype=float) for name in names.reached]
-        estimates = [np.asarray(instants.estimates[name]) for name in names.estimates]
-        groups = {"now": now, "reached": reached, "past": past, "planned": planned, "estimates": estimates}
-        stacked = {key: np.stack(rows, axis=1) if rows else np.zeros((count, 0)) for key, rows in groups.items()}
+        past = {"down": instants.past.get("z", np.zeros((names.num_past, count))), **instants.past}
+        orders = {name: planned.get(name, [columns.get(name)])[0] for name in names.reached}
+        hidden = instants.hidden or orders
+        groups: dict[str, list[Any]] = {
+            "now": [columns.get(name, zero) for name in names.now],
+            "reached": [hidden[name] for name in names.reached],
+            "past": [
+                past[name][k - names.num_past] if name in past else zero
+                for k in range(names.num_past)
+                for name in names.past
+            ],
+            "planned": [planned[name][k] for k in range(names.horizon) for name in names.planned],
+            "estimates": [instants.estimates[name] for name in names.estimates],
+        }
+        stacked = {
+            key: np.stack([np.asarray(row, dtype=float) for row in rows], axis=1) if rows else np.zeros((count, 0))
+            for key, rows in groups.items()
+        }
         return {**stacked, "parameters": np.tile(self.parameters, (count, 1))}
 
 
 def model(predictor: Exportable) -> Model:
     """A predictor as a model; ShipidError for a method that has no counterpart."""
     corrector, physics = predictor.corrector, predictor.physics
-    taken_ = taken(corrector)
+    taken = inputs_of(corrector)
     if isinstance(corrector, ForceCorrector):
         physics = corrector.with_force(physics)
     names = layout(
         physics,
-        taken_.commands or _orders(predictor),
+        taken.commands or tuple(name for name in predictor.limits if "." in name),
         predictor.past,
         known=predictor.commands == "known",
-        environment=taken_.environment,
+        environment=taken.environment,
         limited=(*predictor.limits, *(() if predictor.bands is None else predictor.bands.names)),
     )
     return Model(predictor, physics, names)
-
-
-def _orders(predictor: Exportable) -> tuple[str, ...]:
-    return tuple(name for name in predictor.limits if "." in name)

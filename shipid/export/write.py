@@ -13,18 +13,10 @@ from typing import get_args
 from shipid.arguments import of_class, one_of, path_of
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, choices, visible
-from shipid.export.blocks import Precision
-from shipid.export.c import Files, c_name
+from shipid.export.c import Files, Precision, c_name
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
-from shipid.export.casadi import (
-    band_file,
-    band_function,
-    files_of,
-    predictor_function,
-    vessel_function,
-    write_functions,
-)
+from shipid.export.casadi import predictor_function, vessel_function, write_function
 from shipid.export.fmu import Packed, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import Exportable, Model, model
 from shipid.export.onnx import write_onnx
@@ -58,8 +50,8 @@ def export_predictor(
 
     Parameters
     ----------
-    to : `c` (a folder with NAME.c, NAME.h, main.c), `fmu` (FMI 2.0), `casadi` (a function, its names as JSON, and the
-        same for the band as NAME-band) or `onnx` (the networks alone).
+    to : `c` (a folder with NAME.c, NAME_casadi.c, NAME.h, main.c), `fmu` (FMI 2.0), `casadi` (a function, and its names
+        as JSON) or `onnx` (the networks alone).
     out : the folder for `c`, else the file.
     single : numbers in single precision (`c` and `onnx`).
     name : begins every public name in C, and is the model identifier of an FMU; default the stem of `out`.
@@ -135,14 +127,6 @@ def _fmu(unit: Packed, file: Path) -> list[Path]:
     return [file]
 
 
-def _functions(kept: Model, title: str, file: Path) -> list[Path]:
-    """Write a predictor as a CasADi function and, in a file beside it, its band; that of an earlier one is removed."""
-    functions, band = {file: predictor_function(kept, title)}, band_function(kept, f"{title}_band")
-    if band is not None:
-        functions[band_file(file)] = band
-    return write_functions(functions, files_of(file))
-
-
 TARGETS: dict[str, Target] = {
     "c": Target(
         lambda kept, title, file, single: _folder(predictor_files(kept, title, Precision(single)), file),
@@ -155,8 +139,8 @@ TARGETS: dict[str, Target] = {
         ".fmu",
     ),
     "casadi": Target(
-        lambda kept, title, file, _: _functions(kept, title, file),
-        lambda ship, title, rule, file, _: write_functions({file: vessel_function(ship, title, rule)}),
+        lambda kept, title, file, _: write_function(*predictor_function(kept, title), file),
+        lambda ship, title, rule, file, _: write_function(*vessel_function(ship, title, rule), file),
         ".casadi",
     ),
     "onnx": Target(

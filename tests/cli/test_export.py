@@ -43,7 +43,7 @@ def test_a_folder_is_no_cell_but_has_some(tmp_path):
     assert "name one of its cells, FOLDER/cells/NAME.npz" in str(result.exception)
 
 
-@pytest.mark.parametrize("name", ["a.casadi", "a.casadi.json", "a-band.casadi", "a-band.casadi.json"])
+@pytest.mark.parametrize("name", ["a.casadi", "a.casadi.json"])
 def test_no_file_beside_a_function_takes_the_place_of_what_is_read(name, tmp_path):
     """Before, the names of its inputs were written over the vessel."""
     vessel = tmp_path / name

@@ -85,6 +85,16 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
     return Strange(predictor, instants)
 
 
+def remembering(physics, memory, instants, seed=2, **more):
+    """A predictor whose network takes every input that the physics and a memory give at some instants."""
+    commands = dynamics(physics.vessel).commands
+    inputs = Inputs(commands, memory)
+    table = inputs.table(physics, instants)
+    network = network_of(np.random.default_rng(seed), list(table), table, physics.horizon, 2, False)
+    corrector = Compensator(inputs, (network,), {})
+    return Predictor(physics, "path-drawn", corrector, **{"limits": {"u": (-99.0, 99.0)}, **more})
+
+
 def bands_of(rng, physics, instants, names, slow):
     """Bands that nobody has calibrated: tables that rise, points of training of which some are instants."""
     horizon, count = physics.horizon, len(instants)

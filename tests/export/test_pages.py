@@ -56,7 +56,7 @@ def test_the_loop_in_c_predicts_and_lets_its_band_adapt(tmp_path: Path) -> None:
     source += ["static double adapts(int left_its_band)\n{\n", adapting, "return wider;\n}\n"]
     source += ["int main(void)\n{\nif (!(adapts(1) > adapts(0))) return 2;\n", body, "}\n"]
     (tmp_path / "loop.c").write_text("".join(source))
-    compile_([compiler()], tmp_path, "-O0", "-o", "loop", "loop.c", "aboard.c")
+    compile_([compiler()], tmp_path, "-O0", "-o", "loop", "loop.c", "aboard.c", "aboard_casadi.c")
     done = subprocess.run([tmp_path / "loop"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     given, alarms, missing = map(int, done.stdout.split())

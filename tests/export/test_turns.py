@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import copy
-import ctypes
-import subprocess
 
 import numpy as np
 import pytest
 
 from shipid.data.windows import Instants
 from shipid.engine.casadi import memory_along
-from shipid.export.blocks import Precision
-from shipid.export.c_predictor import predictor_files
-from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
@@ -22,42 +17,11 @@ from shipid.vessel.dynamics import dynamics
 from shipid.vessel.load import check_vessel
 from tests.conftest import variety
 from tests.drawn_ships import drawn_ship, extreme_inputs
-from tests.export.compiled import compile_, compiler, library, pointer, write
+from tests.export.compiled import Recorder
 
 OUTSIDE, TURN = 2, 2 * np.pi
 LAG = {"kind": "first_order", "T": 0.5, "rate": 0.20944}
 FREE = {"u": (-1e3, 1e3), "port.alpha": (-1e3, 1e3), "starboard.alpha": (-1e3, 1e3)}  # angles go on without end
-
-
-class Recorder:
-    """An exported predictor that is given rows."""
-
-    def __init__(self, predictor, folder):
-        self.model = model(predictor)
-        files = predictor_files(self.model, "odd", Precision())
-        write(files, folder)
-        (folder / "size.c").write_text(
-            '#include <stdio.h>\n#include "odd.h"\nint main(void) { printf("%d", (int)sizeof(odd)); return 0; }\n'
-        )
-        compile_([compiler()], folder, "-O0", "-o", "size", "size.c")
-        size = int(subprocess.run([folder / "size"], capture_output=True, text=True, check=True).stdout)
-        self.loaded = library(files, folder)
-        self.loaded.odd_record.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-        others = (name for name in self.model.layout.now if name not in ("north", "east"))
-        self.row = ("north", "east", *others)
-        self.kept = np.zeros(size + 64, dtype=np.uint8)
-        self.begin()
-
-    def begin(self):
-        self.loaded.odd_init(pointer(self.kept))
-
-    def path(self, t, values, plan=None):
-        """Path and result after one more row; what `values` lacks is 0."""
-        row = np.array([float(values.get(name, 0.0)) for name in self.row])
-        assert self.loaded.odd_record(pointer(self.kept), t, pointer(row)) == 0
-        path = np.zeros((self.model.layout.horizon, 2))
-        given = None if plan is None else pointer(plan)
-        return path, self.loaded.odd_predict(pointer(self.kept), given, pointer(path))
 
 
 def gunnerus(gear):
@@ -96,16 +60,20 @@ def played(folder, gear, limits, angles, observer=None, plan=None):
 WALK = [*range(100, 700, 12), 650, 600, 560]
 
 
-@pytest.mark.parametrize("observer", [None, Observer(waves=(0.0,), change=(1.0,))], ids=["plain", "observer"])
+ROUNDS = [
+    (-170, 170, [150, 168, 175, 182, 188, 192, 195]),  # slowly: outside of the training, and inside again
+    (-170, 170, [140, 160, 165, 195, 200]),  # across 180 in one row, both within the training
+    (-200, 120, [100, 110, 130, 150, 165, 165, 140]),  # in again at its other end
+    (-50, 50, [10, 130, 250, 330, 370, 390]),  # once round
+    (-200, 500, WALK),  # a training of more than a turn: on beyond it
+]
+OBSERVER = Observer(waves=(0.0,), change=(1.0,))
+
+
 @pytest.mark.parametrize(
-    ("low", "high", "angles"),
-    [
-        (-170, 170, [140, 160, 165, 195, 200]),  # across 180 in one row, both within the training
-        (-170, 170, [150, 168, 175, 182, 188, 192, 195]),  # slowly: outside of it, and inside again
-        (-200, 120, [100, 110, 130, 150, 165, 165, 140]),  # in again at its other end
-        (-50, 50, [10, 130, 250, 330, 370, 390]),  # once round
-        (-200, 500, WALK),  # a training of more than a turn: on beyond it
-    ],
+    ("low", "high", "angles", "observer"),
+    [(*ROUNDS[0], OBSERVER), (*ROUNDS[2], None)]
+    + [pytest.param(*one, kind, marks=pytest.mark.slow) for one in ROUNDS for kind in (None, OBSERVER)],
 )
 def test_a_unit_that_turns_all_round_goes_the_shortest_way(low, high, angles, observer, tmp_path):
     """Inside of the training without an alarm, and nowhere does its gear go back by a turn."""
@@ -130,20 +98,14 @@ def test_between_stops_a_jump_is_real(low_high, tmp_path):
     """A unit with stops at 175 deg goes from 165 to -165 through 0, outside of the training, too."""
     gear = LAG | {"low": np.radians(-175), "high": np.radians(175)}
     angles = [40, 160, 165, -165, -165, -160, 172]
-    whole = []
-    recorder = Recorder(Predictor(Physics(gunnerus(gear), 20, 1.0), "alone", Unchanged({}), {}), tmp_path / "pure")
-    names = recorder.model.layout
-    reached = memory_along(
-        gunnerus(gear), {name: np.radians(angles) if "alpha" in name else np.full(7, 2.5) for name in names.commands},
-        np.arange(7.0),
-    )  # fmt: skip
-    columns = {name: np.zeros(7) for name in names.now} | {"u": np.full(7, 4.0)}
-    for name in names.commands:
-        columns[name] = np.radians(angles) if name.endswith("alpha") else np.full(7, 2.5)
-    whole = recorder.model.predictor.predict(Instants(columns, hidden=reached)).swapaxes(0, 1)
+    vessel, t = gunnerus(gear), np.arange(7.0)
+    columns = {name: np.zeros(7) for name in ("psi", "v", "r")} | {"u": np.full(7, 4.0)}
+    columns |= {name: np.radians(angles) if "alpha" in name else np.full(7, 2.5) for name in dynamics(vessel).commands}
+    reached = memory_along(vessel, columns, t)
+    physics = Physics(vessel, 20, 1.0)
+    whole = Predictor(physics, "alone", Unchanged({})).predict(Instants(columns, hidden=reached)).swapaxes(0, 1)
     turns = np.array([0, 1, -1, 1, 0, 2, -1])
     limits = limits_of(*low_high)
-    physics = Physics(gunnerus(gear), 20, 1.0)
     other = Recorder(Predictor(physics, "alone", Unchanged({}), limits), tmp_path / "odd")
     for i, angle in enumerate(np.array(angles) + 360 * turns):
         values = {name: column[i] for name, column in columns.items()}
@@ -186,22 +148,11 @@ def test_a_plan_goes_on_from_the_newest_row(low_high, tmp_path):
 
 
 SHIPS = (2, 7, 17, 25, 33, 34, 38)  # with an azimuth unit
+SEEDS = [seed + 100 * more for seed in SHIPS for more in range(4)]
 
 
-@pytest.mark.parametrize("seed", [2, 25, 34])
+@pytest.mark.parametrize("seed", [25, *(pytest.param(one, marks=pytest.mark.slow) for one in SEEDS if one != 25)])
 def test_drawn_ships_take_angles_of_any_turn(seed, tmp_path):
-    takes_any_turn(seed, tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "seed", [seed + 100 * more for seed in SHIPS for more in range(4) if more or seed not in (2, 25, 34)]
-)
-def test_more_drawn_ships_take_angles_of_any_turn(seed, tmp_path):
-    takes_any_turn(seed, tmp_path)
-
-
-def takes_any_turn(seed, folder):
     """Rows whose angles come by any turn give the paths of Python along the log in which they go on.
 
     Angles of training are drawn, too, so also their limits: all, or a part of a turn. Rudders and units with stops keep
@@ -231,7 +182,7 @@ def takes_any_turn(seed, folder):
     reached = memory_along(vessel, {name: columns[name] for name in names.commands}, t)
     with np.errstate(all="ignore"):
         expected = predictor.predict(Instants(columns, hidden=reached))
-    recorder, compared = Recorder(predictor, folder), 0
+    recorder, compared = Recorder(predictor, tmp_path), 0
     for i in range(count):
         values = {name: column[i] for name, column in columns.items()}
         for name in names.commands:
