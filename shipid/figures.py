@@ -105,9 +105,9 @@ def error_over_horizon(
     return _draw(errors_over.error_over_horizon(content_of(source)), [statistic, N_D], dark=dark)
 
 
-def error_over_time(source: Source, run: str | None = None, N_D: int | None = None, *, dark: bool = False) -> go.Figure:
-    """Position error at each instant of prediction of a test run (default: the first), with its commands below."""
-    return _draw(errors_over.error_over_time(content_of(source)), [run, N_D], dark=dark)
+def error_over_time(source: Source, run: str | None = None, *, dark: bool = False) -> go.Figure:
+    """Position error at each instant of prediction of a test run, with its commands below; with the largest N_D."""
+    return _draw(errors_over.error_over_time(content_of(source)), [run], dark=dark)
 
 
 def prediction(

@@ -124,32 +124,32 @@ def _draw_horizon(
 def error_over_time(content: ReportContent) -> Figure | None:
     """Error per instant of prediction of a test run, the commands below on the same axis; None without times."""
     frame = _rows_of_close_up(content.over_time, content)
-    runs = spread(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS)
+    runs, size = spread(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS), sizes(frame.N_D)[-1]
     if not runs:
         return None
-    means = over_seeds(frame[frame.run.isin(runs)], [*BY, "run", "t"], ["error"])
-    counts = sizes(means.N_D)
-    by_run = dict(iter(means.groupby("run", sort=False)))
+    means = over_seeds(frame[frame.run.isin(runs) & frame.N_D.isin([0, size])], [*BY, "run", "t"], ["error"])
     left, seeds = content.over_time.run.nunique() - len(runs), content.cells["seed"].nunique()
-    last = means[means.N_D.isin([0, counts[-1]])]
-    worst = _worst_instant(content, last)
+    worst, units = _worst_instant(content, means), _commands_by_unit(content.commands)
+    chips = [
+        Chip(f"command:{column}", column.partition("[")[0].strip(), INK, LINE_DASHES[i % 4], 1.5)
+        for columns in units.values()
+        for i, column in enumerate(columns)
+    ]
     return Figure(
         id="over-time",
         title="Error over time",
-        takeaway=_takeaway_time(worst, last),
-        how="At each instant t of a test run: mean position error of the prediction made there, over its horizon. "
-        "The commands that were given are below."
+        takeaway=_takeaway_time(worst, means),
+        how="At each instant t of a test run: mean position error of the prediction made there, over its horizon"
+        + (f", with N_D = {size}" if size else "")
+        + ". The commands that were given are below."
         + (f" Of {seeds} seeds the first is drawn." if seeds > 1 else "")
         + _models_of_close_up(content)
         + (f" {counted(left, 'test run')} more are not drawn." if left else ""),
         alternative="Lines of the position error over the time of one test run, above lines of its commands.",
-        height=AROUND + ERROR + (COMMAND + GAP) * len(_commands_by_unit(content.commands)),
-        draw=lambda run, size: [_draw_time(content, by_run[run][by_run[run].N_D.isin([0, size])], run)],
-        controls=[
-            Control("Test run", runs, 0 if worst is None else runs.index(worst.run)),
-            Control("Manoeuvres, N_D", counts, len(counts) - 1),
-        ],
-        chips=[*close_up_chips(content, set(means.source)), *_command_chips(content.commands)],
+        height=AROUND + ERROR + (COMMAND + GAP) * len(units),
+        draw=lambda run: [_draw_time(content, means[means.run == run], content.commands[content.commands.run == run])],
+        controls=[Control("Test run", runs, 0 if worst is None else runs.index(worst.run))],
+        chips=[*close_up_chips(content, set(means.source)), *chips],
     )
 
 
@@ -184,12 +184,11 @@ def _models_of_close_up(content: ReportContent) -> str:
 def _error_lines(content: ReportContent, means: pd.DataFrame, over: str, column: str, unit: str = "m") -> list[Trace]:
     """A line for each model and source; what has no physics first: thick ink must not cover the others."""
     looks, pure, traces = close_styles(content), data_driven(content), []
-    groups = [
-        (str(model), str(source), mine[[over, column]].to_numpy(dtype=float))
-        for (model, source), mine in means.groupby(["model", "source"], sort=False)
-    ]
-    groups.sort(key=lambda group: (group[0] != pure, group[1]))
-    for (model, given, _), points in zip(groups, _visible_points([points for *_, points in groups]), strict=True):
+    every = means[[over, column]].to_numpy(dtype=float)
+    places: dict[Any, Any] = dict(means.groupby(["model", "source"], sort=False).indices)
+    groups = sorted(places, key=lambda key: (key[0] != pure, key[1]))
+    visible = _visible_points([every[places[key]] for key in groups])
+    for (model, given), points in zip(groups, visible, strict=True):
         source, keys = line_source(content, model, given)
         look = looks.get(model)
         ink = {"color": look.colour, "width": look.width if given == "cooperative" else 1.5} if look else {}
@@ -257,22 +256,14 @@ def _commands_by_unit(commands: pd.DataFrame) -> dict[str, list[str]]:
     return units
 
 
-def _command_chips(commands: pd.DataFrame) -> list[Chip]:
-    return [
-        Chip(f"command:{column}", column.partition("[")[0].strip(), INK, LINE_DASHES[i % 4], 1.5)
-        for columns in _commands_by_unit(commands).values()
-        for i, column in enumerate(columns)
-    ]
-
-
-def _draw_time(content: ReportContent, means: pd.DataFrame, run: str) -> go.Figure:
+def _draw_time(content: ReportContent, means: pd.DataFrame, commands: pd.DataFrame) -> go.Figure:
     """Error on top; below, one row per unit of the commands, all on one time axis."""
-    units, mine = _commands_by_unit(content.commands), content.commands[content.commands.run == run]
+    units = _commands_by_unit(commands)
     traces, total, axes = _error_lines(content, means, "t", "error"), ERROR + (COMMAND + GAP) * len(units), {}
     for row, (unit, columns) in enumerate(units.items(), start=2):
         for i, column in enumerate(columns):
-            changed = np.flatnonzero(np.diff(mine[column]) != 0)
-            held = mine.iloc[np.unique([0, *changed, *(changed + 1), len(mine) - 1])]  # what a step line needs
+            changed = np.flatnonzero(np.diff(commands[column]) != 0)
+            held = commands.iloc[np.unique([0, *changed, *(changed + 1), len(commands) - 1])]  # what a step line needs
             ink = {"color": INK, "width": 1.5, "dash": LINE_DASHES[i % 4], "shape": "hv"}
             name, place = column.partition("[")[0].strip(), {"xaxis": "x", "yaxis": f"y{row}"}
             traces.append(line(name, held.t, held[column], [f"command:{column}"], unit, line=ink, **place))

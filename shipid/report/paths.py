@@ -101,14 +101,15 @@ def snapshots(content: ReportContent) -> Figure | None:
         shot = _middle_window([window for windows in runs.values() for window in windows])
         title, where = "One window, more and more data", f"{shot.run}, t = {shot.t:g} s"
         chosen = f"{where}: the window of middle physics error. All panels share their axes; physics alone and bands "
-        chosen += "may leave them."
+        chosen += f"may leave them{_wind_words(shot)}."
         panels = [(shot, size, name, f"{name or where}, N_D = {size}") for name in models or [""] for size in counts]
     else:
         mine = max(runs.values(), key=len)
         places = sorted({round(share * (len(mine) - 1)) for share in (1 / 6, 1 / 2, 5 / 6)})
         title = "Instants of a test run"
         chosen = "Instants at one, three and five sixths of the run." if len(places) == 3 else ""
-        panels = [(mine[i], counts[0], "", f"{mine[i].run}, t = {mine[i].t:g} s") for i in places]
+        shots = [mine[i] for i in places]
+        panels = [(shot, counts[0], "", f"{shot.run}, t = {shot.t:g} s{_wind_words(shot)}") for shot in shots]
     return Figure(
         id="snapshots",
         title=title,
@@ -129,13 +130,13 @@ def snapshots(content: ReportContent) -> Figure | None:
             for window, size, name, _ in panels
         ],
         chips=_window_chips(content, models),
-        captions=[f"{caption}{_wind_words(window)}" for window, _, _, caption in panels],
+        captions=[caption for *_, caption in panels],
         columns=True,
     )
 
 
 def _wind_words(window: Snapshot) -> str:
-    """The wind of a window as the end of its caption."""
+    """The wind of a window as the end of a sentence."""
     if window.wind is None or window.wind[0] < 0.05:
         return "" if window.wind is None else "; no wind"
     return f"; wind {window.wind[0]:.1f} m/s towards {round(math.degrees(window.wind[1])) % 360}° from ahead"

@@ -77,7 +77,7 @@ class CellMap(NamedTuple):
     """What a map shows.
 
     rows : model, family, A [m], y (square root of A; models without A above), short (name beside the row), by A.
-    cells : model, N_D, family, A, y, reach (half the height), H [m], worse (not below that without physics), words (of
+    cells : model, N_D, family, A, y, low and high (reach below and above y), H [m], worse (not below that without physics), words (of
         the hover box).
     """
 
@@ -139,10 +139,9 @@ def map_of_cells(content: ReportContent) -> CellMap | None:
     if map_lack(content):
         return None
     rows = _rows_of_map(content)
-    reach = np.diff(rows.y) / 2
-    reach = np.minimum(np.append(reach, reach[-1:]), np.insert(reach, 0, reach[:1])) if len(reach) else np.ones(1)
-    reach = np.minimum(reach, THICK / 2 * 1.04 * rows.y.max() / INSIDE)
-    cells = content.cells[["model", "N_D"]].drop_duplicates().merge(rows.assign(reach=reach).drop(columns="short"))
+    half = np.minimum(np.diff(rows.y) / 2, THICK / 2 * 1.04 * rows.y.max() / INSIDE)  # way to the next row
+    rows = rows.assign(low=np.insert(half, 0, half[0]), high=np.append(half, half[-1]))
+    cells = content.cells[["model", "N_D"]].drop_duplicates().merge(rows.drop(columns="short"))
     cells = cells.merge(trained(content)[["model", "N_D", "H"]], how="left")
     learned = cells.N_D.map(cells[cells.model.eq(data_driven(content))].set_index("N_D").H)
     worse = cells.family.ne(DATA_DRIVEN) & cells.H.ge(learned)
@@ -213,15 +212,16 @@ def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> go.Figure:
     edge = (rows.y[rows.A.notna()].max() + rows.y[rows.A.isna()].min()) / 2
     rule = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": edge, "y1": edge}
     rules = [{**rule, "line": {"color": MUTED, "width": 1, "dash": "dot"}}] * bool(rows.A.isna().any())
-    names = _names_of_rows(rows, top)
-    return plot([*traces, *lines], x, y, barmode="overlay", annotations=names, margin=MARGIN, shapes=rules)
+    above = {f"{side}axis2": {"overlaying": side, "matches": side, "visible": False} for side in "xy" if lines}
+    more = {"annotations": _names_of_rows(rows, top), "margin": MARGIN, "shapes": rules, **above}
+    return plot([*traces, *lines], x, y, barmode="overlay", **more)
 
 
 def _boxes(cells: pd.DataFrame, widths: dict[int, float]) -> Trace:
-    columns = {"x": cells.N_D, "y": (2 * cells.reach).round(4), "base": (cells.y - cells.reach).round(4)}
-    return {"type": "bar", **{name: list(values) for name, values in columns.items()}} | {
-        "width": [widths[size] for size in cells.N_D]
-    }
+    """Bars around each cell."""
+    size = {"y": (cells.low + cells.high).round(4), "width": cells.N_D.map(widths)}
+    columns = {"x": cells.N_D, "base": (cells.y - cells.low).round(4), **size}
+    return {"type": "bar", **{name: values.tolist() for name, values in columns.items()}}
 
 
 def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
@@ -266,7 +266,7 @@ def _isolines(shown: CellMap, ends: pd.DataFrame) -> tuple[list[Trace], bool]:
 
     mean = grid(shown.cells[shown.cells.model.isin(physics.model)], "H")
     base = {"type": "contour", "x": np.unique(shown.cells.N_D).tolist(), "y": physics.y.tolist(), "hoverinfo": "skip"}
-    base |= {"showscale": False, "autocontour": False}
+    base |= {"showscale": False, "autocontour": False, "xaxis": "x2", "yaxis": "y2"}  # Plotly draws bars over contours
     inks = {"rim": {"color": "var(--page)", "width": 4}, "iso": {"color": INK, "width": 1.5}}
     inks |= {"low": {"color": INK, "width": 1.2, "dash": "dot"}, "high": {"color": INK, "width": 1.2, "dash": "dot"}}
     heights = {"rim": mean, "iso": mean, **({side: grid(ends, side) for side in ("low", "high")} if len(ends) else {})}

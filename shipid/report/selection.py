@@ -55,6 +55,7 @@ def same_physics(frame: pd.DataFrame) -> pd.Series[bool]:
     return frame.A.notna() & frame.duplicated(["family", "A"])
 
 
+@lru_cache(maxsize=4)
 def data_driven(content: ReportContent) -> str | None:
     """Name of the model without physics, if the study has one; the first of several."""
     frame = families(content)
