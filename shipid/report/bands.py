@@ -10,7 +10,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.report.content import ReportContent
-from shipid.report.figure import MUTED, Chip, Control, Figure, Scale, axis, escaped, intervals, line, plot
+from shipid.report.figure import MUTED, Control, Figure, Scale, axis, escaped, intervals, line, plot
 from shipid.report.physics_and_data import HEIGHT, draw_map, ends_of_map, map_of_cells
 from shipid.report.section import Section
 from shipid.report.selection import close_styles, exemplars, model_chips, sizes
@@ -75,7 +75,7 @@ def coverage(content: ReportContent) -> Figure | None:
         height=420,
         draw=lambda size: [_draw_coverage(content, frame, names, size)],
         controls=[Control("Manoeuvres, N_D", counts, len(counts) - 1)],
-        chips=[*model_chips(names, close_styles(content)), Chip("nominal", "as promised", MUTED, "dash", 1.0)],
+        chips=model_chips(names, close_styles(content)),
     )
 
 

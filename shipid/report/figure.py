@@ -312,7 +312,9 @@ def dress_panels(figure: Figure, panels: Sequence[go.Figure], *, dark: bool = Fa
     whole.update_layout(title=title, width=900, height=height, legend_x=beside, margin_t=90)
     whole.update_layout(showlegend=bool(figure.chips))
     colours = page_colours("dark" if dark else "light")
-    return go.Figure(_paint(whole.to_dict(), colours)).update_layout(paper_bgcolor=colours["page"])
+    data = [_paint(trace.to_plotly_json(), colours) for trace in whole.data]
+    layout = {**_paint(whole.layout.to_plotly_json(), colours), "paper_bgcolor": colours["page"]}
+    return go.Figure(data, layout)
 
 
 def _paint(value: Any, colours: Mapping[str, str]) -> Any:

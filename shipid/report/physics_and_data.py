@@ -162,8 +162,9 @@ def _rows_of_map(content: ReportContent) -> pd.DataFrame:
     frame = frame[~same_physics(frame)].reset_index(drop=True)
     top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
     strips = top * (1.05 + 0.06 * frame.A.isna().cumsum())
-    parts = frame.model.str.partition(" + ")
-    short = parts[0] if parts[2].nunique() < 2 else frame.model
+    parts = [str(name).partition(" + ") for name in frame.model]
+    alike = len({method for _, _, method in parts}) == 1
+    short = [foundation for foundation, _, _ in parts] if alike else frame.model
     return frame.assign(y=np.sqrt(frame.A).where(frame.A.notna(), strips), short=short)
 
 
@@ -258,7 +259,7 @@ def _isolines(shown: CellMap, ends: pd.DataFrame) -> tuple[list[Trace], bool]:
 
     ends : model, N_D, low, high [m]; may be empty.
     """
-    physics = shown.rows[shown.rows.A.notna() & shown.rows.family.ne(DATA_DRIVEN)]
+    physics, ends = shown.rows[shown.rows.A.notna() & shown.rows.family.ne(DATA_DRIVEN)], ends.dropna()
 
     def grid(frame: pd.DataFrame, column: str) -> Floats:
         table = frame.pivot(index="model", columns="N_D", values=column)

@@ -17,6 +17,7 @@ from shipid.report.manoeuvre import ManoeuvreContent, write_manoeuvre
 from shipid.simulation.standard import standards
 from tests.measures.made_records import RECORDS, every
 from tests.report.test_page import Page
+from tests.report.views import views
 
 TRIALS = standards()
 
@@ -105,8 +106,8 @@ def test_a_heading_of_few_degrees_is_drawn_with_the_helm(span: float, together: 
     shown = content("zigzag")
     psi = shown.log["psi"].to_numpy()
     wide = shown.log.assign(psi=2.0 + (psi - psi[0]) * np.deg2rad(span) / np.ptp(psi))
-    panels = manoeuvre.histories(replace(shown, log=wide)).views[""]
-    lines = [{str(trace["name"]): np.asarray(trace["y"]) for trace in panel.plot.traces} for panel in panels]
+    panels = views(manoeuvre.histories(replace(shown, log=wide)))[""]
+    lines = [{str(trace["name"]): np.asarray(trace["y"]) for trace in panel.data} for panel in panels]
     assert np.ptp(lines[0]["heading"]) == pytest.approx(span, rel=1e-3)
     assert ("helm" in lines[0]) == together
     execute = [name for name in lines[0] if name.endswith(" deg")]
@@ -121,7 +122,7 @@ def test_rounding_is_not_drawn() -> None:
     """A stop on a straight course: a yaw rate of 1e-25 filled its panel."""
     made = content("stop")
     figure = manoeuvre.histories(replace(made, log=made.log.assign(r=np.linspace(0, 3e-25, len(made.log)))))
-    (panel,) = (one.plot for one in figure.views[""] if one.plot.layout["yaxis"]["title"]["text"] == "yaw rate [deg/s]")
+    (panel,) = (one for one in views(figure)[""] if one.layout["yaxis"]["title"]["text"] == "yaw rate [deg/s]")
     low, high = panel.layout["yaxis"]["range"]
     assert high - low >= 1
 
@@ -143,8 +144,8 @@ def test_ships_are_drawn_to_scale_where_they_were() -> None:
 def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
     shown = content(kind)
     shown = replace(shown, log=shown.log.assign(psi=shown.log["psi"] + 1.0, shaft=np.linspace(-1, 2, len(shown.log))))
-    panels = manoeuvre.histories(shown).views[""]
-    lines = {str(trace["name"]): np.asarray(trace["y"]) for panel in panels for trace in panel.plot.traces}
+    panels = views(manoeuvre.histories(shown))[""]
+    lines = {str(trace["name"]): np.asarray(trace["y"]) for panel in panels for trace in panel.data}
     log = shown.log
     expected = {"heading": np.degrees(log["psi"] - log["psi"].iloc[0]), "helm": np.degrees(log["helm"])}
     expected |= {"ahead, u": log["u"], "to starboard, v": log["v"], "yaw rate, r": np.degrees(log["r"])}
@@ -153,6 +154,6 @@ def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
     if kind == "spiral":
         figure = manoeuvre.spiral(shown)
         assert figure is not None
-        (trace,) = figure.views[""][0].plot.traces
+        (trace,) = views(figure)[""][0].data
         for axis, column in (("x", "helm"), ("y", "rate")):
             np.testing.assert_allclose(trace[axis], np.degrees(shown.levels[column]), rtol=1e-5, atol=1e-6)
