@@ -162,14 +162,14 @@ def test_a_base_that_diverges_leaves_the_map_whole() -> None:
 
 
 def test_tables_keep_the_order_and_say_why_numbers_are_missing() -> None:
-    errors = identification.errors(content())
+    errors = identification.free_run_errors(content())
     assert [row[0].text for row in errors.rows] == ["all held out", "all fitted", "test run", "fit run"]
     assert [cell.text for cell in errors.rows[0][2:4]] == ["1.000", "0.100"]
-    table = identification.manoeuvres(content())
+    table = identification.manoeuvres_before_and_after(content())
     assert table is not None
     assert table.columns[-1] == "why missing"
     assert table.rows[1][-1].text == "before: no"
-    rows = identification.numbers(content()).rows
+    rows = identification.estimates_table(content()).rows
     assert rows[1][0].text == "hull.N_r (with hull.N_v)"
     assert [row[6].text for row in rows] == ["1.00 … 1.20", "0.60 … 1.00", "none"]
 
@@ -177,7 +177,7 @@ def test_tables_keep_the_order_and_say_why_numbers_are_missing() -> None:
 def test_what_was_not_asked_for_is_left_out(tmp_path: Path) -> None:
     bare = replace(content(), profiles=pd.DataFrame(), programme=pd.DataFrame(), unseen=[])
     assert identification.profiles(bare) is None
-    assert identification.programme(bare) is None
-    assert identification.unseen(bare) is None
+    assert identification.programme_table(bare) is None
+    assert identification.unseen_table(bare) is None
     page = Page(write_identification(bare, tmp_path / "page.html").read_text())
     assert "What to run next" not in " ".join(words for _, words in page.all("h2"))

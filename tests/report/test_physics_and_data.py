@@ -337,9 +337,10 @@ def test_data_driven_is_thick_ink_and_accuracy_is_ordered_colour(simulation):
 def test_one_size_is_a_dumbbell(full_scale):
     figure = gain(full_scale)
     drawn = traces(figure, "0")
-    bar, before, after = drawn["inaccurate"]
+    (bar,), (before,), (after,) = (drawn[name] for name in ("inaccurate", "physics alone", "with compensation"))
     np.testing.assert_allclose(bar.x, [5.2, 2.05], rtol=1e-6)
-    assert (before.x[0], after.x[0]) == pytest.approx((5.2, 2.05))
+    row = int(bar.y[0])
+    assert (before.x[row], after.x[row]) == pytest.approx((5.2, 2.05))
     assert before.marker.symbol == "circle-open"
     assert after.marker.symbol == "circle"
     assert figure.takeaway == (
