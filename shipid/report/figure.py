@@ -46,6 +46,7 @@ LEVELS = 24
 ROUNDING = 1e-9  # of the greatest error: that of an exact model
 MILLION = 6  # power of ten from which ticks are short: Plotly would write -5k on one axis and -6000 on the other
 POINTS = 600  # of a line over time: more than pixels are wide
+Values = "Sequence[float] | Floats | pd.Series[Any]"
 Trace = dict[str, Any]  # as Plotly takes it: `type` and the options of that type
 
 
@@ -201,8 +202,8 @@ def chart(
 
 def line(
     name: str,
-    x: Sequence[float] | Floats,
-    y: Sequence[float] | Floats,
+    x: Values,
+    y: Values,
     keys: Sequence[str],
     unit: str = "m",
     *,
