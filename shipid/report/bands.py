@@ -9,12 +9,12 @@ from typing import Any
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import ReportContent
-from shipid.report.figure import MUTED, Control, Figure, Scale, axis, escaped, intervals, line, plot
+from shipid.report.content import ReportContent, rows_in
+from shipid.report.figure import MUTED, Control, Figure, Scale, Trace, axis, escaped, intervals, line, plot
 from shipid.report.physics_and_data import HEIGHT, draw_map, ends_of_map, map_of_cells
 from shipid.report.section import Section
 from shipid.report.selection import close_styles, exemplars, model_chips, sizes
-from shipid.report.tables import Cell, Column, Table, frame_table
+from shipid.report.tables import Cell, Column, Table, frame_table, with_cells
 from shipid.report.wording import counted, listed, metres
 from shipid.units import level_text, percent, plural
 
@@ -91,7 +91,7 @@ def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str]
             for row in mine.to_dict("records")
         ]
         ink = {"color": look.colour, "width": look.width}
-        drawn = {"mode": "lines+markers", "line": ink, "marker": {"symbol": look.symbol, "size": 7}}
+        drawn: Trace = {"mode": "lines+markers", "line": ink, "marker": {"symbol": look.symbol, "size": 7}}
         reach = intervals(held, low, high, look.colour)
         traces.append(line(name, mine.level + shift, held, [f"model:{name}"], hover=words, error_y=reach, **drawn))
     least = min(0.5, frame.level.min()) - 0.05
@@ -130,7 +130,7 @@ def width_map(content: ReportContent) -> Figure | None:
     shown = map_of_cells(replace(content, cells=cells.assign(H=cells.width, H_90=cells.width)))
     if shown is None:
         return None
-    words = [f"<b>{escaped(row.model)}</b>, N_D = {row.N_D}<br>{metres(row.H)}" for row in shown.cells.itertuples()]
+    words = [f"<b>{escaped(row.model)}</b>, N_D = {row.N_D}<br>{metres(row.H)}" for row in rows_in(shown.cells)]
     shown = shown._replace(cells=shown.cells.assign(words=words))
     low, high = ends_of_map(shown.cells)
     hatched = " Hatched: not narrower than the band of no physics at the same N_D." if shown.cells.worse.any() else ""
@@ -155,17 +155,17 @@ def coverage_table(content: ReportContent) -> Table | None:
     if frame.empty:
         return None
     reasons = [
-        f"{listed([f'{row.model} at N_D = {row.N_D}' for row in part.itertuples()])}: {reason}"
+        f"{listed([f'{row.model} at N_D = {row.N_D}' for row in rows_in(part)])}: {reason}"
         for reason, part in (refused.groupby("reason", sort=False) if len(refused) else ())
     ]
     promised = [Cell(level_text(level), level) for level in frame.level]
     takeaway = f"Without a band: {'; '.join(reasons)}." if reasons else ""
-    return frame_table("coverage-table", "Bands by model", takeaway, _held(frame).assign(promised=promised), BANDS)
+    return frame_table("coverage-table", "Bands by model", takeaway, with_cells(_held(frame), promised=promised), BANDS)
 
 
 def _held(frame: pd.DataFrame) -> pd.DataFrame:
     """The frame with `held`: its coverage with the interval, as cells."""
-    return frame.assign(held=[Cell(_share_words(row), row["coverage"]) for row in frame.to_dict("records")])
+    return with_cells(frame, held=[Cell(_share_words(row), row["coverage"]) for row in frame.to_dict("records")])
 
 
 def coverage_by_group(content: ReportContent) -> Table | None:
@@ -198,7 +198,7 @@ def coverage_by_run(content: ReportContent) -> Table | None:
     half = int((mean < 0.5).sum())
     have = "has less than half of its" if half == 1 else "have less than half of their"
     takeaway = f"Mean over models, {counted(half, 'run')} of {len(mean)} {have} paths in the bands."
-    held = shown.assign(held=[Cell(percent(share), share) for share in shown.coverage])
+    held = with_cells(shown, held=[Cell(percent(share), share) for share in shown.coverage])
     return frame_table("coverage-runs", "Runs that bands hold least", takeaway, held, RUNS)
 
 

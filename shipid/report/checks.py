@@ -9,12 +9,12 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.report import logs
-from shipid.report.content import PageContent, Sentence
+from shipid.report.content import PageContent, Sentence, rows_in
 from shipid.report.figure import POINTS, Chip, Control, Figure, axis, category, even_places, line, plot, run_names
 from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.section import Section
-from shipid.report.tables import Cell, Column, Table, frame_table, word_cell
+from shipid.report.tables import Cell, Column, Table, frame_table, with_cells, word_cell
 from shipid.report.wording import bound, counted, listed, scientific, short
 
 CHECKS = {
@@ -75,10 +75,10 @@ def checks_table(content: CheckContent) -> Table:
             "limit": Cell(scientific(row.limit, 3), float(row.limit)),
             "sentence": word_cell(bound(row.sentence), bad=not row.ok),
         }
-        for row in frame.itertuples()
+        for row in rows_in(frame)
     ]
     cells = {name: [row[name] for row in rows] for name in ("ok", "value", "limit", "sentence")}
-    return frame_table("all-checks", "Every check", "", frame.assign(**cells), CHECKS)
+    return frame_table("all-checks", "Every check", "", with_cells(frame, **cells), CHECKS)
 
 
 def checked_motion(series: pd.DataFrame) -> Figure | None:

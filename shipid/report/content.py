@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -109,6 +109,11 @@ class PageContent:
     command: str = ""
     study_document: str = ""
     findings: Sequence[Finding] = ()
+
+
+def rows_in(frame: pd.DataFrame) -> list[Any]:
+    """Rows of a frame as named tuples."""
+    return list(frame.itertuples())
 
 
 def rows_of(*columns: str) -> Callable[[], pd.DataFrame]:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import Floats, ReportContent
+from shipid.report.content import Floats, ReportContent, rows_in
 from shipid.report.figure import (
     INK,
     LINE_DASHES,
@@ -110,9 +110,9 @@ def _draw_horizon(
     for model, mine in spans.groupby("model", sort=False):
         ahead, low, high = (mine[key].to_numpy(dtype=float) for key in ("ahead", (column, "min"), (column, "max")))
         keys = [f"source:{drawn_source(content, str(model), 'cooperative')}", f"model:{model}"]
-        area = {"line": {"width": 0}, "fill": "toself", "fillcolor": looks[str(model)].colour, "opacity": 0.18}
-        x, y = np.concatenate([ahead, ahead[::-1]]), np.concatenate([high, low[::-1]])
-        bands.append(line(f"{model}, seeds", x, y, keys, hover="", **area))
+        area: Trace = {"line": {"width": 0}, "fill": "toself", "fillcolor": looks[str(model)].colour, "opacity": 0.18}
+        around = np.concatenate([ahead, ahead[::-1]]), np.concatenate([high, low[::-1]])
+        bands.append(line(f"{model}, seeds", *around, keys, hover="", **area))
     names = _names_at_ends(lines)
     room = LEADER + EDGE + LETTER * max((len(name["text"]) for name in names), default=0)  # that they fit any window
     x = axis("time ahead [s]", range=[0.0, float(means.ahead.max())])
@@ -194,7 +194,7 @@ def _error_lines(content: ReportContent, means: pd.DataFrame, over: str, column:
         ink = {"color": look.colour, "width": look.width if given == "cooperative" else 1.5} if look else {}
         ink = {"color": NAIVE, "width": 1.5, **ink, "dash": SOURCE_DASHES[source]}
         mark = {"symbol": look.symbol if look else "", "size": 7, "color": ink["color"], "maxdisplayed": 9}
-        more = {"mode": "lines+markers", "marker": mark} if look and given == "cooperative" else {}
+        more: Trace = {"mode": "lines+markers", "marker": mark} if look and given == "cooperative" else {}
         name = name_of_line(content, model, source)
         traces.append(line(name, points[:, 0], points[:, 1], keys, unit, line=ink, **more))
     return traces
@@ -318,7 +318,7 @@ def error_by_kind(content: ReportContent) -> Table | None:
         return None
     how = [
         HOW_PREDICTED[row.source] + (f", {counted(int(row.N_D), 'run')}" if row.N_D else "")
-        for row in frame[["source", "N_D"]].itertuples()
+        for row in rows_in(frame[["source", "N_D"]])
     ]
     of, source = ("of physics alone", "physics") if nothing_learns(content) else ("with data", "cooperative")
     learned = frame[frame.source.eq(source)]

@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import DATA_DRIVEN, ReportContent, spoken
+from shipid.report.content import DATA_DRIVEN, ReportContent, rows_in, spoken
 from shipid.report.figure import INK, MUTED, SYMBOLS, Chip, Figure, axis, category, escaped, line, plot, row_name
 from shipid.report.section import Section
 from shipid.report.selection import families
-from shipid.report.tables import Column, Table, frame_table, word_cell
+from shipid.report.tables import Column, Table, frame_table, with_cells, word_cell
 from shipid.report.wording import counted, listed, metres, number, shortened
 
 ROW = 42  # height of a model [px]
@@ -71,7 +71,7 @@ def _draw_strips(content: ReportContent, frame: pd.DataFrame, names: list[str]) 
         y = np.array([names.index(name) for name in mine.model]) + 0.24 * i / max(1, len(groups) - 1)
         x = [math.log(factor) if factor > 0 else edge for factor in mine.factor]
         marker = {"symbol": SYMBOLS[i % len(SYMBOLS)], "size": 8, "color": category(i), "opacity": 0.75}
-        words = [f"{escaped(row.model)}: {escaped(row.path)} × {row.factor:.3g}" for row in mine.itertuples()]
+        words = [f"{escaped(row.model)}: {escaped(row.path)} × {row.factor:.3g}" for row in rows_in(mine)]
         traces.append(line(str(group), x, y, [f"group:{group}"], mode="markers", marker=marker, hover=words))
     shown = [1.0]
     for tick in sorted(TICKS, key=lambda value: abs(math.log(value))):
@@ -113,7 +113,7 @@ def _takeaway_factors(frame: pd.DataFrame, names: list[str]) -> str:
         text += low if low == high else f"factors from {low} to {high}"
     text += f"; {counted(removed, 'term')} removed" if removed else ""
     if positive.model.nunique() > 1:
-        away = (np.log(positive.factor.astype(float)) ** 2).groupby(positive.model).mean()
+        away = positive.factor.map(lambda factor: math.log(factor) ** 2).groupby(positive.model).mean()
         text += f"; {away.idxmax()} is farthest from its base, by a factor of {math.exp(math.sqrt(away.max())):.2f}"
         text += f" (root mean square{' of those not removed' if removed else ''})"
     return f"{text}."
@@ -123,7 +123,7 @@ def models_table(content: ReportContent) -> Table:
     """List the models, by rising A."""
     frame = content.models.sort_values("A", kind="stable", na_position="last")
     known = frame[frame.A.notna()]
-    ends = [f"{number(row.A)} m ({row.model})" for row in known.itertuples()]
+    ends = [f"{number(row.A)} m ({row.model})" for row in rows_in(known)]
     takeaway = f"A runs from {ends[0]} to {ends[-1]}." if len(ends) > 1 else "No physics model could be judged."
     takeaway = f"A of {known.model.iloc[0]} is {number(known.A.iloc[0])} m." if len(ends) == 1 else takeaway
     return frame_table(
@@ -139,7 +139,7 @@ def with_failures(frame: pd.DataFrame) -> pd.DataFrame:
         word_cell(f"{status}: {words}" if words and status != "ok" else status, bad=status != "ok")
         for status, words in pairs
     ]
-    return frame.assign(status=cells)
+    return with_cells(frame, status=cells)
 
 
 THE_MODELS = Section(

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -46,7 +46,7 @@ LEVELS = 24
 ROUNDING = 1e-9  # of the greatest error: that of an exact model
 MILLION = 6  # power of ten from which ticks are short: Plotly would write -5k on one axis and -6000 on the other
 POINTS = 600  # of a line over time: more than pixels are wide
-Values = "Sequence[float] | Floats | pd.Series[Any]"
+Values: TypeAlias = "Sequence[float] | Floats | pd.Series[Any]"
 Trace = dict[str, Any]  # as Plotly takes it: `type` and the options of that type
 
 

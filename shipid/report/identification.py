@@ -32,7 +32,7 @@ from shipid.report.motion import LOG, MOTIONS, motion_figure
 from shipid.report.page import write_page
 from shipid.report.section import Section
 from shipid.report.structures import group_errors
-from shipid.report.tables import MISSING, Cell, Column, Table, decimals_for_median, frame_table, word_cell
+from shipid.report.tables import MISSING, Cell, Column, Table, decimals_for_median, frame_table, with_cells, word_cell
 from shipid.report.wording import bound, counted, listed, number, scientific
 from shipid.units import interval_text
 
@@ -175,7 +175,7 @@ def _draw_estimates(frame: pd.DataFrame, low: float, high: float) -> go.Figure:
         mine = numbered[frame["identified"].astype(bool) == known]
         ends = np.clip(mine[["factor_low", "factor_high"]].to_numpy(dtype=float), low, high)
         x = np.column_stack([ends, np.full(len(mine), np.nan)]).ravel()
-        bars = {"line": {"color": ink, "width": width}, "hover": ""}
+        bars: Trace = {"line": {"color": ink, "width": width}, "hover": ""}
         traces.append(line("interval", x, np.repeat(mine["row"], 3), [key], **bars))
         marker = {"symbol": symbol, "color": ink, "size": 9, "line": {"color": ink, "width": 2}}
         words = [_estimate_words(row) for row in mine.to_dict("records")]
@@ -189,8 +189,8 @@ def _span_of_factors(frame: pd.DataFrame) -> tuple[float, float]:
     """Return the range of factors drawn: all estimates, and intervals as far as estimates stay distinguishable."""
     dots = np.append(frame["factor"].to_numpy(dtype=float), 1.0)
     reach = FARTHEST * max(float(np.ptp(dots)), 0.25)
-    ends = frame[["factor_low", "factor_high"]].to_numpy(dtype=float)
-    ends = np.append(ends[np.isfinite(ends)], dots)
+    given = frame[["factor_low", "factor_high"]].to_numpy(dtype=float)
+    ends = np.append(given[np.isfinite(given)], dots)
     low, high = max(float(ends.min()), dots.min() - reach), min(float(ends.max()), dots.max() + reach)
     return low - 0.04 * (high - low), high + 0.04 * (high - low)
 
@@ -205,7 +205,7 @@ def estimates_table(content: IdentificationContent) -> Table:
     """Return the table of all estimates in their units."""
     frame = content.estimates
     words = [row["path"] + (f" (with {row['with']})" if row["with"] else "") for row in frame.to_dict("records")]
-    numbers = {name: frame[name].map(_scientific_cell) for name in ("base", "value", "error", "factor")}
+    numbers = {name: list(map(_scientific_cell, frame[name])) for name in ("base", "value", "error", "factor")}
     intervals = [
         Cell(interval_text(low, high, " … ").replace("-", "−"), float(low))
         if np.isfinite(high - low)
@@ -213,7 +213,7 @@ def estimates_table(content: IdentificationContent) -> Table:
         for low, high in zip(frame["factor_low"], frame["factor_high"], strict=True)
     ]
     identified = [word_cell("yes" if known else "no", bad=not known) for known in frame["identified"]]
-    shown = frame.assign(words=words, interval=intervals, identified=identified, **numbers)
+    shown = with_cells(frame.assign(words=words), interval=intervals, identified=identified, **numbers)
     return frame_table("numbers", "Every estimate", "", shown, ESTIMATES)
 
 
@@ -279,11 +279,16 @@ def free_run_errors(content: IdentificationContent) -> Table:
     """Root mean square errors of the free runs, run by run: of all runs first, and of those held out before others."""
     places, words = decimals_for_median(content.errors["position"]), {"fit": "fitted", "test": "held out"}
     factors = {name: factor for name, (_, _, factor) in MOTIONS.items()} | {"position": 1.0}
-    wide = content.errors.set_index(["set", "run", "model"])[list(factors)].astype(float).mul(factors).unstack("model")
-    wide.columns = [f"{name} {model}" for name, model in wide.columns]
+    by_model = {name: content.errors.pivot(index=["set", "run"], columns="model", values=name) for name in factors}
+    wide = pd.DataFrame(
+        {
+            f"{name} {model}": factor * by_model[name][model].astype(float)
+            for name, factor in factors.items()
+            for model in (BEFORE, AFTER)
+        }
+    )
     pairs = dict.fromkeys((row["set"], row["run"]) for row in content.errors.to_dict("records"))
     wide = wide.reindex(sorted(pairs, key=lambda pair: (pair[1] != "all", pair[0] != "test"))).reset_index()
-    named = wide["run"].where(wide["run"].ne("all"), "all " + wide["set"].map(words))
     heads = {
         f"{name} {model}": Column(f"{name} {model}", places if name == "position" else 3)
         for name in factors
@@ -300,9 +305,9 @@ def manoeuvres_before_and_after(content: IdentificationContent) -> Table | None:
     if performed.empty:
         return None
     numbers = [name for name in (BEFORE, AFTER, "low", "high") if name in performed]
-    shown = performed.assign(**{name: performed[name].map(_scientific_cell) for name in numbers})
+    shown = with_cells(performed, **{name: list(map(_scientific_cell, performed[name])) for name in numbers})
     if performed["note"].ne("").any():
-        shown["missing"] = [word_cell(note, bad=bool(note)) for note in performed["note"]]
+        shown = with_cells(shown, missing=[word_cell(note, bad=bool(note)) for note in performed["note"]])
     takeaway = "Simulated in calm deep water, from U_0 of the vessel or a Froude number of 0.2."
     takeaway += "".join(f" Extrapolated: {sentence}." for sentence in content.beyond)
     takeaway += " The band is what the uncertainty of the estimates leaves open." if "low" in performed else ""
@@ -358,7 +363,7 @@ def profiles(content: IdentificationContent) -> Figure | None:
 
 def _draw_profile(path: str, mine: pd.DataFrame) -> go.Figure:
     x, limit = mine["factor"].to_numpy(dtype=float), float(mine["limit"].iloc[0])
-    curve = {"mode": "lines+markers", "line": {"color": category(0), "width": 2}}
+    curve: Trace = {"mode": "lines+markers", "line": {"color": category(0), "width": 2}}
     traces = [
         line("limit", [x[0], x[-1]], [limit, limit], [], "", line={"color": MUTED, "width": 1, "dash": "dot"}),
         line("profile", x, mine["rise"].clip(upper=3 * limit), [], "", **curve),

@@ -5,11 +5,12 @@ from __future__ import annotations
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import PUBLISHED, ReportContent
+from shipid.report.content import PUBLISHED, ReportContent, rows_in
 from shipid.report.figure import (
     MUTED,
     Chip,
     Figure,
+    Trace,
     axis,
     category,
     chart,
@@ -102,8 +103,8 @@ def _draw_ranges(mine: pd.DataFrame) -> go.Figure:
     for row, (name, low, mean, high) in enumerate(mine[["set", "min", "mean", "max"]].itertuples(index=False)):
         published = name == PUBLISHED
         words = f"{escaped(name)}: {_range_words(low, mean, high)} {escaped(unit)}"
-        bar = {"line": {"color": set_colour(name), "width": 5}, "opacity": 0.55}
-        dot: dict[str, object] = {"color": set_colour(name), "size": 11}
+        bar: Trace = {"line": {"color": set_colour(name), "width": 5}, "opacity": 0.55}
+        dot: Trace = {"color": set_colour(name), "size": 11}
         x, y = [low, high, high, low, low], [row - 0.2, row - 0.2, row + 0.2, row + 0.2, row - 0.2]
         if published:
             bar, dot = {"line": {"color": MUTED, "width": 1.5}}, {"symbol": "circle-open", "color": MUTED, "size": 9}
@@ -131,8 +132,8 @@ def _published_words(ours: pd.DataFrame, published: pd.DataFrame) -> str:
     if ours.empty or published.empty:
         return ""
     known, far = 0, []
-    for theirs in published.itertuples():
-        mine, low, high = ours[ours.quantity == theirs.quantity], float(str(theirs.min)), float(str(theirs.max))
+    for theirs in rows_in(published):
+        mine, low, high = ours[ours.quantity == theirs.quantity], theirs.min, theirs.max
         for word, end, value in (("min", low, mine["min"].min()), ("max", high, mine["max"].max())):
             known += bool(pd.notna(value))
             far += [f"{word} of {theirs.quantity}"] * (abs(float(value) - end) > NEAR * (high - low))

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import Floats, PageContent, Sentence, rows_of
+from shipid.report.content import Floats, PageContent, Sentence, rows_in, rows_of
 from shipid.report.figure import MUTED, Chip, Figure, Trace, axis, category, chart, line, plot, zero_axis
+from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.paths import outline_at
 from shipid.report.section import Section
-from shipid.report.tables import Column, Table, frame_table, number_cell, word_cell
+from shipid.report.tables import Column, Table, frame_table, number_cell, with_cells, word_cell
 from shipid.report.wording import distance, number
 
 MOST_ROWS = 2000  # of the log: a line needs no more
@@ -73,7 +75,7 @@ class ManoeuvreContent(PageContent):
     def answer(self) -> list[Sentence]:
         """Return sentences: the main measures, and how many criteria are met."""
         known = self.measures[self.measures["measure"].isin(self.first)]
-        measures = [f"{row.measure}: {_amount_words(row.value, row.unit)}" for row in known.itertuples()]
+        measures = [f"{row.measure}: {_amount_words(row.value, row.unit)}" for row in rows_in(known)]
         sentences = [Sentence("; ".join(measures).capitalize() + ".", "measures")]
         judged = self.criteria[self.criteria["verdict"] != "not judged"] if len(self.criteria) else self.criteria
         if len(judged):
@@ -91,10 +93,10 @@ def _amount_words(value: float, unit: str) -> str:
 def measures_table(content: ManoeuvreContent) -> Table:
     """Every measure; one that is missing says why."""
     frame = content.measures
-    values = [number_cell(row.value, _decimals_of_measure(row.value, row.unit)) for row in frame.itertuples()]
-    shown = frame.assign(value=values)
+    values = [number_cell(row.value, _decimals_of_measure(row.value, row.unit)) for row in rows_in(frame)]
+    shown = with_cells(frame, value=values)
     if frame["note"].ne("").any():
-        shown["missing"] = [word_cell(note, bad=bool(note)) for note in frame["note"]]
+        shown = with_cells(shown, missing=[word_cell(note, bad=bool(note)) for note in frame["note"]])
     return frame_table("measures", "Measures", "", shown, MEASURES)
 
 
@@ -110,7 +112,7 @@ def criteria_table(content: ManoeuvreContent) -> Table | None:
     frame = content.criteria
     if frame.empty:
         return None
-    shown = frame.assign(verdict=[word_cell(verdict, bad=verdict == "not met") for verdict in frame["verdict"]])
+    shown = with_cells(frame, verdict=[word_cell(verdict, bad=verdict == "not met") for verdict in frame["verdict"]])
     return frame_table("criteria", "Criteria of IMO MSC.137(76)", "", shown, CRITERIA)
 
 
@@ -119,14 +121,14 @@ def track(content: ManoeuvreContent) -> Figure:
     log = content.log.iloc[:: max(1, len(content.log) // MOST_ROWS)]
     poses = log[["north", "east", "psi"]].iloc[np.linspace(0, len(log) - 1, OUTLINES).astype(int)]
     gap = np.full((1, 2), np.nan)
-    hulls = [np.vstack([outline_at(content.outline, *pose), gap]) for pose in poses.itertuples(index=False)]
+    hulls = [np.vstack([outline_at(content.outline, pose), gap]) for pose in poses.to_numpy()]
     drawn = np.vstack([*hulls, log[["north", "east"]].to_numpy()])
     bounds = [(float(np.nanmin(drawn[:, i])), float(np.nanmax(drawn[:, i]))) for i in (1, 0)]
     east, north = (distance(high - low) for low, high in bounds)
     ships = np.vstack(hulls)
     words = [
         f"t = {row.t:.1f} s<br>{row.east:.1f} m east, {row.north:.1f} m north"
-        for row in log[["t", "east", "north"]].itertuples()
+        for row in rows_in(log[["t", "east", "north"]])
     ]
     ink = {"color": category(0), "width": 2.5}
     traces = [
@@ -148,7 +150,7 @@ def track(content: ManoeuvreContent) -> Figure:
 def histories(content: ManoeuvreContent) -> Figure:
     """Heading, helm, speeds, yaw rate and shaft over time."""
     log, executed = content.log.iloc[:: max(1, len(content.log) // MOST_ROWS)], _measure(content, EXECUTE)
-    degrees = np.rad2deg(log[["psi", "helm", "r"]])
+    degrees = DEGREES * log[["psi", "helm", "r"]]
     values = log[["u", "v"]].assign(
         heading=degrees["psi"] - degrees["psi"].iloc[0], helm=degrees["helm"], r=degrees["r"], shaft=60 * log["shaft"]
     )
@@ -187,7 +189,7 @@ def _draw_history(t: pd.Series[float], values: pd.DataFrame, title: str, execute
         traces.append(line(name, t, values[key], [str(key)], unit, line=ink))
     drawn = np.concatenate([trace["y"] for trace in traces])
     low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
-    span = {"range": [low - 1, high + 1]} if high - low < ROUNDING else {}
+    span: dict[str, Any] = {"range": [low - 1, high + 1]} if high - low < ROUNDING else {}
     return plot(traces, axis("time [s]", nticks=4), zero_axis(title, nticks=6, **span))
 
 
@@ -202,7 +204,7 @@ def spiral(content: ManoeuvreContent) -> Figure | None:
     if content.levels.empty:
         return None
     levels = np.rad2deg(content.levels[["helm", "rate"]].astype(float))
-    look = {"line": {"color": category(3), "width": 2}, "marker": {"color": category(3), "size": 7}}
+    look: Trace = {"line": {"color": category(3), "width": 2}, "marker": {"color": category(3), "size": 7}}
     trace = line("yaw rate", levels["helm"], levels["rate"], [], "deg/s", mode="lines+markers", **look)
     axes = zero_axis("helm [deg]", nticks=9), zero_axis("yaw rate [deg/s]", nticks=8)
     return Figure(

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import ReportContent
+from shipid.report.content import ReportContent, rows_in
 from shipid.report.figure import (
     INK,
     MUTED,
     Chip,
     Control,
     Figure,
+    Trace,
     axis,
     category,
     escaped,
@@ -28,7 +29,7 @@ from shipid.report.figure import (
 )
 from shipid.report.section import Section
 from shipid.report.selection import in_words, spread
-from shipid.report.tables import Cell, Column, Table, frame_table
+from shipid.report.tables import Cell, Column, Table, frame_table, with_cells
 from shipid.report.wording import counted, difference_text, listed, number
 
 ROW, GAP, AROUND = 118, 26, 56  # heights of a row of a stacked figure, between rows, and around them [px]
@@ -121,7 +122,7 @@ def _takeaway_observer(frame: pd.DataFrame, runs: Sequence[str], current: bool) 
     return f"Along {counted(len(runs), 'test run')}, {', '.join(parts)}, and {test}."
 
 
-def _draw_observer(frame: pd.DataFrame, moments: Sequence[float], rows: Sequence[str]) -> go.Figure:
+def _draw_observer(frame: pd.DataFrame, moments: Iterable[float], rows: Sequence[str]) -> go.Figure:
     """A row for each signal, from the top; dotted lines over the whole height at the moments of new orders."""
     traces, axes, total = [], {}, len(rows) * (ROW + GAP)
     for place, title in enumerate(rows, start=1):
@@ -147,7 +148,7 @@ def memory_gain(content: ReportContent) -> Figure | None:
     accuracy = frame.groupby("model", sort=False).A.mean().sort_values(kind="stable", na_position="last")
     models, compared = spread([str(name) for name in accuracy.index], FEW), run_names(frame, "comparison")
     uneven = frame[frame.differs.ne("")].drop_duplicates("comparison")
-    differing = [f"{row.comparison} ({row.differs})" for row in uneven.itertuples()]
+    differing = [f"{row.comparison} ({row.differs})" for row in rows_in(uneven)]
     total = len(accuracy)
     return Figure(
         id="memory-gain",
@@ -184,12 +185,12 @@ def _draw_memory(frame: pd.DataFrame, models: Sequence[str]) -> go.Figure:
         ink, keys = {"color": category(i), "width": 2}, [f"model:{name}"]
         mark = {"marker": {"color": ink["color"], "size": 6}}
         for side, dash in (("without", "dot"), ("with", "solid")):
-            look = {"mode": "lines+markers", "line": {**ink, "dash": dash}, **mark}
+            look: Trace = {"mode": "lines+markers", "line": {**ink, "dash": dash}, **mark}
             traces.append(line(f"{name}, {side}", x, mine[f"H_{side}"], [*keys, f"side:{side}"], **look))
         middle, low, high = (mine[column].to_numpy(dtype=float) for column in ("difference", "low", "high"))
         words = [f"{escaped(name)}: {difference_text(*ends)}" for ends in zip(middle, low, high, strict=True)]
-        look = {"mode": "markers", **mark, "yaxis": "y2", "error_y": intervals(middle, low, high, category(i))}
-        traces.append(line(f"{name}, difference", x + shift, middle, keys, hover=words, **look))
+        looks: Trace = {"mode": "markers", **mark, "yaxis": "y2", "error_y": intervals(middle, low, high, category(i))}
+        traces.append(line(f"{name}, difference", x + shift, middle, keys, hover=words, **looks))
     names = [str(amount) if amount else "physics alone" for amount in amounts]
     title = "manoeuvres, N_D [1]" if amounts != [0] else ""
     x_axis = names_axis(names, title, anchor="y2", range=[-0.5, len(amounts) - 0.5], showgrid=False)
@@ -216,12 +217,12 @@ def memory_table(content: ReportContent) -> Table | None:
         return None
     ends = [
         Cell(f"{number(row.low)} to {number(row.high)}" if math.isfinite(row.low) else "–", row.low)
-        for row in frame.itertuples()
+        for row in rows_in(frame)
     ]
-    better = [Cell(f"{row.better} of {row.runs}", row.better) for row in frame.itertuples()]
+    better = [Cell(f"{row.better} of {row.runs}", row.better) for row in rows_in(frame)]
     takeaway = f"{counted(len(frame), 'comparison')}; N_D = 0 is physics alone; "
     takeaway += f"means over {counted(int(frame.seeds.max()), 'seed')} at most."
-    shown = frame.assign(interval=ends, better=better)
+    shown = with_cells(frame, interval=ends, better=better)
     return frame_table("memory-table", "Every comparison", takeaway, shown, COMPARISONS, like="H_without")
 
 

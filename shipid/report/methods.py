@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import DATA_DRIVEN, PageContent, ReportContent, Sentence, spoken
+from shipid.report.content import DATA_DRIVEN, PageContent, ReportContent, Sentence, rows_in, spoken
 from shipid.report.figure import (
     INK,
     OKABE_ITO,
@@ -30,7 +30,7 @@ from shipid.report.figure import (
     zero_axis,
 )
 from shipid.report.section import Section
-from shipid.report.tables import Cell, Column, Table, frame_table, word_cell
+from shipid.report.tables import Cell, Column, Table, frame_table, with_cells, word_cell
 from shipid.report.wording import counted, difference_text, ends, listed, number, shortened
 from shipid.units import plural
 
@@ -101,16 +101,16 @@ def _verdict_at_size(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
     err = plural(len(tied), "errs", "err alike,")
     text = f"with N_D = {N_D} {listed(tied)} {err} least{over}, {number(best.H)} m"
     leads = best.reference in tied
-    for row in whole[~alike if leads else alike][:1].itertuples():
+    for row in rows_in(whole[~alike if leads else alike][:1]):
         if math.isfinite(row.low):
             its = f"{row.method} is next, its" if leads else plural(len(tied), "its", "their")
             text += f" ({its} difference to {row.reference} is {difference_text(row.difference, row.low, row.high)})"
     partial = set(mine.method[mine.missing.gt(0)])
     if ahead := [name for name in best.ahead.split(", ") if name in partial]:
         text += f", but over the cells that both have {listed(ahead)} {plural(len(ahead), 'errs', 'err')} less"
-    failed = [f"{row.method} ({row.failed} of {row.cells})" for row in mine[mine.failed.gt(0)].itertuples()]
+    failed = [f"{row.method} ({row.failed} of {row.cells})" for row in rows_in(mine[mine.failed.gt(0)])]
     text += f", without a result: {listed(failed)}" if failed else ""
-    partly = [str(row.method) for row in mine[mine.missing.gt(mine.failed)].itertuples()]
+    partly = [str(row.method) for row in rows_in(mine[mine.missing.gt(mine.failed)])]
     return text + (f" (left out: {listed(partly)}, not on every model)" if partly else "")
 
 
@@ -175,14 +175,14 @@ def _draw_methods(mine: pd.DataFrame, order: Sequence[str], families: Sequence[s
         known = mine[mine.family.eq(family) & mine.H.notna()]
         paired = mine[mine.family.eq(family) & mine.difference.notna() & mine.method.ne(mine.reference)]
         shift = 0.14 * ((len(families) - 1) / 2 - k)
-        prices = [f"{number(row.H)} m, {row.seconds:.1f} s" for row in known.itertuples()]
+        prices = [f"{number(row.H)} m, {row.seconds:.1f} s" for row in rows_in(known)]
         errors.append(_dots_of_family(family, families, known, known.H, order, shift, prices))
-        words = [difference_text(row.difference, row.low, row.high) for row in paired.itertuples()]
+        words = [difference_text(row.difference, row.low, row.high) for row in rows_in(paired)]
         dots = _dots_of_family(family, families, paired, paired.difference, order, shift, words)
         middle, low, high = (paired[column].to_numpy(dtype=float) for column in ("difference", "low", "high"))
         differences.append(dots | {"error_x": intervals(middle, low, high, dots["marker"]["color"])})
-    known = mine.H[mine.H > 0]
-    span = float(known.max() / known.min()) if len(known) else 1.0
+    positive = mine.H[mine.H > 0]
+    span = float(positive.max() / positive.min()) if len(positive) else 1.0
     fine = next((steps for most, steps in STEPS if span < most), (1,))
     y = names_axis([shortened(name, LONGEST) for name in order], range=[-0.6, len(order) - 0.4])
     return [
@@ -202,7 +202,7 @@ def _dots_of_family(
 ) -> Trace:
     y = [order.index(name) + shift for name in rows.method]
     hover = [f"{spoken(family)}, {name}: {text}" for name, text in zip(rows.method, words, strict=True)]
-    look = {"mode": "markers", "marker": _family_marker(family, families)}
+    look: Trace = {"mode": "markers", "marker": _family_marker(family, families)}
     return line(spoken(family), values, y, [f"family:{family}"], hover=list(map(escaped, hover)), **look)
 
 
@@ -211,11 +211,8 @@ def methods_table(content: ReportContent | MethodsContent) -> Table:
     frame = content.frames["methods"]
     records = frame.to_dict("records")
     failed = [Cell(f"{row['failed']} of {row['cells']}", float(row["failed"]), bool(row["failed"])) for row in records]
-    shown = frame.assign(
-        family=frame.family.map(spoken),
-        without=failed,
-        **{name: [_paired_cell(row, name) for row in records] for name in ("over_runs", "better_runs", "by_world")},
-    )
+    paired = {name: [_paired_cell(row, name) for row in records] for name in ("over_runs", "better_runs", "by_world")}
+    shown = with_cells(frame.assign(family=frame.family.map(spoken)), without=failed, **paired)
     shown = shown.drop(columns="condition") if frame.condition.nunique() < 2 else shown
     counts = frame.loc[frame.family.ne(EVERY), ["failed", "cells"]].sum()
     bad, every = int(counts["failed"]), counted(int(counts["cells"]), "cell")

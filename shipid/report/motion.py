@@ -20,7 +20,7 @@ MOTIONS = {"u": ("speed ahead, u", "m/s", 1.0), "v": ("to starboard, v", "m/s", 
 
 
 def motion_figure(
-    series: pd.DataFrame, inks: Mapping[str, Mapping[str, Any]], framed: Sequence[str], **texts: str
+    series: pd.DataFrame, inks: Mapping[str, Mapping[str, Any]], framed: Sequence[str], **texts: Any
 ) -> Figure:
     """Panels of a run that a reader picks: u, v, r over time, and the map, north up with equal axes.
 

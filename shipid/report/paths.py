@@ -16,7 +16,7 @@ import plotly.graph_objects as go
 from shipid.errors import ShipidError, choices
 from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, Snapshot
 from shipid.report.errors_over import close_up_chips, line_source, name_of_line
-from shipid.report.figure import MUTED, NAIVE, TRUTH, Chip, Control, Figure, Trace, chart, even_places, line
+from shipid.report.figure import MUTED, NAIVE, TRUTH, Chip, Control, Figure, Trace, chart, escaped, even_places, line
 from shipid.report.section import Section
 from shipid.report.selection import (
     FEW_RUNS,
@@ -222,17 +222,23 @@ def draw_window(
     """
     truth = np.asarray(window.truth)
     traces = [_path_line("true path", truth, ["truth"], line={"color": TRUTH, "width": 9}, hover="true path")]
-    for place, psi in ((np.zeros(2), 0.0), (truth[-1], window.psi_end)):
-        hull = outline_at(window.outline, *place, psi)
-        fill = {"line": {"color": MUTED, "width": 1}, "fill": "toself", "fillcolor": "var(--hull)"}
+    for pose in (np.zeros(3), np.append(truth[-1], window.psi_end)):
+        hull = outline_at(window.outline, pose)
+        fill: Trace = {"line": {"color": MUTED, "width": 1}, "fill": "toself", "fillcolor": "var(--hull)"}
         traces.append(_path_line("ship", hull, ["ship"], hover="", **fill))
     for key in (key for key in window.paths if _is_drawn(content, key, [size], models)):
         look = _line_style(content, "" if key[1] == "naive" else key[0], key[1])
         if key in window.bands:
-            shade = {"line": {**look["line"], "width": 0.5}, "fill": "toself", "fillcolor": look["line"]["color"]}
+            shade: Trace = {
+                "line": {**look["line"], "width": 0.5},
+                "fill": "toself",
+                "fillcolor": look["line"]["color"],
+            }
             keys = [*look["keys"], "band"]
             traces.append(_path_line(look["name"], window.bands[key], keys, hover="", opacity=0.15, **shade))
-        traces.append(_path_line(look["name"], window.paths[key], look["keys"], line=look["line"], hover=look["name"]))
+        traces.append(
+            _path_line(look["name"], window.paths[key], look["keys"], line=look["line"], hover=escaped(look["name"]))
+        )
     return chart(traces, TO_STARBOARD, AHEAD, spans)
 
 
@@ -241,16 +247,16 @@ def _path_line(name: str, path: Floats, keys: Sequence[str], **options: Any) -> 
     return line(name, np.asarray(path)[:, 1], np.asarray(path)[:, 0], keys, **options)
 
 
-def outline_at(outline: Floats, x: float, y: float, psi: float) -> Floats:
-    """Closed outline (k + 1, 2) of a ship at a place [m] and a heading [rad]."""
-    turn = np.array([[np.cos(psi), np.sin(psi)], [-np.sin(psi), np.cos(psi)]])
-    return np.vstack([outline, outline[:1]]) @ turn + [x, y]
+def outline_at(outline: Floats, pose: Floats) -> Floats:
+    """Closed outline (k + 1, 2) of a ship at a pose: x, y [m] and heading [rad]."""
+    turn = np.array([[np.cos(pose[2]), np.sin(pose[2])], [-np.sin(pose[2]), np.cos(pose[2])]])
+    closed: Floats = np.vstack([outline, outline[:1]]) @ turn + pose[:2]
+    return closed
 
 
 def _spans(window: Snapshot, models: Sequence[str]) -> list[tuple[float, float]]:
     """Range of y, then of x [m] of the true path, the ship at both of its ends and what was compensated or learned."""
-    end = np.asarray(window.truth)[-1]
-    hulls = [window.outline, outline_at(window.outline, *end, window.psi_end)]
+    hulls = [window.outline, outline_at(window.outline, np.append(window.truth[-1], window.psi_end))]
     paths = [path for (model, source, _), path in window.paths.items() if source == "cooperative" and model in models]
     every = np.vstack([window.truth, *hulls, *paths])
     return [(float(np.nanmin(column)), float(np.nanmax(column))) for column in (every[:, 1], every[:, 0])]
@@ -324,7 +330,7 @@ def _middle_window(windows: Sequence[Snapshot]) -> Snapshot:
         np.mean([_end_error(window, path) for (_, kind, _), path in window.paths.items() if kind != "cooperative"] or 0)
         for window in windows
     ]
-    return windows[np.argsort(errors, kind="stable")[len(errors) // 2]]
+    return windows[int(np.argsort(errors, kind="stable")[len(errors) // 2])]
 
 
 def _mean_end_error(windows: Sequence[Snapshot], keys: set[PathKey]) -> float:
@@ -352,7 +358,7 @@ def _takeaway_row(content: ReportContent, panels: Sequence[tuple[Snapshot, int]]
     """How far the compensated paths end from the truth in each panel, or those without physics where there are none."""
     pure = data_driven(content)
     physics = [name for name in exemplars(content) if name != pure]
-    sets = {
+    sets: dict[str, list[str | None]] = {
         "the compensated paths": [name for name in physics if name not in content.alone],
         "the paths of physics alone": [name for name in physics if name in content.alone],
         "the paths without physics": [pure],

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_in
 from shipid.report.figure import (
     CLEAR,
     INK,
@@ -77,8 +77,8 @@ class CellMap(NamedTuple):
     """What a map shows.
 
     rows : model, family, A [m], y (square root of A; models without A above), short (name beside the row), by A.
-    cells : model, N_D, family, A, y, low and high (reach below and above y), H [m], worse (not below that without physics), words (of
-        the hover box).
+    cells : model, N_D, family, A, y, low and high (reach below and above y), H [m], worse (not below that without
+        physics), words (of the hover box).
     """
 
     rows: pd.DataFrame
@@ -143,12 +143,12 @@ def map_of_cells(content: ReportContent) -> CellMap | None:
     rows = rows.assign(low=np.insert(half, 0, half[0]), high=np.append(half, half[-1]))
     cells = content.cells[["model", "N_D"]].drop_duplicates().merge(rows.drop(columns="short"))
     cells = cells.merge(trained(content)[["model", "N_D", "H"]], how="left")
-    learned = cells.N_D.map(cells[cells.model.eq(data_driven(content))].set_index("N_D").H)
+    learned = cells.N_D.map(cells[cells.model.eq(data_driven(content) or "")].set_index("N_D").H)
     worse = cells.family.ne(DATA_DRIVEN) & cells.H.ge(learned)
     groups = {key: mine.to_dict("records") for key, mine in content.cells.groupby(["model", "N_D"])}
     words = [
         _cell_words(groups[row.model, row.N_D], row, learned[row.Index] if worse[row.Index] else None)
-        for row in cells.itertuples()
+        for row in rows_in(cells)
     ]
     return CellMap(rows, cells.assign(worse=worse, words=words))
 
@@ -329,8 +329,8 @@ def _rival(rows: pd.DataFrame) -> str:
 
 def ends_of_map(cells: pd.DataFrame) -> tuple[str, str]:
     """The least and the greatest H, each with its model and N_D."""
-    ends = cells.loc[[cells.H.idxmin(), cells.H.idxmax()]].itertuples()
-    least, greatest = (f"{metres(float(str(row.H)))} ({row.model}, N_D = {row.N_D})" for row in ends)
+    ends = rows_in(cells.loc[[cells.H.idxmin(), cells.H.idxmax()]])
+    least, greatest = (f"{metres(row.H)} ({row.model}, N_D = {row.N_D})" for row in ends)
     return least, greatest
 
 
@@ -437,7 +437,7 @@ def _draw_sizes(
         ink = {"color": look.colour, "width": look.width}
         traces.append(line(name, sizes, heights, keys, mode="lines+markers", line=ink, marker=marker))
         if seeds.seed.nunique() > 1:
-            faint = {"mode": "markers", "marker": {**marker, "size": 5}, "opacity": 0.4}
+            faint: Trace = {"mode": "markers", "marker": {**marker, "size": 5}, "opacity": 0.4}
             traces.append(line(f"{name}, seed", seeds.N_D, seeds[column], keys, **faint))
     traces.append(_floor(content, statistic, [sizes[0], sizes[-1]]))
     title = f"position error, {statistic} [m]"
@@ -490,12 +490,12 @@ def _gain_at_one_size(content: ReportContent, means: pd.DataFrame) -> Figure:
     )
 
 
-def _draw_dumbbells(content: ReportContent, means: pd.DataFrame, statistic: str, names: Sequence[str]) -> go.Figure:
+def _draw_dumbbells(content: ReportContent, means: pd.DataFrame, statistic: str, names: list[str]) -> go.Figure:
     """A row for each model: the physics alone, with compensation, and a bar between them."""
     column, alone, _ = STATISTICS[statistic]
     old = content.models.set_index("model")[alone].reindex(names).to_numpy(dtype=float)
     new = means.set_index("model")[column].reindex(names).to_numpy(dtype=float)
-    colours, rows = [styles(content)[name].colour for name in names], np.arange(len(names))
+    colours = [styles(content)[name].colour for name in names]
     seeds = content.cells[content.cells.status.eq("ok") & content.cells.model.isin(names)]
     seeds = seeds[seeds.groupby("model").H.transform("size") > 1]
     at = {name: row for row, name in enumerate(names)}
@@ -506,16 +506,16 @@ def _draw_dumbbells(content: ReportContent, means: pd.DataFrame, statistic: str,
         line(name, [old[i], new[i]], [i, i], ["before", "after"], line={"color": colours[i], "width": 3}, hover="")
         for i, name in enumerate(names)
     ]
-    for key, what, x, y, symbol, size in (
-        ("before", "physics alone", old, rows, "circle-open", 13),
-        ("after", "with compensation, seed", seeds[column].to_numpy(), places, "circle", 7),
-        ("after", "with compensation", new, rows, "circle", 13),
+    for key, what, values, lines, symbol, size in (
+        ("before", "physics alone", old, range(len(names)), "circle-open", 13),
+        ("after", "with compensation, seed", seeds[column].to_numpy(dtype=float), places, "circle", 7),
+        ("after", "with compensation", new, range(len(names)), "circle", 13),
     ):
-        ink = [colours[i] for i in y]
+        ink = [colours[i] for i in lines]
         marker = {"symbol": symbol, "size": size, "color": ink, "line": {"width": 2, "color": ink}}
-        words = [f"{escaped(names[i])}, {what}: {metres(value)}" for i, value in zip(y, x, strict=True)]
+        words = [f"{escaped(names[i])}, {what}: {metres(value)}" for i, value in zip(lines, values, strict=True)]
         shade = 0.4 if size == 7 else 1.0
-        traces.append(line(what, x, y, [key], mode="markers", marker=marker, hover=words, opacity=shade))
+        traces.append(line(what, values, lines, [key], mode="markers", marker=marker, hover=words, opacity=shade))
     texts = []
     for row, name in enumerate(names):
         numbers = " → ".join(metres(value) for value in (old[row], new[row]) if np.isfinite(value))

@@ -26,7 +26,7 @@ from shipid.report.figure import (
 )
 from shipid.report.section import Section
 from shipid.report.selection import sizes
-from shipid.report.tables import Cell, Column, Table, frame_table, number_cell, word_cell
+from shipid.report.tables import Cell, Column, Table, frame_table, number_cell, with_cells, word_cell
 from shipid.report.wording import counted, duration, fixed, number, short
 
 MOST_DOTS = 1200  # in one panel: more hide each other
@@ -133,9 +133,13 @@ def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> go.
         traces.append(line(state, mine[name], y, [f"state:{state}"], mode="markers", marker=marker, hover=hover))
     middle = _medians(frame[frame.ratio.notna()], name)
     ink = {"color": INK, "width": 2.5}
-    traces.insert(3, line("median", *middle.T, ["median"], "times the best", line=ink))
+    traces.insert(3, line("median", middle[:, 0], middle[:, 1], ["median"], "times the best", line=ink))
     ticks = {1: "1", 1.5: "1.5", 2: "2", 3: "3", CEILING: f"≥{CEILING:g}", FAILED: "div."}
-    y_axis = {"range": [-0.02, math.log10(FAILED) + 0.04], "tickvals": list(ticks), "ticktext": list(ticks.values())}
+    y_axis: dict[str, Any] = {
+        "range": [-0.02, math.log10(FAILED) + 0.04],
+        "tickvals": list(ticks),
+        "ticktext": list(ticks.values()),
+    }
     return plot(traces, _axis_of_values(name, every), log_axis("error / best of cell [1]", **y_axis))
 
 
@@ -209,14 +213,12 @@ def search_table(content: ReportContent) -> Table:
     tried = []
     for name in names:
         share = _yes_or_no(frame[name])
-        choices = [
-            _choice_cell(chosen[name][chosen.N_D.eq(size)].astype(float).dropna(), share) for size in shown.index
-        ]
-        shown[f"chosen {name}"] = choices
+        values = [chosen[name][chosen.N_D.eq(size)].astype(float).dropna() for size in shown.index]
+        shown = with_cells(shown, **{f"chosen {name}": [_choice_cell(some, share) for some in values]})
         columns[f"{'share of ' if share else ''}chosen {_title(name)}"] = Column(f"chosen {name}", numeric=True)
         unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
-        values = "yes or no" if share else f"{short(frame[name].min())} to {short(frame[name].max())}{unit}"
-        tried.append(f"{name.replace('_', ' ')} {values}")
+        span = "yes or no" if share else f"{short(frame[name].min())} to {short(frame[name].max())}{unit}"
+        tried.append(f"{name.replace('_', ' ')} {span}")
     stopped, diverged = (int(states[state].sum()) or "none" for state in ("stopped", "diverged"))
     takeaway = f"{counted(len(frame), 'trial')} in {counted(frame.cell.nunique(), 'cell')}: {stopped} stopped early, "
     takeaway += f"{diverged} diverged; {duration(float(frame.seconds.sum()))} of training."

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, Indices, ReportContent
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, Indices, ReportContent, rows_in
 from shipid.report.figure import INK, MUTED, OKABE_ITO, SYMBOLS, Chip, category, colour_level
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
@@ -130,11 +130,11 @@ def styles(content: ReportContent) -> Mapping[str, Style]:
     frame, span = families(content), accuracy_range(content)
     kinds = [kind for kind in pd.unique(frame.family) if kind != DATA_DRIVEN]
     result = _styles_without_physics([str(name) for name in frame.model[frame.family.eq(DATA_DRIVEN)]])
-    for index, (row, again) in enumerate(zip(frame.itertuples(), same_physics(frame), strict=True)):
+    for index, (row, again) in enumerate(zip(rows_in(frame), same_physics(frame), strict=True)):
         if row.family != DATA_DRIVEN:
             # A is unknown where the physics diverged. Of several methods on one model the first marker is filled.
-            known = span is not None and np.isfinite(float(str(row.A)))
-            shade = f"var(--scale-{colour_level(float(str(row.A)), span)})" if known and span else MUTED
+            known = span is not None and np.isfinite(row.A)
+            shade = f"var(--scale-{colour_level(row.A, span)})" if known and span else MUTED
             symbol = SYMBOLS[kinds.index(row.family) % len(SYMBOLS)] + "-open" * bool(span and again)
             result[str(row.model)] = Style(category(index) if span is None else shade, symbol, 2.0)
     return result

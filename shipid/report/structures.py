@@ -10,12 +10,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import PageContent, Sentence
+from shipid.report.content import PageContent, Sentence, rows_in
 from shipid.report.figure import run_names
 from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.section import Section
-from shipid.report.tables import Cell, Column, Table, decimals_for_median, frame_table, number_cell, word_cell
+from shipid.report.tables import (
+    Cell,
+    Column,
+    Table,
+    decimals_for_median,
+    frame_table,
+    number_cell,
+    with_cells,
+    word_cell,
+)
 from shipid.report.wording import counted, fixed, listed
 from shipid.units import decimals_for
 
@@ -61,7 +70,7 @@ def structures_table(content: StructuresContent) -> Table:
         Cell(f"{fixed(row.low, places)} … {fixed(row.high, places)}", row.low)
         if np.isfinite(row.low + row.high)
         else number_cell(None, 0)
-        for row in frame.itertuples()
+        for row in rows_in(frame)
     ]
     columns = {
         "structure": Column("structure"),
@@ -77,7 +86,7 @@ def structures_table(content: StructuresContent) -> Table:
         "why missing": Column("note"),
     }
     equal = frame["equal"].map({True: "yes", False: "no"})
-    shown = frame.assign(r=DEGREES * frame["r"], between=between, equal=equal)
+    shown = with_cells(frame.assign(r=DEGREES * frame["r"], equal=equal), between=between)
     length = f"of {content.ahead:g} s" if content.ahead else "as long as the runs"
     title = f"Free runs {length}, of runs that the fit has not seen"
     takeaway = "Means over runs of root mean square errors; intervals of differences are paired over runs."
@@ -105,7 +114,7 @@ def structure_manoeuvres(content: StructuresContent) -> Table:
     """Measures of standard manoeuvres by structure, the spread between structures beside the interval within one."""
     known = content.manoeuvres[content.manoeuvres["measure"] != ""]
     names, place = _structures_in(content, known), ["manoeuvre", "measure"]
-    cells = known.assign(cell=[_measure_cell(row) for row in known.to_dict("records")])
+    cells = with_cells(known, cell=[_measure_cell(row) for row in known.to_dict("records")])
     by_structure = cells.pivot(index=place, columns="structure", values="cell").reset_index()
     shown = known.drop_duplicates(place)[[*place, "unit"]].merge(by_structure, how="left")
     shown = shown.merge(content.spread[[*place, "spread", "width"]], how="left")

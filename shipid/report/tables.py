@@ -88,6 +88,11 @@ def _cell(value: Any, places: int | None) -> Cell:
     return word_cell(value) if places is None else number_cell(value, places)
 
 
+def with_cells(frame: pd.DataFrame, **cells: Sequence[Cell]) -> pd.DataFrame:
+    """The frame with columns of cells."""
+    return frame.assign(**{name: pd.Series(list(some), frame.index, object) for name, some in cells.items()})
+
+
 def cell_html(cell: Cell, numeric: bool, first: bool) -> Markup:
     """Write a cell as an element of HTML; its key is left out where page.js reads the same from the text.
 

@@ -137,7 +137,7 @@ def test_counts_have_no_decimals() -> None:
 def test_ships_are_drawn_to_scale_where_they_were() -> None:
     """Bow and stern of an outline lie on the heading, the bow half a length ahead; starboard of east is south."""
     shape = np.array([[60.0, 0.0], [-60.0, 0.0], [0.0, 9.0]])
-    drawn = outline_at(shape, 10.0, 20.0, np.pi / 2)
+    drawn = outline_at(shape, np.array([10.0, 20.0, np.pi / 2]))
     np.testing.assert_allclose(drawn[:3], [[10.0, 80.0], [10.0, -40.0], [1.0, 20.0]], atol=1e-9)
 
 
