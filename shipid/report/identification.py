@@ -294,6 +294,7 @@ def free_run_errors(content: IdentificationContent) -> Table:
         for name in factors
         for model in (BEFORE, AFTER)
     }
+    named = wide["run"].where(wide["run"].ne("all"), "all " + wide["set"].map(words))
     title = f"Root mean square errors of free runs {_run_length(content)}"
     takeaway, columns = "u, v in m/s, r in deg/s, position in m.", {"run": Column("run"), "set": Column("set"), **heads}
     return frame_table("errors", title, takeaway, wide.assign(run=named), columns)

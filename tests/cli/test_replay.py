@@ -92,8 +92,8 @@ def test_the_page_draws_runs_in_the_units_of_its_axes() -> None:
     content = replay.ReplayContent(
         title="", name="", series=series, errors=errors, ahead=5.0, provenance={}, command=""
     )
-    panels = replay.motion(content).views["0"]
-    *over_time, (track, _) = (list(panel.plot.traces) for panel in panels)
+    panels = replay.replayed_motion(content).draw(series["run"].iloc[0])
+    *over_time, (track, _) = (list(panel.data) for panel in panels)
     for (measured, _), value in zip(over_time, (5.0, 0.1, 2.0), strict=True):
         y = np.asarray(measured["y"], dtype=float)
         assert y[np.isfinite(y)] == pytest.approx(value)
@@ -102,7 +102,7 @@ def test_the_page_draws_runs_in_the_units_of_its_axes() -> None:
     north = np.asarray(track["y"], dtype=float)
     assert np.ptp(north[np.isfinite(north)]) == pytest.approx(27.0)
     assert {float(x) for x in track["x"] if np.isfinite(x)} == {7.0}
-    table = replay.errors(content)
+    table = replay.replay_errors(content)
     assert table.columns[3] == "r [deg/s]"
     assert [float(cell.text) for cell in table.rows[0][1:]] == pytest.approx([0.1, 0.2, 4.0, 9.0])
 
