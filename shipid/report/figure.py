@@ -307,7 +307,7 @@ def dress_panels(figure: Figure, panels: Sequence[go.Figure], *, dark: bool = Fa
         whole.add_trace(_scale_bar(figure.scale))
     takeaway = "<br>".join(map(escaped, wrap(figure.takeaway, 110)))
     title = {"text": f"{escaped(figure.title)}<br><sup>{takeaway}</sup>", "x": 0, "xref": "paper", "y": 1}
-    title |= {"yref": "container", "yanchor": "top", "pad": {"t": 14}}
+    title |= {"yref": "container", "yanchor": "top", "pad": {"t": 24}}
     height = len(panels) * figure.height + 130 + 70 * (len(panels) - 1)
     beside = 1.25 if whole.layout.annotations else 1.02  # right of names that stand beside the lines
     whole.update_layout(title=title, width=900, height=height, legend_x=beside, margin_t=90)
@@ -347,4 +347,7 @@ def _scale_bar(scale: Scale) -> Trace:
     bar |= {"tickvals": ticks, "ticktext": [f"{10**tick:.3g}" for tick in ticks], "thickness": 16}
     steps = [[step, f"var(--{scale.gradient}-{i})"] for i, step in enumerate(np.linspace(0, 1, LEVELS).tolist())]
     marker = {"color": [low, high], "colorscale": steps, "cmin": low, "cmax": high, "showscale": True, "colorbar": bar}
-    return {"type": "scatter", "x": [None, None], "y": [None, None], "mode": "markers", "marker": marker}
+    return {"type": "scatter", "x": [None, None], "y": [None, None], "mode": "markers"} | {
+        "marker": marker,
+        "showlegend": False,
+    }

@@ -281,11 +281,11 @@ def _isolines(shown: CellMap, ends: pd.DataFrame) -> tuple[list[Trace], bool]:
 
 
 def nice_levels(values: Floats, most: int) -> list[float]:
-    """At most `most` round levels inside the middle nine tenths of the finite values."""
+    """At most `most` round levels inside the middle three fifths of the finite values."""
     finite = values[np.isfinite(values) & (values > 0)]
     if finite.size < 4:
         return []
-    low, high = np.quantile(finite, [0.05, 0.95])
+    low, high = np.quantile(finite, [0.2, 0.8])
     decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     inside = [digit * 10.0**decade for decade in decades for digit in NICE if low < digit * 10.0**decade < high]
     return [inside[i] for i in even_places(len(inside), most)] if inside else []
