@@ -15,7 +15,7 @@ from shipid import figures
 from shipid.answer.pages import report_content
 from shipid.errors import ShipidError
 from shipid.report import ReportContent
-from shipid.report.standalone import FIGURES, _colours
+from shipid.report.figure import page_colours
 from shipid.study.results import read_results
 from tests.report import test_checks, test_identification, test_manoeuvre
 
@@ -31,10 +31,6 @@ def content(tiny_run: Path) -> ReportContent:
     return report_content(read_results(tiny_run))
 
 
-def test_every_figure_of_the_report_has_a_function() -> None:
-    assert set(figures.__all__) == {*FIGURES, "prediction"}
-
-
 def test_every_option_of_a_signature_is_one_of_the_figure(content: ReportContent) -> None:
     """What a type checker takes is what the function takes."""
     drawn = 0
@@ -44,22 +40,22 @@ def test_every_option_of_a_signature_is_one_of_the_figure(content: ReportContent
             for option in get_args(kind) if get_origin(kind) is Literal else ():
                 assert function(content, **{argument: option}).data, f"{name}: {argument} = {option!r}"
                 drawn += 1
-    assert drawn == 12
+    assert drawn == 10
 
 
 def test_every_colour_of_dark_is_one_of_light() -> None:
     """So a figure that can be drawn in dark can be drawn in light."""
-    light, dark = (_colours(dark) for dark in (False, True))
+    light, dark = (page_colours(theme) for theme in ("light", "dark"))
     assert dark.keys() <= light.keys()
     assert not any("var(" in light[name] for name in dark)
-    assert light["--ink"] != dark["--ink"]
+    assert light["ink"] != dark["ink"]
 
 
 @pytest.mark.parametrize("name", figures.__all__)
 def test_a_plain_plotly_figure(name: str, content: ReportContent) -> None:
     """It has data, a title, units at its axes, and no name of a colour that only the page knows."""
     made = getattr(figures, name)(OTHERS[name]() if name in OTHERS else content, dark=True)
-    assert made.layout.paper_bgcolor == _colours(True)["--page"]
+    assert made.layout.paper_bgcolor == page_colours("dark")["page"]
     assert isinstance(made, go.Figure)
     assert len(made.data) > 0
     assert made.layout.title.text

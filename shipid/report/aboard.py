@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 
 from shipid.report.content import Floats, Line, PageContent, Sentence
-from shipid.report.figure import Chip, Control, Figure, Panel, Plot, Trace, axis, layout, line, plane
-from shipid.report.page import page, write
-from shipid.report.palette import INK, category
+from shipid.report.figure import INK, Chip, Control, Figure, axis, category, chart, even_places, line, plot, run_names
+from shipid.report.page import write_page
 from shipid.report.section import Section
 from shipid.report.selection import spread
 from shipid.report.wording import metres
 
 LOGGED, PATH, PHYSICS, BAND, ALARM = "logged track", "predicted path", "physics alone", "band", "alarm"
-COLOURS = {LOGGED: INK, PATH: category(0), PHYSICS: category(1), BAND: category(0), ALARM: INK}
-DASHES = {PHYSICS: "dash", BAND: "dot"}
+LOOKS = {
+    LOGGED: {"color": INK, "dash": "solid", "width": 1.6},
+    PATH: {"color": category(0), "dash": "solid", "width": 2.4},
+    PHYSICS: {"color": category(1), "dash": "dash", "width": 1.4},
+    BAND: {"color": category(0), "dash": "dot", "width": 1.2},
+}
+HALF_AXES = {"band along": ("band_along", "dash"), "band across": ("band_across", "dot")}
+"""Half axes of the band in the figure over time: name -> column, dash."""
 FIRST = ("predictions", "alarm", "band")  # kinds of lines that the page begins with
 MOST_RUNS, MOMENTS = 24, 6  # runs to choose from; instants of a run whose paths are drawn
 
@@ -48,134 +54,108 @@ class AboardContent(PageContent):
         """What was predicted, how often the alarm was raised, whether the band kept its promise; then its limits."""
         first = [line for line in self.lines if line.kind in FIRST]
         limits = [line for line in self.lines if line.kind == "limit"]
-        return [_sentence(line) for line in (*first, *limits)]
-
-    @property
-    def runs(self) -> list[str]:
-        """Runs to choose from: if there are many some at even distances, and the one with the largest error."""
-        every = [str(run) for run in pd.unique(self.instants["run"])]
-        shown = {*spread(every, MOST_RUNS), self.worst}
-        return [run for run in every if run in shown]
-
-    @property
-    def worst(self) -> str:
-        """The run with the largest error at the end of a path; the first where none can be judged."""
-        return str(self.instants["run"].iloc[int(self.instants["error"].fillna(-1.0).argmax())])
-
-    @property
-    def banded(self) -> bool:
-        """Whether a band was asked for."""
-        return "band_along" in self.points
+        return [Sentence(sentence_of(line), "seen") for line in (*first, *limits)]
 
 
-def _sentence(line: Line) -> Sentence:
+def sentence_of(line: Line) -> str:
     """A line of the terminal as a sentence of the page."""
-    return Sentence(line.text[0].upper() + line.text[1:] + ".", "seen")
+    return f"{line.text[0].upper()}{line.text[1:]}."
 
 
-AXES = {"band along": ("band_along", "dash"), "band across": ("band_across", "dot")}
-"""Half axes of the band in the figure over time: name -> column, dash."""
+def _control_of_runs(content: AboardContent) -> Control:
+    """Runs to choose from, if there are many some at even distances; first the one with the largest error."""
+    every = run_names(content.instants)
+    worst = str(content.instants["run"].iloc[int(content.instants["error"].fillna(-1.0).argmax())])
+    shown = {*spread(every, MOST_RUNS), worst}
+    runs = [run for run in every if run in shown]
+    return Control("Run", runs, runs.index(worst))
 
 
-def write_aboard(content: AboardContent, file: Path) -> Path:
-    """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
-    return write(page(content, SECTIONS, "aboard"), file)
-
-
-def outline(points: pd.DataFrame, corners: int = 16) -> tuple[Floats, Floats]:
+def band_outline(points: pd.DataFrame, corners: int = 16) -> tuple[Floats, Floats]:
     """East and north [m] of the ellipses of a band around the points of a path, with a gap between two."""
     turn = np.append(np.linspace(0, 2 * np.pi, corners), np.nan)
-    along = points["band_along"].to_numpy()[:, None] * np.cos(turn)
-    across = points["band_across"].to_numpy()[:, None] * np.sin(turn)
-    course = points["band_course"].to_numpy()[:, None]
-    north = points["north"].to_numpy()[:, None] + along * np.cos(course) - across * np.sin(course)
-    east = points["east"].to_numpy()[:, None] + along * np.sin(course) + across * np.cos(course)
+    columns = ("band_along", "band_across", "band_course", "north", "east")
+    along, across, course, north, east = (points[name].to_numpy()[:, None] for name in columns)
+    x, y = along * np.cos(turn), across * np.sin(turn)
+    north, east = north + x * np.cos(course) - y * np.sin(course), east + x * np.sin(course) + y * np.cos(course)
     return east.ravel(), north.ravel()
 
 
 def seen(content: AboardContent) -> Figure:
     """The track of a run with the paths, and bands, that were shown at some instants."""
-    drawn = [LOGGED, PATH, *([PHYSICS] if content.points["physics_north"].notna().any() else [])]
-    drawn += [BAND] if content.banded else []
+    banded, physics = "band_along" in content.points, bool(content.points["physics_north"].notna().any())
+    drawn = [LOGGED, PATH, *[PHYSICS] * physics, *[BAND] * banded]
     return Figure(
         id="seen",
         title="What was seen",
-        takeaway=_sentence(next((line for line in content.lines if line.kind == "band"), content.lines[0])).text,
+        takeaway=sentence_of(next((line for line in content.lines if line.kind == "band"), content.lines[0])),
         how=f"Paths of at most {MOMENTS} instants of a run, predicted from the rows up to then; the track went on as "
-        "drawn." + (" Ellipses are the band at a few steps of each path." if content.banded else ""),
+        "drawn." + (" Ellipses are the band at a few steps of each path." if banded else ""),
         alternative="The measured track, with the paths predicted along it and those of the physics alone.",
         height=520,
-        views={str(i): [Panel(_map(content, run))] for i, run in enumerate(content.runs)},
-        controls=[Control("Run", content.runs, content.runs.index(content.worst))],
-        chips=[Chip(name, name, COLOURS[name], DASHES.get(name, "solid")) for name in drawn],
+        draw=lambda run: [_draw_seen(content, run, drawn)],
+        controls=[_control_of_runs(content)],
+        chips=[Chip(name, name, str(LOOKS[name]["color"]), str(LOOKS[name]["dash"])) for name in drawn],
     )
 
 
-def _map(content: AboardContent, run: str) -> Plot:
-    track = content.track[content.track["run"] == run]
-    points = content.points[content.points["run"] == run]
+def _draw_seen(content: AboardContent, run: str, drawn: Sequence[str]) -> go.Figure:
+    track, points = (frame[frame["run"] == run] for frame in (content.track, content.points))
+    traces = [line(LOGGED, track["east"], track["north"], [LOGGED], line=LOOKS[LOGGED])]
     times = points["t"].unique()
-    shown = times[np.unique(np.linspace(0, len(times) - 1, MOMENTS).round().astype(int))]
-    traces = [_trace(LOGGED, track["east"].to_numpy(), track["north"].to_numpy(), 1.6)]
-    for t in shown:
+    for t in times[even_places(len(times), MOMENTS)]:
         mine = points[points["t"] == t]
-        traces.append(_trace(PATH, mine["east"].to_numpy(), mine["north"].to_numpy(), 2.4))
-        if mine["physics_north"].notna().any():
-            traces.append(_trace(PHYSICS, mine["physics_east"].to_numpy(), mine["physics_north"].to_numpy(), 1.4))
-        if content.banded:
-            few = mine.iloc[np.unique(np.linspace(len(mine) // 4, len(mine) - 1, 3).round().astype(int))]
-            traces.append(_trace(BAND, *outline(few), 1.2))
-    return Plot(traces, plane("east [m]", "north [m]"))
+        few = mine.iloc[np.unique(np.linspace(len(mine) // 4, len(mine) - 1, 3).round().astype(int))]
+        places = {PATH: (mine["east"], mine["north"]), PHYSICS: (mine["physics_east"], mine["physics_north"])}
+        places |= {BAND: band_outline(few)} if BAND in drawn else {}
+        traces += [line(name, x, y, [name], line=LOOKS[name]) for name, (x, y) in places.items() if name in drawn]
+    return chart(traces, "east [m]", "north [m]")
 
 
-def _trace(name: str, x: Floats, y: Floats, width: float) -> Trace:
-    look = {"color": COLOURS[name], "dash": DASHES.get(name, "solid"), "width": width}
-    return line(name, x, y, [name], line=look)
-
-
-def along(content: AboardContent) -> Figure:
+def along_run(content: AboardContent) -> Figure:
     """Error at the end of each path, size of the band there, and the alarm, over the time of a run."""
-    error = content.instants["error"].median()
-    takeaway = f"Over all runs, the median error at the end of a path is {metres(error)}"
-    takeaway += f"; the largest, {metres(float(content.instants['error'].max()))}, is in {content.worst}."
+    error, runs, banded = content.instants["error"], _control_of_runs(content), "band_along" in content.points
+    takeaway = f"Over all runs, the median error at the end of a path is {metres(error.median())}"
+    takeaway += f"; the largest, {metres(float(error.max()))}, is in {runs.options[runs.start]}."
+    colour = category(0)
     return Figure(
         id="along",
         title="Along the run",
-        takeaway=takeaway if np.isfinite(error) else "The log ends before a path can be judged: 0 errors.",
+        takeaway=takeaway if error.notna().any() else "The log ends before a path can be judged: 0 errors.",
         how="Error at the end of the path predicted at each instant"
-        + (", with the half axes of the band there" if content.banded else "")
+        + (", with the half axes of the band there" if banded else "")
         + "; marks are instants outside of the training, where nothing is promised.",
         alternative="Error over time, with instants of alarm marked.",
         height=300,
-        views={str(i): [Panel(_history(content, run))] for i, run in enumerate(content.runs)},
-        controls=[Control("Run", content.runs, content.runs.index(content.worst))],
+        draw=lambda run: [_draw_along(content, run)],
+        controls=[runs],
         chips=[
-            Chip(PATH, "error", COLOURS[PATH]),
-            *(Chip(name, name, COLOURS[BAND], dash) for name, (_, dash) in AXES.items() if content.banded),
-            Chip(ALARM, "alarm", COLOURS[ALARM], "none", symbol="triangle-up"),
+            Chip(PATH, "error", colour),
+            *(Chip(name, name, colour, dash) for name, (_, dash) in HALF_AXES.items() if banded),
+            Chip(ALARM, "alarm", INK, "none", symbol="triangle-up"),
         ],
     )
 
 
-def _history(content: AboardContent, run: str) -> Plot:
-    mine = content.instants[content.instants["run"] == run]
-    t = mine["t"].to_numpy() - float(content.track.loc[content.track["run"] == run, "t"].min())
-    traces = [line("error", t, mine["error"].to_numpy(), [PATH], line={"color": COLOURS[PATH], "width": 2})]
-    if content.banded:
-        last = content.points[(content.points["run"] == run)].groupby("t", sort=False).last()
-        for name, (column, dash) in AXES.items():
-            look = {"color": COLOURS[BAND], "dash": dash, "width": 1.4}
-            traces.append(line(name, t, last[column].to_numpy(), [name], line=look))
-    alarm = mine["outside"].to_numpy(dtype=bool)
-    marks = {"color": COLOURS[ALARM], "size": 8, "symbol": "triangle-up"}
-    traces.append(line(ALARM, t[alarm], np.zeros(alarm.sum()), [ALARM], mode="markers", marker=marks))
-    up = axis("at the end of the path [m]", rangemode="tozero")
-    return Plot(traces, layout(axis("time in the run [s]"), up))
+def _draw_along(content: AboardContent, run: str) -> go.Figure:
+    mine, points = (frame[frame["run"] == run] for frame in (content.instants, content.points))
+    t = mine["t"] - float(content.track.loc[content.track["run"] == run, "t"].min())
+    traces = [line("error", t, mine["error"], [PATH], line={"color": category(0), "width": 2})]
+    last = points.groupby("t", sort=False).last()
+    for name, (column, dash) in HALF_AXES.items() if "band_along" in last else ():
+        traces.append(line(name, t, last[column], [name], line={"color": category(0), "dash": dash, "width": 1.4}))
+    raised = t[mine["outside"].astype(bool)]
+    marker = {"color": INK, "size": 8, "symbol": "triangle-up"}
+    traces.append(line(ALARM, raised, np.zeros(len(raised)), [ALARM], mode="markers", marker=marker))
+    return plot(traces, axis("time in the run [s]"), axis("at the end of the path [m]", rangemode="tozero"))
 
 
-SECTIONS: dict[str, Section] = {
+ABOARD_PAGE = {
     "aboard": Section(
-        "As if at sea", lambda content: (seen(content), along(content)), needs=("instants",), anchors=("seen", "along")
+        "As if at sea",
+        lambda content: (seen(content), along_run(content)),
+        needs=("instants",),
+        anchors=("seen", "along"),
     ),
 }
-"""Sections of the page in order."""
+write_aboard = partial(write_page, "aboard", ABOARD_PAGE)

@@ -7,25 +7,49 @@ from dataclasses import replace
 from typing import Any
 
 import pandas as pd
+import plotly.graph_objects as go
 
-from shipid.report.content import ReportContent
-from shipid.report.error_map import cells_map
-from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line
-from shipid.report.palette import MUTED, close_styles
+from shipid.report.content import ReportContent, rows_in
+from shipid.report.figure import MUTED, Control, Figure, Scale, Trace, axis, escaped, intervals, line, plot
+from shipid.report.physics_and_data import HEIGHT, draw_map, ends_of_map, map_of_cells
 from shipid.report.section import Section
-from shipid.report.selection import exemplars, sizes
-from shipid.report.tables import Cell, Table, figure, length_places, text
+from shipid.report.selection import close_styles, exemplars, model_chips, sizes
+from shipid.report.tables import Cell, Column, Table, frame_table, with_cells
 from shipid.report.wording import counted, listed, metres
 from shipid.units import level_text, percent, plural
 
 WORST = 12  # test runs in the table of those that pay
 BY = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
+BANDS = {
+    "model": Column("model"),
+    "N_D [1]": Column("N_D", 0),
+    "promised": Column("promised", numeric=True),
+    "held [95 %]": Column("held", numeric=True),
+    "mean radius [m]": Column("width", "length"),
+    "radius at the end [m]": Column("end", "length"),
+    "in lengths [1]": Column("lengths", 3),
+}
+GROUPS = {
+    "model": Column("model"),
+    "by": Column("by"),
+    "group": Column("group"),
+    "held [95 %]": Column("held", numeric=True),
+    "mean radius [m]": Column("width", "length"),
+    "test runs [1]": Column("runs", 0),
+    "note": Column("note"),
+}
+RUNS = {
+    "test run": Column("run"),
+    "manoeuvre": Column("kind"),
+    "model": Column("model"),
+    "paths in the band": Column("held", numeric=True),
+    "greatest error over the band [1]": Column("reach", 2),
+}
 
 
-def _judged(frame: pd.DataFrame) -> float:
+def _level_of_sentences(frame: pd.DataFrame) -> float:
     """The level of the sentences: 0.9 where it is promised, else the highest."""
-    levels = [float(level) for level in pd.unique(frame.level)]
-    return 0.9 if 0.9 in levels else max(levels)
+    return 0.9 if frame.level.eq(0.9).any() else float(frame.level.max())
 
 
 def coverage(content: ReportContent) -> Figure | None:
@@ -34,41 +58,12 @@ def coverage(content: ReportContent) -> Figure | None:
     names = [name for name in exemplars(content) if len(frame) and name in set(frame.model)]
     if not names:
         return None
-    counts, looks, banded = sizes(frame.N_D), close_styles(content), frame.model.nunique()
+    counts, banded = sizes(frame.N_D), frame.model.nunique()
     drawn = f" Of {banded} models, {listed(names, 6)} {plural(len(names), 'is', 'are')} drawn; the table has all."
-    views = {}
-    for place, size in enumerate(counts):
-        traces = [
-            line(
-                "as promised",
-                [0.45, 1.0],
-                [0.45, 1.0],
-                ["nominal"],
-                "",
-                line={"color": MUTED, "width": 1, "dash": "dash"},
-            )
-        ]
-        for i, name in enumerate(names):
-            mine = frame[frame.model.eq(name) & frame.N_D.eq(size)].sort_values("level")
-            shift = 0.004 * (i - (len(names) - 1) / 2)  # intervals of several models would hide each other
-            x, y = mine.level.to_numpy(dtype=float) + shift, mine.coverage.to_numpy(dtype=float)
-            reach = {"type": "data", "symmetric": False, "thickness": 1.5, "width": 4, "color": looks[name].colour}
-            reach |= {"array": mine.high.to_numpy() - y, "arrayminus": y - mine.low.to_numpy()}
-            ink = {"color": looks[name].colour, "width": looks[name].width}
-            points = line(name, x, y, [f"model:{name}"], "", mode="lines+markers", line=ink)
-            points["marker"] = {"symbol": looks[name].symbol, "size": 7}
-            points.update(error_y=reach, customdata=[_words(row) for row in mine.to_dict("records")])
-            points.update(hovertemplate=f"{label(name)}: %{{customdata}}<extra></extra>")
-            traces.append(points)
-        x_axis = axis(
-            "share promised [1]", range=[min(0.5, frame.level.min()) - 0.05, 1.0], tickvals=sorted(set(frame.level))
-        )
-        y_axis = axis("share of whole test paths in the band [1]", range=[0, 1.02])
-        views[str(place)] = [Panel(Plot(traces, layout(x_axis, y_axis, hovermode="closest")))]
     return Figure(
         id="coverage",
         title="What bands promise, and what they hold",
-        takeaway=_takeaway(frame, counts[-1]),
+        takeaway=_takeaway_coverage(frame, counts[-1]),
         how="A band is a region around every step of a predicted path; it holds a path if it holds all its steps. It "
         "is calibrated on errors of models that saw the run neither in training nor in the choice of hyperparameters, "
         "and counts runs, not windows. Measured on the test runs, on which no cell trained. Bars are exact binomial "
@@ -78,35 +73,46 @@ def coverage(content: ReportContent) -> Figure | None:
         alternative="Points of the measured over the promised share of paths with intervals, one line per model. The "
         "numbers are in the table below.",
         height=420,
-        views=views,
-        controls=[Control("Manoeuvres, N_D", [str(count) for count in counts], len(counts) - 1)],
-        chips=[
-            Chip(f"model:{name}", name, looks[name].colour, width=looks[name].width, symbol=looks[name].symbol)
-            for name in names
-        ],
+        draw=lambda size: [_draw_coverage(content, frame, names, size)],
+        controls=[Control("Manoeuvres, N_D", counts, len(counts) - 1)],
+        chips=model_chips(names, close_styles(content)),
     )
 
 
-def _words(row: dict[Hashable, Any]) -> str:
-    inside = f"{percent(row['coverage'])} [{percent(row['low'])}, {percent(row['high'])}] of {level_text(row['level'])}"
-    return f"{inside}, mean radius {metres(row['width'])}"
+def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str], size: int) -> go.Figure:
+    diagonal = {"color": MUTED, "width": 1, "dash": "dash"}
+    traces = [line("as promised", [0.45, 1.0], [0.45, 1.0], ["nominal"], "", line=diagonal)]
+    for i, name in enumerate(names):
+        look, mine = close_styles(content)[name], frame[frame.model.eq(name) & frame.N_D.eq(size)].sort_values("level")
+        shift = 0.004 * (i - (len(names) - 1) / 2)  # intervals of several models would hide each other
+        held, low, high = (mine[column].to_numpy(dtype=float) for column in ("coverage", "low", "high"))
+        words = [
+            f"{escaped(name)}: {_share_words(row)} of {level_text(row['level'])}, mean radius {metres(row['width'])}"
+            for row in mine.to_dict("records")
+        ]
+        ink = {"color": look.colour, "width": look.width}
+        drawn: Trace = {"mode": "lines+markers", "line": ink, "marker": {"symbol": look.symbol, "size": 7}}
+        reach = intervals(held, low, high, look.colour)
+        traces.append(line(name, mine.level + shift, held, [f"model:{name}"], hover=words, error_y=reach, **drawn))
+    least = min(0.5, frame.level.min()) - 0.05
+    x = axis("share promised [1]", range=[least, 1.0], tickvals=sorted(set(frame.level)))
+    return plot(traces, x, axis("share of whole test paths in the band [1]", range=[0, 1.02]))
 
 
-def _takeaway(frame: pd.DataFrame, size: int) -> str:
-    level = _judged(frame[frame.N_D.eq(size)] if frame.N_D.eq(size).any() else frame)
-    mine = frame[frame.N_D.eq(size) & frame.level.eq(level)]
+def _share_words(row: dict[Hashable, Any]) -> str:
+    return f"{percent(row['coverage'])} [{percent(row['low'])}, {percent(row['high'])}]"
+
+
+def _takeaway_coverage(frame: pd.DataFrame, size: int) -> str:
+    level = _level_of_sentences(frame[frame.N_D.eq(size)] if frame.N_D.eq(size).any() else frame)
+    mine = frame[frame.N_D.eq(size) & frame.level.eq(level)].sort_values("width")
     if mine.empty:
         return f"No band is promised at N_D = {size}."
-    below = mine[mine.high < level]
-    by_width = mine.sort_values("width")
-    least, most = by_width.iloc[0], by_width.iloc[-1]
-    text = (
-        f"With N_D = {size}, bands of {level_text(level)} hold {percent(float(mine.coverage.mean()))} of the test "
-        "paths "
-    )
-    text += f"on average over {counted(len(mine), 'model')}; "
-    text += f"the mean radius is {metres(least.width)} ({least.model})"
-    text += f" to {metres(most.width)} ({most.model}). " if len(mine) > 1 else ". "
+    below = mine[mine.high < level].sort_index()
+    least, most = mine.iloc[0], mine.iloc[-1]
+    text = f"With N_D = {size}, bands of {level_text(level)} hold {percent(float(mine.coverage.mean()))} of the test "
+    text += f"paths on average over {counted(len(mine), 'model')}; the mean radius is {metres(least.width)} "
+    text += f"({least.model})" + (f" to {metres(most.width)} ({most.model}). " if len(mine) > 1 else ". ")
     if below.empty:
         return text + "No interval lies below its promise."
     return text + f"Below their promise, interval and all: {listed([str(name) for name in below.model])}."
@@ -118,94 +124,61 @@ def width_map(content: ReportContent) -> Figure | None:
     if "width" not in cells:
         return None
     if cells.width.notna().sum() < 2 and len(frame):  # too few runs for the level of the study: the highest there is
-        top = frame[frame.level.eq(_judged(frame))][["model", "N_D", "width"]]
+        top = frame[frame.level.eq(_level_of_sentences(frame))][["model", "N_D", "width"]]
         cells = cells.drop(columns="width").merge(top, how="left", on=["model", "N_D"])
     cells = cells[cells.width.notna()]
-    if len(cells) < 2:
+    shown = map_of_cells(replace(content, cells=cells.assign(H=cells.width, H_90=cells.width)))
+    if shown is None:
         return None
-    shown = replace(content, cells=cells.assign(H=cells.width, H_90=cells.width))
-    return cells_map(
-        shown,
+    words = [f"<b>{escaped(row.model)}</b>, N_D = {row.N_D}<br>{metres(row.H)}" for row in rows_in(shown.cells)]
+    shown = shown._replace(cells=shown.cells.assign(words=words))
+    low, high = ends_of_map(shown.cells)
+    hatched = " Hatched: not narrower than the band of no physics at the same N_D." if shown.cells.worse.any() else ""
+    return Figure(
         id="width-map",
         title="Better physics, narrower promise",
-        scale="mean radius of the band [m]",
+        takeaway=f"The mean radius of the band goes from {low} to {high}.",
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is the mean radius of "
         "its band over the horizon and all test windows, mean over seeds. Cells with too few runs for the level are "
-        "left out.",
-        hatched="not narrower than the band of no physics at the same N_D.",
+        f"left out.{hatched}",
+        alternative=f"Cells of the mean radius of the band [m] for {counted(len(shown.rows), 'model')} by A and N_D. "
+        "The numbers are in a table.",
+        height=HEIGHT,
+        draw=lambda: [draw_map(shown)],
+        scale=Scale("mean radius of the band [m]", float(shown.cells.H.min()), float(shown.cells.H.max()), "heat"),
     )
 
 
-def table(content: ReportContent) -> Table | None:
+def coverage_table(content: ReportContent) -> Table | None:
     """Coverage and width by model, N_D and level."""
-    frame = content.frame("coverage")
+    frame, refused = content.frame("coverage"), content.frame("no_band")
     if frame.empty:
         return None
-    width, end = length_places(frame["width"]), length_places(frame["end"])
-    rows = [
-        [
-            text(row["model"]),
-            figure(row["N_D"], 0),
-            Cell(level_text(row["level"]), row["level"]),
-            _share(row),
-            figure(row["width"], width),
-            figure(row["end"], end),
-            figure(row["lengths"], 3),
-        ]
-        for row in frame.to_dict("records")
+    reasons = [
+        f"{listed([f'{row.model} at N_D = {row.N_D}' for row in rows_in(part)])}: {reason}"
+        for reason, part in (refused.groupby("reason", sort=False) if len(refused) else ())
     ]
-    columns = [
-        "model",
-        "N_D [1]",
-        "promised",
-        "held [95 %]",
-        "mean radius [m]",
-        "radius at the end [m]",
-        "in lengths [1]",
-    ]
-    return Table("coverage-table", "Bands by model", _refused(content), columns, [False, *[True] * 6], rows)
+    promised = [Cell(level_text(level), level) for level in frame.level]
+    takeaway = f"Without a band: {'; '.join(reasons)}." if reasons else ""
+    return frame_table("coverage-table", "Bands by model", takeaway, with_cells(_held(frame), promised=promised), BANDS)
 
 
-def _share(row: dict[Hashable, Any]) -> Cell:
-    return Cell(f"{percent(row['coverage'])} [{percent(row['low'])}, {percent(row['high'])}]", row["coverage"])
+def _held(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame with `held`: its coverage with the interval, as cells."""
+    return with_cells(frame, held=[Cell(_share_words(row), row["coverage"]) for row in frame.to_dict("records")])
 
 
-def _refused(content: ReportContent) -> str:
-    frame = content.frame("no_band")
-    if frame.empty:
-        return ""
-    parts = [
-        f"{listed([f'{row.model} at N_D = {row.N_D}' for row in part.itertuples()])}: {reason}"
-        for reason, part in frame.groupby("reason", sort=False)
-    ]
-    return f"Without a band: {'; '.join(parts)}."
-
-
-def groups(content: ReportContent) -> Table | None:
+def coverage_by_group(content: ReportContent) -> Table | None:
     """Coverage at one level by kind of manoeuvre, time ahead and speed."""
     frame = content.frame("coverage_groups")
     if frame.empty:
         return None
     frame = frame[frame.model.isin(exemplars(content))]
-    width = length_places(frame["width"])
-    rows = [
-        [
-            text(row["model"]),
-            text(BY[row["by"]]),
-            text(row["group"]),
-            _share(row),
-            figure(row["width"], width),
-            figure(row["runs"], 0),
-            text(row["note"] or None),
-        ]
-        for row in frame.to_dict("records")
-    ]
-    columns = ["model", "by", "group", "held [95 %]", "mean radius [m]", "test runs [1]", "note"]
-    numeric = [False, False, False, True, True, True, False]
-    return Table("coverage-groups", "Where bands hold more and less", _lowest(frame), columns, numeric, rows)
+    shown = _held(frame).assign(by=frame.by.map(BY), note=frame.note.where(frame.note.ne(""), None))
+    return frame_table("coverage-groups", "Where bands hold more and less", _least_held(frame), shown, GROUPS)
 
 
-def _lowest(frame: pd.DataFrame) -> str:
+def _least_held(frame: pd.DataFrame) -> str:
     kinds = frame[frame.by.isin(["kind", "speed"])]
     if kinds.empty:
         return ""
@@ -215,40 +188,28 @@ def _lowest(frame: pd.DataFrame) -> str:
     return f"{text} --kind of shipid predict gives the band that is calibrated for this kind alone." if better else text
 
 
-def worst(content: ReportContent) -> Table | None:
+def coverage_by_run(content: ReportContent) -> Table | None:
     """Test runs whose paths leave their bands most often."""
     frame = content.frame("coverage_runs")
     if frame.empty:
         return None
     shown = frame[frame.model.isin(exemplars(content))].head(WORST)
-    rows = [
-        [
-            text(row["run"]),
-            text(row["kind"]),
-            text(row["model"]),
-            Cell(percent(row["coverage"]), row["coverage"]),
-            figure(row["reach"], 2),
-        ]
-        for row in shown.to_dict("records")
-    ]
     mean = frame.groupby("run").coverage.mean()
     half = int((mean < 0.5).sum())
     have = "has less than half of its" if half == 1 else "have less than half of their"
     takeaway = f"Mean over models, {counted(half, 'run')} of {len(mean)} {have} paths in the bands."
-    columns = ["test run", "manoeuvre", "model", "paths in the band", "greatest error over the band [1]"]
-    return Table(
-        "coverage-runs", "Runs that bands hold least", takeaway, columns, [False, False, False, True, True], rows
-    )
+    held = with_cells(shown, held=[Cell(percent(share), share) for share in shown.coverage])
+    return frame_table("coverage-runs", "Runs that bands hold least", takeaway, held, RUNS)
 
 
-SECTION = Section(
+HOW_FAR_OFF = Section(
     "How far off it may be",
     draw=lambda content: (
         coverage(content),
-        table(content),
+        coverage_table(content),
         width_map(content),
-        groups(content),
-        worst(content),
+        coverage_by_group(content),
+        coverage_by_run(content),
     ),
     needs=("coverage",),
     anchors=("coverage", "coverage-table", "width-map", "coverage-groups", "coverage-runs"),

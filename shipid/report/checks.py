@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
+from functools import partial
 
-import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 
-from shipid.report import logs, tables
-from shipid.report.content import PageContent, Sentence
-from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, layout, line
-from shipid.report.page import page, write
-from shipid.report.palette import category
+from shipid.report import logs
+from shipid.report.content import PageContent, Sentence, rows_in
+from shipid.report.figure import POINTS, Chip, Control, Figure, axis, category, even_places, line, plot, run_names
+from shipid.report.motion import DEGREES
+from shipid.report.page import write_page
 from shipid.report.section import Section
-from shipid.report.tables import Cell, Table
+from shipid.report.tables import Cell, Column, Table, frame_table, with_cells, word_cell
 from shipid.report.wording import bound, counted, listed, scientific, short
 
-POINTS = 600  # of one line: more than pixels are wide
-HEADING, RATE = 0, 1  # colours
+CHECKS = {
+    "run": Column("run"),
+    "check": Column("check"),
+    "result": Column("ok"),
+    "value": Column("value", numeric=True),
+    "limit": Column("limit", numeric=True),
+    "what it says": Column("sentence"),
+}
+SIGNALS_OF_CHECKS = {
+    "rate [deg/s]": {"psi_rate": "rate of the heading", "r": "yaw rate r"},
+    "distance [m]": {"drift": "position off integrated velocities"},
+    "velocity [m/s]": {"u": "u", "v": "v"},
+}
+"""Title of an axis with its unit -> column of the series -> name."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,7 +44,6 @@ class CheckContent(PageContent):
     series : run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s].
     tracks : run, set, north, east [m].
     repairs : kind, column, count, note; may be empty.
-    provenance : label -> value.
     """
 
     checks: pd.DataFrame
@@ -44,56 +55,39 @@ class CheckContent(PageContent):
     @property
     def answer(self) -> list[Sentence]:
         """How many checks passed, and which failed."""
-        return _answer(self.checks)
-
-
-def write_checks(content: CheckContent, file: Path) -> Path:
-    """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
-    return write(page(content, SECTIONS, "data check"), file)
-
-
-def _answer(checks: pd.DataFrame) -> list[Sentence]:
-    failed = checks[~checks["ok"].astype(bool)]
-    runs = counted(checks["run"].nunique(), "run")
-    if failed.empty:
-        return [Sentence(f"All {counted(len(checks), 'check')} of {runs} passed.")]
-    kinds = [str(kind) for kind in pd.unique(failed["check"])]
-    return [
-        Sentence(f"{len(failed)} of {counted(len(checks), 'check')} failed, in {failed['run'].nunique()} of {runs}."),
-        Sentence(f"What failed: {listed(kinds, 8)}."),
-    ]
-
-
-def _table(checks: pd.DataFrame) -> Table:
-    """Return the table of all checks, failed ones first; what these say is shown whole."""
-    ordered = checks.assign(ok=checks["ok"].astype(bool)).sort_values("ok", kind="stable")
-    rows = [
-        [
-            tables.text(row.run),
-            tables.text(row.check),
-            Cell("passed", "passed") if row.ok else Cell("failed", "failed", bad=True),
-            Cell(_amount(float(str(row.value)), str(row.unit)), float(str(row.value))),
-            Cell(scientific(float(str(row.limit)), 3), float(str(row.limit))),
-            replace(tables.text(bound(str(row.sentence))), bad=not row.ok),
+        failed, runs = self.checks[~self.checks["ok"].astype(bool)], counted(self.checks["run"].nunique(), "run")
+        every = counted(len(self.checks), "check")
+        if failed.empty:
+            return [Sentence(f"All {every} of {runs} passed.")]
+        return [
+            Sentence(f"{len(failed)} of {every} failed, in {failed['run'].nunique()} of {runs}."),
+            Sentence(f"What failed: {listed(run_names(failed, 'check'), 8)}."),
         ]
-        for row in ordered.itertuples()
+
+
+def checks_table(content: CheckContent) -> Table:
+    """Return the table of all checks, failed ones first; what these say is shown whole."""
+    frame = content.checks.assign(ok=content.checks["ok"].astype(bool)).sort_values("ok", kind="stable")
+    rows = [
+        {
+            "ok": word_cell("passed" if row.ok else "failed", bad=not row.ok),
+            "value": Cell(scientific(row.value, 3) + (f" {row.unit}" if row.unit != "1" else ""), float(row.value)),
+            "limit": Cell(scientific(row.limit, 3), float(row.limit)),
+            "sentence": word_cell(bound(row.sentence), bad=not row.ok),
+        }
+        for row in rows_in(frame)
     ]
-    headings = ["run", "check", "result", "value", "limit", "what it says"]
-    return Table("all-checks", "Every check", "", headings, [False, False, False, True, True, False], rows)
+    cells = {name: [row[name] for row in rows] for name in ("ok", "value", "limit", "sentence")}
+    return frame_table("all-checks", "Every check", "", with_cells(frame, **cells), CHECKS)
 
 
-def _amount(value: float, unit: str) -> str:
-    """Three digits and the unit, which a share or a ratio does not have."""
-    return scientific(value, 3) + (f" {unit}" if unit != "1" else "")
-
-
-def motion(series: pd.DataFrame) -> Figure | None:
+def checked_motion(series: pd.DataFrame) -> Figure | None:
     """Rate of the heading and yaw rate, drift of the position, and velocities, over time, one run at a time."""
-    runs = [str(run) for run in pd.unique(series["run"])]
+    runs = run_names(series)
     if not runs:
         return None
-    views = {str(index): _panels(series[series["run"] == run]) for index, run in enumerate(runs)}
     worst = series.groupby("run")["drift"].max()
+    names = [name for columns in SIGNALS_OF_CHECKS.values() for name in columns.items()]
     return Figure(
         id="motion-figure",
         title="Heading, yaw rate, position and velocity",
@@ -102,50 +96,36 @@ def motion(series: pd.DataFrame) -> Figure | None:
         "start together every 30 s.",
         alternative="Lines over time; the table below has the results of the checks.",
         height=240,
-        views=views,
+        draw=lambda run: _draw_checked(series[series["run"] == run]),
         controls=[Control("Run", runs, runs.index(str(worst.idxmax())))],
-        chips=[
-            Chip("psi", "rate of the heading", category(HEADING)),
-            Chip("r", "yaw rate r", category(RATE)),
-            Chip("drift", "position off integrated velocities", category(2)),
-            Chip("u", "u", category(3)),
-            Chip("v", "v", category(4)),
-        ],
+        chips=[Chip(column, name, category(i)) for i, (column, name) in enumerate(names)],
     )
 
 
-def _panels(rows: pd.DataFrame) -> list[Panel]:
-    thin = rows.iloc[np.unique(np.linspace(0, len(rows) - 1, min(POINTS, len(rows))).astype(int))]
-    t = thin["t"].to_numpy() - float(rows["t"].iloc[0])  # single precision would not do for a clock since 1970
-    degrees = {name: np.degrees(thin[name].to_numpy()) for name in ("psi_rate", "r")}
-    rates = [
-        line(
-            "rate of the heading",
-            t,
-            degrees["psi_rate"],
-            ["psi"],
-            "deg/s",
-            line={"color": category(HEADING), "width": 1},
-        ),
-        line("yaw rate r", t, degrees["r"], ["r"], "deg/s", line={"color": category(RATE), "width": 1.5}),
-    ]
-    drift = [line("drift", t, thin["drift"].to_numpy(), ["drift"], line={"color": category(2), "width": 1.5})]
-    speeds = [
-        line(name, t, thin[name].to_numpy(), [name], "m/s", line={"color": category(colour), "width": 1.5})
-        for name, colour in (("u", 3), ("v", 4))
-    ]
-    shown = (("rate [deg/s]", rates), ("distance [m]", drift), ("velocity [m/s]", speeds))
-    return [Panel(Plot(traces, layout(axis("time in the run [s]"), axis(title)))) for title, traces in shown]
+def _draw_checked(rows: pd.DataFrame) -> list[go.Figure]:
+    shown = rows.iloc[even_places(len(rows), POINTS)]
+    t = shown["t"] - rows["t"].iloc[0]  # single precision would not do for a clock since 1970
+    shown = shown.assign(psi_rate=DEGREES * shown["psi_rate"], r=DEGREES * shown["r"])
+    order, panels = [column for columns in SIGNALS_OF_CHECKS.values() for column in columns], []
+    for title, columns in SIGNALS_OF_CHECKS.items():
+        unit = title.partition("[")[2].rstrip("]")
+        traces = [
+            line(name, t, shown[column], [column], unit, line={"color": category(order.index(column)), "width": 1.5})
+            for column, name in columns.items()
+        ]
+        panels.append(plot(traces, axis("time in the run [s]"), axis(title)))
+    return panels
 
 
-SECTIONS: dict[str, Section] = {
+CHECK_PAGE = {
     "motion": Section(
-        "What the checks compare", lambda content: (motion(content.series),), ("series",), ("motion-figure",)
+        "What the checks compare", lambda content: (checked_motion(content.series),), ("series",), ("motion-figure",)
     ),
-    "checks": Section("The checks", lambda content: (_table(content.checks),), ("checks",), ("all-checks",)),
+    "checks": Section("The checks", lambda content: (checks_table(content),), ("checks",), ("all-checks",)),
     "data": Section(
         "The data",
-        lambda content: (logs.manoeuvres(content), tables.repairs(content)),
+        lambda content: (logs.manoeuvres(content), logs.repairs_table(content)),
         anchors=("manoeuvres", "repairs"),
     ),
 }
+write_checks = partial(write_page, "data check", CHECK_PAGE)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from functools import partial
 
-from shipid.report.methods import SECTION, MethodsContent
-from shipid.report.page import page, write
+from shipid.report.methods import THE_METHODS
+from shipid.report.page import write_page
 
-
-def write_comparison(content: MethodsContent, file: Path) -> Path:
-    """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
-    return write(page(content, {"the-methods": SECTION}, "methods"), file)
+write_comparison = partial(write_page, "methods", {"the-methods": THE_METHODS})

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -54,11 +54,6 @@ class Sentence:
     text: str
     figure: str = ""
 
-    @property
-    def warns(self) -> bool:
-        """Whether it must be seen, wherever it is."""
-        return self.text.startswith("Careful: ")
-
 
 @dataclass(frozen=True)
 class Finding:
@@ -95,13 +90,9 @@ class Snapshot:
     bands: Mapping[PathKey, Floats] = field(default_factory=dict)
 
 
-def _empty(*columns: str) -> pd.DataFrame:
-    return pd.DataFrame(columns=list(columns))
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PageContent:
-    """What a page shows besides its sections; a page that is no study's adds frames and a property `answer`.
+    """What a page shows besides its sections; every page adds frames and `answer`, the sentences below the title.
 
     Parameters
     ----------
@@ -120,8 +111,18 @@ class PageContent:
     findings: Sequence[Finding] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class ReportContent:
+def rows_in(frame: pd.DataFrame) -> list[Any]:
+    """Rows of a frame as named tuples."""
+    return list(frame.itertuples())
+
+
+def rows_of(*columns: str) -> Callable[[], pd.DataFrame]:
+    """What makes a frame that has these columns and no rows."""
+    return lambda: pd.DataFrame(columns=list(columns))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReportContent(PageContent):
     """Everything one report shows; a frame without rows leaves its figure out.
 
     `source` is "physics", "cooperative" or "naive". Rows of physics and naive do not depend on the number
@@ -130,7 +131,6 @@ class ReportContent:
 
     Parameters
     ----------
-    title, name : the study's question in words and its short name.
     answer : a few sentences, in order.
     cells : one row per cell: model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres
         A, A_90, H, H_90, rms; then member, runs, minutes, seconds, hyperparameters (text). Failed cells have NaN.
@@ -150,36 +150,24 @@ class ReportContent:
     tracks : run, set ("train", "validation", "test", ...), north, east [m].
     envelope : set, quantity, unit, min, mean, max; the set "published" holds the numbers of the paper.
     repairs : kind, column, count, note.
-    provenance : label -> value.
-    study_document, command : the document as TOML text and the command that reproduces the study.
     best : the physics model that validation prefers at the largest amount of data; every figure means it by "best".
     frames : further frames by name, for sections that show something new.
     alone : models of the cells whose method learns nothing from data: their path is that of the physics.
     """
 
-    title: str
-    name: str
-    answer: list[Sentence]
-    findings: list[Finding]
+    answer: Sequence[Sentence] = ()
     cells: pd.DataFrame
     naive: Mapping[str, float]
     models: pd.DataFrame
-    horizon: pd.DataFrame = field(
-        default_factory=lambda: _empty("model", "N_D", "seed", "source", "ahead", "mean", "p90")
-    )
-    over_time: pd.DataFrame = field(
-        default_factory=lambda: _empty("run", "t", "model", "N_D", "seed", "source", "error")
-    )
-    commands: pd.DataFrame = field(default_factory=lambda: _empty("run", "t"))
-    snapshots: list[Snapshot] = field(default_factory=list)
-    tracks: pd.DataFrame = field(default_factory=lambda: _empty("run", "set", "north", "east"))
-    envelope: pd.DataFrame = field(default_factory=lambda: _empty("set", "quantity", "unit", "min", "mean", "max"))
-    factors: pd.DataFrame = field(default_factory=lambda: _empty("model", "path", "group", "factor"))
-    trials: pd.DataFrame = field(default_factory=lambda: _empty(*TRIAL))
-    repairs: pd.DataFrame = field(default_factory=lambda: _empty("kind", "column", "count", "note"))
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    study_document: str = ""
-    command: str = ""
+    horizon: pd.DataFrame = field(default_factory=rows_of("model", "N_D", "seed", "source", "ahead", "mean", "p90"))
+    over_time: pd.DataFrame = field(default_factory=rows_of("run", "t", "model", "N_D", "seed", "source", "error"))
+    commands: pd.DataFrame = field(default_factory=rows_of("run", "t"))
+    snapshots: Sequence[Snapshot] = ()
+    tracks: pd.DataFrame = field(default_factory=rows_of("run", "set", "north", "east"))
+    envelope: pd.DataFrame = field(default_factory=rows_of("set", "quantity", "unit", "min", "mean", "max"))
+    factors: pd.DataFrame = field(default_factory=rows_of("model", "path", "group", "factor"))
+    trials: pd.DataFrame = field(default_factory=rows_of(*TRIAL))
+    repairs: pd.DataFrame = field(default_factory=rows_of("kind", "column", "count", "note"))
     best: str = ""
     alone: Collection[str] = ()
     frames: Mapping[str, pd.DataFrame] = field(default_factory=dict)
@@ -187,9 +175,9 @@ class ReportContent:
     def __post_init__(self) -> None:
         """Give the model without physics its name for people, wherever a model is named."""
         for name in ("cells", "models", "factors", "trials", "horizon", "over_time"):
-            object.__setattr__(self, name, _renamed(getattr(self, name)))
-        object.__setattr__(self, "frames", {name: _renamed(frame) for name, frame in self.frames.items()})
-        object.__setattr__(self, "snapshots", [_window(snapshot) for snapshot in self.snapshots])
+            object.__setattr__(self, name, with_spoken_models(getattr(self, name)))
+        object.__setattr__(self, "frames", {name: with_spoken_models(frame) for name, frame in self.frames.items()})
+        object.__setattr__(self, "snapshots", [window_with_spoken_models(snapshot) for snapshot in self.snapshots])
         object.__setattr__(self, "alone", {spoken(model) for model in self.alone})
 
     def frame(self, name: str) -> pd.DataFrame:
@@ -197,20 +185,14 @@ class ReportContent:
         return self.frames.get(name, pd.DataFrame())
 
 
-def _renamed(frame: pd.DataFrame) -> pd.DataFrame:
-    """A frame whose models have their names for people; itself where they have them."""
-    changed = {}
-    for column in (name for name in MODELS if name in frame):
-        raw = [name for name in pd.unique(frame[column]) if isinstance(name, str) and spoken(name) != name]
-        if raw:
-            changed[column] = frame[column].replace({name: spoken(name) for name in raw})
-    return frame.assign(**changed) if changed else frame
+def with_spoken_models(frame: pd.DataFrame) -> pd.DataFrame:
+    """A frame whose models have their names for people."""
+    columns = [column for column in MODELS if column in frame]
+    return frame.assign(**{column: frame[column].map(spoken, na_action="ignore") for column in columns})
 
 
-def _window(snapshot: Snapshot) -> Snapshot:
-    """A window whose models have their names for people; itself where they have them."""
-    if all(spoken(model) == model for model, _, _ in snapshot.paths):
-        return snapshot
+def window_with_spoken_models(snapshot: Snapshot) -> Snapshot:
+    """A window whose models have their names for people."""
     paths, bands = (
         {(spoken(model), source, size): line for (model, source, size), line in lines.items()}
         for lines in (snapshot.paths, snapshot.bands)

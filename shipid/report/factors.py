@@ -1,4 +1,4 @@
-"""How each model was degraded: every perturbed number as a dot at its factor."""
+"""The models: how each was degraded, every perturbed number as a dot at its factor, and a table of all."""
 
 from __future__ import annotations
 
@@ -7,18 +7,29 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 
-from shipid.report import tables
-from shipid.report.content import DATA_DRIVEN, ReportContent
-from shipid.report.figure import Chip, Figure, Panel, Plot, axis, label, layout, line
-from shipid.report.palette import INK, MUTED, SYMBOLS, category
+from shipid.report.content import DATA_DRIVEN, ReportContent, rows_in, spoken
+from shipid.report.figure import INK, MUTED, SYMBOLS, Chip, Figure, axis, category, escaped, line, plot, row_name
 from shipid.report.section import Section
 from shipid.report.selection import families
+from shipid.report.tables import Column, Table, frame_table, with_cells, word_cell
 from shipid.report.wording import counted, listed, metres, number, shortened
 
 ROW = 42  # height of a model [px]
 LONGEST = 11  # characters of a name that fit beside its errors on a phone
 TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 5.0, 10.0, 20.0, 50.0, 100.0)
+MODELS = {
+    "model": Column("model"),
+    "family": Column("family"),
+    "A [m]": Column("A", "length"),
+    "A_90 [m]": Column("A_90", "length"),
+    "rms [m]": Column("A_rms", "length"),
+    "A along [m]": Column("A_along", "length"),
+    "A across [m]": Column("A_across", "length"),
+    "status": Column("status"),
+    "what it is": Column("description"),
+}
 
 
 def factors(content: ReportContent) -> Figure | None:
@@ -29,126 +40,111 @@ def factors(content: ReportContent) -> Figure | None:
     names = [str(name) for name in families(content).model if name in set(frame.model)]
     bases = set(content.models.model[content.models.family.ne(DATA_DRIVEN)])  # further methods have their numbers
     untouched = [str(name) for name in families(content).model if name in bases and name not in names]
-    groups = [str(name) for name in pd.unique(frame.group)]
+    crosses = bool((frame.factor <= 0).any())  # a factor without a logarithm
     return Figure(
         id="factors",
         title="How the models were degraded",
-        takeaway=_takeaway(frame, names),
+        takeaway=_takeaway_factors(frame, names),
         how="One dot per perturbed number, at its factor on the base model, logarithmic; rows by "
         "rising A, with the mean absolute error along and across the heading at the instant of prediction where known."
-        + (" A factor that is not positive lies at the left edge: 0 removes the term." if _crosses(frame) else "")
+        + (" A factor that is not positive lies at the left edge: 0 removes the term." if crosses else "")
         + (f" Not perturbed: {listed(untouched, 6)}." if untouched else ""),
         alternative=f"Dots at the factors of {counted(len(names), 'model')}; the table of models has A.",
         height=ROW * len(names) + 70,
-        views={"": [Panel(_strips(content, frame, names, groups))]},
+        draw=lambda: [_draw_strips(content, frame, names)],
         chips=[
-            Chip(f"group:{name}", name.replace("_", " "), category(i), "none", symbol=SYMBOLS[i % len(SYMBOLS)])
-            for i, name in enumerate(groups)
+            Chip(f"group:{name}", str(name).replace("_", " "), category(i), "none", symbol=SYMBOLS[i % len(SYMBOLS)])
+            for i, name in enumerate(pd.unique(frame.group))
         ],
     )
 
 
-def _strips(content: ReportContent, frame: pd.DataFrame, names: list[str], groups: list[str]) -> Plot:
-    (low, high), rows = _span(frame), {name: i for i, name in enumerate(names)}
-    edge = low - 0.08 * (high - low)
-    traces = []
+def _draw_strips(content: ReportContent, frame: pd.DataFrame, names: list[str]) -> go.Figure:
+    logs = np.log(frame.factor[frame.factor > 0].to_numpy(dtype=float))
+    least = math.log(1.25)  # at least a quarter down and up
+    low, high = min(float(logs.min(initial=0.0)), -least), max(float(logs.max(initial=0.0)), least)
+    edge, room, removed = low - 0.08 * (high - low), 0.03 * (high - low), frame.factor[frame.factor <= 0]
+    groups, traces = pd.unique(frame.group), []
     for i, group in enumerate(groups):
         mine = frame[frame.group.eq(group) & frame.model.isin(names)]
         # Each group is drawn a little below the one before, so that equal factors do not hide each other.
-        y = mine.model.map(rows).to_numpy(dtype=float) + 0.24 * i / max(1, len(groups) - 1)
-        x = np.array([math.log(factor) if factor > 0 else edge for factor in mine.factor])
+        y = np.array([names.index(name) for name in mine.model]) + 0.24 * i / max(1, len(groups) - 1)
+        x = [math.log(factor) if factor > 0 else edge for factor in mine.factor]
         marker = {"symbol": SYMBOLS[i % len(SYMBOLS)], "size": 8, "color": category(i), "opacity": 0.75}
-        trace = line(group, x, y, [f"group:{group}"], mode="markers", marker=marker)
-        trace["customdata"] = [
-            f"{label(str(model))}: {label(str(path))} × {factor:.3g}"
-            for model, path, factor in zip(mine.model, mine.path, mine.factor, strict=True)
-        ]
-        trace["hovertemplate"] = "%{customdata}<extra></extra>"
-        traces.append(trace)
-    room = 0.03 * (high - low)
-    span = [(edge if _crosses(frame) else low) - room, high + room]
-    x_axis = axis("factor [1]", range=span, **_ticks(frame, low, high, edge))
-    y_axis = axis("", range=[len(names) - 0.5, -0.85], showticklabels=False, showgrid=False)
-    texts = [_row_text(content, name, row) for name, row in rows.items()]
-    plot = layout(x_axis, y_axis, annotations=texts, hovermode="closest", margin={"l": 12, "r": 12, "t": 4, "b": 44})
-    plot["shapes"] = [_rule(row, span) for row in rows.values()] + [
-        {"type": "line", "yref": "paper", "x0": 0, "x1": 0, "y0": 0, "y1": 1, "layer": "below"}
-        | {"line": {"color": INK, "width": 1}}
-    ]
-    return Plot(traces, plot)
-
-
-def _rule(row: int, span: list[float]) -> dict[str, Any]:
-    ink = {"color": MUTED, "width": 0.5}
-    return {"type": "line", "x0": span[0], "x1": span[1], "y0": row, "y1": row, "layer": "below", "line": ink}
-
-
-def _row_text(content: ReportContent, name: str, row: int) -> dict[str, Any]:
-    """Name and accuracy of a row, written above its dots."""
-    mine = content.models[content.models.model == name]
-    short = shortened(name, LONGEST)
-    words = f"<b>{label(short)}</b>"
-    if len(mine):
-        record = mine.iloc[0]
-        words += (
-            f"  A {metres(float(record.A))}" if math.isfinite(float(record.A)) else f"  {label(str(record.status))}"
-        )
-        split = [float(record.get(column, math.nan)) for column in ("A_along", "A_across")]
-        if all(map(math.isfinite, split)):
-            words += f": {number(split[0])} along, {number(split[1])} across"
-    place = {"x": 0, "xref": "paper", "xanchor": "left", "y": row, "yshift": 17, "showarrow": False}
-    return {**place, "text": words, "font": {"size": 12}, "bgcolor": "var(--page)", "borderpad": 0}
-
-
-def _crosses(frame: pd.DataFrame) -> bool:
-    """Whether some factor has no logarithm."""
-    return bool((frame.factor <= 0).any())
-
-
-def _span(frame: pd.DataFrame) -> tuple[float, float]:
-    """Logarithms of the smallest and largest positive factor, at least a quarter down and up."""
-    logs = np.log(frame.factor[frame.factor > 0].to_numpy(dtype=float))
-    least = math.log(1.25)
-    return min(float(logs.min(initial=0.0)), -least), max(float(logs.max(initial=0.0)), least)
-
-
-def _ticks(frame: pd.DataFrame, low: float, high: float, edge: float) -> dict[str, list[Any]]:
+        words = [f"{escaped(row.model)}: {escaped(row.path)} × {row.factor:.3g}" for row in rows_in(mine)]
+        traces.append(line(str(group), x, y, [f"group:{group}"], mode="markers", marker=marker, hover=words))
     shown = [1.0]
     for tick in sorted(TICKS, key=lambda value: abs(math.log(value))):
         far = all(abs(math.log(tick / other)) > 0.08 * (high - low) for other in shown)
-        if far and low - 0.02 <= math.log(tick) <= high + 0.02:
-            shown.append(tick)
-    named = [("0" if (frame.factor[frame.factor <= 0] == 0).all() else "≤ 0", edge)] if _crosses(frame) else []
-    return {
-        "tickvals": [place for _, place in named] + [math.log(tick) for tick in shown],
-        "ticktext": [word for word, _ in named] + [f"{tick:g}" for tick in shown],
-    }
+        shown += [tick] * (far and low - 0.02 <= math.log(tick) <= high + 0.02)
+    ticks = {math.log(tick): f"{tick:g}" for tick in shown}
+    ticks |= {edge: "0" if removed.eq(0).all() else "≤ 0"} if len(removed) else {}
+    span = [(edge if len(removed) else low) - room, high + room]
+    x_axis = axis("factor [1]", range=span, tickvals=list(ticks), ticktext=list(ticks.values()))
+    y_axis = axis("", range=[len(names) - 0.5, -0.85], showticklabels=False, showgrid=False)
+    texts = [row_name(row, _words_of_row(content, name)) for row, name in enumerate(names)]
+    rule: dict[str, Any] = {"type": "line", "layer": "below", "line": {"color": MUTED, "width": 0.5}}
+    rules = [{**rule, "x0": span[0], "x1": span[1], "y0": row, "y1": row} for row in range(len(names))]
+    rules.append({**rule, "yref": "paper", "x0": 0, "x1": 0, "y0": 0, "y1": 1, "line": {"color": INK, "width": 1}})
+    margin = {"l": 12, "r": 12, "t": 4, "b": 44}
+    return plot(traces, x_axis, y_axis, annotations=texts, shapes=rules, margin=margin)
 
 
-def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
+def _words_of_row(content: ReportContent, name: str) -> str:
+    """Name of a model and its accuracy."""
+    words, mine = f"<b>{escaped(shortened(name, LONGEST))}</b>", content.models[content.models.model == name]
+    if mine.empty:
+        return words
+    record = mine.iloc[0]
+    accuracy = f"A {metres(float(record.A))}" if math.isfinite(float(record.A)) else escaped(record.status)
+    along, across = (float(record.get(column, math.nan)) for column in ("A_along", "A_across"))
+    split = f": {number(along)} along, {number(across)} across" if math.isfinite(along + across) else ""
+    return f"{words}  {accuracy}{split}"
+
+
+def _takeaway_factors(frame: pd.DataFrame, names: list[str]) -> str:
     """How many numbers, how far from 1, and which model is farthest from its base."""
-    positive = frame[frame.factor > 0]
-    removed = int((frame.factor == 0).sum())
-    kept = frame.factor[frame.factor != 0]
-    text = f"{counted(len(kept), 'number')} in {counted(len(names), 'model')}"
+    positive, removed = frame[frame.factor > 0], int((frame.factor == 0).sum())
+    kept, models = frame.factor[frame.factor != 0], counted(len(names), "model")
+    text = f"{models} changed"
     if len(kept):
         low, high = number(kept.min()), number(kept.max())
-        text += f", times {low}" if low == high else f", times factors from {low} to {high}"
-    else:
-        text = f"{counted(len(names), 'model')} changed"
+        text = f"{counted(len(kept), 'number')} in {models}, times "
+        text += low if low == high else f"factors from {low} to {high}"
     text += f"; {counted(removed, 'term')} removed" if removed else ""
     if positive.model.nunique() > 1:
-        squared = pd.Series(np.log(positive.factor.to_numpy(dtype=float)) ** 2, index=positive.model)
-        away = squared.groupby(level=0).mean()
-        far = str(away.idxmax())
-        text += f"; {far} is farthest from its base, by a factor of {math.exp(math.sqrt(float(away[far]))):.2f}"
+        away = positive.factor.map(lambda factor: math.log(factor) ** 2).groupby(positive.model).mean()
+        text += f"; {away.idxmax()} is farthest from its base, by a factor of {math.exp(math.sqrt(away.max())):.2f}"
         text += f" (root mean square{' of those not removed' if removed else ''})"
     return f"{text}."
 
 
-SECTION = Section(
+def models_table(content: ReportContent) -> Table:
+    """List the models, by rising A."""
+    frame = content.models.sort_values("A", kind="stable", na_position="last")
+    known = frame[frame.A.notna()]
+    ends = [f"{number(row.A)} m ({row.model})" for row in rows_in(known)]
+    takeaway = f"A runs from {ends[0]} to {ends[-1]}." if len(ends) > 1 else "No physics model could be judged."
+    takeaway = f"A of {known.model.iloc[0]} is {number(known.A.iloc[0])} m." if len(ends) == 1 else takeaway
+    return frame_table(
+        "models", "Every model", takeaway, with_failures(frame).assign(family=frame.family.map(spoken)), MODELS
+    )
+
+
+def with_failures(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame with a `status` that says why there is no result, where it is not "ok"."""
+    why = frame.get("sentence", pd.Series("", index=frame.index)).fillna("")
+    pairs = zip(frame.status, why, strict=True)
+    cells = [
+        word_cell(f"{status}: {words}" if words and status != "ok" else status, bad=status != "ok")
+        for status, words in pairs
+    ]
+    return with_cells(frame, status=cells)
+
+
+THE_MODELS = Section(
     "The models",
-    draw=lambda content: (factors(content), tables.models(content)),
+    draw=lambda content: (factors(content), models_table(content)),
     needs=("models",),
     anchors=("factors", "models"),
 )

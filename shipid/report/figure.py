@@ -1,26 +1,97 @@
-"""The parts of every figure: a takeaway above, panels with controls, and below how it was computed."""
+"""What every figure is made of: colours, axes, lines, the legend, and the words around it.
+
+A figure of a page names CSS variables, `var(--ink)`, instead of colours: one serves a light, a dark and a printed
+page. `draw_alone` puts colours in their place.
+"""
 
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping, Sequence
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from textwrap import wrap
+from typing import Any, TypeAlias
 
 import numpy as np
+import pandas as pd
 import plotly.graph_objects as go
+from plotly.colors import sample_colorscale
+from plotly.subplots import make_subplots
 
-from shipid.report.content import Floats
-from shipid.report.palette import GRID, INK
+from shipid.errors import ShipidError, choices
+from shipid.report.content import Floats, Indices
 from shipid.report.wording import scientific
+
+INK, MUTED, GRID, TRUTH, NAIVE = "var(--ink)", "var(--muted)", "var(--grid)", "var(--truth)", "var(--muted)"
+CLEAR = "rgba(0,0,0,0)"
+PAGE_COLOURS = {
+    "light": {
+        "page": "#ffffff", "card": "#f6f7f9", "ink": "#15191f", "muted": "#5a6472", "grid": "#dfe3e8",
+        "truth": "#c3cad3", "accent": "#00598c", "good": "#0b6b3a", "bad": "#a8321a", "open": "#6a5200",
+        "hull": "rgba(90, 100, 114, 0.25)",
+    },
+    "dark": {
+        "page": "#12151a", "card": "#1b2027", "ink": "#eef1f5", "muted": "#a3adba", "grid": "#303742",
+        "truth": "#4d5866", "accent": "#7cc0ee", "good": "#66cf96", "bad": "#ff9a80", "open": "#e6c35c",
+        "hull": "rgba(163, 173, 186, 0.3)",
+    },
+}  # fmt: skip
+# Okabe and Ito (2008), "Color universal design"; yellow and black are left out: one page is white, one nearly black.
+OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+SYMBOLS = ("circle", "diamond", "square", "triangle-up", "cross", "star")
+LINE_DASHES = ("solid", "dash", "dot", "dashdot")
+LEVELS = 24
+ROUNDING = 1e-9  # of the greatest error: that of an exact model
+MILLION = 6  # power of ten from which ticks are short: Plotly would write -5k on one axis and -6000 on the other
+POINTS = 600  # of a line over time: more than pixels are wide
+Values: TypeAlias = "Sequence[float] | Floats | pd.Series[Any]"
+Trace = dict[str, Any]  # as Plotly takes it: `type` and the options of that type
+
+
+def category(index: int) -> str:
+    """Return the CSS variable of the index-th category colour."""
+    return f"var(--category-{index % len(OKABE_ITO)})"
+
+
+def page_colours(theme: str) -> dict[str, str]:
+    """Name of a CSS variable -> colour of the `light` or `dark` page, with viridis and the Okabe-Ito colours.
+
+    `scale-0` to `scale-23` are for lines: those of viridis with contrast to the page; `heat-0` on are all of it.
+    """
+    dark = theme == "dark"
+    # Dark blue has contrast to white but not to black: the dark page takes sky blue instead, and the reverse.
+    named = (OKABE_ITO[-1], *OKABE_ITO[1:-1], OKABE_ITO[0]) if dark else OKABE_ITO
+    colours = PAGE_COLOURS[theme] | {f"category-{i}": colour for i, colour in enumerate(named)}
+    for name, ends in (("scale", (0.28, 1.0) if dark else (0.0, 0.72)), ("heat", (0.0, 1.0))):
+        steps = sample_colorscale("Viridis", list(np.linspace(*ends, LEVELS)))
+        colours |= {f"{name}-{i}": colour for i, colour in enumerate(steps)}
+        colours[name] = f"linear-gradient(90deg, {', '.join(steps)})"
+    return colours
+
+
+def least_coloured(span: tuple[float, float]) -> float:
+    """Where a scale of colours begins: at its least magnitude; where that is nothing or rounding, at 1e-4 of its end.
+
+    Above 0, also for a scale of zeros alone.
+    """
+    low, high = span
+    return (low if low >= ROUNDING * high else 1e-4 * high) or 1.0
+
+
+def colour_level(value: float, span: tuple[float, float]) -> int:
+    """Place of a magnitude on a logarithmic scale of `LEVELS` colours: errors are factors apart, a few far off."""
+    low, high, place = np.log(np.maximum([*span, value], least_coloured(span)))
+    return round(float(np.clip((place - low) / (high - low), 0, 1)) * (LEVELS - 1)) if high > low else 0
 
 
 @dataclass(frozen=True)
 class Control:
-    """A choice above a figure: a row of radio buttons for a few options, a list for many."""
+    """A choice above a figure: a row of radio buttons for a few options, a list for many; `start` is an index."""
 
     label: str
-    options: Sequence[str]
+    options: Sequence[Any]
     start: int = 0
 
 
@@ -36,52 +107,14 @@ class Chip:
     symbol: str = ""
 
 
-Trace = dict[str, Any]  # as Plotly.js takes it: `type` and the options of that type
-
-
-@dataclass(frozen=True)
-class Plot:
-    """Traces and layout as plain data: Plotly's Python classes take milliseconds a trace to check it."""
-
-    traces: Sequence[Trace]
-    layout: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One plot with the caption below it."""
-
-    plot: Plot
-    caption: str = ""
-
-    @property
-    def figure(self) -> go.Figure:
-        """The plot as a checked figure of Plotly; ValueError for an option that there is not."""
-        return go.Figure(self.plot.traces, self.plot.layout)
-
-
-@dataclass(frozen=True)
-class FixedWindow:
-    """A panel that shows one window of the browser: indices of run, instant and N_D among those offered there.
-
-    `model` restricts it to the lines of one model; empty for those of all.
-    """
-
-    caption: str
-    run: int
-    instant: int
-    size: int
-    model: str = ""
-
-
 @dataclass(frozen=True)
 class Scale:
-    """A colour scale: a label with its unit, the smallest and largest value, the CSS variable of the gradient."""
+    """A logarithmic colour scale: a label with its unit, the least and greatest value, the CSS variable of it."""
 
     label: str
     low: float
     high: float
-    gradient: str = "--scale"
+    gradient: str = "scale"
 
 
 @dataclass(frozen=True)
@@ -91,11 +124,11 @@ class Figure:
     Parameters
     ----------
     id, title, takeaway, how, alternative : texts; the alternative says what a reader who cannot see it would miss.
-    views : option indices of the controls, joined by "-" ("" without controls) -> panels.
     height : of one panel [px].
-    windows : panels drawn from the windows of the page instead of views.
-    browser : whether it is the window browser, instead of views.
-    scale : the logarithmic colour scale, if there is one.
+    draw : an option of each control -> panels, as many for all options.
+    captions : of the panels; empty for none.
+    columns : whether panels stand in rows of three, instead of as many as have room.
+    browser : whether the page draws the window that a reader picks, instead of `draw`.
     """
 
     id: str
@@ -104,20 +137,18 @@ class Figure:
     how: str
     alternative: str
     height: int
-    views: Mapping[str, Sequence[Panel]]
+    draw: Callable[..., Sequence[go.Figure]]
     controls: Sequence[Control] = ()
     chips: Sequence[Chip] = ()
-    windows: Sequence[FixedWindow] = ()
-    browser: bool = False
+    captions: Sequence[str] = ()
     scale: Scale | None = None
+    columns: bool = False
+    browser: bool = False
 
 
-def label(text: str) -> str:
+def escaped(text: object) -> str:
     """Escape a name for Plotly, which reads tags and links in its texts."""
-    return html.escape(text, quote=False)
-
-
-MILLION = 6  # power of ten from which ticks are short: Plotly would write -5k on one axis and -6000 on the other
+    return html.escape(str(text), quote=False)
 
 
 def axis(title: str, **options: Any) -> dict[str, Any]:
@@ -126,23 +157,97 @@ def axis(title: str, **options: Any) -> dict[str, Any]:
     return {**base, "title": {"text": title, "standoff": 8, "font": {"size": 13}}, **options}
 
 
-def logarithmic(title: str, steps: Sequence[float] = (1, 2, 5), **options: Any) -> dict[str, Any]:
+def zero_axis(title: str, colour: str = GRID, **options: Any) -> dict[str, Any]:
+    """Make an axis with a line at 0."""
+    return axis(title, zeroline=True, zerolinecolor=colour, **options)
+
+
+def log_axis(title: str, steps: Sequence[float] = (1, 2, 5), **options: Any) -> dict[str, Any]:
     """Make a logarithmic axis with whole numbers at its ticks: Plotly would write 0.5 as 5."""
     ticks = [float(f"{step}e{decade}") for decade in range(-8, 5) for step in steps]
     return axis(title, type="log", **{"tickvals": ticks, "ticktext": [scientific(tick) for tick in ticks], **options})
 
 
-def plane(x: str, y: str, spans: Sequence[tuple[float, float]] = ()) -> dict[str, Any]:
-    """Lay out two lengths on equal axes, over given spans of x and y [m] or over what is drawn."""
+def names_axis(names: Sequence[object], title: str = "", **options: Any) -> dict[str, Any]:
+    """Make an axis with a name at 0, 1, 2, ..."""
+    return axis(title, tickvals=list(range(len(names))), ticktext=list(map(escaped, names)), **options)
+
+
+def plot(traces: Sequence[Trace], x: dict[str, Any], y: dict[str, Any], **options: Any) -> go.Figure:
+    """Make a figure without background, legend or template: the page gives colours and the legend is text."""
+    base = {
+        "template": None,
+        "paper_bgcolor": CLEAR,
+        "plot_bgcolor": CLEAR,
+        "font": {"family": "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif", "size": 13, "color": INK},
+        "margin": {"l": 48, "r": 12, "t": 12, "b": 44},
+        "showlegend": False,
+        "hovermode": "closest",
+        "hoverlabel": {"bgcolor": "var(--card)", "bordercolor": GRID, "font": {"color": INK}, "namelength": -1},
+    }
+    return go.Figure(traces, {**base, "xaxis": x, "yaxis": y, **options})
+
+
+def chart(
+    traces: Sequence[Trace], x: str, y: str, spans: Sequence[tuple[float, float]] = (), nticks: int = 6
+) -> go.Figure:
+    """Make a plot of two lengths on equal axes, over given spans of x and y [m] or over what is drawn."""
     room = 0.04 * max((high - low for low, high in spans), default=0.0)
     ranges = [{"range": [low - room, high + room]} for low, high in spans] or [{}, {}]
     # Margins are fixed: automatic ones and equal axes chase each other.
-    right = axis(x, scaleanchor="y", scaleratio=1, nticks=6, automargin=False, **ranges[0])
+    right = axis(x, scaleanchor="y", scaleratio=1, nticks=nticks, automargin=False, **ranges[0])
     up = axis(y, nticks=8, automargin=False, **ranges[1])
-    return layout(right, up, hovermode="closest", margin={"l": 70, "r": 12, "t": 12, "b": 44})
+    return plot(traces, right, up, margin={"l": 70, "r": 12, "t": 12, "b": 44})
 
 
-def apart(places: Sequence[float], gap: float, most: float) -> list[float]:
+def line(
+    name: str,
+    x: Values,
+    y: Values,
+    keys: Sequence[str],
+    unit: str = "m",
+    *,
+    mode: str = "lines",
+    hover: str | Sequence[str] | None = None,
+    **options: Any,
+) -> Trace:
+    """One line or its points, in single precision.
+
+    Parameters
+    ----------
+    name : in the hover box and in what a reader saves.
+    keys : of the chips that hide it.
+    unit : of y.
+    hover : template of the hover box, or the text of each point; empty for no box, None for name and y.
+    """
+    template = "%{customdata}" if not isinstance(hover, str | None) else hover
+    template = f"{escaped(name)}: %{{y:.4~r}} {escaped(unit)}" if template is None else template
+    trace = {
+        "type": "scatter",
+        "x": np.asarray(x, dtype=np.float32),
+        "y": np.asarray(y, dtype=np.float32),
+        "mode": mode,
+        "name": escaped(name),
+        "meta": list(keys),
+        "connectgaps": False,
+    }
+    trace |= {"hovertemplate": f"{template}<extra></extra>"} if template else {"hoverinfo": "skip"}
+    return {**trace, **({} if isinstance(hover, str | None) else {"customdata": list(hover)}), **options}
+
+
+def intervals(middle: Floats, low: Floats, high: Floats, colour: str) -> dict[str, Any]:
+    """Error bars from low to high around the middle; none where an end is not finite."""
+    reach = {"array": np.nan_to_num(high - middle, posinf=0.0), "arrayminus": np.nan_to_num(middle - low, posinf=0.0)}
+    return {"type": "data", "symmetric": False, "color": colour, "thickness": 1.5, "width": 4, **reach}
+
+
+def row_name(row: int, words: str) -> dict[str, Any]:
+    """Annotation above a row of a figure, at its left edge: long names need no margin there."""
+    place = {"x": 0, "xref": "paper", "xanchor": "left", "y": row, "yshift": 17, "showarrow": False}
+    return {**place, "text": words, "font": {"size": 12}, "bgcolor": "var(--page)", "borderpad": 0}
+
+
+def spread_apart(places: Sequence[float], gap: float, most: float) -> list[float]:
     """Move rising places at least `gap` apart and none beyond `most`, each as little as those before it allow."""
     moved: list[float] = []
     for place in places:
@@ -152,48 +257,97 @@ def apart(places: Sequence[float], gap: float, most: float) -> list[float]:
     return moved
 
 
-def layout(x: dict[str, Any], y: dict[str, Any], **options: Any) -> dict[str, Any]:
-    """Layout without background, legend or template: the page gives colours and the legend is text."""
-    base = {
-        "template": None,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"family": "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif", "size": 13, "color": INK},
-        "margin": {"l": 48, "r": 12, "t": 12, "b": 44},
+def even_places(length: int, most: int) -> Indices:
+    """At most so many indices of a sequence at even distances, the first and the last included."""
+    return np.unique(np.linspace(0, length - 1, min(length, most)).round().astype(int))
+
+
+def run_names(frame: pd.DataFrame, column: str = "run") -> list[str]:
+    """Names in a column of a frame, each once, in their order."""
+    return [str(name) for name in pd.unique(frame[column])]
+
+
+def draw_alone(figure: Figure, chosen: Sequence[object] = (), *, dark: bool = False) -> go.Figure:
+    """Draw a figure of a page as one Plotly figure with title, legend and real colours.
+
+    Parameters
+    ----------
+    chosen : an option of each control of the figure, in order; None for the one that the page shows first.
+    dark : light ink on a dark ground.
+
+    Raises ShipidError for an option that does not exist.
+    """
+    given = [*chosen, *[None] * (len(figure.controls) - len(chosen))]
+    options = [_find_option(control, value) for control, value in zip(figure.controls, given, strict=True)]
+    return dress_panels(figure, figure.draw(*options), dark=dark)
+
+
+def _find_option(control: Control, value: object) -> Any:
+    """An option by its text, or by its number where the text is one."""
+    texts = [str(option) for option in control.options]
+    if value is not None and str(value) not in texts:
+        words = f"{control.label}: {str(value)!r} is none of its options; {choices(str(value), texts)}"
+        raise ShipidError(words, path="figures")
+    return control.options[control.start if value is None else texts.index(str(value))]
+
+
+def dress_panels(figure: Figure, panels: Sequence[go.Figure], *, dark: bool = False) -> go.Figure:
+    """Put panels below each other, with title, legend and scale, in the colours of the light or the dark page."""
+    whole = make_subplots(rows=len(panels), subplot_titles=[*map(escaped, figure.captions)] or None)
+    whole = go.Figure(panels[0]) if len(panels) == 1 else whole
+    for row, panel in enumerate(panels if len(panels) > 1 else (), start=1):
+        across = panel.layout.xaxis.to_plotly_json()
+        across |= {"scaleanchor": f"y{row}"} if "scaleanchor" in across else {}
+        whole.add_traces(panel.data, rows=row, cols=1)
+        whole.update_xaxes(across, row=row, col=1).update_yaxes(panel.layout.yaxis, row=row, col=1)
+        whole.update_layout(template=None, plot_bgcolor=CLEAR, font=panel.layout.font, hovermode="closest")
+    whole.update_traces(showlegend=False)
+    whole.add_traces([_legend_entry(chip) for chip in figure.chips])
+    if figure.scale is not None:
+        whole.add_trace(_scale_bar(figure.scale))
+    takeaway = "<br>".join(map(escaped, wrap(figure.takeaway, 110)))
+    title = {"text": f"{escaped(figure.title)}<br><sup>{takeaway}</sup>", "x": 0, "xref": "paper", "y": 1}
+    title |= {"yref": "container", "yanchor": "top", "pad": {"t": 24}}
+    height = len(panels) * figure.height + 130 + 70 * (len(panels) - 1)
+    beside = 1.25 if whole.layout.annotations else 1.02  # right of names that stand beside the lines
+    whole.update_layout(title=title, width=900, height=height, legend_x=beside, margin_t=90)
+    whole.update_layout(showlegend=bool(figure.chips))
+    colours = page_colours("dark" if dark else "light")
+    data = [_paint(trace.to_plotly_json(), colours) for trace in whole.data]
+    layout = {**_paint(whole.layout.to_plotly_json(), colours), "paper_bgcolor": colours["page"]}
+    return go.Figure(data, layout)
+
+
+def _paint(value: Any, colours: Mapping[str, str]) -> Any:
+    """Replace the names of colours, `var(--ink)`, in the options of a figure by colours."""
+    if isinstance(value, str):
+        return re.sub(r"var\(--([\w-]+)\)", lambda match: colours[match[1]], value)
+    if isinstance(value, Mapping):
+        return {key: _paint(item, colours) for key, item in value.items()}
+    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype.kind in "OU"):
+        return [_paint(item, colours) for item in value]
+    return value
+
+
+def _legend_entry(chip: Chip) -> Trace:
+    """Entry of the legend without a point on the plot."""
+    mode = "+".join(["lines"] * (chip.dash != "none") + ["markers"] * bool(chip.symbol))
+    ink = {"color": chip.colour, "width": chip.width, "dash": "solid" if chip.dash == "none" else chip.dash}
+    marker = {"color": chip.colour, "symbol": chip.symbol or "circle"}
+    entry = {"x": [None], "y": [None], "name": escaped(chip.label), "mode": mode, "line": ink, "marker": marker}
+    return {"type": "scatter", "showlegend": True, **entry}
+
+
+def _scale_bar(scale: Scale) -> Trace:
+    """Colour bar of a logarithmic scale below the panels, without a point on the plot."""
+    least = least_coloured((scale.low, scale.high))
+    low, high = (math.log10(max(value, least)) for value in (scale.low, scale.high))
+    ticks = np.linspace(low, high, 4).tolist()
+    bar = {"title": {"text": escaped(scale.label), "side": "top"}, "orientation": "h", "y": -0.15, "yanchor": "top"}
+    bar |= {"tickvals": ticks, "ticktext": [f"{10**tick:.3g}" for tick in ticks], "thickness": 16}
+    steps = [[step, f"var(--{scale.gradient}-{i})"] for i, step in enumerate(np.linspace(0, 1, LEVELS).tolist())]
+    marker = {"color": [low, high], "colorscale": steps, "cmin": low, "cmax": high, "showscale": True, "colorbar": bar}
+    return {"type": "scatter", "x": [None, None], "y": [None, None], "mode": "markers"} | {
+        "marker": marker,
         "showlegend": False,
-        "hoverlabel": {"bgcolor": "var(--card)", "bordercolor": GRID, "font": {"color": INK}, "namelength": -1},
     }
-    return {**base, "xaxis": x, "yaxis": y, **options}
-
-
-def line(
-    name: str,
-    x: Sequence[float] | Floats,
-    y: Sequence[float] | Floats,
-    keys: Sequence[str],
-    unit: str = "m",
-    mode: str = "lines",
-    **options: Any,
-) -> Trace:
-    """One line in single precision; its hover says name, x and y."""
-    return {
-        "type": "scatter",
-        "x": np.asarray(x, dtype=np.float32),
-        "y": np.asarray(y, dtype=np.float32),
-        "mode": mode,
-        "name": label(name),
-        "meta": list(keys),
-        "connectgaps": False,
-        "hovertemplate": f"{label(name)}: %{{y:.4~r}} {label(unit)}<extra></extra>",
-        **options,
-    }
-
-
-def marks(kind: str, **options: Any) -> Trace:
-    """Another trace than a line, of a type of Plotly such as `bar`."""
-    return {"type": kind, **options}
-
-
-def silent(trace: Trace) -> Trace:
-    """Return the trace without a hover box."""
-    return {**{key: value for key, value in trace.items() if key != "hovertemplate"}, "hoverinfo": "skip"}

@@ -4,22 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from functools import partial
 from textwrap import wrap
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 
-from shipid.report import tables
-from shipid.report.content import Floats, PageContent, Sentence
-from shipid.report.figure import Chip, Control, Figure, Panel, Plot, axis, label, layout, line, marks, silent
-from shipid.report.motion import LOG, MOTIONS, panels
-from shipid.report.page import page, write
-from shipid.report.palette import INK, MUTED, category
+from shipid.report.content import Floats, PageContent, Sentence, rows_of
+from shipid.report.figure import (
+    INK,
+    MUTED,
+    Chip,
+    Figure,
+    Trace,
+    axis,
+    category,
+    escaped,
+    line,
+    names_axis,
+    plot,
+    run_names,
+    zero_axis,
+)
+from shipid.report.motion import LOG, MOTIONS, motion_figure
+from shipid.report.page import write_page
 from shipid.report.section import Section
-from shipid.report.structures import group_table
-from shipid.report.tables import Cell, Table, decimals, figure, text
+from shipid.report.structures import group_errors
+from shipid.report.tables import MISSING, Cell, Column, Table, decimals_for_median, frame_table, with_cells, word_cell
 from shipid.report.wording import bound, counted, listed, number, scientific
 from shipid.units import interval_text
 
@@ -28,8 +41,39 @@ WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [
 MOST_NAMED = 16  # estimates whose names have room below the columns on a phone
 FARTHEST = 4.0  # an interval may reach so many spans of the estimates beyond them before it is cut
 BEFORE, AFTER = "before", "after"
-INKS = {LOG: INK, BEFORE: category(1), AFTER: category(0)}
-DASHES = {LOG: "solid", BEFORE: "dot", AFTER: "solid"}
+RUN_INKS = {
+    LOG: {"color": INK, "dash": "solid"},
+    BEFORE: {"color": category(1), "dash": "dot"},
+    AFTER: {"color": category(0), "dash": "solid"},
+}
+ESTIMATES = {
+    "parameter": Column("words"),
+    "unit": Column("unit"),
+    "base": Column("base", numeric=True),
+    "estimate": Column("value", numeric=True),
+    "standard error": Column("error", numeric=True),
+    "factor": Column("factor", numeric=True),
+    "factor, 95 %": Column("interval", numeric=True),
+    "identified": Column("identified"),
+}
+MEASURES_BEFORE_AND_AFTER = {
+    "manoeuvre": Column("manoeuvre"),
+    "measure": Column("measure"),
+    BEFORE: Column(BEFORE, numeric=True),
+    AFTER: Column(AFTER, numeric=True),
+    "band from": Column("low", numeric=True),
+    "to": Column("high", numeric=True),
+    "unit": Column("unit"),
+    "why missing": Column("missing"),
+}
+PROGRAMME = {
+    "manoeuvre": Column("manoeuvre"),
+    "time [h]": Column("hours", 2),
+    "gain [bit]": Column("gain", 2),
+    "gain [bit/h]": Column("per_hour", 2),
+    "narrows most": Column("narrows"),
+    "by [%]": Column("by", 0),
+}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -65,9 +109,9 @@ class IdentificationContent(PageContent):
     ahead: float
     manoeuvres: pd.DataFrame
     colours: pd.DataFrame
-    profiles: pd.DataFrame = field(default_factory=pd.DataFrame)
-    programme: pd.DataFrame = field(default_factory=pd.DataFrame)
-    groups: pd.DataFrame = field(default_factory=pd.DataFrame)
+    profiles: pd.DataFrame = field(default_factory=rows_of())
+    programme: pd.DataFrame = field(default_factory=rows_of())
+    groups: pd.DataFrame = field(default_factory=rows_of())
     beyond: Sequence[str] = ()
 
     @property
@@ -75,62 +119,30 @@ class IdentificationContent(PageContent):
         """Sentences: how many parameters are identified, errors on runs held out before and after, warnings."""
         known, count = int(self.estimates["identified"].sum()), len(self.estimates)
         sentences = [Sentence(f"{known} of {counted(count, 'parameter')} are identified by these runs.", "estimates")]
-        sentences.append(Sentence(_bought(self), "free-runs"))
+        sentences.append(Sentence(_errors_before_and_after(self), "free-runs"))
         return [*sentences, *(Sentence(f"Careful: {warning}.") for warning in self.warnings)]
 
 
-def write_identification(content: IdentificationContent, file: Path) -> Path:
-    """Write the page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
-    return write(page(content, SECTIONS, "identification"), file)
-
-
-def _bought(content: IdentificationContent) -> str:
+def _errors_before_and_after(content: IdentificationContent) -> str:
     which = "test" if content.held_out else "fit"
-    rows = content.errors[(content.errors["set"] == which) & (content.errors["run"] == "all")]
-    rms = rows.set_index("model")[[*MOTIONS, "position"]].astype(float)
+    rows = content.errors[(content.errors["set"] == which) & (content.errors["run"] == "all")].set_index("model")
     runs = counted(len(content.held_out), "run") + " held out" if content.held_out else "the fitted runs"
     changes = [
-        f"{name} from {number(factor * rms[name][BEFORE])} to {number(factor * rms[name][AFTER])} {unit}"
+        f"{name} from {number(factor * rms[BEFORE])} to {number(factor * rms[AFTER])} {unit}"
         for name, (_, unit, factor) in {**MOTIONS, "position": ("", "m", 1.0)}.items()
+        for rms in [rows[name].astype(float)]
     ]
-    return f"On {runs}, the root mean square error of a free run {_length(content)} goes in {listed(changes)}."
+    return f"On {runs}, the root mean square error of a free run {_run_length(content)} goes in {listed(changes)}."
 
 
-def _length(content: IdentificationContent) -> str:
+def _run_length(content: IdentificationContent) -> str:
     return f"of {content.ahead:g} s" if content.ahead else "over the whole run"
 
 
 def estimates(content: IdentificationContent) -> Figure:
     """Estimates with 95 % intervals as factors on the base values; hollow where not identified."""
     frame = content.estimates
-    low, high = _span(frame)
-    traces = []
-    for known in (True, False):
-        mine = frame["identified"].to_numpy(dtype=bool) == known
-        rows = np.flatnonzero(mine)
-        ends = np.clip(frame.loc[mine, ["factor_low", "factor_high"]].to_numpy(dtype=float), low, high)
-        x = np.column_stack([ends, np.full(len(rows), np.nan)]).ravel()
-        y = np.repeat(rows, 3).astype(float)
-        ink = category(0) if known else MUTED
-        bar = line("interval", x, y, [_key(known)], line={"color": ink, "width": 2.5 if known else 1.2})
-        bar = silent(bar)
-        marker = {
-            "symbol": "circle" if known else "circle-open",
-            "color": ink,
-            "size": 9,
-            "line": {"color": ink, "width": 2},
-        }
-        dots = frame.loc[mine, "factor"].to_numpy(dtype=float)
-        dot = line("estimate", dots, rows.astype(float), [_key(known)], mode="markers", marker=marker)
-        dot["customdata"] = [_hover(row) for row in frame[mine].to_dict("records")]
-        dot["hovertemplate"] = "%{customdata}<extra></extra>"
-        traces += [bar, dot]
-    base = line("base", [1.0, 1.0], [-0.7, len(frame) - 0.3], [], line={"color": INK, "width": 1, "dash": "dot"})
-    base = silent(base)
-    y_axis = axis("", tickvals=list(range(len(frame))), ticktext=list(map(label, frame["name"])), showgrid=False)
-    y_axis["range"] = [len(frame) - 0.4, -0.6]
-    x_axis = axis("factor on the base value [1]", nticks=9, range=[low, high])
-    plot = layout(x_axis, y_axis, hovermode="closest", margin={"l": 8, "r": 12, "t": 4, "b": 44})
+    low, high = _span_of_factors(frame)
     cut = bool(((frame["factor_low"] < low) | (frame["factor_high"] > high)).any())
     vague = frame.loc[~frame["identified"].astype(bool), "name"].tolist()
     none = frame.loc[frame["base"] == 0, "name"].tolist()
@@ -144,285 +156,267 @@ def estimates(content: IdentificationContent) -> Figure:
         + (" Bars that reach an edge go on." if cut else ""),
         alternative="Estimates with intervals; the table below has the numbers.",
         height=ROW * len(frame) + HEAD,
-        views={"": [Panel(Plot([base, *traces], plot))]},
+        draw=lambda: [_draw_estimates(frame, low, high)],
         chips=[
-            Chip(_key(True), "identified", category(0), symbol="circle"),
-            Chip(_key(False), "not identified", MUTED, symbol="circle-open", width=1.2),
+            Chip("identified", "identified", category(0), symbol="circle"),
+            Chip("vague", "not identified", MUTED, symbol="circle-open", width=1.2),
         ],
     )
 
 
-def _key(known: bool) -> str:
-    return "identified" if known else "vague"
+def _draw_estimates(frame: pd.DataFrame, low: float, high: float) -> go.Figure:
+    base_ink = {"color": INK, "width": 1, "dash": "dot"}
+    traces = [line("base", [1.0, 1.0], [-0.7, len(frame) - 0.3], [], line=base_ink, hover="")]
+    numbered = frame.assign(row=np.arange(len(frame), dtype=float))
+    for known, key, ink, width, symbol in (
+        (True, "identified", category(0), 2.5, "circle"),
+        (False, "vague", MUTED, 1.2, "circle-open"),
+    ):
+        mine = numbered[frame["identified"].astype(bool) == known]
+        ends = np.clip(mine[["factor_low", "factor_high"]].to_numpy(dtype=float), low, high)
+        x = np.column_stack([ends, np.full(len(mine), np.nan)]).ravel()
+        bars: Trace = {"line": {"color": ink, "width": width}, "hover": ""}
+        traces.append(line("interval", x, np.repeat(mine["row"], 3), [key], **bars))
+        marker = {"symbol": symbol, "color": ink, "size": 9, "line": {"color": ink, "width": 2}}
+        words = [_estimate_words(row) for row in mine.to_dict("records")]
+        traces.append(line("estimate", mine["factor"], mine["row"], [key], mode="markers", marker=marker, hover=words))
+    y = names_axis(list(frame["name"]), showgrid=False, range=[len(frame) - 0.4, -0.6])
+    x_axis = axis("factor on the base value [1]", nticks=9, range=[low, high])
+    return plot(traces, x_axis, y, margin={"l": 8, "r": 12, "t": 4, "b": 44})
 
 
-def _span(frame: pd.DataFrame) -> tuple[float, float]:
+def _span_of_factors(frame: pd.DataFrame) -> tuple[float, float]:
     """Return the range of factors drawn: all estimates, and intervals as far as estimates stay distinguishable."""
     dots = np.append(frame["factor"].to_numpy(dtype=float), 1.0)
     reach = FARTHEST * max(float(np.ptp(dots)), 0.25)
-    ends = frame[["factor_low", "factor_high"]].to_numpy(dtype=float)
-    ends = ends[np.isfinite(ends)]
-    low = max(float(min(ends.min(initial=1.0), dots.min())), float(dots.min()) - reach)
-    high = min(float(max(ends.max(initial=1.0), dots.max())), float(dots.max()) + reach)
-    room = 0.04 * (high - low)
-    return low - room, high + room
+    given = frame[["factor_low", "factor_high"]].to_numpy(dtype=float)
+    ends = np.append(given[np.isfinite(given)], dots)
+    low, high = max(float(ends.min()), dots.min() - reach), min(float(ends.max()), dots.max() + reach)
+    return low - 0.04 * (high - low), high + 0.04 * (high - low)
 
 
-def _hover(row: Mapping[Any, Any]) -> str:
+def _estimate_words(row: Mapping[Any, Any]) -> str:
     interval = interval_text(row["factor_low"], row["factor_high"])
-    words = [f"<b>{label(str(row['path']))}</b> x {row['factor']:.4g}, 95 % {interval}"]
-    return "<br>".join([*words, *wrap(label(str(row["reason"])), 70)])
+    words = [f"<b>{escaped(row['path'])}</b> x {row['factor']:.4g}, 95 % {interval}"]
+    return "<br>".join([*words, *wrap(escaped(row["reason"]), 70)])
 
 
-def numbers(content: IdentificationContent) -> Table:
+def estimates_table(content: IdentificationContent) -> Table:
     """Return the table of all estimates in their units."""
-    rows = [
-        [
-            text(row["path"] + (f" (with {row['with']})" if row["with"] else "")),
-            text(row["unit"]),
-            *(_short(row[name]) for name in ("base", "value", "error", "factor")),
-            _interval(row["factor_low"], row["factor_high"]),
-            Cell("yes" if row["identified"] else "no", "yes" if row["identified"] else "no", bad=not row["identified"]),
-        ]
-        for row in content.estimates.to_dict("records")
+    frame = content.estimates
+    words = [row["path"] + (f" (with {row['with']})" if row["with"] else "") for row in frame.to_dict("records")]
+    numbers = {name: list(map(_scientific_cell, frame[name])) for name in ("base", "value", "error", "factor")}
+    intervals = [
+        Cell(interval_text(low, high, " … ").replace("-", "−"), float(low))
+        if np.isfinite(high - low)
+        else Cell("none", MISSING)
+        for low, high in zip(frame["factor_low"], frame["factor_high"], strict=True)
     ]
-    head = ["parameter", "unit", "base", "estimate", "standard error", "factor", "factor, 95 %", "identified"]
-    return Table("numbers", "Every estimate", "", head, [False, False, *[True] * 5, False], rows)
+    identified = [word_cell("yes" if known else "no", bad=not known) for known in frame["identified"]]
+    shown = with_cells(frame.assign(words=words), interval=intervals, identified=identified, **numbers)
+    return frame_table("numbers", "Every estimate", "", shown, ESTIMATES)
 
 
-def _interval(low: float, high: float) -> Cell:
-    if not np.isfinite(high - low):
-        return Cell("none", tables.MISSING)
-    return Cell(interval_text(low, high, " … ").replace("-", "−"), float(low))
+def _scientific_cell(value: float) -> Cell:
+    return Cell(scientific(value), float(value)) if np.isfinite(value) else Cell("–", MISSING)
 
 
-def unseen(content: IdentificationContent) -> Table | None:
+def unseen_table(content: IdentificationContent) -> Table | None:
     """Return the table of what is not identified, and why; None if everything is."""
-    rows = [[text(bound(f"{sentence[0].upper()}{sentence[1:]}"))] for sentence in content.unseen]
+    rows = [[word_cell(bound(f"{sentence[0].upper()}{sentence[1:]}"))] for sentence in content.unseen]
     takeaway = "Fix, tie or give priors to some of these, or run manoeuvres that separate them."
     return Table("unseen", "What is not identified", takeaway, ["why"], [False], rows) if rows else None
 
 
-def _short(value: float) -> Cell:
-    if not np.isfinite(value):
-        return Cell("–", tables.MISSING)
-    return Cell(scientific(value), float(value))
-
-
 def correlations(content: IdentificationContent) -> Figure | None:
     """Correlations of the estimates; None for a single one."""
-    names, matrix = list(map(label, content.estimates["name"])), np.asarray(content.correlations, dtype=float)
+    names, matrix = [str(name) for name in content.estimates["name"]], np.asarray(content.correlations, dtype=float)
     if len(names) < 2:
         return None
-    scale = [[0.0, "var(--category-0)"], [0.5, "var(--page)"], [1.0, "var(--category-1)"]]
-    font = {"font": {"size": 13}}
-    heat = marks(
-        "heatmap",
-        z=matrix.astype(np.float32), x=names, y=names, zmin=-1, zmax=1, colorscale=scale, xgap=1, ygap=1,
-        colorbar={"thickness": 12, "dtick": 0.5, "title": {"text": "correlation [1]", "side": "right"} | font},
-        hovertemplate="%{y} and %{x}: %{z:.2f}<extra></extra>",
-    )  # fmt: skip
-    apart = np.abs(matrix - np.eye(len(names)))
-    i, j = np.unravel_index(int(np.argmax(apart)), matrix.shape)
-    y_axis = axis("", showgrid=False, tickmode="array", tickvals=names, ticktext=names, autorange="reversed")
-    many = len(names) > MOST_NAMED
-    x_axis = axis("", showgrid=False, tickmode="array", tickvals=names, ticktext=names, tickangle=-90)
-    x_axis |= {"showticklabels": not many}
-    plot = layout(x_axis, y_axis, hovermode="closest", margin={"l": 8, "r": 8, "t": 8, "b": 8})
+    i, j = np.unravel_index(int(np.argmax(np.abs(matrix - np.eye(len(names))))), matrix.shape)
+    order = " Columns are in the order of the rows." if len(names) > MOST_NAMED else ""
     return Figure(
         id="correlations",
         title="Correlated estimates",
-        takeaway=f"Most correlated are {content.estimates['name'].iloc[i]} and {content.estimates['name'].iloc[j]}: "
-        f"{number(float(matrix[i, j]))}.",
+        takeaway=f"Most correlated are {names[i]} and {names[j]}: {number(float(matrix[i, j]))}.",
         how="Correlations of the errors of the estimates: near 1 or −1, a change of one is compensated by a change "
-        "of the other, and only their combination is known."
-        + (" Columns are in the order of the rows." if many else ""),
+        f"of the other, and only their combination is known.{order}",
         alternative="Heat map of the correlations of all pairs of estimates.",
         height=WIDTH * len(names) + SIDE,
-        views={"": [Panel(Plot([heat], plot))]},
+        draw=lambda: [_draw_correlations([escaped(name) for name in names], matrix)],
     )
+
+
+def _draw_correlations(names: Sequence[str], matrix: Floats) -> go.Figure:
+    scale = [[0.0, "var(--category-0)"], [0.5, "var(--page)"], [1.0, "var(--category-1)"]]
+    title = {"text": "correlation [1]", "side": "right", "font": {"size": 13}}
+    heat: Trace = {"type": "heatmap", "z": matrix.astype(np.float32), "x": names, "y": names, "zmin": -1, "zmax": 1}
+    heat |= {"colorscale": scale, "xgap": 1, "ygap": 1, "colorbar": {"thickness": 12, "dtick": 0.5, "title": title}}
+    heat |= {"hovertemplate": "%{y} and %{x}: %{z:.2f}<extra></extra>"}
+    both = {"showgrid": False, "tickmode": "array", "tickvals": names, "ticktext": names}
+    x = axis("", tickangle=-90, showticklabels=len(names) <= MOST_NAMED, **both)
+    return plot([heat], x, axis("", autorange="reversed", **both), margin={"l": 8, "r": 8, "t": 8, "b": 8})
 
 
 def free_runs(content: IdentificationContent) -> Figure:
     """Measured motion and free runs before and after, one run at a time."""
-    runs = [str(run) for run in pd.unique(content.series["run"])]
-    views = {str(i): _panels(content.series[content.series["run"] == run]) for i, run in enumerate(runs)}
-    return Figure(
+    return motion_figure(
+        content.series,
+        RUN_INKS,
+        (LOG, AFTER),
         id="free-runs",
         title="Free runs " + ("of runs held out" if content.held_out else "of the fitted runs"),
-        takeaway=_bought(content),
-        how=f"Each free run {_length(content)} begins at the measured state and goes by the commands alone, with no "
-        "current, bias or other unknown of the run."
+        takeaway=_errors_before_and_after(content),
+        how=f"Each free run {_run_length(content)} begins at the measured state and goes by the commands alone, with "
+        "no current, bias or other unknown of the run."
         + (" New pieces begin where lines are broken." if content.ahead else "")
         + " The map, north up with equal axes, shows what is measured and identified; the base may leave it.",
         alternative="Speeds, yaw rate and tracks, measured and predicted; the table below has the errors.",
-        height=290,
-        views=views,
-        controls=[Control("Run", runs)],
-        chips=[Chip(name, name, INKS[name], DASHES[name]) for name in INKS],
     )
 
 
-def _panels(rows: pd.DataFrame) -> list[Panel]:
-    return panels(rows, {name: {"color": INKS[name], "dash": DASHES[name]} for name in INKS}, (LOG, AFTER))
-
-
-def errors(content: IdentificationContent) -> Table:
-    """Root mean square errors of the free runs, run by run."""
-    words, places = {"fit": "fitted", "test": "held out"}, decimals(content.errors["position"])
+def free_run_errors(content: IdentificationContent) -> Table:
+    """Root mean square errors of the free runs, run by run: of all runs first, and of those held out before others."""
+    places, words = decimals_for_median(content.errors["position"]), {"fit": "fitted", "test": "held out"}
     factors = {name: factor for name, (_, _, factor) in MOTIONS.items()} | {"position": 1.0}
-    rows = []
-    for kind, run in _all_first(content.errors[["set", "run"]]):
-        mine = content.errors[(content.errors["set"] == kind) & (content.errors["run"] == run)].set_index("model")
-        cells = [
-            figure(factor * mine[name][model], places if name == "position" else 3)
+    by_model = {name: content.errors.pivot(index=["set", "run"], columns="model", values=name) for name in factors}
+    wide = pd.DataFrame(
+        {
+            f"{name} {model}": factor * by_model[name][model].astype(float)
             for name, factor in factors.items()
             for model in (BEFORE, AFTER)
-        ]
-        rows.append([text(f"all {words[kind]}" if run == "all" else run), text(kind), *cells])
-    heads = [f"{name} {model}" for name in factors for model in (BEFORE, AFTER)]
-    title = f"Root mean square errors of free runs {_length(content)}"
-    takeaway = "u, v in m/s, r in deg/s, position in m."
-    return Table("errors", title, takeaway, ["run", "set", *heads], [False, False, *[True] * len(heads)], rows)
+        }
+    )
+    pairs = dict.fromkeys((row["set"], row["run"]) for row in content.errors.to_dict("records"))
+    wide = wide.reindex(sorted(pairs, key=lambda pair: (pair[1] != "all", pair[0] != "test"))).reset_index()
+    heads = {
+        f"{name} {model}": Column(f"{name} {model}", places if name == "position" else 3)
+        for name in factors
+        for model in (BEFORE, AFTER)
+    }
+    named = wide["run"].where(wide["run"].ne("all"), "all " + wide["set"].map(words))
+    title = f"Root mean square errors of free runs {_run_length(content)}"
+    takeaway, columns = "u, v in m/s, r in deg/s, position in m.", {"run": Column("run"), "set": Column("set"), **heads}
+    return frame_table("errors", title, takeaway, wide.assign(run=named), columns)
 
 
-def _all_first(frame: pd.DataFrame) -> list[tuple[str, str]]:
-    """Sets and runs: runs held out before fitted ones, and all of each before any of them."""
-    pairs = list(dict.fromkeys((str(kind), str(run)) for kind, run in frame.itertuples(index=False)))
-    return sorted(pairs, key=lambda pair: (pair[1] != "all", pair[0] != "test"))
-
-
-def manoeuvres(content: IdentificationContent) -> Table | None:
+def manoeuvres_before_and_after(content: IdentificationContent) -> Table | None:
     """Measures of standard manoeuvres before and after; None where there are none."""
     performed = content.manoeuvres[content.manoeuvres["measure"] != ""]
     if performed.empty:
         return None
-    noted = bool(performed["note"].ne("").any())
-    banded = "low" in content.manoeuvres
-    rows = [
-        [
-            text(row["manoeuvre"]),
-            text(row["measure"]),
-            *(_short(row[name]) for name in (BEFORE, AFTER, *(("low", "high") if banded else ()))),
-            text(row["unit"]),
-            *[Cell(str(row["note"]), str(row["note"]), bad=bool(row["note"]))] * noted,
-        ]
-        for row in performed.to_dict("records")
-    ]
-    head = ["manoeuvre", "measure", BEFORE, AFTER, *["band from", "to"] * banded, "unit", *["why missing"] * noted]
+    numbers = [name for name in (BEFORE, AFTER, "low", "high") if name in performed]
+    shown = with_cells(performed, **{name: list(map(_scientific_cell, performed[name])) for name in numbers})
+    if performed["note"].ne("").any():
+        shown = with_cells(shown, missing=[word_cell(note, bad=bool(note)) for note in performed["note"]])
     takeaway = "Simulated in calm deep water, from U_0 of the vessel or a Froude number of 0.2."
     takeaway += "".join(f" Extrapolated: {sentence}." for sentence in content.beyond)
-    takeaway += " The band is what the uncertainty of the estimates leaves open." if banded else ""
-    numeric = [False, False, True, True, *[True, True] * banded, False, *[False] * noted]
-    return Table("manoeuvres", "Standard manoeuvres", takeaway, head, numeric, rows)
+    takeaway += " The band is what the uncertainty of the estimates leaves open." if "low" in performed else ""
+    return frame_table("manoeuvres", "Standard manoeuvres", takeaway, shown, MEASURES_BEFORE_AND_AFTER)
 
 
 def residuals(content: IdentificationContent) -> Figure | None:
     """Autocorrelation of the residuals; None without any."""
-    if content.colours.empty:
+    frame = content.colours
+    if frame.empty:
         return None
-    names = [str(name) for name in pd.unique(content.colours["signal"])]
-    parts = {name: content.colours[content.colours["signal"] == name] for name in names}
-    traces = [
-        line(
-            name,
-            mine["lag"].to_numpy(),
-            mine["correlation"].to_numpy(),
-            [name],
-            "",
-            line={"color": category(i), "width": 2},
-        )
-        for i, (name, mine) in enumerate(parts.items())
-    ]
-    least = min(-0.5, float(content.colours["correlation"].min()))
-    y = axis("autocorrelation [1]", nticks=6, zeroline=True, zerolinecolor=INK, range=[least - 0.05, 1.05])
-    first = {name: float(mine["correlation"].iloc[1]) if len(mine) > 1 else 0.0 for name, mine in parts.items()}
-    correlated = [f"{name} {number(value)}" for name, value in first.items()]
+    parts = {name: frame[frame["signal"] == name] for name in run_names(frame, "signal")}
+    first = [f"{name} {number(([*mine['correlation'], 0.0, 0.0])[1])}" for name, mine in parts.items()]
     return Figure(
         id="residuals",
         title="Autocorrelation of the residuals",
-        takeaway=f"The correlation of residuals one sample apart is {listed(correlated)}.",
+        takeaway=f"The correlation of residuals one sample apart is {listed(first)}.",
         how="Autocorrelation of the weighted residuals, pooled over runs. White residuals drop to 0; a long "
         "tail shows effects that the model, or the data on wind and current, lack; standard errors then count runs.",
         alternative="Autocorrelation of the residuals of each signal over lag.",
         height=300,
-        views={"": [Panel(Plot(traces, layout(axis("lag [s]", nticks=9), y, hovermode="closest")))]},
-        chips=[Chip(name, name, category(i)) for i, name in enumerate(names)],
+        draw=lambda: [_draw_residuals(parts)],
+        chips=[Chip(name, name, category(i)) for i, name in enumerate(parts)],
     )
 
 
-def sides(content: IdentificationContent) -> Table | None:
-    """Errors by side, helm and speed; None without rows."""
-    runs = "Runs held out" if content.held_out else "Fitted runs"
-    return group_table(content.groups, f"{runs}, over the horizon of the fit.")
+def _draw_residuals(parts: Mapping[str, pd.DataFrame]) -> go.Figure:
+    traces = [
+        line(name, mine["lag"], mine["correlation"], [name], "", line={"color": category(i), "width": 2})
+        for i, (name, mine) in enumerate(parts.items())
+    ]
+    least = min(-0.5, *(float(mine["correlation"].min()) for mine in parts.values()))
+    y = zero_axis("autocorrelation [1]", INK, nticks=6, range=[least - 0.05, 1.05])
+    return plot(traces, axis("lag [s]", nticks=9), y)
 
 
 def profiles(content: IdentificationContent) -> Figure | None:
     """Return the figure of the profile likelihoods; None if none was asked for."""
     if content.profiles.empty:
         return None
-    panels, sentences = [], []
-    for path, mine in content.profiles.groupby("path", sort=False):
-        x, limit = mine["factor"].to_numpy(dtype=float), float(mine["limit"].iloc[0])
-        y = np.minimum(mine["rise"].to_numpy(dtype=float), 3 * limit)
-        curve = line("profile", x, y, [], "", mode="lines+markers", line={"color": category(0), "width": 2})
-        end = line("limit", [x[0], x[-1]], [limit, limit], [], "", line={"color": MUTED, "width": 1, "dash": "dot"})
-        axes = (
-            axis(f"factor of {label(str(path))} [1]", nticks=6),
-            axis("worse by [variances]", nticks=6, rangemode="tozero"),
-        )
-        panels.append(Panel(Plot([end, curve], layout(*axes, hovermode="closest"))))
-        sentences.append(str(mine["sentence"].iloc[0]))
+    curves = content.profiles.groupby("path", sort=False)
     return Figure(
         id="profiles",
         title="Profile likelihood",
-        takeaway="; ".join(sentences) + ".",
+        takeaway="; ".join(curves["sentence"].first()) + ".",
         how="How much worse the best fit becomes when one factor is held away from its estimate and all others are "
         "fitted again; the 95 % interval is where the curve lies below the dotted line.",
         alternative="Curves of the profile likelihood.",
         height=290,
-        views={"": panels},
+        draw=lambda: [_draw_profile(str(path), mine) for path, mine in curves],
     )
 
 
-def programme(content: IdentificationContent) -> Table | None:
-    """Return the table of manoeuvres to run next; None if it was not asked for."""
-    if content.programme.empty:
-        return None
-    rows = [
-        [
-            text(row["manoeuvre"]),
-            *(figure(row[name], 2) for name in ("hours", "gain", "per_hour")),
-            text(row["narrows"]),
-            figure(100 * (1 - row["after"] / row["before"]), 0),
-        ]
-        for row in content.programme.to_dict("records")
+def _draw_profile(path: str, mine: pd.DataFrame) -> go.Figure:
+    x, limit = mine["factor"].to_numpy(dtype=float), float(mine["limit"].iloc[0])
+    curve: Trace = {"mode": "lines+markers", "line": {"color": category(0), "width": 2}}
+    traces = [
+        line("limit", [x[0], x[-1]], [limit, limit], [], "", line={"color": MUTED, "width": 1, "dash": "dot"}),
+        line("profile", x, mine["rise"].clip(upper=3 * limit), [], "", **curve),
     ]
-    head = ["manoeuvre", "time [h]", "gain [bit]", "gain [bit/h]", "narrows most", "by [%]"]
-    best = content.programme.iloc[0]
-    takeaway = f"Most information per hour about these parameters: {best['manoeuvre']}."
-    return Table("programme", "Candidates", takeaway, head, [False, True, True, True, False, True], rows)
+    y = axis("worse by [variances]", nticks=6, rangemode="tozero")
+    return plot(traces, axis(f"factor of {escaped(path)} [1]", nticks=6), y)
 
 
-SECTIONS: dict[str, Section] = {
+def programme_table(content: IdentificationContent) -> Table | None:
+    """Return the table of manoeuvres to run next; None if it was not asked for."""
+    frame = content.programme
+    if frame.empty:
+        return None
+    takeaway = f"Most information per hour about these parameters: {frame['manoeuvre'].iloc[0]}."
+    shown = frame.assign(by=100 * (1 - frame["after"] / frame["before"]))
+    return frame_table("programme", "Candidates", takeaway, shown, PROGRAMME)
+
+
+def errors_by_side(content: IdentificationContent) -> Table | None:
+    """Errors by side, helm and speed; None without rows."""
+    runs = "Runs held out" if content.held_out else "Fitted runs"
+    return group_errors(content.groups, f"{runs}, over the horizon of the fit.")
+
+
+IDENTIFICATION_PAGE = {
     "what-is-known": Section(
         "What is known",
-        lambda content: (estimates(content), numbers(content), unseen(content), correlations(content)),
+        lambda content: (
+            estimates(content),
+            estimates_table(content),
+            unseen_table(content),
+            correlations(content),
+        ),
         needs=("estimates",),
         anchors=("estimates", "numbers", "unseen", "correlations"),
     ),
     "what-it-buys": Section(
         "What it buys",
-        lambda content: (free_runs(content), errors(content), manoeuvres(content)),
+        lambda content: (free_runs(content), free_run_errors(content), manoeuvres_before_and_after(content)),
         needs=("series", "errors"),
         anchors=("free-runs", "errors", "manoeuvres"),
     ),
     "what-is-left": Section(
         "What is left over",
-        lambda content: (sides(content), residuals(content), profiles(content)),
+        lambda content: (errors_by_side(content), residuals(content), profiles(content)),
         anchors=("sides", "residuals", "profiles"),
     ),
     "next": Section(
-        "What to run next", lambda content: (programme(content),), needs=("programme",), anchors=("programme",)
+        "What to run next",
+        lambda content: (programme_table(content),),
+        needs=("programme",),
+        anchors=("programme",),
     ),
 }
+write_identification = partial(write_page, "identification", IDENTIFICATION_PAGE)

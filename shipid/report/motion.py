@@ -1,4 +1,4 @@
-"""Recorded and simulated motion: speeds and yaw rate over time, and the track."""
+"""Recorded and simulated motion: speeds and yaw rate over time, the track, and the errors of free runs."""
 
 from __future__ import annotations
 
@@ -7,56 +7,62 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 
-from shipid.report.figure import Panel, Plot, axis, layout, line, plane
-from shipid.report.palette import GRID
+from shipid.report.figure import POINTS, Chip, Control, Figure, axis, chart, line, plot, run_names, zero_axis
 
-POINTS = 600  # of one line: more than pixels are wide
 LOG = "measured"
+DEGREES = float(np.rad2deg(1.0))
 MOTIONS = {"u": ("speed ahead, u", "m/s", 1.0), "v": ("to starboard, v", "m/s", 1.0)} | {
-    "r": ("yaw rate, r", "deg/s", float(np.rad2deg(1.0)))
+    "r": ("yaw rate, r", "deg/s", DEGREES)
 }
 """Column -> what it is, the unit shown, and how many of those an SI unit is."""
 
 
-def panels(rows: pd.DataFrame, lines: Mapping[str, Mapping[str, Any]], framed: Sequence[str]) -> list[Panel]:
-    """Panels of one run: u, v, r over time, and the map, north up with equal axes.
+def motion_figure(
+    series: pd.DataFrame, inks: Mapping[str, Mapping[str, Any]], framed: Sequence[str], **texts: Any
+) -> Figure:
+    """Panels of a run that a reader picks: u, v, r over time, and the map, north up with equal axes.
 
-    rows : `model`, `piece`, `t` [s], `north`, `east` [m], `u`, `v` [m/s], `r` [rad/s]. lines : model -> colour and dash
-    of its line. framed : models that the map shows whole; the others may leave it.
+    Parameters
+    ----------
+    series : `run`, `model`, `piece`, `t` [s], `north`, `east` [m], `u`, `v` [m/s], `r` [rad/s].
+    inks : model -> colour and dash of its line.
+    framed : models that the map shows whole; the others may leave it.
+    texts : of the figure.
     """
-    start, parts = float(rows["t"].min()), {name: _joined(rows[rows["model"] == name]) for name in lines}
-    inks = {name: {**ink, "width": 1.4 if name == LOG else 2} for name, ink in lines.items()}
-    result = []
+    runs = run_names(series)
+    return Figure(
+        **texts,
+        height=290,
+        draw=lambda run: _draw_motion(series[series["run"] == run], inks, framed),
+        controls=[Control("Run", runs)],
+        chips=[Chip(name, name, ink["color"], ink["dash"]) for name, ink in inks.items()],
+    )
+
+
+def _draw_motion(rows: pd.DataFrame, inks: Mapping[str, Mapping[str, Any]], framed: Sequence[str]) -> list[go.Figure]:
+    parts = {name: _with_gaps(rows[rows["model"] == name]) for name in inks}
+    looks = {name: {**ink, "width": 1.4 if name == LOG else 2} for name, ink in inks.items()}
+    panels = []
     for column, (title, unit, factor) in MOTIONS.items():
         traces = [
-            line(name, mine["t"].to_numpy() - start, factor * mine[column].to_numpy(), [name], unit, line=inks[name])
+            line(name, mine["t"] - rows["t"].min(), factor * mine[column], [name], unit, line=looks[name])
             for name, mine in parts.items()
         ]
-        y = axis(f"{title} [{unit}]", nticks=6, zeroline=True, zerolinecolor=GRID)
-        result.append(Panel(Plot(traces, layout(axis("time in the run [s]", nticks=6), y, hovermode="closest"))))
-    tracks = [
-        line(name, mine["east"].to_numpy(), mine["north"].to_numpy(), [name], line=inks[name])
-        for name, mine in parts.items()
-    ]
+        panels.append(plot(traces, axis("time in the run [s]", nticks=6), zero_axis(f"{title} [{unit}]", nticks=6)))
+    tracks = [line(name, mine["east"], mine["north"], [name], line=looks[name]) for name, mine in parts.items()]
     shown = pd.concat([parts[name] for name in framed])
     bounds = [(float(shown[name].min()), float(shown[name].max())) for name in ("east", "north")]
-    chart = plane("east [m]", "north [m]", _finite(bounds))
-    chart["xaxis"]["nticks"] = 4  # the panel is narrow
-    return [*result, Panel(Plot(tracks, chart))]
+    bounds = [(low, high) if high > low else (low - 1, low + 1) for low, high in bounds]
+    return [*panels, chart(tracks, "east [m]", "north [m]", bounds, nticks=4)]  # the panel is narrow
 
 
-def _finite(bounds: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return the spans (low, high) of a map; one without width gets 1 on each side."""
-    return [(low, high) if high > low else (low - 1, low + 1) for low, high in bounds]
-
-
-def _joined(mine: pd.DataFrame) -> pd.DataFrame:
-    """Join the pieces of a line, with a gap between them."""
-    every = max(1, len(mine) // POINTS)
+def _with_gaps(mine: pd.DataFrame) -> pd.DataFrame:
+    """Join the pieces of a line, of no more rows than a line needs, with a gap between them."""
     pieces = mine.groupby("piece", sort=False)
-    kept = mine[(pieces.cumcount() % every == 0).to_numpy()]
+    kept = mine[(pieces.cumcount() % max(1, len(mine) // POINTS) == 0).to_numpy()]
     gaps = pieces.tail(1).assign(**dict.fromkeys(("north", "east", "u", "v", "r"), np.nan))
     whole = pd.concat([kept, gaps])
-    numbers = pd.Series(range(pieces.ngroups), index=pd.unique(mine["piece"]))
-    return whole.iloc[np.argsort(whole["piece"].map(numbers).to_numpy(), kind="stable")]
+    order = {name: i for i, name in enumerate(pd.unique(mine["piece"]))}
+    return whole.iloc[np.argsort(whole["piece"].map(order).to_numpy(), kind="stable")]

@@ -50,7 +50,6 @@
     const coarse = matchMedia("(pointer: coarse)").matches;
     layout.dragmode = coarse ? false : "zoom";
     layout.uirevision = view;
-    if (!plot.data) plot.replaceChildren(); // the sketch
     Plotly.react(plot, data, layout, CONFIG);
   }
 
@@ -69,6 +68,7 @@
     const rows = [["line", "x", "y", "shown", "text"]];
     const plain = (text) => String(text ?? "").replace(/<br>/g, "; ").replace(/<[^>]*>/g, "");
     for (const trace of plot.data) {
+      if (trace.z) continue; // cells are in a table
       const x = values(trace.x), y = values(trace.y);
       const words = [trace.customdata, trace.text].find(Array.isArray) || [];
       x.forEach((value, i) => rows.push(
@@ -193,12 +193,12 @@
   const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
   const pathsOf = (shot, size) => shot.paths.filter((path) => path[1] === size || path[1] === -1);
 
-  function drawWindow(plot, shot, size, hidden, view, panel = {}) {
+  function drawWindow(plot, shot, size, hidden, view) {
     const [x, y] = shot.truth;
     const end = x.length - 1;
     const truth = { x: y, y: x, mode: "lines", name: "true path", meta: ["truth"], line: windows.truth,
                     hovertemplate: "true path<extra></extra>" };
-    const shown = pathsOf(shot, size).filter((path) => !panel.lines || panel.lines.includes(path[0]));
+    const shown = pathsOf(shot, size);
     const lines = shown.map(([line, , ahead, aside]) => ({
       x: aside, y: ahead, mode: "lines", meta: windows.lines[line].keys, line: windows.lines[line].line,
       hovertemplate: `${escaped(windows.lines[line].name)}<extra></extra>`,
@@ -209,12 +209,7 @@
       fill: "toself", fillcolor: windows.lines[line].line.color,
     }));
     const data = [...bands, truth, outlineAt(0, 0, 0), outlineAt(x[end], y[end], shot.psi), ...lines];
-    const layout = { ...windows.layout };
-    if (panel.spans) {
-      layout.xaxis = { ...layout.xaxis, range: panel.spans[0] };
-      layout.yaxis = { ...layout.yaxis, range: panel.spans[1] };
-    }
-    draw(plot, { data, layout }, hidden, view);
+    draw(plot, { data, layout: windows.layout }, hidden, view);
   }
 
   function showWind(place, wind) {
@@ -228,20 +223,6 @@
     place.innerHTML = `<svg viewBox="0 0 20 20" width="20" height="20" aria-hidden="true">
       <path transform="rotate(${degrees} 10 10)" d="M10 18V3M5 8l5-5 5 5"/></svg>`;
     place.append(`wind ${wind[0].toFixed(1)} m/s towards ${degrees}° from ahead`);
-  }
-
-  for (const script of document.querySelectorAll("script.fixed")) {
-    const figure = script.closest("figure");
-    const panels = figure.querySelectorAll(".panel");
-    const load = async () => {
-      await loadWindows();
-      return json(script);
-    };
-    setUp(figure, load, (fixed, hidden) => fixed.forEach((panel, i) => {
-      const shot = windows.runs[panel.run][panel.instant];
-      drawWindow(panels[i].querySelector(".plot"), shot, panel.size, hidden, "fixed", panel);
-      showWind(panels[i].querySelector(".wind"), shot.wind);
-    }));
   }
 
   // as `length_text` in Python

@@ -1,6 +1,6 @@
-"""Figures of predictions: a window browser, and three windows side by side.
+"""Figures of predictions: a window browser, and some windows side by side.
 
-The page holds every window once, as finely as a pixel can show, and draws it itself (page.js).
+The page holds every window once, as finely as a pixel can show, and draws the one that a reader picks (page.js).
 """
 
 from __future__ import annotations
@@ -11,15 +11,17 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 
 from shipid.errors import ShipidError, choices
 from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, Snapshot
-from shipid.report.errors_over import model_chips
-from shipid.report.figure import Chip, Control, Figure, FixedWindow, Plot, line, plane
-from shipid.report.palette import DASHES, MUTED, NAIVE, TRUTH, close_styles
+from shipid.report.errors_over import close_up_chips, line_source, name_of_line
+from shipid.report.figure import MUTED, NAIVE, TRUTH, Chip, Control, Figure, Trace, chart, escaped, even_places, line
 from shipid.report.section import Section
 from shipid.report.selection import (
     FEW_RUNS,
+    SOURCE_DASHES,
+    close_styles,
     data_driven,
     drawn_source,
     exemplars,
@@ -30,13 +32,14 @@ from shipid.report.selection import (
     spread,
     thinned,
 )
-from shipid.report.wording import CONSTANT, counted, listed, metres, number
+from shipid.report.wording import counted, listed, metres, number
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
 MOST_WINDOWS = 600  # in all
 MOST_PATHS = 2400  # in all: with their bands about 0.7 MB of the page
 PIXELS = 1000  # a window is drawn about half as large
-HOW = (
+TO_STARBOARD, AHEAD = "y, to starboard [m]", "x, ahead [m]"
+HOW_WINDOWS = (
     "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
     "where the ship truly was at the end. The pale broad line is the true path. "
 )
@@ -53,8 +56,7 @@ def windows_of(content: ReportContent) -> dict[str, list[Snapshot]]:
     result, most = {}, min(MOST_INSTANTS, max(1, windows // max(1, min(FEW_RUNS, len(by_run)))))
     for run in spread(sorted(by_run), FEW_RUNS):
         ordered = sorted(by_run[run], key=lambda window: window.t)
-        chosen = np.linspace(0, len(ordered) - 1, min(len(ordered), most)).round().astype(int)
-        result[run] = [ordered[i] for i in chosen]
+        result[run] = [ordered[i] for i in even_places(len(ordered), most)]
     return result
 
 
@@ -71,18 +73,15 @@ def browser(content: ReportContent) -> Figure | None:
     return Figure(
         id="browser",
         title="Look at predictions",
-        takeaway=_takeaway(content, counts[-1]),
-        how=HOW + f"{counted(sum(map(len, runs.values())), 'window')} of {counted(len(runs), 'test run')}; "
+        takeaway=_takeaway_windows(content, counts[-1]),
+        how=f"{HOW_WINDOWS}{counted(sum(map(len, runs.values())), 'window')} of {counted(len(runs), 'test run')}; "
         "arrow keys move the slider.",
         alternative="True path and predicted paths of one window, with the outline of the ship at start and end. "
         "The line of text beside it gives the end errors.",
         height=520,
-        views={},
-        controls=[
-            Control("Test run", list(runs)),
-            Control("Manoeuvres, N_D", [str(c) for c in counts], len(counts) - 1),
-        ],
-        chips=_chips(content),
+        draw=lambda run, size: [draw_window(content, runs[run][len(runs[run]) // 2], size)],
+        controls=[Control("Test run", list(runs)), Control("Manoeuvres, N_D", counts, len(counts) - 1)],
+        chips=_window_chips(content),
         browser=True,
     )
 
@@ -96,53 +95,61 @@ def snapshots(content: ReportContent) -> Figure | None:
     runs, counts = windows_of(content), window_sizes(content)
     if not runs:
         return None
-    names, models = list(runs), _compared(content)
-    if len(counts) > 1:
-        run, instant = _middle(runs)
-        window = runs[names[run]][instant]
-        where = f"{names[run]}, t = {window.t:g} s"
-        title, chosen = (
-            "One window, more and more data",
-            f"{where}: the window of middle physics error. All panels share their axes; physics alone and bands may "
-            "leave them.",
-        )
-        windows = [
-            FixedWindow(f"{name or where}, N_D = {c}", run, instant, i, name)
-            for name in models or [""]
-            for i, c in enumerate(counts)
-        ]
-        takeaway = _takeaway_models(window, models, counts) if models else _takeaway_row(content, [window] * 3, counts)
+    several = len(counts) > 1
+    models = _compared_models(content) if several else []
+    if several:
+        shot = _middle_window([window for windows in runs.values() for window in windows])
+        title, where = "One window, more and more data", f"{shot.run}, t = {shot.t:g} s"
+        chosen = f"{where}: the window of middle physics error. All panels share their axes; physics alone and bands "
+        chosen += f"may leave them{_wind_words(shot)}."
+        panels = [(shot, size, name, f"{name or where}, N_D = {size}") for name in models or [""] for size in counts]
     else:
-        run = max(range(len(names)), key=lambda i: len(runs[names[i]]))
-        mine = runs[names[run]]
-        instants = sorted({round(share * (len(mine) - 1)) for share in (1 / 6, 1 / 2, 5 / 6)})
-        windows = [FixedWindow(f"{names[run]}, t = {mine[i].t:g} s", run, i, 0) for i in instants]
+        mine = max(runs.values(), key=len)
+        places = sorted({round(share * (len(mine) - 1)) for share in (1 / 6, 1 / 2, 5 / 6)})
         title = "Instants of a test run"
-        chosen = "Instants at one, three and five sixths of the run." if len(instants) == 3 else ""
-        takeaway = _takeaway_row(content, [mine[i] for i in instants], counts * len(instants))
+        chosen = "Instants at one, three and five sixths of the run." if len(places) == 3 else ""
+        shots = [mine[i] for i in places]
+        panels = [(shot, counts[0], "", f"{shot.run}, t = {shot.t:g} s{_wind_words(shot)}") for shot in shots]
     return Figure(
         id="snapshots",
         title=title,
-        takeaway=takeaway,
-        how=HOW + chosen,
-        alternative=f"{len(windows)} small plots of true and predicted paths; captions name what they show.",
-        height=300 if models and len(counts) > 1 else 380,
-        views={},
-        chips=_chips(content, models if len(counts) > 1 else []),
-        windows=windows,
+        takeaway=_takeaway_models(panels[0][0], models, counts)
+        if models
+        else _takeaway_row(content, [(window, size) for window, size, *_ in panels]),
+        how=HOW_WINDOWS + chosen,
+        alternative=f"{len(panels)} small plots of true and predicted paths; captions name what they show.",
+        height=300 if models else 380,
+        draw=lambda: [
+            draw_window(
+                content,
+                window,
+                size,
+                [name] if name else None,
+                _spans(window, models or exemplars(content)) if several else (),
+            )
+            for window, size, name, _ in panels
+        ],
+        chips=_window_chips(content, models),
+        captions=[caption for *_, caption in panels],
+        columns=True,
     )
 
 
-def _compared(content: ReportContent) -> list[str]:
+def _wind_words(window: Snapshot) -> str:
+    """The wind of a window as the end of a sentence."""
+    if window.wind is None or window.wind[0] < 0.05:
+        return "" if window.wind is None else "; no wind"
+    return f"; wind {window.wind[0]:.1f} m/s towards {round(math.degrees(window.wind[1])) % 360}° from ahead"
+
+
+def _compared_models(content: ReportContent) -> list[str]:
     """The model without physics and one of each of the two largest families, by A; empty if families are too few."""
     recorded = {model for window in content.snapshots for model, source, _ in window.paths if source == "cooperative"}
     middle = {family: name for family, name in middles(content).items() if name in recorded}
     physics = [name for family, name in middle.items() if family != DATA_DRIVEN][:2]
-    if len(physics) < 2:
-        return []
     order = [str(name) for name in families(content).model]
     pure = [middle[DATA_DRIVEN]] if DATA_DRIVEN in middle else []
-    return [*pure, *sorted(physics, key=order.index)]
+    return [*pure, *sorted(physics, key=order.index)] if len(physics) > 1 else []
 
 
 def window_data(content: ReportContent) -> dict[str, Any]:
@@ -152,88 +159,114 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     `line` is an index into `lines`, `size` into the N_D offered or -1 for a path that does not depend on N_D. Lengths
     are metres, angles radians.
     """
-    runs, counts, drawn = windows_of(content), window_sizes(content), exemplars(content)
+    runs, counts = windows_of(content), window_sizes(content)
     lines: dict[tuple[str, str], int] = {}
-    detail = _detail([window for windows in runs.values() for window in windows])
-    packed: dict[str, list[dict[str, Any]]] = {}
-    tracks = _Tracks()
-    for run, windows in runs.items():
-        packed[run] = []
-        for window in windows:
-            paths = []
-            for (model, source, size), points in window.paths.items():
-                if (source == "cooperative" and size not in counts) or (source != "naive" and model not in drawn):
-                    continue
-                which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
-                at = counts.index(size) if source == "cooperative" else -1
-                paths.append([which, at, *tracks.columns(points), _rounded(_end_error(window, points), 1e-6)])
-                if (model, source, size) in window.bands:
-                    paths[-1] += tracks.columns(window.bands[model, source, size])
-            wind = None if window.wind is None else [round(value, 3) for value in window.wind]
-            packed[run].append(
-                {"t": window.t, "psi": round(window.psi_end, 4), "wind": wind, "truth": tracks.columns(window.truth)}
-                | {"paths": paths}
-            )
-    tracks.fill(detail)
-    first = next(iter(runs.values()))[0] if runs else None
+    shots = [window for windows in runs.values() for window in windows]
+    detail = _detail(shots)
+    # All paths are thinned together: it takes a fifth of the time.
+    every = [track for window in shots for track in (window.truth, *window.paths.values(), *window.bands.values())]
+    columns = dict(zip(map(id, every), _thinned_columns(every, detail), strict=True))
+
+    def path_of(window: Snapshot, key: PathKey) -> list[Any]:
+        model, source, size = key
+        which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
+        error = round(_end_error(window, window.paths[key]), 6)
+        band = columns[id(window.bands[key])] if key in window.bands else []
+        at = counts.index(size) if source == "cooperative" else -1
+        return [which, at, *columns[id(window.paths[key])], error if math.isfinite(error) else None, *band]
+
+    packed = [
+        [
+            {
+                "t": window.t,
+                "psi": round(window.psi_end, 4),
+                "wind": None if window.wind is None else [round(value, 3) for value in window.wind],
+                "truth": columns[id(window.truth)],
+                "paths": [path_of(window, key) for key in window.paths if _is_drawn(content, key, counts)],
+            }
+            for window in windows
+        ]
+        for windows in runs.values()
+    ]
+    outline = np.transpose(shots[0].outline).round(3).tolist() if shots else [[], []]
     return {
-        "runs": list(packed.values()),
-        "outline": [[_rounded(value, 0.0) for value in column] for column in np.transpose(first.outline)]
-        if first
-        else [[], []],
-        "lines": [_line(content, model, source) for model, source in lines],
+        "runs": packed,
+        "outline": outline,
+        "lines": [_line_style(content, model, source) for model, source in lines],
         "truth": {"color": TRUTH, "width": 9},
-        "layout": plane("y, to starboard [m]", "x, ahead [m]"),
+        "layout": chart([], TO_STARBOARD, AHEAD).layout.to_plotly_json(),
     }
 
 
-def fixed_data(panels: Sequence[FixedWindow], data: dict[str, Any]) -> list[dict[str, Any]]:
-    """What page.js needs for panels that show a window of `window_data`: indices and lines.
-
-    Panels of one window share their axes, so that they can be compared; these reach over the true path, the ship at
-    both of its ends and what was compensated or learned. Physics alone and bands may leave them.
-    """
-    together = {i for i, line in enumerate(data["lines"]) if line["cell"]}
-    result = []
-    for panel in panels:
-        shot = data["runs"][panel.run][panel.instant]
-        lines = [
-            i
-            for i, line in enumerate(data["lines"])
-            if not panel.model or f"model:{panel.model}" in line["keys"] or "source:naive" in line["keys"]
-        ]
-        result.append({"run": panel.run, "instant": panel.instant, "size": panel.size, "lines": lines})
-        same = [other for other in panels if (other.run, other.instant) == (panel.run, panel.instant)]
-        if len(same) > 1:
-            models = {f"model:{other.model}" for other in same}
-            shown = {i for i in together if not panel.model or models & set(data["lines"][i]["keys"])}
-            result[-1]["spans"] = _spans(shot, shown, data["outline"])
-    return result
+def _is_drawn(content: ReportContent, key: PathKey, counts: Sequence[int], models: Sequence[str] | None = None) -> bool:
+    """Whether windows show a path: constant u, v, r, or a model of the close-up, or of some, at one of some N_D."""
+    model, source, size = key
+    shown = exemplars(content) if models is None else models
+    return source == "naive" or (model in shown and (source != "cooperative" or size in counts))
 
 
-def _spans(shot: dict[str, Any], lines: set[int], outline: Sequence[Sequence[float]]) -> list[list[float]]:
-    """Range of y, then of x [m] that holds the true path, the ship at both of its ends and the paths of some lines."""
-    spans, (ahead, aside), psi = [], outline, shot["psi"]
-    turned = (
-        [x * math.cos(psi) - y * math.sin(psi) for x, y in zip(ahead, aside, strict=True)],
-        [x * math.sin(psi) + y * math.cos(psi) for x, y in zip(ahead, aside, strict=True)],
-    )
-    for place in (1, 0):
-        paths = [shot["truth"][place], *(path[2 + place] for path in shot["paths"] if path[0] in lines)]
-        end = shot["truth"][place][-1] if shot["truth"][place] else None
-        paths += [outline[place], [end + value for value in turned[place]] if end is not None else []]
-        values = [value for path in paths for value in path if value is not None]
-        spans.append([min(values), max(values)])
-    room = 0.06 * max(high - low for low, high in spans)
-    return [[round(low - room, 2), round(high + room, 2)] for low, high in spans]
-
-
-def window_plot(content: ReportContent, run: str | None = None, t: float | None = None, N_D: int | None = None) -> Plot:
-    """Draw one window of a test run as the browser of the page draws it.
+def draw_window(
+    content: ReportContent,
+    window: Snapshot,
+    size: int,
+    models: Sequence[str] | None = None,
+    spans: Sequence[tuple[float, float]] = (),
+) -> go.Figure:
+    """Draw one window of a test run as page.js does.
 
     Parameters
     ----------
-    content : with `snapshots`.
+    size : N_D of the compensated paths.
+    models : that are drawn; default: those of the close-up.
+    spans : of y and x [m]; default: what is drawn.
+    """
+    truth = np.asarray(window.truth)
+    traces = [_path_line("true path", truth, ["truth"], line={"color": TRUTH, "width": 9}, hover="true path")]
+    for pose in (np.zeros(3), np.append(truth[-1], window.psi_end)):
+        hull = outline_at(window.outline, pose)
+        fill: Trace = {"line": {"color": MUTED, "width": 1}, "fill": "toself", "fillcolor": "var(--hull)"}
+        traces.append(_path_line("ship", hull, ["ship"], hover="", **fill))
+    for key in (key for key in window.paths if _is_drawn(content, key, [size], models)):
+        look = _line_style(content, "" if key[1] == "naive" else key[0], key[1])
+        if key in window.bands:
+            shade: Trace = {
+                "line": {**look["line"], "width": 0.5},
+                "fill": "toself",
+                "fillcolor": look["line"]["color"],
+            }
+            keys = [*look["keys"], "band"]
+            traces.append(_path_line(look["name"], window.bands[key], keys, hover="", opacity=0.15, **shade))
+        traces.append(
+            _path_line(look["name"], window.paths[key], look["keys"], line=look["line"], hover=escaped(look["name"]))
+        )
+    return chart(traces, TO_STARBOARD, AHEAD, spans)
+
+
+def _path_line(name: str, path: Floats, keys: Sequence[str], **options: Any) -> Trace:
+    """A path (n, 2) of x, y as a plot has it: y to the right, x up."""
+    return line(name, np.asarray(path)[:, 1], np.asarray(path)[:, 0], keys, **options)
+
+
+def outline_at(outline: Floats, pose: Floats) -> Floats:
+    """Closed outline (k + 1, 2) of a ship at a pose: x, y [m] and heading [rad]."""
+    turn = np.array([[np.cos(pose[2]), np.sin(pose[2])], [-np.sin(pose[2]), np.cos(pose[2])]])
+    closed: Floats = np.vstack([outline, outline[:1]]) @ turn + pose[:2]
+    return closed
+
+
+def _spans(window: Snapshot, models: Sequence[str]) -> list[tuple[float, float]]:
+    """Range of y, then of x [m] of the true path, the ship at both of its ends and what was compensated or learned."""
+    hulls = [window.outline, outline_at(window.outline, np.append(window.truth[-1], window.psi_end))]
+    paths = [path for (model, source, _), path in window.paths.items() if source == "cooperative" and model in models]
+    every = np.vstack([window.truth, *hulls, *paths])
+    return [(float(np.nanmin(column)), float(np.nanmax(column))) for column in (every[:, 1], every[:, 0])]
+
+
+def find_window(content: ReportContent, run: str | None, t: float | None, N_D: int | None) -> tuple[Snapshot, int]:
+    """A window of a test run, and the N_D to draw it with.
+
+    Parameters
+    ----------
     run : test run; default: the first.
     t : instant of prediction [s], the nearest recorded one is taken; default: the middle of the run.
     N_D : manoeuvres that compensated models were trained on; default: the most that were recorded.
@@ -247,149 +280,92 @@ def window_plot(content: ReportContent, run: str | None = None, t: float | None 
         raise ShipidError(f"no window of run {run!r}; {choices(run, runs)}", path="prediction")
     if N_D is not None and N_D not in counts:
         raise ShipidError(f"no window with N_D = {N_D}; valid: {', '.join(map(str, counts))}", path="prediction")
-    windows, size = runs[run or next(iter(runs))], N_D or counts[-1]
+    windows = runs[run or next(iter(runs))]
     window = windows[len(windows) // 2] if t is None else min(windows, key=lambda shot: abs(shot.t - t))
-    end, drawn = np.asarray(window.truth)[-1], exemplars(content)
-    traces = [line("true path", *_aside(window.truth), ["truth"], line={"color": TRUTH, "width": 9})]
-    ink = {"color": MUTED, "width": 1}
-    for x, y, psi in ((0.0, 0.0, 0.0), (*end, window.psi_end)):
-        turned = np.column_stack([np.cos(psi), -np.sin(psi), np.sin(psi), np.cos(psi)]).reshape(2, 2)
-        hull = np.vstack([window.outline, window.outline[:1]]) @ turned.T + [x, y]
-        traces.append(line("ship", *_aside(hull), ["ship"], line=ink, fill="toself", fillcolor="var(--hull)"))
-    for (model, source, count), points in window.paths.items():
-        if source == "naive" or (model in drawn and (source != "cooperative" or count == size)):
-            look = _line(content, model, source)
-            if (model, source, count) in window.bands:
-                outline, ink = window.bands[model, source, count], {"color": look["line"]["color"], "width": 0.5}
-                shade = {"fill": "toself", "fillcolor": look["line"]["color"], "opacity": 0.15}
-                keys = [*look["keys"], "band"]
-                traces.append(line(f"{look['name']}, band", *_aside(outline), keys, line=ink, **shade))
-            traces.append(line(look["name"], *_aside(points), look["keys"], line=look["line"]))
-    return Plot(traces, plane("y, to starboard [m]", "x, ahead [m]"))
+    return window, N_D or counts[-1]
 
 
-def _aside(points: Floats) -> tuple[Floats, Floats]:
-    """Columns of a path (n, 2) of x, y as a plot has them: y to the right, x up."""
-    path = np.asarray(points, dtype=float)
-    return path[:, 1], path[:, 0]
+def _line_style(content: ReportContent, model: str, given: str) -> dict[str, Any]:
+    style, cell = close_styles(content).get(model), given == "cooperative"
+    source, keys = line_source(content, model, given)
+    ink = {"color": style.colour if style else NAIVE, "dash": SOURCE_DASHES[source]}
+    width = style.width if style and cell else 1.5
+    return {"name": name_of_line(content, model, source), "keys": keys, "line": {**ink, "width": width}}
 
 
-def _line(content: ReportContent, model: str, source: str) -> dict[str, Any]:
-    style = close_styles(content).get(model)
-    pure = model == data_driven(content)
-    words = {"cooperative": model if pure else f"{model}, compensated", "physics": f"{model}, physics alone"}
-    of_cell = source == "cooperative"
-    width = style.width if style and of_cell else 1.5
-    source = drawn_source(content, model, source)
-    return {
-        "name": words.get(source, CONSTANT),
-        "cell": of_cell,
-        "keys": [f"source:{source}"] + ([f"model:{model}"] if model else []),
-        "line": {"color": style.colour if style else NAIVE, "dash": DASHES[source], "width": width},
-    }
-
-
-def _chips(content: ReportContent, only: Sequence[str] = ()) -> list[Chip]:
+def _window_chips(content: ReportContent, only: Sequence[str] = ()) -> list[Chip]:
     """Legend of the windows; of some models, if they are given."""
     sources = {source for window in content.snapshots for _, source, _ in window.paths}
-    chips = [Chip("truth", "true path", TRUTH, width=9), *model_chips(content, sources)]
+    chips = [Chip("truth", "true path", TRUTH, width=9), *close_up_chips(content, sources)]
     chips += [Chip("band", "bands", MUTED, width=9)] * any(window.bands for window in content.snapshots)
-    others = {f"model:{name}" for name in exemplars(content) if name not in only} if only else set()
+    others = {f"model:{name}" for name in exemplars(content) if only and name not in only}
     return [chip for chip in chips if chip.key not in others]
 
 
-def _detail(windows: list[Snapshot]) -> float:
+def _detail(windows: Sequence[Snapshot]) -> float:
     """Return half the length [m] of a pixel in a usual window, as wide as the ship or its path over the horizon."""
     extents = [float(np.ptp(np.vstack([window.truth, window.outline]), axis=0).max()) for window in windows]
     return float(np.median(extents)) / PIXELS if extents else 0.0
 
 
-class _Tracks:
-    """Columns x and y of many paths, handed out empty and filled together: it takes a fifth of the time."""
-
-    def __init__(self) -> None:
-        self.paths: list[Floats] = []
-        self.handed: list[tuple[list[float | None], list[float | None]]] = []
-
-    def columns(self, path: Floats) -> tuple[list[float | None], list[float | None]]:
-        """Lists for x and y of a path (n, 2), empty until `fill`."""
-        self.paths.append(np.asarray(path, dtype=float))
-        self.handed.append(([], []))
-        return self.handed[-1]
-
-    def fill(self, detail: float) -> None:
-        """Fill them with the points that differ by `detail` [m]; a path that diverged keeps its gaps."""
-        sound = [i for i, path in enumerate(self.paths) if detail > 0 and np.isfinite(path).all()]
-        for i, kept in zip(sound, thinned([self.paths[i] for i in sound], detail), strict=True):
-            self.paths[i] = self.paths[i][kept]
-        for path, columns in zip(self.paths, self.handed, strict=True):
-            with np.errstate(over="ignore"):  # a path that diverged: its points are left out
-                rounded = np.round(path.T, _decimals(detail))
-            whole = np.isfinite(rounded).all()
-            for column, values in zip(columns, rounded.tolist(), strict=True):
-                column += values if whole else [value if math.isfinite(value) else None for value in values]
-
-
-def _rounded(value: float, detail: float) -> float | None:
-    """Round to as many decimals as `detail` needs; None for what is not finite."""
-    return round(float(value), _decimals(detail)) if math.isfinite(value) else None
-
-
-def _decimals(detail: float) -> int:
-    """Number of decimals that show a difference of `detail` [m]; 3 where it is 0."""
-    return max(0, math.ceil(-math.log10(detail or 0.001)))
+def _thinned_columns(paths: Sequence[Floats], detail: float) -> list[list[list[float | None]]]:
+    """Columns x and y of paths (n, 2), of the points that differ by `detail` [m]; one that diverged keeps its gaps."""
+    kept = [np.asarray(path, dtype=float) for path in paths]
+    sound = [i for i, path in enumerate(kept) if detail > 0 and np.isfinite(path).all()]
+    for i, chosen in zip(sound, thinned([kept[i] for i in sound], detail), strict=True):
+        kept[i] = kept[i][chosen]
+    places = max(0, math.ceil(-math.log10(detail or 0.001)))
+    with np.errstate(over="ignore"):  # a path that diverged: its points are left out
+        columns = [np.round(path.T, places).tolist() for path in kept]
+    return [[[value if math.isfinite(value) else None for value in column] for column in pair] for pair in columns]
 
 
 def _end_error(window: Snapshot, points: Floats) -> float:
     return float(np.linalg.norm(np.asarray(points)[-1] - np.asarray(window.truth)[-1]))
 
 
-def _middle(runs: dict[str, list[Snapshot]]) -> tuple[int, int]:
-    """Run and instant of the window whose mean physics error at the end is the middle one."""
+def _middle_window(windows: Sequence[Snapshot]) -> Snapshot:
+    """The window whose mean physics error at the end is the middle one."""
     errors = [
-        (np.mean([_end_error(w, p) for (_, source, _), p in w.paths.items() if source != "cooperative"] or [0]), i, j)
-        for i, windows in enumerate(runs.values())
-        for j, w in enumerate(windows)
+        np.mean([_end_error(window, path) for (_, kind, _), path in window.paths.items() if kind != "cooperative"] or 0)
+        for window in windows
     ]
-    _, run, instant = sorted(errors)[len(errors) // 2]
-    return run, instant
+    return windows[int(np.argsort(errors, kind="stable")[len(errors) // 2])]
 
 
-def _mean_end_error(windows: list[Snapshot], keys: set[PathKey]) -> float:
+def _mean_end_error(windows: Sequence[Snapshot], keys: set[PathKey]) -> float:
     errors = [_end_error(w, points) for w in windows for key, points in w.paths.items() if key in keys]
     return float(np.mean(errors)) if errors else float("nan")
 
 
-def _takeaway(content: ReportContent, size: int) -> str:
+def _takeaway_windows(content: ReportContent, size: int) -> str:
     """Mean end errors over all windows, per source."""
     pure, drawn, windows = data_driven(content), exemplars(content), content.snapshots
     keys = {key for window in windows for key in window.paths if key[0] in drawn and key[2] in (0, size)}
-    called = {key: drawn_source(content, key[0], key[1]) for key in keys if key[0] != pure}
-    together = _mean_end_error(windows, {key for key, source in called.items() if source == "cooperative"})
-    alone = _mean_end_error(windows, {key for key, source in called.items() if source == "physics"})
-    learned = _mean_end_error(windows, {k for k in keys if k[0] == pure and k[2] == size})
-    parts = [(together, "the compensated paths"), (alone, "physics alone"), (learned, in_words(pure or ""))]
-    errors = [f"{word} by {metres(value)}" for value, word in parts if np.isfinite(value)]
+    called = {key: drawn_source(content, key[0], key[1]) if key[0] != pure else "pure" for key in keys}
+    words = {"cooperative": "the compensated paths", "physics": "physics alone", "pure": in_words(pure or "")}
+    errors = []
+    for source, word in words.items():
+        mine = {key for key, name in called.items() if name == source and (source != "pure" or key[2] == size)}
+        value = _mean_end_error(windows, mine)
+        errors += [f"{word} by {metres(value)}"] * bool(np.isfinite(value))
     where = f", N_D = {size}" if size else ""  # where no cell has a result there is physics alone
-    return (
-        f"In the {counted(len(windows), 'window')} to look at{where}, the models drawn miss the true place at "
-        f"the end of the horizon on average: {'; '.join(errors)}."
-    )
+    text = f"In the {counted(len(windows), 'window')} to look at{where}, the models drawn miss the true place at "
+    return f"{text}the end of the horizon on average: {'; '.join(errors)}."
 
 
-def _takeaway_row(content: ReportContent, windows: list[Snapshot], counts: list[int]) -> str:
+def _takeaway_row(content: ReportContent, panels: Sequence[tuple[Snapshot, int]]) -> str:
     """How far the compensated paths end from the truth in each panel, or those without physics where there are none."""
-    pure, drawn = data_driven(content), exemplars(content)
-    physics = [name for name in drawn if name != pure]
-    learned, alone = ([name for name in physics if (name in content.alone) == which] for which in (False, True))
-    sets = (
-        (learned, "the compensated paths"),
-        (alone, "the paths of physics alone"),
-        ([pure], "the paths without physics"),
-    )
-    for models, words in sets:
+    pure = data_driven(content)
+    physics = [name for name in exemplars(content) if name != pure]
+    sets: dict[str, list[str | None]] = {
+        "the compensated paths": [name for name in physics if name not in content.alone],
+        "the paths of physics alone": [name for name in physics if name in content.alone],
+        "the paths without physics": [pure],
+    }
+    for words, models in sets.items():
         means = []
-        for window, size in zip(windows, counts, strict=False):
+        for window, size in panels:
             keys = {k for k in window.paths if k[1] == "cooperative" and k[2] == size and k[0] in models}
             means.append(_mean_end_error([window], keys))
         if np.isfinite(means).any():
@@ -397,19 +373,19 @@ def _takeaway_row(content: ReportContent, windows: list[Snapshot], counts: list[
     return "No compensated path was recorded for these windows."
 
 
-def _takeaway_models(window: Snapshot, models: list[str], counts: list[int]) -> str:
+def _takeaway_models(window: Snapshot, models: Sequence[str], counts: Sequence[int]) -> str:
     """How far each model ends from the truth, by rising N_D."""
     parts = []
     for name in models:
-        ends = [_mean_end_error([window], {(name, "cooperative", size)}) for size in counts]
+        ends = [number(_mean_end_error([window], {(name, "cooperative", size)})) for size in counts]
         alone = _mean_end_error([window], {(name, "physics", 0)})
-        text = f"{in_words(name)} {listed([number(end) for end in ends])} m"
-        parts.append(text + (f" (physics alone {metres(alone)})" if np.isfinite(alone) else ""))
+        physics = f" (physics alone {metres(alone)})" if np.isfinite(alone) else ""
+        parts.append(f"{in_words(name)} {listed(ends)} m{physics}")
     numbers = listed([str(size) for size in counts])
     return f"Distance from the true place at the end, with N_D = {numbers}: {'; '.join(parts)}."
 
 
-SECTION = Section(
+PREDICTIONS = Section(
     "The predictions",
     draw=lambda content: (browser(content), snapshots(content)),
     needs=("snapshots",),

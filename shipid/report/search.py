@@ -7,14 +7,27 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 
 from shipid.report.content import TRIAL, Floats, ReportContent
-from shipid.report.figure import Chip, Control, Figure, Panel, Plot, Trace, axis, label, layout, line, logarithmic
-from shipid.report.palette import INK, MUTED, category
+from shipid.report.figure import (
+    INK,
+    MUTED,
+    Chip,
+    Control,
+    Figure,
+    axis,
+    category,
+    escaped,
+    even_places,
+    line,
+    log_axis,
+    plot,
+)
 from shipid.report.section import Section
 from shipid.report.selection import sizes
-from shipid.report.tables import Cell, Table, duration, figure, text
-from shipid.report.wording import counted, fixed, number, short
+from shipid.report.tables import Cell, Column, Table, frame_table, number_cell, with_cells, word_cell
+from shipid.report.wording import counted, duration, fixed, number, short
 
 MOST_DOTS = 1200  # in one panel: more hide each other
 MOST_CHOSEN = 200
@@ -23,57 +36,57 @@ WIDE = 3.0  # largest / smallest value from which an axis is logarithmic
 MOST_DECADES = 4.0  # with a tick each: more have no room
 CEILING = 4.0  # times the best of the cell: farther off is drawn here
 FAILED = CEILING * 1.25  # where diverged trials lie
-UNITS = {"delays": "s"}  # of hyperparameters; others have none
+HYPERPARAMETER_UNITS = {"delays": "s"}  # others have none
 # The kinds of memory that a trial may have, by number.
 MEMORIES = (
     "none", "the error of the physics", "that and history", "estimates of the observer", "everything",
     "history", "the error of the physics and estimates of the observer", "history and estimates of the observer",
 )  # fmt: skip
+STATES = {  # what a trial came to -> its name in the legend, marker and colour; all but the first are drawn larger
+    "complete": ("trial", "circle", MUTED),
+    "stopped": ("stopped early", "triangle-up", category(4)),
+    "diverged": ("diverged", "x", "var(--bad)"),
+    "chosen": ("chosen", "diamond", category(0)),
+}
 
 
 def search(content: ReportContent) -> Figure | None:
     """Error of the trials over each searched hyperparameter; None without trials or without any."""
-    names, frame = searched(content), _relative(content.trials)
+    names, frame = searched(content), _with_ratio(content.trials)
     if not names or frame.empty:
         return None
     counts = sizes(frame.N_D) if frame.N_D.nunique() > 1 else []
-    parts = [frame, *(frame[frame.N_D.eq(size)] for size in counts)]
-    views = {
-        str(i) if counts else "": [Panel(_panel(part, name, frame[name]), _caption(part, name)) for name in names]
-        for i, part in enumerate(parts)
-    }
+    early = "triangles are those that a part of the windows judged, and that were not among the best; "
+    thinned = f"of many, at most {MOST_DOTS + MOST_CHOSEN:,} are drawn in a panel; "
+    tried = sorted({int(kind) for kind in frame.memory.dropna()}) if "memory" in names else []
+    memories = f" Memory: {', '.join(f'{kind} {MEMORIES[kind]}' for kind in tried)}." if tried else ""
     return Figure(
         id="search",
         title="Trials of the search",
-        takeaway=_takeaway(frame, names),
+        takeaway=_takeaway_search(frame, names),
         how="Each dot is a trial: the root of its validation error over the best of its cell; "
-        f"{_thinned(frame)}{_stopped(frame)}diamonds are those whose networks the cell uses; those beyond "
+        + (thinned if len(frame) > MOST_DOTS + MOST_CHOSEN else "")
+        + (early if frame.state.eq("stopped").any() else "")
+        + "diamonds are those whose networks the cell uses; those beyond "
         f"{CEILING:g} times lie at the upper edge, those that diverged above it. The line joins the medians of all "
         "that have a value. Rank correlation (Spearman) is taken within each cell, then averaged over cells: it sees "
-        f"what rises or falls throughout, not an optimum in the middle.{_memories(frame, names)}",
+        f"what rises or falls throughout, not an optimum in the middle.{memories}",
         alternative="Dots of the relative validation error of trials over each hyperparameter; a table sums up.",
         height=270,
-        views=views,
-        controls=[Control("Manoeuvres, N_D", ["all", *map(str, counts)])] if counts else [],
-        chips=_chips(frame),
+        draw=lambda size="all": [
+            _draw_trials(frame if size == "all" else frame[frame.N_D.eq(size)], name, frame[name]) for name in names
+        ],
+        controls=[Control("Manoeuvres, N_D", ["all", *counts])] if counts else [],
+        chips=[
+            *(
+                Chip(f"state:{state}", word, colour, "none", symbol=symbol)
+                for state, (word, symbol, colour) in STATES.items()
+                if state == "chosen" or frame.state.eq(state).any()
+            ),
+            Chip("median", "median", INK),
+        ],
+        captions=[_caption(frame, name) for name in names],
     )
-
-
-def table(content: ReportContent) -> Table | None:
-    """Sum the trials up by N_D; None without trials."""
-    frame, names = content.trials, searched(content)
-    if frame.empty:
-        return None
-    passes = bool(frame.epochs.any())
-    shares = {name: _yes_or_no(frame[name]) for name in names}
-    rows = [_row(int(str(size)), mine, shares, passes) for size, mine in frame.groupby("N_D", sort=True)]
-    chosen = [
-        f"{'share of ' if share else ''}chosen {spoken(name)} [{unit_of(name)}]" for name, share in shares.items()
-    ]
-    headings = ["N_D [1]", "cells [1]", "trials [1]", "stopped [1]", "diverged [1]"]
-    headings += [*(["epochs [1]"] if passes else []), "time [s]", "time per cell [s]", *chosen]
-    takeaway = " ".join(part for part in (_counts(frame), _tried(frame, names)) if part)
-    return Table("search-table", "The search by N_D", takeaway, headings, [True] * len(headings), rows)
 
 
 def searched(content: ReportContent) -> list[str]:
@@ -82,14 +95,9 @@ def searched(content: ReportContent) -> list[str]:
     return [str(name) for name in frame.columns if name not in TRIAL and frame[name].nunique() > 1]
 
 
-def spoken(name: str) -> str:
-    """Name a hyperparameter as in a sentence."""
-    return name.replace("_", " ")
-
-
-def unit_of(name: str) -> str:
-    """Return the unit of a hyperparameter; most have none."""
-    return UNITS.get(name, "1")
+def _title(name: str) -> str:
+    """Name of a hyperparameter in words, with its unit; most have none."""
+    return f"{name.replace('_', ' ')} [{HYPERPARAMETER_UNITS.get(name, '1')}]"
 
 
 def importance(frame: pd.DataFrame, name: str) -> float:
@@ -98,86 +106,47 @@ def importance(frame: pd.DataFrame, name: str) -> float:
     cell, counts = cells.ngroup().to_numpy(), cells.size().to_numpy()
     x, y = cells[[name, "value"]].rank().to_numpy(dtype=float).T - (counts[cell] + 1) / 2
     xy, xx, yy = (np.bincount(cell, product, len(counts)) for product in (x * y, x * x, y * y))
-    judged = (counts > 2) & (xx > 0) & (yy > 0)
-    return float((xy[judged] / np.sqrt(xx * yy)[judged]).mean()) if judged.any() else math.nan
+    varying = (counts > 2) & (xx > 0) & (yy > 0)
+    return float((xy[varying] / np.sqrt(xx * yy)[varying]).mean()) if varying.any() else math.nan
 
 
-def _relative(trials: pd.DataFrame) -> pd.DataFrame:
-    """Trials with `ratio` [1]: the root of the value over the best of the cell."""
+def _with_ratio(trials: pd.DataFrame) -> pd.DataFrame:
+    """Trials with `ratio` [1]: the root of the value over the best of the cell; one that diverged has no value."""
     good = trials.value.where(trials.state.ne("diverged")).astype(float)
     best = good.where(trials.state.eq("complete")).groupby(trials.cell).transform("min")
     return trials.assign(value=good, ratio=np.sqrt(good / best))
 
 
-def _chips(frame: pd.DataFrame) -> list[Chip]:
-    """Return the legend; states that no trial has are left out."""
-    states = {
-        "complete": Chip("state:complete", "trial", MUTED, "none", symbol="circle"),
-        "stopped": Chip("state:stopped", "stopped early", category(4), "none", symbol="triangle-up"),
-        "diverged": Chip("state:diverged", "diverged", "var(--bad)", "none", symbol="x"),
-    }
-    chips = [chip for state, chip in states.items() if frame.state.eq(state).any()]
-    return [*chips, Chip("chosen", "chosen", category(0), "none", symbol="diamond"), Chip("median", "median", INK)]
-
-
-def _panel(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> Plot:
+def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> go.Figure:
     """One hyperparameter; its axis holds `every` value, so that it stays when N_D changes."""
-    traces = []
-    looks = {
-        "complete": {"symbol": "circle", "size": 4, "color": MUTED, "opacity": 0.45},
-        "stopped": {"symbol": "triangle-up", "size": 5, "color": category(4), "opacity": 0.6},
-        "diverged": {"symbol": "x", "size": 6, "color": "var(--bad)", "opacity": 0.7},
-    }
-    chosen = frame.chosen.astype(bool)
-    others, best = _some(frame[~chosen], MOST_DOTS), _some(frame[chosen], MOST_CHOSEN)
-    for state, marker in looks.items():
-        traces.append(_dots(others[others.state == state], name, state, [f"state:{state}"], marker))
-    diamond = {"symbol": "diamond", "size": 7, "color": category(0), "opacity": 0.8}
+    chosen, traces = frame.chosen.astype(bool), []
+    others, best = frame[~chosen], frame[chosen]
+    others, best = others.iloc[even_places(len(others), MOST_DOTS)], best.iloc[even_places(len(best), MOST_CHOSEN)]
+    unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
+    for state, (_, symbol, colour) in STATES.items():
+        mine = best if state == "chosen" else others[others.state == state]
+        size, shade = (4, 0.45) if state == "complete" else (6, 0.7)
+        marker = {"symbol": symbol, "size": size, "color": colour, "opacity": shade}
+        known = "" if state == "diverged" else ", %{y:.2f} times the best of its cell"
+        hover = f"{state}: {escaped(name.replace('_', ' '))} %{{x:.3g}}{unit}{known}"
+        y = mine.ratio.fillna(FAILED).where(mine.ratio.isna(), mine.ratio.clip(upper=CEILING)).round(3)
+        traces.append(line(state, mine[name], y, [f"state:{state}"], mode="markers", marker=marker, hover=hover))
     middle = _medians(frame[frame.ratio.notna()], name)
-    if len(middle):
-        traces.append(
-            line("median", middle[:, 0], middle[:, 1], ["median"], "times the best", line={"color": INK, "width": 2.5})
-        )
-    traces.append(_dots(best, name, "chosen", ["chosen"], diamond))
-    return Plot(traces, _frame(name, every))
-
-
-def _dots(mine: pd.DataFrame, name: str, what: str, keys: list[str], marker: dict[str, Any]) -> Trace:
-    ratio = mine.ratio.to_numpy(dtype=float)
-    y = np.where(np.isnan(ratio), FAILED, np.minimum(ratio, CEILING))
-    trace = line(what, mine[name].to_numpy(dtype=float), np.round(y, 3), keys, mode="markers", marker=marker)
-    known = "" if what == "diverged" else ", %{y:.2f} times the best of its cell"
-    value = f"{label(spoken(name))} %{{x:.3g}}" + (f" {UNITS[name]}" if name in UNITS else "")
-    trace["hovertemplate"] = f"{label(what)}: {value}{known}<extra></extra>"
-    return trace
-
-
-def _some(frame: pd.DataFrame, most: int) -> pd.DataFrame:
-    """Return at most `most` trials, evenly spread over the rows."""
-    return frame.iloc[np.linspace(0, len(frame) - 1, min(len(frame), most)).round().astype(int)]
-
-
-def _thinned(frame: pd.DataFrame) -> str:
-    most = MOST_DOTS + MOST_CHOSEN
-    return f"of many, at most {most:,} are drawn in a panel; " if len(frame) > most else ""
-
-
-def _stopped(frame: pd.DataFrame) -> str:
-    early = frame.state.eq("stopped").any()
-    return "triangles are those that a part of the windows judged, and that were not among the best; " if early else ""
-
-
-def _memories(frame: pd.DataFrame, names: list[str]) -> str:
-    """Sentence on what the numbers of `memory` mean, if it is searched."""
-    tried = sorted({int(number) for number in frame.memory.dropna()}) if "memory" in names else []
-    words = [f"{number} {MEMORIES[number]}" for number in tried]
-    return f" Memory: {', '.join(words)}." if words else ""
+    ink = {"color": INK, "width": 2.5}
+    traces.insert(3, line("median", middle[:, 0], middle[:, 1], ["median"], "times the best", line=ink))
+    ticks = {1: "1", 1.5: "1.5", 2: "2", 3: "3", CEILING: f"≥{CEILING:g}", FAILED: "div."}
+    y_axis: dict[str, Any] = {
+        "range": [-0.02, math.log10(FAILED) + 0.04],
+        "tickvals": list(ticks),
+        "ticktext": list(ticks.values()),
+    }
+    return plot(traces, _axis_of_values(name, every), log_axis("error / best of cell [1]", **y_axis))
 
 
 def _medians(frame: pd.DataFrame, name: str) -> Floats:
     """Median ratio per value of a hyperparameter, or of `BINS` parts of them where there are many: (n, 2)."""
     values = frame[name].astype(float)
-    if frame.empty or values.nunique() < 2:
+    if values.nunique() < 2:
         return np.empty((0, 2))
     groups = values if values.nunique() <= BINS else values.rank(pct=True).mul(BINS).apply(np.ceil)
     medians = pd.DataFrame({"x": values, "y": frame.ratio}).groupby(groups).median().sort_values("x")
@@ -185,30 +154,21 @@ def _medians(frame: pd.DataFrame, name: str) -> Floats:
     return points
 
 
-def _frame(name: str, every: pd.Series[float]) -> dict[str, Any]:
-    low, high = float(every.min()), float(every.max())
-    title = f"{label(spoken(name))} [{unit_of(name)}]"
-    room = 0.04
+def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:
+    """Axis of a hyperparameter: yes and no, logarithmic where its values are factors apart, or linear."""
+    low, high, title = float(every.min()), float(every.max()), escaped(_title(name))
     if _yes_or_no(every):
-        x = axis(label(spoken(name)), range=[-0.3, 1.3], tickvals=[0, 1], ticktext=["no", "yes"])
-    elif low > 0 and high / low > WIDE:
-        ends = np.log10([low, high])
-        decades = float(np.ptp(ends))
-        span = [float(ends[0] - room * decades), float(ends[1] + room * decades)]
-        x = logarithmic(title, (1,) if decades > 1.5 else (1, 2, 3, 5), range=span)
-        each = math.ceil(decades / MOST_DECADES)
-        x |= {name: x[name][::each] for name in ("tickvals", "ticktext")} if each > 1 else {}
-    else:
-        x = axis(title, range=[low - room * (high - low), high + room * (high - low)], nticks=6)
-        counts = sorted(set(every.dropna()))
-        if len(counts) <= 6 and all(count == round(count) for count in counts):
-            x |= {"tickvals": counts}
-    ticks: dict[str, Any] = {
-        "tickvals": [1, 1.5, 2, 3, CEILING, FAILED],
-        "ticktext": ["1", "1.5", "2", "3", f"≥{CEILING:g}", "div."],
-    }
-    y = logarithmic("error / best of cell [1]", range=[-0.02, math.log10(FAILED) + 0.04], **ticks)
-    return layout(x, y, hovermode="closest")
+        return axis(escaped(name.replace("_", " ")), range=[-0.3, 1.3], tickvals=[0, 1], ticktext=["no", "yes"])
+    if low > 0 and high / low > WIDE:
+        first, last = math.log10(low), math.log10(high)
+        room, steps = 0.04 * (last - first), (1,) if last - first > 1.5 else (1, 2, 3, 5)
+        x = log_axis(title, steps, range=[first - room, last + room])
+        each = max(1, math.ceil((last - first) / MOST_DECADES))
+        return x | {key: x[key][::each] for key in ("tickvals", "ticktext")}
+    room, counts = 0.04 * (high - low), sorted(set(every.dropna()))
+    whole = len(counts) <= 6 and all(count == round(count) for count in counts)
+    ticks = {"tickvals": counts} if whole else {"nticks": 6}
+    return axis(title, range=[low - room, high + room], **ticks)
 
 
 def _caption(frame: pd.DataFrame, name: str) -> str:
@@ -220,59 +180,65 @@ def _yes_or_no(values: pd.Series[float]) -> bool:
     return set(values.dropna()) == {0.0, 1.0}
 
 
-def _counts(frame: pd.DataFrame) -> str:
-    stopped, diverged = (int(frame.state.eq(name).sum()) or "none" for name in ("stopped", "diverged"))
-    text = f"{counted(len(frame), 'trial')} in {counted(frame.cell.nunique(), 'cell')}: {stopped} stopped early, "
-    return f"{text}{diverged} diverged; {duration(float(frame.seconds.sum()))} of training."
-
-
-def _tried(frame: pd.DataFrame, names: list[str]) -> str:
-    """Return the range of each hyperparameter over the trials, as text."""
-    ranges = []
-    for name in names:
-        low, high = float(frame[name].min()), float(frame[name].max())
-        unit = f" {UNITS[name]}" if name in UNITS else ""
-        values = "yes or no" if _yes_or_no(frame[name]) else f"{short(low)} to {short(high)}{unit}"
-        ranges.append(f"{spoken(name)} {values}")
-    return f"Tried: {', '.join(ranges)}." if ranges else ""
-
-
-def _takeaway(frame: pd.DataFrame, names: list[str]) -> str:
+def _takeaway_search(frame: pd.DataFrame, names: list[str]) -> str:
     """Return the median ratio of a trial to the best of its cell, and the hyperparameter most correlated with it."""
     if frame.ratio.isna().all():
         return f"None of {counted(len(frame), 'trial')} ended with a value."
     text = f"The median error of a trial is {number(float(frame.ratio.median()))} times that of the best of its cell"
-    correlations = {name: importance(frame, name) for name in names}
-    correlations = {name: value for name, value in correlations.items() if math.isfinite(value)}
+    correlations = {name: value for name in names if math.isfinite(value := importance(frame, name))}
     if correlations:
         most = max(correlations, key=lambda name: abs(correlations[name]))
-        text += f"; the error goes most with {spoken(most)}, rank correlation {fixed(correlations[most], 2)}"
+        text += f"; the error goes most with {most.replace('_', ' ')}, rank correlation {fixed(correlations[most], 2)}"
     return f"{text}."
 
 
-def _row(size: int, mine: pd.DataFrame, shares: dict[str, bool], passes: bool) -> list[Cell]:
-    counts = [mine.cell.nunique(), len(mine), int(mine.state.eq("stopped").sum()), int(mine.state.eq("diverged").sum())]
-    seconds = float(mine.seconds.sum())
-    numbers = [size, *counts, *([int(mine.epochs.sum())] if passes else [])]
-    chosen = mine[mine.chosen.astype(bool)]
-    choices = [_choice(chosen[name], share) for name, share in shares.items()]
-    return [*(figure(value, 0) for value in numbers), figure(seconds, 1), figure(seconds / counts[0], 1), *choices]
+def search_table(content: ReportContent) -> Table:
+    """Sum the trials up by N_D."""
+    frame, names = content.trials, searched(content)
+    states = pd.crosstab(frame.N_D, frame.state).reindex(columns=["stopped", "diverged"], fill_value=0)
+    groups = frame.groupby("N_D", sort=True)
+    shown = states.assign(cells=groups.cell.nunique(), trials=groups.size(), seconds=groups.seconds.sum())
+    shown = shown.assign(epochs=groups.epochs.sum()) if frame.epochs.any() else shown
+    columns = {
+        "N_D [1]": Column("N_D", 0),
+        "cells [1]": Column("cells", 0),
+        "trials [1]": Column("trials", 0),
+        "stopped [1]": Column("stopped", 0),
+        "diverged [1]": Column("diverged", 0),
+        "epochs [1]": Column("epochs", 0),
+        "time [s]": Column("seconds", 1),
+        "time per cell [s]": Column("each", 1),
+    }
+    chosen = frame[frame.chosen.astype(bool)]
+    tried = []
+    for name in names:
+        share = _yes_or_no(frame[name])
+        values = [chosen[name][chosen.N_D.eq(size)].astype(float).dropna() for size in shown.index]
+        shown = with_cells(shown, **{f"chosen {name}": [_choice_cell(some, share) for some in values]})
+        columns[f"{'share of ' if share else ''}chosen {_title(name)}"] = Column(f"chosen {name}", numeric=True)
+        unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
+        span = "yes or no" if share else f"{short(frame[name].min())} to {short(frame[name].max())}{unit}"
+        tried.append(f"{name.replace('_', ' ')} {span}")
+    stopped, diverged = (int(states[state].sum()) or "none" for state in ("stopped", "diverged"))
+    takeaway = f"{counted(len(frame), 'trial')} in {counted(frame.cell.nunique(), 'cell')}: {stopped} stopped early, "
+    takeaway += f"{diverged} diverged; {duration(float(frame.seconds.sum()))} of training."
+    takeaway += f" Tried: {', '.join(tried)}." if tried else ""
+    shown = shown.assign(each=shown.seconds / shown.cells).reset_index()
+    return frame_table("search-table", "The search by N_D", takeaway, shown, columns)
 
 
-def _choice(chosen: pd.Series[float], share: bool) -> Cell:
+def _choice_cell(values: pd.Series[float], share: bool) -> Cell:
     """Smallest, middle and largest chosen value, or the share of yes."""
-    values = chosen.astype(float).dropna()
     if values.empty:
-        return text(None)
+        return word_cell(None)
     if share:
-        return figure(values.mean(), 2)
-    low, middle, high = (float(value) for value in values.quantile([0.0, 0.5, 1.0]))
-    return Cell(" / ".join(short(value) for value in (low, middle, high)), middle)
+        return number_cell(values.mean(), 2)
+    return Cell(" / ".join(short(value) for value in values.quantile([0.0, 0.5, 1.0])), float(values.median()))
 
 
-SECTION = Section(
+THE_SEARCH = Section(
     "The search",
-    draw=lambda content: (search(content), table(content)),
+    draw=lambda content: (search(content), search_table(content)),
     needs=("trials",),
     anchors=("search", "search-table"),
 )

@@ -46,12 +46,6 @@ def declared(sections: Mapping[str, Section]) -> set[str]:
     return {anchor for section in sections.values() for anchor in section.anchors} | set(OF_EVERY_PAGE)
 
 
-def part(content: object, name: str) -> Any:
-    """Return a part of the content: the field of that name, else the entry of `frames`, else None."""
-    value = getattr(content, name, None)
-    return getattr(content, "frames", {}).get(name) if value is None else value
-
-
 def drawn(sections: Mapping[str, Section], content: object, say: Callable[[str], object] | None = None) -> list[Drawn]:
     """Draw the sections that have something to show, in the order of the registry.
 
@@ -59,7 +53,7 @@ def drawn(sections: Mapping[str, Section], content: object, say: Callable[[str],
     """
     result = []
     for name, section in sections.items():
-        if any(_empty(part(content, need)) for need in section.needs):
+        if not all(_has_part(content, need) for need in section.needs):
             continue
         if say is not None:
             say(f"drawing: {section.title}")
@@ -69,5 +63,7 @@ def drawn(sections: Mapping[str, Section], content: object, say: Callable[[str],
     return result
 
 
-def _empty(value: object) -> bool:
-    return value is None or (isinstance(value, Sized) and len(value) == 0)
+def _has_part(content: object, name: str) -> bool:
+    """Whether the content has a field of that name, or an entry of `frames`, that is not empty."""
+    value = getattr(content, name, getattr(content, "frames", {}).get(name))
+    return value is not None and not (isinstance(value, Sized) and len(value) == 0)

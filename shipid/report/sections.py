@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from shipid.report import bands, cells, error_map, errors_over, factors, logs, memory, methods, paths, search
+from shipid.report import bands, cells, errors_over, factors, logs, memory, methods, paths, physics_and_data, search
 from shipid.report.section import Section
 
 SECTIONS: dict[str, Section] = {
-    "results": error_map.SECTION,
-    "errors": errors_over.SECTION,
-    "how-far-off": bands.SECTION,
-    "the-methods": methods.SECTION,
-    "the-past": memory.SECTION,
-    "predictions": paths.SECTION,
-    "the-models": factors.SECTION,
-    "data": logs.SECTION,
-    "the-search": search.SECTION,
-    "all-cells": cells.SECTION,
+    "results": physics_and_data.RESULTS,
+    "errors": errors_over.ERRORS,
+    "how-far-off": bands.HOW_FAR_OFF,
+    "the-methods": methods.THE_METHODS,
+    "the-past": memory.THE_PAST,
+    "predictions": paths.PREDICTIONS,
+    "the-models": factors.THE_MODELS,
+    "data": logs.DATA,
+    "the-search": search.THE_SEARCH,
+    "all-cells": cells.THE_CELLS,
 }

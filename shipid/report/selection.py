@@ -1,18 +1,32 @@
-"""Which models, data sets and runs a figure draws, and how seeds become one line."""
+"""Which models, data sets and runs a figure draws, how each model looks, and how seeds become one line."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, Indices, ReportContent
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, Indices, ReportContent, rows_in
+from shipid.report.figure import INK, MUTED, OKABE_ITO, SYMBOLS, Chip, category, colour_level
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
 MOST_MODELS = 12  # with more, figures of all models leave out the methods that the study does not judge by
 FEW_RUNS = 40  # test runs in the error-over-time figure and the window browser
+SOURCE_DASHES = {"cooperative": "solid", "physics": "dot", "naive": "dash"}
+# Of the second, third, ... model without physics: all are ink.
+FURTHER = ("cross", "circle-open", "square-open", "diamond-open", "triangle-up-open", "star", "square", "diamond")
+
+
+@dataclass(frozen=True)
+class Style:
+    """How one model is drawn: colour (CSS variable), marker of its family, line width [px]."""
+
+    colour: str
+    symbol: str
+    width: float
 
 
 def spread(items: Sequence[str], count: int) -> list[str]:
@@ -41,6 +55,7 @@ def same_physics(frame: pd.DataFrame) -> pd.Series[bool]:
     return frame.A.notna() & frame.duplicated(["family", "A"])
 
 
+@lru_cache(maxsize=4)
 def data_driven(content: ReportContent) -> str | None:
     """Name of the model without physics, if the study has one; the first of several."""
     frame = families(content)
@@ -100,6 +115,59 @@ def exemplars(content: ReportContent) -> list[str]:
     names = [str(name) for name in families(content).model]
     middle = {*middles(content).values(), content.best}
     return names if len(names) <= FEW_MODELS else [name for name in names if name in middle]
+
+
+def accuracy_range(content: ReportContent) -> tuple[float, float] | None:
+    """Smallest and largest A [m] if models are coloured by A; None if there are few and each has a separate colour."""
+    frame = families(content)
+    physics = frame.A[frame.A.notna() & (frame.family != DATA_DRIVEN)]
+    return None if len(frame) <= FEW_MODELS or physics.empty else (float(physics.min()), float(physics.max()))
+
+
+@lru_cache(maxsize=4)  # every figure asks for it
+def styles(content: ReportContent) -> Mapping[str, Style]:
+    """Style of every model: colour by A for many models, Okabe-Ito for few, thick ink for no physics."""
+    frame, span = families(content), accuracy_range(content)
+    kinds = [kind for kind in pd.unique(frame.family) if kind != DATA_DRIVEN]
+    result = _styles_without_physics([str(name) for name in frame.model[frame.family.eq(DATA_DRIVEN)]])
+    for index, (row, again) in enumerate(zip(rows_in(frame), same_physics(frame), strict=True)):
+        if row.family != DATA_DRIVEN:
+            # A is unknown where the physics diverged. Of several methods on one model the first marker is filled.
+            known = span is not None and np.isfinite(row.A)
+            shade = f"var(--scale-{colour_level(row.A, span)})" if known and span else MUTED
+            symbol = SYMBOLS[kinds.index(row.family) % len(SYMBOLS)] + "-open" * bool(span and again)
+            result[str(row.model)] = Style(category(index) if span is None else shade, symbol, 2.0)
+    return result
+
+
+@lru_cache(maxsize=4)
+def close_styles(content: ReportContent) -> Mapping[str, Style]:
+    """Style of the models of a close-up: a colour and a marker each, whatever their A; no physics in ink.
+
+    When all colours are used, they come again with other markers: 36 models are told apart.
+    """
+    of_family = dict(zip(*families(content)[["model", "family"]].to_numpy().T, strict=True))
+    physics = [name for name in exemplars(content) if of_family[name] != DATA_DRIVEN]
+    result = _styles_without_physics([name for name in exemplars(content) if name not in physics])
+    for index, name in enumerate(physics):
+        symbol = SYMBOLS[(index + index // len(OKABE_ITO)) % len(SYMBOLS)]
+        result[name] = Style(category(index), symbol, 2.0)
+    return result
+
+
+def _styles_without_physics(names: Sequence[str]) -> dict[str, Style]:
+    """Ink: thick for the first model without physics, thin and with other markers for others."""
+    looks = [Style(INK, "x", 3.0), *(Style(INK, symbol, 1.5) for symbol in FURTHER)]
+    return {name: looks[min(i, 1 + (i - 1) % len(FURTHER))] for i, name in enumerate(names)}
+
+
+def model_chips(names: Sequence[str], looks: Mapping[str, Style], words: Mapping[str, str] | None = None) -> list[Chip]:
+    """Legend of models: each with its colour, line width and marker, by its name or other words."""
+    return [
+        Chip(f"model:{name}", (words or {}).get(name, name), look.colour, width=look.width, symbol=look.symbol)
+        for name in names
+        for look in [looks[name]]
+    ]
 
 
 def sizes(values: pd.Series[int], count: int = 3) -> list[int]:

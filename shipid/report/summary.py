@@ -3,55 +3,51 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from shipid.report import tables
+from shipid.report.cells import cells_table
 from shipid.report.content import ReportContent, Sentence
-from shipid.report.page import LEAD, write
+from shipid.report.errors_over import error_by_kind
+from shipid.report.factors import models_table
+from shipid.report.page import LEAD, write_whole
 from shipid.report.wording import CONSTANT, metres
 
 
 def summary(content: ReportContent) -> str:
     """Answer, findings, errors of constant u, v, r, models, cells and provenance as Markdown."""
-    naive = content.naive
-    findings = [[f.id, f.claim, f.verdict, f.evidence] for f in content.findings]
+    mean, p90, rms = (metres(content.naive[name]) for name in ("mean", "p90", "rms"))
+    more, findings = content.answer[LEAD:], [[f.id, f.claim, f.verdict, f.evidence] for f in content.findings]
     parts = [
-        f"# {_plain(content.title)}",
-        _listed(content.answer[:LEAD]),
-        *(["## In detail", _listed(content.answer[LEAD:])] if content.answer[LEAD:] else []),
+        f"# {_one_line(content.title)}",
+        _bullets(content.answer[:LEAD]),
+        *(["## In detail", _bullets(more)] if more else []),
         *(["## Findings", _grid(["", "claim", "verdict", "evidence"], findings)] if findings else []),
         f"## {CONSTANT.capitalize()}",
-        f"Mean error {metres(naive['mean'])}, 90th percentile {metres(naive['p90'])}, "
-        f"root mean square {metres(naive['rms'])}.",
+        f"Mean error {mean}, 90th percentile {p90}, root mean square {rms}.",
     ]
-    for table in filter(None, (tables.kinds(content), tables.models(content), tables.cells(content))):
+    for table in filter(None, (error_by_kind(content), models_table(content), cells_table(content))):
         rows = [[cell.text for cell in row] for row in table.rows]
-        parts += [f"## {table.title}", _plain(table.takeaway), _grid(table.columns, rows)]
-    parts += ["## Provenance", _grid(["", ""], [[key, value] for key, value in content.provenance.items()])]
-    if content.command:
-        parts.append("\n".join(f"    {line}" for line in content.command.splitlines()))
+        parts += [f"## {table.title}", _one_line(table.takeaway), _grid(table.columns, rows)]
+    parts += ["## Provenance", _grid(["", ""], content.provenance.items())]
+    parts.append("\n".join(f"    {line}" for line in content.command.splitlines()))
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
 def write_summary(content: ReportContent, file: Path) -> Path:
     """Write the summary as Markdown; returns the file. Raises ResultError if it cannot."""
-    return write(summary(content), file)
+    return write_whole(summary(content), file)
 
 
-def _listed(sentences: Sequence[Sentence]) -> str:
-    return "\n".join(f"- {_plain(sentence.text)}" for sentence in sentences)
+def _bullets(sentences: Sequence[Sentence]) -> str:
+    return "\n".join(f"- {_one_line(sentence.text)}" for sentence in sentences)
 
 
-def _grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [
-        [_plain(name) for name in columns],
-        ["---"] * len(columns),
-        *([_plain(cell) for cell in row] for row in rows),
-    ]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) if rows else ""
+def _grid(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [list(map(_one_line, line)) for line in (columns, ["---"] * len(columns), *rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) if len(lines) > 2 else ""
 
 
-def _plain(text: str) -> str:
+def _one_line(text: str) -> str:
     """One line of text that Markdown reads as text: no tag, no column."""
     return html.escape(" ".join(text.split()), quote=False).replace("|", "\\|")

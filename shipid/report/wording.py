@@ -62,8 +62,10 @@ def metres(value: float) -> str:
     return f"{number(value)} m"
 
 
-def difference(value: float, low: float, high: float) -> str:
+def difference_text(value: float, low: float, high: float) -> str:
     """Write a difference [m] and its interval with the decimals of the greatest of them: it may be nearly 0."""
+    if not math.isfinite(low):
+        return f"{metres(value)}, no interval from fewer than five runs"
     places = _decimals(max(map(abs, (value, low, high))))
     return f"{fixed(value, places)} m [{fixed(low, places)}, {fixed(high, places)}]"
 
@@ -100,3 +102,10 @@ def _power(match: re.Match[str]) -> str:
 def counted(count: int, noun: str) -> str:
     """`1 run`, `3 runs`."""
     return f"{count:,} {plural(count, noun)}"
+
+
+def duration(seconds: float) -> str:
+    """Write a duration [s] as text in s, min or h."""
+    if seconds >= 7200:
+        return f"{seconds / 3600:.1f} h"
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"

@@ -20,6 +20,7 @@ from shipid.report.sections import SECTIONS
 from shipid.study import seals
 from shipid.study.plan import build_plan
 from shipid.study.results import read_cells, read_results
+from tests.report.views import views
 from tests.study.tiny import events_here, run_here, tiny_plan, without_figures
 
 
@@ -41,7 +42,7 @@ def test_no_model_is_named_that_no_cell_has(tmp_path: Path) -> None:
         run_here(plan, folder)
     content = report_content(read_results(folder))
     assert set(content.models["model"]) == {"right", "wrong-1", "wrong-2"}
-    assert "no physics" not in [chip.label for chip in errors_over.horizon(content).chips]
+    assert "no physics" not in [chip.label for chip in errors_over.error_over_horizon(content).chips]
 
 
 def test_a_further_frame_is_one_line(tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -107,8 +108,8 @@ def test_a_study_of_physics_alone_has_a_page_and_says_so(tmp_path: Path) -> None
     assert not {"map", "gain"} & {figure.id for figure in figures}, "H is A everywhere"
     words = [text for item in shown for text in (item.title, item.takeaway, getattr(item, "how", ""))]
     words += [chip.label for figure in figures for chip in figure.chips]
-    panels = [panel for figure in figures for view in figure.views.values() for panel in view]
-    words += [str(trace.get("name")) for panel in panels for trace in panel.plot.traces]
+    panels = [panel for figure in figures for panels in views(figure).values() for panel in panels]
+    words += [str(trace.name) for panel in panels for trace in panel.data]
     words += (lines := [line["name"] for line in window_data(content)["lines"]])
     assert not [text for text in words if "ompensat" in text]
     assert len(lines) == len(set(lines))

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from shipid.cli import app
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.errors import ShipidError
+from shipid.report import replay
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform
 from shipid.vessel.load import load_vessel
@@ -67,3 +68,29 @@ def test_a_mistake_is_one_line(log: Path, words: list[str], message: str) -> Non
     assert isinstance(result.exception, ShipidError)
     assert message in str(result.exception)
     assert "\n" not in str(result.exception)
+
+
+def test_the_page_draws_runs_in_the_units_of_its_axes() -> None:
+    """Two pieces of a run that turns by 2 deg/s and moves north: a gap between them, time from the start of the run."""
+    t = np.arange(100.0, 110.0)
+    one = pd.DataFrame({"run": "zz", "piece": np.arange(10) // 5, "t": t, "model": "measured", "u": 5.0, "v": 0.1})
+    one = one.assign(r=np.radians(2.0), north=3.0 * t, east=7.0)
+    series = pd.concat([one, one.assign(model="replayed", north=3.0 * t + 1.0)])
+    names = ["run", "u", "v", "r", "position"]
+    errors = pd.DataFrame([("all", 0.1, 0.2, np.radians(4.0), 9.0)], columns=names)
+    content = replay.ReplayContent(
+        title="", name="", series=series, errors=errors, ahead=5.0, provenance={}, command=""
+    )
+    panels = replay.replayed_motion(content).draw(series["run"].iloc[0])
+    *over_time, (track, _) = (list(panel.data) for panel in panels)
+    for (measured, _), value in zip(over_time, (5.0, 0.1, 2.0), strict=True):
+        y = np.asarray(measured["y"], dtype=float)
+        assert y[np.isfinite(y)] == pytest.approx(value)
+        assert np.flatnonzero(np.isnan(y)).tolist() == [5, 11]
+        assert measured["x"][0] == 0.0
+    north = np.asarray(track["y"], dtype=float)
+    assert np.ptp(north[np.isfinite(north)]) == pytest.approx(27.0)
+    assert {float(x) for x in track["x"] if np.isfinite(x)} == {7.0}
+    table = replay.replay_errors(content)
+    assert table.columns[3] == "r [deg/s]"
+    assert [float(cell.text) for cell in table.rows[0][1:]] == pytest.approx([0.1, 0.2, 4.0, 9.0])

@@ -4,36 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import chain
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report import Finding, ReportContent, Sentence, Snapshot, page
-from shipid.report.figure import Figure
+from shipid.report import Finding, ReportContent, Sentence, Snapshot
 from shipid.report.section import Drawn, drawn
 from shipid.report.sections import SECTIONS
-from shipid.report.sketch import sketch
 
 NASTY = "<script>alert('x')</script>"
 OUTLINE = np.array([[14.5, 0.0], [9.0, 4.8], [-14.4, 4.8], [-14.4, -4.8], [9.0, -4.8]])
-
-
-@pytest.fixture(autouse=True)
-def plots_are_what_plotly_takes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Plots are plain data; Plotly's classes refuse an option that there is not, and every plot can be sketched."""
-    views = page._views
-
-    def checked(figure: Figure) -> dict[str, Any]:
-        for panel in next(iter(figure.views.values()), ()):
-            assert len(panel.figure.data) == len(panel.plot.traces)
-        for panel in chain.from_iterable(figure.views.values()):
-            sketch(panel.plot, figure.height)
-        return views(figure)
-
-    monkeypatch.setattr(page, "_views", checked)
 
 
 @dataclass(frozen=True)

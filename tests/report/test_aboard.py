@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report.aboard import SECTIONS, AboardContent, along, outline, seen, write_aboard
+from shipid.report.aboard import ABOARD_PAGE, AboardContent, along_run, band_outline, seen, write_aboard
 from shipid.report.content import Line
 from shipid.report.section import drawn
+from tests.report.views import views
 
 NASTY = "<b>run</b>"
 
@@ -38,7 +39,7 @@ def content(banded: bool = True, physics: bool = True) -> AboardContent:
 def test_the_outline_of_a_band_is_its_ellipse() -> None:
     """Every corner lies at distance 1 in half axes, turned by the course; a gap parts two ellipses."""
     points = content().points.iloc[:3]
-    east, north = (values.reshape(3, -1) for values in outline(points, 12))
+    east, north = (values.reshape(3, -1) for values in band_outline(points, 12))
     assert np.isnan(east[:, -1]).all()
     away_n = north[:, :-1] - points["north"].to_numpy()[:, None]
     away_e = east[:, :-1] - points["east"].to_numpy()[:, None]
@@ -52,11 +53,11 @@ def test_the_outline_of_a_band_is_its_ellipse() -> None:
 @pytest.mark.parametrize("physics", [True, False])
 def test_it_draws_what_was_played(banded: bool, physics: bool, tmp_path) -> None:
     here = content(banded, physics)
-    names = [trace.name for trace in seen(here).views["0"][0].figure.data]
+    names = [trace.name for trace in views(seen(here))["0"][0].data]
     assert names.count("predicted path") == 6
     assert names.count("physics alone") == 6 * physics
     assert names.count("band") == 6 * banded
-    history = along(here).views["0"][0].figure.data
+    history = views(along_run(here))["0"][0].data
     assert len(history) == 2 + 2 * banded
     np.testing.assert_allclose(history[-1].x, here.instants["t"][here.instants["outside"]])
     text = write_aboard(here, tmp_path / "seen.html").read_text()
@@ -88,12 +89,12 @@ def test_of_many_runs_the_worst_is_among_those_to_choose_from() -> None:
     rows = frames["instants"]
     frames["instants"] = rows.assign(error=rows["error"].where(rows["run"].ne("run 31") | rows["t"].ne(4.0), 55.0))
     many = replace(here, **frames)
-    figure = along(many)
+    figure = along_run(many)
     assert "the largest, 55.0 m, is in run 31." in figure.takeaway
     assert figure.controls[0].options[figure.controls[0].start] == "run 31"
-    drawn_errors = figure.views[str(figure.controls[0].start)][0].plot.traces[0]["y"]
+    drawn_errors = views(figure)[str(figure.controls[0].start)][0].data[0]["y"]
     assert np.nanmax(drawn_errors) == 55.0
-    assert 24 <= len(many.runs) <= 25
+    assert 24 <= len(figure.controls[0].options) <= 25
 
 
 def test_it_opens_at_the_worst_run_in_time_of_the_run() -> None:
@@ -107,13 +108,13 @@ def test_it_opens_at_the_worst_run_in_time_of_the_run() -> None:
                 part.assign(t=part["t"] + 1e6, **({"error": worse * part["error"]} if "error" in part else {}))
             )
     three = replace(here, **{key: pd.concat(parts, ignore_index=True) for key, parts in frames.items()})
-    for figure in (seen(three), along(three)):
+    for figure in (seen(three), along_run(three)):
         assert list(figure.controls[0].options) == ["a", "b", "c"]
         assert figure.controls[0].start == 1
     late = replace(three, instants=three.instants[three.instants["t"] >= 1e6 + 8], points=three.points)
-    (error, *_) = along(late).views["1"][0].plot.traces
+    (error, *_) = views(along_run(late))["1"][0].data
     assert error["x"][0] == 8, "the run began with its track, before there was a prediction"
-    lines = {str(trace["name"]): trace for trace in along(three).views["1"][0].plot.traces}
+    lines = {str(trace["name"]): trace for trace in views(along_run(three))["1"][0].data}
     np.testing.assert_allclose(lines["error"]["x"], here.instants["t"])
     np.testing.assert_allclose(lines["error"]["y"], 3.0 * here.instants["error"], rtol=1e-6)
     np.testing.assert_allclose(lines["band along"]["y"], 5.0)
@@ -121,5 +122,5 @@ def test_it_opens_at_the_worst_run_in_time_of_the_run() -> None:
 
 
 def test_every_item_is_declared() -> None:
-    for one in drawn(SECTIONS, content()):
-        assert [item.id for item in one.items] == list(SECTIONS[one.id].anchors)
+    for one in drawn(ABOARD_PAGE, content()):
+        assert [item.id for item in one.items] == list(ABOARD_PAGE[one.id].anchors)

@@ -8,9 +8,10 @@ import pandas as pd
 import pytest
 
 from shipid.report import ReportContent, bands
-from shipid.report.page import page
+from shipid.report.page import render_page
 from shipid.report.section import drawn
 from shipid.report.sections import SECTIONS
+from tests.report.views import views
 
 NASTY = "<b>wrong</b>"
 
@@ -52,8 +53,8 @@ def test_it_says_what_was_held(banded: ReportContent) -> None:
     figure = bands.coverage(banded)
     assert figure is not None
     assert "bands of 90 % hold 89 % of the test paths" in figure.takeaway
-    assert len(figure.views) == 3
-    groups = bands.groups(banded)
+    assert len(views(figure)) == 3
+    groups = bands.coverage_by_group(banded)
     assert groups is not None
     assert NASTY in groups.takeaway
     assert groups.takeaway.startswith("Bands hold least at ")
@@ -61,10 +62,10 @@ def test_it_says_what_was_held(banded: ReportContent) -> None:
     notes = [row[-1].text for row in groups.rows if row[1].text == "manoeuvre"]
     assert notes == ["2 runs of this kind calibrated the band: too few"]
     assert "--kind" not in groups.takeaway, "too few runs of this kind: it has no band"
-    table = bands.table(banded)
+    table = bands.coverage_table(banded)
     assert table is not None
     assert "needs 9 runs" in table.takeaway
-    worst = bands.worst(banded)
+    worst = bands.coverage_by_run(banded)
     assert worst is not None
     assert worst.rows[0][0].text == "M003"
 
@@ -78,7 +79,7 @@ def test_a_band_for_one_kind_is_named_where_there_is_one(
         | {"runs": 5, "note": ""}
         for kind in kinds
     ]
-    table = bands.groups(replace(banded, frames={**banded.frames, "coverage_groups": pd.DataFrame(rows)}))
+    table = bands.coverage_by_group(replace(banded, frames={**banded.frames, "coverage_groups": pd.DataFrame(rows)}))
     assert table is not None
     assert ("--kind of shipid predict" in table.takeaway) is said
 
@@ -90,7 +91,7 @@ def test_lines_of_the_coverage_are_those_of_a_close_up(banded: ReportContent) ->
     looks = {(chip.colour, chip.symbol) for chip in figure.chips}
     assert len(looks) == len(figure.chips)
     assert all(chip.symbol and "scale" not in chip.colour for chip in figure.chips)
-    symbols = [trace.marker.symbol for trace in figure.views["0"][0].figure.data if trace.mode == "lines+markers"]
+    symbols = [trace.marker.symbol for trace in views(figure)["0"][0].data if trace.mode == "lines+markers"]
     assert symbols == [chip.symbol for chip in figure.chips]
 
 
@@ -106,7 +107,7 @@ def test_the_coverage_says_which_models_are_drawn(banded: ReportContent) -> None
     assert "drawn; the table has all." in figure.how
     alone = replace(banded, frames={**banded.frames, "coverage": other})
     assert bands.coverage(alone) is None
-    assert bands.table(alone) is not None
+    assert bands.coverage_table(alone) is not None
 
 
 def test_bands_of_a_small_model_are_no_zeros(banded: ReportContent) -> None:
@@ -115,7 +116,7 @@ def test_bands_of_a_small_model_are_no_zeros(banded: ReportContent) -> None:
         for column in {"width", "end"} & set(frames[name].columns):
             frames[name][column] /= 1000
     small = replace(banded, frames=frames)
-    for table in (bands.table(small), bands.groups(small)):
+    for table in (bands.coverage_table(small), bands.coverage_by_group(small)):
         assert table is not None
         place = list(table.columns).index("mean radius [m]")
         assert not {"0.00", "0.000"} & {row[place].text for row in table.rows}
@@ -142,11 +143,11 @@ def test_the_map_of_the_width_speaks_of_hatching_where_there_is_some(banded: Rep
 def test_the_page_holds_it_and_no_tag(banded: ReportContent) -> None:
     only = {"how-far-off": SECTIONS["how-far-off"]}
     none = {name: getattr(banded, name).iloc[:0] for name in ("horizon", "over_time", "trials")}
-    text = page(replace(banded, snapshots=[], answer=[], findings=[], **none), only, "study")
+    text = render_page("study", only, replace(banded, snapshots=[], answer=[], findings=[], **none))
     assert "How far off it may be" in text
     assert NASTY not in text
     (section,) = drawn(only, banded)
-    assert [item.id for item in section.items] == list(bands.SECTION.anchors)
+    assert [item.id for item in section.items] == list(bands.HOW_FAR_OFF.anchors)
 
 
 def test_without_bands_nothing_is_drawn(simulation: ReportContent) -> None:

@@ -8,7 +8,9 @@ from shipid.report.content import spoken
 
 
 def test_every_frame_but_cells_and_models_may_be_absent(full_scale):
-    content = ReportContent("Question?", "bare", [], [], full_scale.cells, full_scale.naive, full_scale.models)
+    content = ReportContent(
+        title="Question?", name="bare", cells=full_scale.cells, naive=full_scale.naive, models=full_scale.models
+    )
     for name in ("horizon", "over_time", "commands", "tracks", "envelope", "factors", "trials", "repairs"):
         assert len(getattr(content, name)) == 0
         assert set(getattr(full_scale, name).columns) >= set(getattr(content, name).columns)

@@ -3,15 +3,15 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from shipid.report.errors_over import _changes, horizon, over_time
-from shipid.report.page import render
+from shipid.report.errors_over import error_over_horizon as horizon
+from shipid.report.errors_over import error_over_time as over_time
+from tests.report.test_page import render
+from tests.report.views import views
 
 
 def lines(figure, view):
-    return {trace.name: trace for trace in figure.views[view][0].figure.data}
+    return {trace.name: trace for trace in views(figure)[view][0].data}
 
 
 @pytest.mark.parametrize(("statistic", "column"), [(0, "mean"), (1, "p90")])
@@ -33,12 +33,11 @@ def test_horizon_draws_the_rows_of_its_size(simulation, statistic, column, index
         assert np.abs(whole - rows[column]).max() <= np.ptp(rows[column]) / 400  # less than a pixel
 
 
-@pytest.mark.parametrize("draw", [horizon, over_time])
-def test_the_page_opens_at_the_largest_amount_of_data(simulation, draw):
+def test_the_page_opens_at_the_largest_amount_of_data(simulation):
     """As the takeaway beside it speaks of that."""
-    control = draw(simulation).controls[-1]
-    assert control.options[control.start] == str(simulation.cells.N_D.max())
-    assert len(control.options) > 1
+    control = horizon(simulation).controls[-1]
+    assert (control.options, control.start) == ([10, 30, 100], 2)
+    assert "with N_D = 100" in over_time(simulation).how
 
 
 def test_seeds_become_their_mean(full_scale):
@@ -79,7 +78,7 @@ def test_a_close_up_of_many_models_says_which(simulation, full_scale):
 
 def test_names_at_the_ends_of_lines_fit_a_narrow_window(simulation):
     """The room for them is in pixels: a share of the time axis cut them in a window of 390 px."""
-    plot = horizon(simulation).views["0-0"][0].figure
+    plot = views(horizon(simulation))["0-0"][0]
     assert plot.layout.xaxis.range[1] == simulation.horizon.ahead.max()
     longest = max(len(name.text) for name in plot.layout.annotations)
     assert plot.layout.margin.r >= 16 + 7 * longest
@@ -92,7 +91,7 @@ def test_names_at_the_ends_do_not_stretch_the_axis_of_their_view(simulation):
     lost = simulation.horizon.assign(mean=simulation.horizon["mean"].mask(small, 100 * simulation.horizon["mean"]))
     figure = horizon(replace(simulation, horizon=lost))
     for view in ("0-0", "0-2"):
-        plot = figure.views[view][0].figure
+        plot = views(figure)[view][0]
         highest = max(max(trace.y) for trace in plot.data)
         assert max(name.ay for name in plot.layout.annotations) <= 1.1 * highest
 
@@ -106,8 +105,8 @@ def test_names_at_the_ends_of_many_lines_have_room(simulation):
         for key, frame in mine.items():
             many[key].append(frame.assign(model=f"m-{i}", **{"family": f"m-{i}"} if "family" in frame else {}))
     content = replace(simulation, **{key: pd.concat(frames, ignore_index=True) for key, frames in many.items()})
-    for view in horizon(content).views.values():
-        plot = view[0].figure
+    for view in views(horizon(content)).values():
+        plot = view[0]
         most = max(np.nanmax(trace.y) for trace in plot.data if not trace.name.endswith(", seeds"))
         heights = sorted(name.ay for name in plot.layout.annotations)
         assert 10 < len(heights) < 40
@@ -133,7 +132,7 @@ def test_takeaway_of_the_horizon(full_scale):
 
 def test_commands_share_the_time_axis_but_not_the_unit(full_scale):
     figure = over_time(full_scale)
-    plot = figure.views["0-0"][0].figure
+    plot = views(figure)["0"][0]
     titles = [plot.layout[name].title.text for name in ("yaxis", "yaxis2", "yaxis3")]
     assert titles == ["position error [m]", "azimuth [deg]", "shaft [rpm]"]
     domains = [plot.layout[name].domain for name in ("yaxis", "yaxis2", "yaxis3")]
@@ -153,11 +152,3 @@ def test_takeaway_names_the_worst_instant(simulation):
     mine = frame[(frame.model == "nominal") & (frame.N_D == 100)]
     worst = mine.loc[mine.error.idxmax()]
     assert f"in {worst.run} at t = {worst.t:g} s: {worst.error:.2f} m" in over_time(simulation).takeaway
-
-
-@given(st.lists(st.integers(-2, 2), min_size=1, max_size=60))
-def test_kept_changes_give_the_whole_command_back(values):
-    held = np.asarray(values, dtype=float)
-    kept = _changes(held)
-    back = held[kept[np.searchsorted(kept, np.arange(len(held)), side="right") - 1]]
-    np.testing.assert_array_equal(back, held)

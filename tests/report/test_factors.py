@@ -5,11 +5,12 @@ import pandas as pd
 import pytest
 
 from shipid.report.factors import factors
+from tests.report.views import views
 
 
 def test_one_dot_per_number_at_its_factor(simulation):
     figure = factors(simulation)
-    plot = figure.views[""][0].figure
+    plot = views(figure)[""][0]
     assert [trace.name for trace in plot.data] == ["hull", "inertia", "added mass", "thruster"]
     assert [chip.label for chip in figure.chips] == [trace.name for trace in plot.data]
     rows = ["moderate-1", "moderate-2", "moderate-3", "high-1", "high-2"]
@@ -25,10 +26,10 @@ def test_one_dot_per_number_at_its_factor(simulation):
 
 
 def test_the_row_tells_where_the_error_comes_from(simulation):
-    texts = [note.text for note in factors(simulation).views[""][0].figure.layout.annotations]
+    texts = [note.text for note in views(factors(simulation))[""][0].layout.annotations]
     assert texts[1] == "<b>moderate-2</b>  A 3.10 m: 2.17 along, 1.86 across"
     bare = replace(simulation, models=simulation.models.drop(columns=["A_along", "A_across"]))
-    assert factors(bare).views[""][0].figure.layout.annotations[1].text == "<b>moderate-2</b>  A 3.10 m"
+    assert views(factors(bare))[""][0].layout.annotations[1].text == "<b>moderate-2</b>  A 3.10 m"
 
 
 def test_a_long_name_leaves_room_for_the_errors_of_its_row(simulation):
@@ -38,7 +39,7 @@ def test_a_long_name_leaves_room_for_the_errors_of_its_row(simulation):
         part: getattr(simulation, part).assign(model=getattr(simulation, part).model.replace(long))
         for part in ("cells", "models", "factors")
     }
-    texts = [note.text for note in factors(replace(simulation, **renamed)).views[""][0].figure.layout.annotations]
+    texts = [note.text for note in views(factors(replace(simulation, **renamed)))[""][0].layout.annotations]
     (mine,) = [text for text in texts if text.startswith("<b>a-fa")]
     assert "7.50 m: 5.25 along, 4.50 across" in mine
     small = "  A 0.0016 m: 0.0073 along, 0.0014 across"  # of a model ship: these were cut off
@@ -71,9 +72,9 @@ def test_removed_terms_are_no_numbers_times_a_factor(full_scale):
 @pytest.mark.parametrize(("factor", "word"), [(0.0, "0"), (-0.5, "≤ 0")])
 def test_a_removed_term_lies_at_the_left_edge(full_scale, factor, word):
     figure = factors(replace(full_scale, factors=full_scale.factors.assign(factor=[factor, 1.2])))
-    plot = figure.views[""][0].figure
-    assert plot.layout.xaxis.ticktext[0] == word
-    assert plot.data[0].x[0] == pytest.approx(plot.layout.xaxis.tickvals[0])
+    plot = views(figure)[""][0]
+    assert plot.layout.xaxis.ticktext[-1] == word
+    assert plot.data[0].x[0] == pytest.approx(plot.layout.xaxis.tickvals[-1])
     assert plot.layout.xaxis.range[0] < plot.data[0].x[0] < np.log(0.8)
     assert "0 removes the term" in figure.how
 

@@ -10,9 +10,10 @@ import pandas as pd
 import pytest
 
 from shipid.report import identification
-from shipid.report.identification import SECTIONS, IdentificationContent, write_identification
+from shipid.report.identification import IDENTIFICATION_PAGE, IdentificationContent, write_identification
 from shipid.report.section import declared
 from tests.report.test_page import Page
+from tests.report.views import views
 
 NAMES = ["Y_v", "N_r", "X_vv"]
 
@@ -89,7 +90,7 @@ def test_the_page_fetches_nothing_and_every_link_leads_somewhere(held_out: tuple
     assert "<b>ship" not in text
     assert "T <1>" not in text
     anchors = {attributes.get("id") for _, attributes, _ in page.elements}
-    assert declared(SECTIONS) <= anchors | {"findings"}
+    assert declared(IDENTIFICATION_PAGE) <= anchors | {"findings"}
     for tag, attributes, _ in page.elements:
         assert "src" not in attributes
         assert tag not in ("link", "iframe", "object", "img")
@@ -108,7 +109,7 @@ def test_the_answer_counts_compares_and_warns() -> None:
 
 
 def test_what_is_not_identified_is_hollow_and_its_bar_is_cut() -> None:
-    figure = identification.estimates(content()).views[""][0].figure
+    figure = views(identification.estimates(content()))[""][0]
     bars = {trace.meta[0]: trace for trace in figure.data if trace.name == "interval"}
     dots = {trace.meta[0]: trace for trace in figure.data if trace.name == "estimate"}
     assert dots["identified"].marker.symbol == "circle"
@@ -125,7 +126,7 @@ def test_the_figure_of_residuals_holds_every_line() -> None:
     colours = pd.DataFrame({"signal": "v", "lag": [0.0, 1.0, 2.0], "correlation": [1.0, 0.95, -0.93]})
     figure = identification.residuals(replace(content(), colours=colours))
     assert figure is not None
-    low, high = figure.views[""][0].figure.layout.yaxis.range
+    low, high = views(figure)[""][0].layout.yaxis.range
     assert low < -0.93
     assert high > 1.0
     assert figure.takeaway == "The correlation of residuals one sample apart is v 0.95."
@@ -137,18 +138,18 @@ def test_names_of_many_estimates_do_not_cover_each_other(count: int, named: bool
     rows = one.estimates.iloc[[0] * count].assign(name=[f"N_{k}" for k in range(count)])
     figure = identification.correlations(replace(one, estimates=rows, correlations=np.eye(count)))
     assert figure is not None
-    assert figure.views[""][0].figure.layout.xaxis.showticklabels is named
+    assert views(figure)[""][0].layout.xaxis.showticklabels is named
     assert ("Columns are in the order of the rows." in figure.how) is not named
 
 
 def test_pieces_are_not_joined_and_time_starts_at_zero() -> None:
-    panels = identification.free_runs(content()).views["0"]
-    speed = next(trace for trace in panels[0].figure.data if trace.name == "measured")
+    panels = views(identification.free_runs(content()))["0"]
+    speed = next(trace for trace in panels[0].data if trace.name == "measured")
     gaps = np.flatnonzero(np.isnan(speed.y))
     assert gaps.tolist() == [30, 61]
     assert speed.x[0] == 0
     assert np.nanmax(speed.x) == 59  # a clock since 1970 in single precision would not tell seconds
-    rate = next(trace for trace in panels[2].figure.data if trace.name == "after")
+    rate = next(trace for trace in panels[2].data if trace.name == "after")
     assert np.nanmax(rate.y) == pytest.approx(np.rad2deg(1 / 9), rel=0.01)
 
 
@@ -156,19 +157,19 @@ def test_a_base_that_diverges_leaves_the_map_whole() -> None:
     page = content()
     series = page.series.copy()
     series.loc[series["model"] == "before", ["north", "east", "u", "v", "r"]] = np.nan
-    figure = identification.free_runs(replace(page, series=series)).views["0"][3].figure
+    figure = views(identification.free_runs(replace(page, series=series)))["0"][3]
     assert np.isfinite(figure.layout.xaxis.range).all()
 
 
 def test_tables_keep_the_order_and_say_why_numbers_are_missing() -> None:
-    errors = identification.errors(content())
+    errors = identification.free_run_errors(content())
     assert [row[0].text for row in errors.rows] == ["all held out", "all fitted", "test run", "fit run"]
     assert [cell.text for cell in errors.rows[0][2:4]] == ["1.000", "0.100"]
-    table = identification.manoeuvres(content())
+    table = identification.manoeuvres_before_and_after(content())
     assert table is not None
     assert table.columns[-1] == "why missing"
     assert table.rows[1][-1].text == "before: no"
-    rows = identification.numbers(content()).rows
+    rows = identification.estimates_table(content()).rows
     assert rows[1][0].text == "hull.N_r (with hull.N_v)"
     assert [row[6].text for row in rows] == ["1.00 … 1.20", "0.60 … 1.00", "none"]
 
@@ -176,7 +177,7 @@ def test_tables_keep_the_order_and_say_why_numbers_are_missing() -> None:
 def test_what_was_not_asked_for_is_left_out(tmp_path: Path) -> None:
     bare = replace(content(), profiles=pd.DataFrame(), programme=pd.DataFrame(), unseen=[])
     assert identification.profiles(bare) is None
-    assert identification.programme(bare) is None
-    assert identification.unseen(bare) is None
+    assert identification.programme_table(bare) is None
+    assert identification.unseen_table(bare) is None
     page = Page(write_identification(bare, tmp_path / "page.html").read_text())
     assert "What to run next" not in " ".join(words for _, words in page.all("h2"))

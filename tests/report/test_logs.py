@@ -3,12 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from shipid.report.logs import _takeaway, envelope, manoeuvres
+from shipid.report.logs import _takeaway_envelope, envelope, manoeuvres
+from tests.report.views import views
 
 
 def test_tracks_are_thinned_below_a_pixel_on_equal_axes(content, away):
     figure = manoeuvres(content)
-    plot = figure.views[""][0].figure
+    plot = views(figure)[""][0]
     assert plot.layout.xaxis.scaleanchor == "y"
     assert plot.layout.xaxis.scaleratio == 1
     assert len(plot.data) == content.tracks.run.nunique()
@@ -21,7 +22,7 @@ def test_tracks_are_thinned_below_a_pixel_on_equal_axes(content, away):
 
 
 def test_the_test_lies_on_top_in_another_colour(simulation):
-    plot = manoeuvres(simulation).views[""][0].figure
+    plot = views(manoeuvres(simulation))[""][0]
     colours = [trace.line.color for trace in plot.data]
     assert set(colours[-4:]) == {"var(--category-1)"}
     assert "var(--category-1)" not in colours[:-4]
@@ -44,9 +45,12 @@ def test_what_the_test_asks_beyond_training_is_named():
         ("test", "v", "m/s", -1.2, 0, 1),
     ]
     frame = pd.DataFrame(rows, columns=columns)
-    assert _takeaway(frame) == "The test reaches outside what the other sets cover in 1 of 2 inputs: v."
-    assert _takeaway(frame[frame.quantity == "u"]) == "The test stays inside what the other sets cover in all 1 input."
-    assert _takeaway(frame[frame["set"] == "D_10"]) == "2 inputs in 1 set."
+    assert _takeaway_envelope(frame) == "The test reaches outside what the other sets cover in 1 of 2 inputs: v."
+    assert (
+        _takeaway_envelope(frame[frame.quantity == "u"])
+        == "The test stays inside what the other sets cover in all 1 input."
+    )
+    assert _takeaway_envelope(frame[frame["set"] == "D_10"]) == "2 inputs in 1 set."
 
 
 def test_the_published_ranges_are_compared_and_not_counted_as_data():
@@ -56,7 +60,7 @@ def test_the_published_ranges_are_compared_and_not_counted_as_data():
         ("test", "u", "m/s", 1, 2, 4.5),
         ("published", "u", "m/s", 0.5, 2, 8),
     ]
-    text = _takeaway(pd.DataFrame(rows, columns=columns))
+    text = _takeaway_envelope(pd.DataFrame(rows, columns=columns))
     assert text == (
         "The test stays inside what the other sets cover in all 1 input. "
         "1 of 2 published ends are met within 20 % of the published range; not max of u."
@@ -64,7 +68,7 @@ def test_the_published_ranges_are_compared_and_not_counted_as_data():
 
 
 def test_the_published_range_is_the_last_row_and_open(simulation):
-    figure = envelope(simulation).views[""][0].figure
+    figure = views(envelope(simulation))[""][0]
     assert list(figure.layout.yaxis.ticktext) == ["D_10", "D_30", "D_100", "test", "published"]
     assert len(figure.data[-2].x) == 5
     assert figure.data[-1].marker.symbol == "circle-open"
@@ -72,10 +76,10 @@ def test_the_published_range_is_the_last_row_and_open(simulation):
 
 
 def test_ranges_run_from_smallest_to_largest(full_scale):
-    panels = envelope(full_scale).views[""]
+    panels = views(envelope(full_scale))[""]
     frame = full_scale.envelope
     assert len(panels) == frame.quantity.nunique()
-    bar, dot = panels[1].figure.data[2:4]  # sway speed of the test
+    bar, dot = panels[1].data[2:4]  # sway speed of the test
     expected = frame[(frame["set"] == "test") & frame.quantity.str.startswith("sway")].iloc[0]
     np.testing.assert_allclose([*bar.x, *dot.x], [expected["min"], expected["max"], expected["mean"]], rtol=1e-6)
 

@@ -14,9 +14,11 @@ from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import levels
 from shipid.report import manoeuvre
 from shipid.report.manoeuvre import ManoeuvreContent, write_manoeuvre
+from shipid.report.paths import outline_at
 from shipid.simulation.standard import standards
 from tests.measures.made_records import RECORDS, every
 from tests.report.test_page import Page
+from tests.report.views import views
 
 TRIALS = standards()
 
@@ -73,7 +75,7 @@ def test_the_answer_has_the_digits_of_the_table() -> None:
     helm = shown.measures["measure"].eq("neutral helm")
     shown = replace(shown, measures=shown.measures.assign(value=shown.measures["value"].mask(helm, -0.0248)))
     assert "Neutral helm: −0.025 deg" in shown.answer[0].text
-    assert "−0.025" in [row[1].text for row in manoeuvre.measures(shown).rows]
+    assert "−0.025" in [row[1].text for row in manoeuvre.measures_table(shown).rows]
     still = shown.measures.assign(value=shown.measures["value"].mask(helm, -1e-9))
     assert "Neutral helm: 0.00 deg" in replace(shown, measures=still).answer[0].text
 
@@ -83,17 +85,17 @@ def test_answer_counts_the_criteria_that_are_judged() -> None:
     assert shown.answer[1].text == "3 of 3 criteria of IMO MSC.137(76) are met."
     worse = shown.criteria.assign(verdict=["met", "not met", "not judged"])
     assert replace(shown, criteria=worse).answer[1].text == "1 of 2 criteria of IMO MSC.137(76) are met."
-    table = manoeuvre.criteria(replace(shown, criteria=worse))
+    table = manoeuvre.criteria_table(replace(shown, criteria=worse))
     assert table is not None
     assert [row[4].bad for row in table.rows] == [False, True, False]
 
 
 def test_a_missing_measure_says_why_in_its_row() -> None:
     shown = content("zigzag")
-    assert "why missing" not in manoeuvre.measures(shown).columns
+    assert "why missing" not in manoeuvre.measures_table(shown).columns
     spoiled = shown.measures.copy()
     spoiled.loc[spoiled["measure"] == "period", ["value", "note"]] = [np.nan, "too short"]
-    table = manoeuvre.measures(replace(shown, measures=spoiled))
+    table = manoeuvre.measures_table(replace(shown, measures=spoiled))
     row = next(row for row in table.rows if row[0].text == "period")
     assert (row[1].text, row[4].text, row[4].bad) == ("–", "too short", True)
     assert "period: not reached" in replace(shown, measures=spoiled).answer[0].text
@@ -105,8 +107,8 @@ def test_a_heading_of_few_degrees_is_drawn_with_the_helm(span: float, together: 
     shown = content("zigzag")
     psi = shown.log["psi"].to_numpy()
     wide = shown.log.assign(psi=2.0 + (psi - psi[0]) * np.deg2rad(span) / np.ptp(psi))
-    panels = manoeuvre.histories(replace(shown, log=wide)).views[""]
-    lines = [{str(trace["name"]): np.asarray(trace["y"]) for trace in panel.plot.traces} for panel in panels]
+    panels = views(manoeuvre.histories(replace(shown, log=wide)))[""]
+    lines = [{str(trace["name"]): np.asarray(trace["y"]) for trace in panel.data} for panel in panels]
     assert np.ptp(lines[0]["heading"]) == pytest.approx(span, rel=1e-3)
     assert ("helm" in lines[0]) == together
     execute = [name for name in lines[0] if name.endswith(" deg")]
@@ -121,13 +123,13 @@ def test_rounding_is_not_drawn() -> None:
     """A stop on a straight course: a yaw rate of 1e-25 filled its panel."""
     made = content("stop")
     figure = manoeuvre.histories(replace(made, log=made.log.assign(r=np.linspace(0, 3e-25, len(made.log)))))
-    (panel,) = (one.plot for one in figure.views[""] if one.plot.layout["yaxis"]["title"]["text"] == "yaw rate [deg/s]")
+    (panel,) = (one for one in views(figure)[""] if one.layout["yaxis"]["title"]["text"] == "yaw rate [deg/s]")
     low, high = panel.layout["yaxis"]["range"]
     assert high - low >= 1
 
 
 def test_counts_have_no_decimals() -> None:
-    rows = {row[0].text: row[1].text for row in manoeuvre.measures(content("spiral")).rows}
+    rows = {row[0].text: row[1].text for row in manoeuvre.measures_table(content("spiral")).rows}
     assert rows["levels"] == f"{int(rows['levels'])}"
     assert rows["levels not steady"] == f"{int(rows['levels not steady'])}"
 
@@ -135,16 +137,16 @@ def test_counts_have_no_decimals() -> None:
 def test_ships_are_drawn_to_scale_where_they_were() -> None:
     """Bow and stern of an outline lie on the heading, the bow half a length ahead; starboard of east is south."""
     shape = np.array([[60.0, 0.0], [-60.0, 0.0], [0.0, 9.0]])
-    drawn = manoeuvre._outline(shape, north=10.0, east=20.0, psi=np.pi / 2)
-    np.testing.assert_allclose(drawn[:3], [[80.0, 10.0], [-40.0, 10.0], [20.0, 1.0]], atol=1e-9)
+    drawn = outline_at(shape, np.array([10.0, 20.0, np.pi / 2]))
+    np.testing.assert_allclose(drawn[:3], [[10.0, 80.0], [10.0, -40.0], [1.0, 20.0]], atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["zigzag", "stop", "spiral"])
 def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
     shown = content(kind)
     shown = replace(shown, log=shown.log.assign(psi=shown.log["psi"] + 1.0, shaft=np.linspace(-1, 2, len(shown.log))))
-    panels = manoeuvre.histories(shown).views[""]
-    lines = {str(trace["name"]): np.asarray(trace["y"]) for panel in panels for trace in panel.plot.traces}
+    panels = views(manoeuvre.histories(shown))[""]
+    lines = {str(trace["name"]): np.asarray(trace["y"]) for panel in panels for trace in panel.data}
     log = shown.log
     expected = {"heading": np.degrees(log["psi"] - log["psi"].iloc[0]), "helm": np.degrees(log["helm"])}
     expected |= {"ahead, u": log["u"], "to starboard, v": log["v"], "yaw rate, r": np.degrees(log["r"])}
@@ -153,6 +155,6 @@ def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
     if kind == "spiral":
         figure = manoeuvre.spiral(shown)
         assert figure is not None
-        (trace,) = figure.views[""][0].plot.traces
+        (trace,) = views(figure)[""][0].data
         for axis, column in (("x", "helm"), ("y", "rate")):
             np.testing.assert_allclose(trace[axis], np.degrees(shown.levels[column]), rtol=1e-5, atol=1e-6)

@@ -9,9 +9,10 @@ import pandas as pd
 import pytest
 
 from shipid.report import ReportContent, memory
-from shipid.report.page import page
+from shipid.report.page import render_page
 from shipid.report.section import drawn
 from shipid.report.sections import SECTIONS
+from tests.report.views import views
 
 NASTY = "<b>wrong</b>"
 ONLY = {"the-past": SECTIONS["the-past"]}
@@ -58,7 +59,7 @@ def little(past: ReportContent) -> ReportContent:
 
 
 def test_the_section_is_on_the_page_and_names_are_escaped(little: ReportContent) -> None:
-    text = page(little, ONLY, "study")
+    text = render_page("study", ONLY, little)
     assert "What the past shows" in text
     assert NASTY not in text
     (section,) = drawn(ONLY, little)
@@ -66,7 +67,7 @@ def test_the_section_is_on_the_page_and_names_are_escaped(little: ReportContent)
 
 
 def test_a_study_without_a_past_has_no_such_section(little: ReportContent) -> None:
-    assert "What the past shows" not in page(replace(little, frames={}), ONLY, "study")
+    assert "What the past shows" not in render_page("study", ONLY, replace(little, frames={}))
 
 
 def test_an_observer_alone_is_shown(past: ReportContent) -> None:
@@ -83,7 +84,7 @@ def test_the_observer_says_its_numbers(past: ReportContent) -> None:
     assert "0.30 m/s" in figure.takeaway
     assert "1.50 on average" in figure.takeaway
     assert f"{100 * np.exp(-1.5):.0f} % is left 30 s ahead" in figure.how
-    plot = figure.views["0"][0].figure
+    plot = views(figure)["0"][0]
     assert [shape.x0 for shape in plot.layout.shapes] == [5.0, 30.0]
     force = next(trace for trace in plot.data if trace.name == "ahead")
     assert force.y == pytest.approx(-2.0)  # cm/s^2
@@ -106,15 +107,15 @@ def test_no_row_for_a_current_that_nobody_looked_for(past: ReportContent) -> Non
     figure = memory.observer(replace(past, frames={"observer": along(current=0.0)}))
     assert figure is not None
     assert "current" not in figure.takeaway
-    assert not any("towards" in trace.name for trace in figure.views["0"][0].figure.data)
+    assert not any("towards" in trace.name for trace in views(figure)["0"][0].data)
 
 
 def test_the_gain_counts_intervals_free_of_zero(past: ReportContent) -> None:
-    figure = memory.gain(past)
+    figure = memory.memory_gain(past)
     assert figure is not None
     assert "With N_D = 30, 1 of 3 comparisons lower H and 1 raise it" in figure.takeaway
     assert "−0.40 m [−0.60, −0.20]" in figure.takeaway
-    points = [trace for trace in figure.views["0"][0].figure.data if trace.yaxis == "y2"]
+    points = [trace for trace in views(figure)["0"][0].data if trace.yaxis == "y2"]
     heights = {value for trace in points for value in np.asarray(trace.y, dtype=float).round(4)}
     assert heights == {-0.1, -0.05, -0.6, -0.4, 0.3}
     bars = next(trace for trace in points if NASTY not in trace.name and "none" not in trace.name and len(trace.y) == 2)
@@ -126,74 +127,29 @@ def test_the_gain_counts_intervals_free_of_zero(past: ReportContent) -> None:
 
 def test_rivals_that_differ_in_more_are_named(past: ReportContent) -> None:
     sums = past.frames["memory"].assign(differs="trials")
-    figure = memory.gain(replace(past, frames={**past.frames, "memory": sums}))
+    figure = memory.memory_gain(replace(past, frames={**past.frames, "memory": sums}))
     assert figure is not None
     assert "memory: b against a (trials)" in figure.how
 
 
-def test_windows_offer_the_largest_and_the_smallest_gain(past: ReportContent) -> None:
-    figure = memory.windows(past)
-    assert figure is not None
-    assert list(figure.controls[0].options) == [
-        f"{NASTY}, memory: b against a",
-        "no physics, memory: b against a",
-        "right, observer: physics alone",
-    ]
-    assert "in 72 % of the windows" in figure.takeaway  # 1 + t / 100 is above 1.3 from t = 31 s on
-    assert "1.59 m become 1.30 m" in figure.takeaway
-    plot = figure.views["0-0"][0].figure
-    assert [shape.x0 for shape in plot.layout.shapes] == [30.0], "no order before the windows"
-    first, second, difference = (np.asarray(trace.y, dtype=float) for trace in plot.data)
-    np.testing.assert_allclose(difference, second - first, atol=1e-6)  # with less without
-    assert (first[-1], second[-1]) == pytest.approx((1.59, 1.3))
-
-
 def test_rivals_without_physics_are_named_as_everywhere(past: ReportContent) -> None:
     """`none + b errs less than none + a` says that nothing does."""
-    sums, time = (past.frames[name] for name in ("memory", "memory_over_time"))
-    bare = replace(past, frames={**past.frames, "memory": sums[sums.model.eq("no physics")], "memory_over_time": time})
-    figure, table = memory.windows(bare), memory.table(bare)
-    assert figure is not None
+    sums = past.frames["memory"]
+    bare = replace(past, frames={**past.frames, "memory": sums[sums.model.eq("no physics")]})
+    table = memory.memory_table(bare)
     assert table is not None
-    assert figure.takeaway.startswith('"no physics + b" errs less than "no physics + a" in ')
     assert [cell.text for cell in table.rows[0][:2]] == ["no physics + a", "no physics + b"]
-    gained = memory.gain(bare)
+    gained = memory.memory_gain(bare)
     assert gained is not None
     assert 'is that of "no physics", 0.30 m' in gained.takeaway
 
 
-def test_the_map_has_a_cell_for_each_model_and_amount(past: ReportContent) -> None:
-    figure = memory.difference_map(past)
-    assert figure is not None
-    boxes, words = figure.views["0"][0].figure.data
-    assert list(words.text) == ["<b>−0.10</b>", "−0.050", "<b>−0.60</b>", "<b>−0.40</b>", "<b>0.30</b>"]
-    assert list(words.y) == [0, 0, 1, 1, 2], "models by rising A, no physics on top"
-    colours = dict(zip(words.text, boxes.marker.color, strict=True))
-    assert colours["<b>0.30</b>"] != colours["−0.050"]
-    assert boxes.marker.opacity[2] == max(boxes.marker.opacity)
-
-
-def test_no_difference_is_no_loss(past: ReportContent) -> None:
-    """Where validation takes no memory, both methods are the same."""
-    none = past.frames["memory"].assign(difference=0.0, low=0.0, high=0.0)
-    figure = memory.difference_map(replace(past, frames={**past.frames, "memory": none}))
-    assert figure is not None
-    assert set(figure.views["0"][0].figure.data[0].marker.color) == {"var(--muted)"}
-
-
-def test_no_minus_before_a_zero(past: ReportContent) -> None:
-    sums = past.frames["memory"].assign(difference=-0.0000001, low=-0.1, high=0.1)
-    figure = memory.difference_map(replace(past, frames={**past.frames, "memory": sums}))
-    assert figure is not None
-    assert set(figure.views["0"][0].figure.data[1].text) == {"0.00"}
-
-
 def test_the_table_has_every_comparison(past: ReportContent) -> None:
-    table = memory.table(past)
+    table = memory.memory_table(past)
     assert table is not None
     assert len(table.rows) == len(SUMS)
     assert [cell.text for cell in table.rows[-1]][-2:] == ["–", "15 of 20"]
     small = past.frames["memory"].assign(H_without=0.0123, H_with=0.0119, difference=-0.0004)
-    of_a_model_ship = memory.table(replace(past, frames={**past.frames, "memory": small}))
+    of_a_model_ship = memory.memory_table(replace(past, frames={**past.frames, "memory": small}))
     assert of_a_model_ship is not None
     assert [cell.text for cell in of_a_model_ship.rows[0][4:7]] == ["0.012", "0.012", "0.000"]

@@ -4,7 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from shipid.report.palette import accuracy_range, close_styles, level, styles, variables
+from shipid.report.figure import colour_level, page_colours
+from shipid.report.selection import accuracy_range, close_styles, styles
 
 
 def luminance(colour: str) -> float:
@@ -15,7 +16,12 @@ def luminance(colour: str) -> float:
 
 
 def scale(dark: bool) -> list[float]:
-    return [luminance(c) for c in re.findall(r"--scale-\d+: (rgb\([^)]*\))", variables(dark))]
+    return [
+        luminance(c)
+        for c in [
+            colour for name, colour in page_colours("dark" if dark else "light").items() if name.startswith("scale-")
+        ]
+    ]
 
 
 def test_the_scale_is_ordered_and_has_contrast_on_both_pages():
@@ -30,7 +36,7 @@ def test_the_scale_is_ordered_and_has_contrast_on_both_pages():
 
 def test_named_colours_are_distinct_and_the_first_has_most_contrast():
     for dark, page in ((False, "#ffffff"), (True, "#12151a")):
-        named = re.findall(r"--category-\d: (#\w{6})", variables(dark))
+        named = [page_colours("dark" if dark else "light")[f"category-{i}"] for i in range(6)]
         assert len(set(named)) == 6
         paper = luminance(page)
         first = luminance(named[0])
@@ -48,14 +54,14 @@ def test_few_models_have_names_many_have_a_scale(simulation, full_scale):
 
 def test_errors_of_a_model_ship_have_colours():
     """A scale from 0.1 mm to 10 km, and one whose first value is that of an exact model."""
-    decades = [level(10.0**k, (1e-4, 1e4)) for k in range(-4, 5)]
+    decades = [colour_level(10.0**k, (1e-4, 1e4)) for k in range(-4, 5)]
     assert decades[0] == 0
     assert decades[-1] == 23
     assert min(np.diff(decades)) >= 2
-    assert level(4e-4, (2e-4, 8e-4)) == 12
+    assert colour_level(4e-4, (2e-4, 8e-4)) == 12
     for exact in (0.0, 1e-15):
-        assert [level(value, (exact, 10.0)) for value in (exact, 0.1, 10.0)] == [0, 12, 23]
-    assert level(0.0, (0.0, 0.0)) == 0
+        assert [colour_level(value, (exact, 10.0)) for value in (exact, 0.1, 10.0)] == [0, 12, 23]
+    assert colour_level(0.0, (0.0, 0.0)) == 0
 
 
 def test_methods_on_one_model_and_models_without_physics_have_markers_of_their_own(simulation):

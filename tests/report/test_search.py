@@ -7,35 +7,36 @@ import pytest
 from scipy.stats import spearmanr
 
 from shipid.hybrid.path_drawn import MEMORIES as KINDS_BY_NUMBER
-from shipid.report.search import CEILING, FAILED, MEMORIES, importance, searched, table
+from shipid.report.search import CEILING, FAILED, MEMORIES, importance, search_table, searched
 from shipid.report.search import search as drawn_anew
 from shipid.report.wording import short
+from tests.report.views import views
 
 search = lru_cache(maxsize=2)(drawn_anew)  # the same content is drawn once
 
 
 def panels(content, view="0"):
-    return {panel.figure.layout.xaxis.title.text.split(" [")[0]: panel for panel in search(content).views[view]}
+    return {panel.layout.xaxis.title.text.split(" [")[0]: panel for panel in views(search(content))[view]}
 
 
 def dots(panel):
-    return {trace.name: trace for trace in panel.figure.data}
+    return {trace.name: trace for trace in panel.data}
 
 
 def test_a_panel_per_hyperparameter_that_varies(simulation):
     fixed = replace(simulation, trials=simulation.trials.assign(units=64.0))
     assert searched(simulation) == ["learning_rate", "weight_decay", "units"]
     assert list(panels(fixed)) == ["learning rate", "weight decay"]
-    assert panels(simulation)["learning rate"].figure.layout.xaxis.type == "log"
+    assert panels(simulation)["learning rate"].layout.xaxis.type == "log"
     dropped = replace(simulation, trials=simulation.trials.assign(hidden_dropout=simulation.trials.number / 20))
-    assert panels(dropped)["hidden dropout"].figure.layout.xaxis.type is None
+    assert panels(dropped)["hidden dropout"].layout.xaxis.type is None
 
 
 def test_ticks_over_many_decades_have_room(simulation):
     """A panel is 190 px wide: names of five powers of ten lay over each other."""
     for decades in range(2, 13):
         values = np.geomspace(10.0 ** (4 - decades), 1e4, len(simulation.trials))
-        x = panels(replace(simulation, trials=simulation.trials.assign(weight_decay=values)))["weight decay"].figure
+        x = panels(replace(simulation, trials=simulation.trials.assign(weight_decay=values)))["weight decay"]
         low, high = x.layout.xaxis.range
         shown = [tick for tick in x.layout.xaxis.tickvals if low <= np.log10(tick) <= high]
         assert 2 <= len(shown) <= 5
@@ -58,7 +59,7 @@ def test_views_hold_their_size(simulation):
     drawn = dots(panels(simulation, "2")["units"])
     mine = simulation.trials[simulation.trials.N_D.eq(30) & simulation.trials.chosen]
     np.testing.assert_allclose(drawn["chosen"].x, mine.units)
-    ranges = {tuple(panels(simulation, view)["units"].figure.layout.xaxis.range) for view in ("0", "1", "2", "3")}
+    ranges = {tuple(panels(simulation, view)["units"].layout.xaxis.range) for view in ("0", "1", "2", "3")}
     assert len(ranges) == 1
 
 
@@ -102,7 +103,10 @@ def test_takeaway_names_what_goes_with_the_error(simulation):
 
 
 def test_the_table_sums_up_by_size(simulation):
-    rows = {int(row[0].key): dict(zip(table(simulation).columns, row, strict=True)) for row in table(simulation).rows}
+    rows = {
+        int(row[0].key): dict(zip(search_table(simulation).columns, row, strict=True))
+        for row in search_table(simulation).rows
+    }
     mine = simulation.trials[simulation.trials.N_D == 30]
     assert list(rows) == [10, 30, 100]
     assert rows[30]["cells [1]"].key == 14
@@ -121,16 +125,16 @@ def test_a_search_in_closed_form_says_what_there_was(simulation):
     content = replace(simulation, trials=trials)
     drawn = panels(content)
     assert list(drawn) == ["motion scale", "mirror"]
-    assert list(drawn["mirror"].figure.layout.xaxis.ticktext) == ["no", "yes"]
+    assert list(drawn["mirror"].layout.xaxis.ticktext) == ["no", "yes"]
     assert [chip.label for chip in search(content).chips] == ["trial", "chosen", "median"]
-    printed = table(content)
+    printed = search_table(content)
     assert "504 trials in 42 cells: none stopped early, none diverged" in printed.takeaway
     assert "Tried: motion scale 2 to 13, mirror yes or no." in printed.takeaway
     row = dict(zip(printed.columns, printed.rows[0], strict=True))
     assert "epochs [1]" not in row
     assert row["chosen motion scale [1]"].text == "2 / 3.5 / 5"
     assert row["share of chosen mirror [1]"].text == "0.75"
-    assert "epochs [1]" in table(simulation).columns
+    assert "epochs [1]" in search_table(simulation).columns
     assert {"stopped early", "diverged"} < {chip.label for chip in search(simulation).chips}
 
 
@@ -138,7 +142,7 @@ def test_delays_are_seconds_and_kinds_of_memory_are_named(simulation):
     trials = simulation.trials.drop(columns=["learning_rate", "weight_decay", "units"])
     trials = trials.assign(delays=2.0 + trials.number.mod(3), memory=trials.number.mod(3).astype(float))
     content = replace(simulation, trials=trials)
-    assert {panel.figure.layout.xaxis.title.text for panel in search(content).views["0"]} == {
+    assert {panel.layout.xaxis.title.text for panel in views(search(content))["0"]} == {
         "delays [s]",
         "memory [1]",
     }
@@ -146,8 +150,8 @@ def test_delays_are_seconds_and_kinds_of_memory_are_named(simulation):
         "%{x:.3g} s" in dot.hovertemplate for name, dot in dots(panels(content)["delays"]).items() if name != "median"
     )
     assert search(content).how.endswith(" Memory: 0 none, 1 the error of the physics, 2 that and history.")
-    assert "chosen delays [s]" in table(content).columns
-    assert "delays 2 to 4 s," in table(content).takeaway
+    assert "chosen delays [s]" in search_table(content).columns
+    assert "delays 2 to 4 s," in search_table(content).takeaway
     assert "Memory:" not in search(simulation).how
 
 
@@ -163,12 +167,11 @@ def test_every_kind_of_memory_has_its_words():
 def test_trials_that_all_diverged_stand(simulation):
     lost = simulation.trials.assign(state="diverged", value=np.nan, chosen=False)
     content = replace(simulation, trials=lost)
-    assert "–" in table(content).rows[0][-1].text
+    assert "–" in search_table(content).rows[0][-1].text
     assert search(content).takeaway.startswith("None of 504 trials ended")
 
 
 def test_no_trials_no_search(simulation):
     none = replace(simulation, trials=simulation.trials.iloc[:0])
     assert search(none) is None
-    assert table(none) is None
     assert search(replace(simulation, trials=simulation.trials[["cell", "N_D", "state", "value", "chosen"]])) is None

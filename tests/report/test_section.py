@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from shipid.report.section import Section, declared, drawn, part
+from shipid.report.section import Section, declared, drawn
 from shipid.report.tables import Table
 
 EMPTY = pd.DataFrame()
@@ -12,14 +12,6 @@ FULL = pd.DataFrame({"a": [1.0]})
 
 def table(name: str) -> Table:
     return Table(name, name, "", ["a"], [True], [])
-
-
-def test_a_part_is_a_field_or_a_frame():
-    content = SimpleNamespace(cells=FULL, frames={"waves": FULL, "cells": EMPTY})
-    assert part(content, "cells") is FULL, "fields come first"
-    assert part(content, "waves") is FULL
-    assert part(content, "tides") is None
-    assert part(SimpleNamespace(), "tides") is None
 
 
 @pytest.mark.parametrize(("need", "shown"), [("full", True), ("empty", False), ("absent", False), ("number", True)])

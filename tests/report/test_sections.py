@@ -6,7 +6,7 @@ import pytest
 
 from shipid.answer.pages import FRAMES
 from shipid.report import ReportContent, checks, identification, manoeuvre
-from shipid.report.page import render
+from shipid.report.page import render_page
 from shipid.report.section import OF_EVERY_PAGE, Section, drawn
 from shipid.report.sections import SECTIONS
 from tests.documented import module
@@ -14,9 +14,9 @@ from tests.report import test_checks, test_identification, test_manoeuvre
 
 PAGES = {
     "study": (SECTIONS, None),
-    "check": (checks.SECTIONS, lambda: test_checks.content("log")),
-    "identification": (identification.SECTIONS, test_identification.content),
-    "manoeuvre": (manoeuvre.SECTIONS, lambda: test_manoeuvre.content("spiral")),
+    "check": (checks.CHECK_PAGE, lambda: test_checks.content("log")),
+    "identification": (identification.IDENTIFICATION_PAGE, test_identification.content),
+    "manoeuvre": (manoeuvre.MANOEUVRE_PAGE, lambda: test_manoeuvre.content("spiral")),
 }
 
 
@@ -57,7 +57,7 @@ def test_the_section_of_the_page_on_adding_is_drawn(simulation, monkeypatch):
     bias = module("A section of the report", "bias_figure_of_the_page", monkeypatch, number=3).bias
     signed = Section("Bias", draw=lambda content: (bias(content),), needs=("bias",), anchors=("bias",))
     monkeypatch.setitem(SECTIONS, "signed", signed)
-    shown = render(replace(simulation, frames={"bias": frame(results)}))
+    shown = render_page("study", SECTIONS, replace(simulation, frames={"bias": frame(results)}))
     assert 'id="bias"' in shown
 
 

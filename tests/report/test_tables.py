@@ -7,15 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipid.report.tables import Cell, cell_html, cells, envelope, figure, models, repairs, text
+from shipid.report.cells import cells_table as cells
+from shipid.report.factors import models_table as models
+from shipid.report.logs import envelope_table as envelope
+from shipid.report.logs import repairs_table as repairs
+from shipid.report.tables import Cell, cell_html, number_cell, word_cell
 
 
 def test_numbers_align_and_what_is_missing_sorts_last():
-    assert figure(0.9, 2).text == "0.90"
-    assert figure(-12.345, 1).text == "−12.3"
-    assert figure(np.nan, 2).text == "–"
-    assert figure(np.nan, 2).key > 1e200
-    assert text(None).text == text(np.nan).text == text(pd.NA).text == "–"
+    assert number_cell(0.9, 2).text == "0.90"
+    assert number_cell(-12.345, 1).text == "−12.3"
+    assert number_cell(np.nan, 2).text == "–"
+    assert number_cell(np.nan, 2).key > 1e200
+    assert word_cell(None).text == word_cell(np.nan).text == word_cell(pd.NA).text == "–"
 
 
 def test_every_cell_is_a_row(content):
@@ -59,16 +63,6 @@ def test_errors_of_a_small_model_are_no_zeros(simulation):
         assert len({len(text.partition(".")[2]) for text in texts if text != "–"}) == 1, "points align"
 
 
-def test_where_a_model_errs_is_shown_where_known(simulation):
-    assert {"A along [m]", "A across [m]"} <= set(models(simulation).columns)
-    bare = simulation.models.drop(columns=["A_along", "A_across"])
-    assert "A along [m]" not in models(replace(simulation, models=bare)).columns
-
-
-def test_the_published_set_is_the_last_row(simulation):
-    assert [row[0].text for row in envelope(simulation).rows][-2:] == ["test", "published"]
-
-
 def test_envelope_and_repairs_hold_their_numbers(full_scale):
     table = envelope(full_scale)
     assert [row[0].text for row in table.rows] == ["train, all folds", "test"]
@@ -103,5 +97,5 @@ def test_a_cell_is_read_back_from_its_element(words, key, numeric, first):
 )
 def test_a_long_name_is_shown_whole(words, style):
     """Models whose names differ at the end alone looked alike."""
-    classes = ElementTree.fromstring(cell_html(text(words), numeric=False, first=False)).get("class").split()
+    classes = ElementTree.fromstring(cell_html(word_cell(words), numeric=False, first=False)).get("class").split()
     assert classes == ["words", *([style] if style else [])]

@@ -3,7 +3,7 @@ import math
 from shipid.report.wording import (
     bound,
     counted,
-    difference,
+    difference_text,
     distance,
     ends,
     listed,
@@ -78,7 +78,7 @@ def test_a_sentence_is_set_with_signs_and_spaces() -> None:
 
 def test_a_difference_and_its_interval_have_as_many_decimals() -> None:
     """`0.018 m [0.00, 3.42]` has digits that do not match."""
-    assert difference(0.018, -0.004, 0.042) == "0.018 m [−0.004, 0.042]"
-    assert difference(0.0003, -2.1, 2.14) == "0.00 m [−2.10, 2.14]", "nearly 0 in a wide interval"
-    assert difference(9.8, 8.13, 11.52) == "9.8 m [8.1, 11.5]"
+    assert difference_text(0.018, -0.004, 0.042) == "0.018 m [−0.004, 0.042]"
+    assert difference_text(0.0003, -2.1, 2.14) == "0.00 m [−2.10, 2.14]", "nearly 0 in a wide interval"
+    assert difference_text(9.8, 8.13, 11.52) == "9.8 m [8.1, 11.5]"
     assert ends(0.018, 3.42) == "0.02 to 3.42"

@@ -6,7 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report.error_map import error_map, lack
+from shipid.report.figure import Figure
+from shipid.report.physics_and_data import error_map, gain, gain_lack, map_lack, nice_levels, smoothed
+from tests.report.views import first_panel, views
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +22,7 @@ def failing(simulation):
 
 
 def flat(content):
-    return error_map(content).views["0"][0].figure
+    return first_panel(error_map(content))
 
 
 def test_every_cell_lies_at_its_accuracy_and_size(simulation):
@@ -79,11 +81,9 @@ def test_a_failed_cell_is_a_cross_and_no_line_passes_it(failing):
     assert len(bars.x) == 20
     (words,) = (w for w in bars.customdata if "high-2" in w and "N_D = 30" in w)
     assert "1 of 2 seeds gave no result" in words
-    # Between high-1 and high-2 the triangle at N_D = 10 has a corner without value.
-    low, high = np.sqrt([7.5, 13.0])
-    for line in figure.data[3:]:
-        x, y = np.asarray(line.x), np.asarray(line.y)
-        assert not ((x < 30) & (y > low + (high - low) * (x - 10) / 20 + 1e-4)).any()
+    lines = [trace for trace in figure.data if trace.type == "contour"]
+    assert lines
+    assert all(np.isnan(trace.z[5, 0]) and np.isfinite(trace.z[5, 1:]).all() for trace in lines)
     assert "high-2 at N_D = 10 (diverged)" in error_map(failing).how
 
 
@@ -112,56 +112,11 @@ def test_names_of_many_rows_are_beside_their_cells(simulation):
     assert all(abs(note.y - places[note.text]) < 1.5 * line for note in names)
 
 
-def test_lines_carry_their_level_in_metres(simulation):
-    figure = flat(simulation)
-    texts = [note.text for note in figure.layout.annotations if note.xref != "paper"]
-    assert texts
-    assert all(re.fullmatch(r"[\d.]+ m", text) for text in texts)
-    assert len(set(texts)) == len(texts)
-
-
-def test_bars_stand_as_high_as_the_error(failing):
-    """A box is its front, top and right side, then its side once more, shaded; what is nearer is drawn later."""
-    traces = error_map(failing).views["1"][0].figure.data
-    means = failing.cells.groupby(["model", "N_D"]).H.mean().dropna()
-    bodies = [trace for trace in traces if trace.fill == "toself" and "var(--heat" in trace.fillcolor]
-    crosses = [trace for trace in traces if trace.mode == "markers"]
-    assert (len(bodies), len(crosses)) == (len(means), 1)
-    heights = [np.asarray(body.y, dtype=float)[2] - np.asarray(body.y, dtype=float)[1] for body in bodies]
-    np.testing.assert_allclose(np.sort(heights), np.sort(means), atol=2e-4)
-    texts = [trace.text for trace in traces if trace.text]
-    assert "N_D = 10:" in texts[0]
-    assert "N_D = 100:" in texts[-1]
-
-
-def test_the_front_row_stands_on_the_axis_and_no_bar_is_cut(simulation):
-    """Its fronts began below 0, where they were cut, and ended below H by 4 % of the greatest."""
-    figure = error_map(simulation).views["1"][0].figure
-    sides = [trace for trace in figure.data if trace.text and "N_D = 100" in trace.text]
-    assert len(sides) == simulation.cells.model.nunique()
-    for side in sides:
-        (H,) = re.findall(r"H ([\d.]+) m", side.text)
-        corners = np.asarray(side.y, dtype=float)
-        np.testing.assert_allclose(corners[[0, 3]], [0, float(H)], atol=0.006)
-    tops = [np.nanmax(np.asarray(trace.y, dtype=float)) for trace in figure.data]
-    low, high = figure.layout.yaxis.range
-    assert low == 0
-    assert max(tops) < high
-    assert figure.layout.xaxis.ticktext[-1] == "no physics"
-
-
-def test_sides_of_the_bars_have_units(simulation):
-    layout = error_map(simulation).views["1"][0].figure.layout
-    assert (layout.xaxis.title.text, layout.yaxis.title.text) == ("models by A [m]", "H, front row [m]")
-    assert layout.yaxis.range[0] == 0
-    assert {note.text for note in layout.annotations} == {"N_D = 10", "N_D = 30", "N_D = 100"}
-
-
 def test_two_methods_on_the_same_physics_do_not_hide_each_other(simulation):
     names = simulation.cells.model.isin(["moderate-1", "moderate-2"])
     others = simulation.cells[names].assign(model=lambda cells: cells.model + " + alone", H=1.7)
     figure = error_map(replace(simulation, cells=pd.concat([simulation.cells, others], ignore_index=True)))
-    bars = figure.views["0"][0].figure.data[0]
+    bars = first_panel(figure).data[0]
     assert len(bars.x) == 7 * 3
     assert min(bars.y) > 0.05
     assert not any("alone" in words for words in bars.customdata)
@@ -198,8 +153,8 @@ def test_what_a_map_lacks_is_named(simulation, kept, needs):
     """Every one of them was said to be `no rows`."""
     content = replace(simulation, cells=kept(simulation.cells))
     assert error_map(content) is None
-    assert re.match(f"it needs {needs}", lack(content))
-    assert lack(simulation) == ""
+    assert re.match(f"it needs {needs}", map_lack(content))
+    assert map_lack(simulation) == ""
 
 
 @pytest.mark.parametrize("factor", [0.001, 0.02, 1.0, 1000.0])
@@ -207,28 +162,10 @@ def test_axes_have_ticks_at_any_size_of_error(simulation, factor):
     lengths = ["A", "A_90", "H", "H_90", "rms"]
     cells = simulation.cells.assign(**{name: factor * simulation.cells[name] for name in lengths})
     models = simulation.models.assign(A=factor * simulation.models.A)
-    views = error_map(replace(simulation, cells=cells, models=models)).views
-    axis = views["0"][0].figure.layout.yaxis
+    axis = flat(replace(simulation, cells=cells, models=models)).layout.yaxis
     words = [word for word in axis.ticktext if word != "no physics"]
     assert len(words) >= 4
     np.testing.assert_allclose([float(word) ** 0.5 for word in words], axis.tickvals[: len(words)])
-    heights = views["1"][0].figure.layout.yaxis.tickvals
-    assert 3 <= len(heights) <= 7
-    assert len(set(heights)) == len(heights)
-
-
-def test_names_of_lines_are_apart(simulation):
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        errors = dict.fromkeys(zip(simulation.cells.model, simulation.cells.N_D, strict=True))
-        errors = {key: float(np.exp(rng.normal())) for key in errors}
-        pairs = zip(simulation.cells.model, simulation.cells.N_D, strict=True)
-        figure = flat(replace(simulation, cells=simulation.cells.assign(H=[errors[pair] for pair in pairs])))
-        lines = np.concatenate([np.column_stack([t.x, t.y]) for t in figure.data if t.meta == ("iso",)])
-        span = np.ptp(lines, axis=0)
-        places = [np.array([note.x, note.y]) / span for note in figure.layout.annotations if note.xref != "paper"]
-        assert len(places) > 2
-        assert min(np.hypot(*(a - b)) for a, b in itertools.combinations(places, 2)) > 0.15
 
 
 def test_of_several_models_without_physics_the_rival_has_its_name(simulation):
@@ -246,27 +183,6 @@ def test_a_map_of_physics_alone_speaks_of_no_rival_and_no_training(simulation):
     assert "trained" not in figure.how
 
 
-def test_there_is_no_map_of_one_size_or_one_model(simulation, full_scale):
-    assert error_map(full_scale) is None
-    names = ["nominal", "no physics"]
-    one = replace(
-        simulation,
-        cells=simulation.cells[simulation.cells.model.isin(names)],
-        models=simulation.models[simulation.models.model.isin(names)],
-    )
-    assert error_map(one) is None
-    assert error_map(replace(simulation, cells=simulation.cells.assign(H=np.nan, status="failed"))) is None
-
-
-def test_without_data_driven_nothing_is_compared(simulation):
-    kept = simulation.cells.model.ne("no physics")
-    figure = error_map(
-        replace(simulation, cells=simulation.cells[kept], models=simulation.models[simulation.models.family != "none"])
-    )
-    assert "not below that of" not in figure.takeaway
-    assert len(figure.views["0"][0].figure.data[1].x) == 0
-
-
 def test_a_model_without_accuracy_has_a_separate_strip(simulation):
     lost = simulation.models.A.where(simulation.models.model != "high-2")
     cells = simulation.cells.assign(A=simulation.cells.A.where(simulation.cells.model != "high-2"))
@@ -281,29 +197,13 @@ def test_bands_of_lines_of_equal_error_hold_the_lines(simulation):
     wide = means.assign(low=0.8 * means.H, high=1.25 * means.H)
     plain, banded = (flat(replace(simulation, frames=frames)) for frames in ({}, {"intervals": wide}))
     assert not [trace for trace in plain.data if trace.meta == ("bounds",)]
-    lines = [trace for trace in banded.data if trace.meta == ("iso",)]
-    bounds = [trace for trace in banded.data if trace.meta == ("bounds",)]
-    assert bounds
-    for level in {trace.name for trace in lines}:
-        at = np.concatenate([trace.y for trace in lines if trace.name == level])
-        sides = [np.nanmean(trace.y) for trace in bounds if trace.name == level]
-        if len(sides) == 2:
-            assert min(sides) < np.nanmean(at) < max(sides)
-    narrow = flat(replace(simulation, frames={"intervals": means.assign(low=means.H, high=means.H)}))
-    same = [trace for trace in narrow.data if trace.meta == ("bounds",)]
-    assert len(same) == 2 * len(lines) // 2
-
-
-def test_a_dotted_line_is_of_a_level_that_has_a_line(simulation):
-    """Else a reader takes the dotted line of 1.5 m for the end of the interval of the line of 1 m."""
-    means = simulation.cells.groupby(["model", "N_D"], as_index=False).H.mean()
-    corner = simulation.cells.model.eq("high-1") & simulation.cells.N_D.eq(10)
-    one_cell = simulation.cells.assign(H=np.where(corner, 8.0, 1.0))  # the lines around it are too short to be drawn
-    ends = means.assign(low=means.H / means.H.median(), high=means.H / means.H.median() * 1.4)
-    drawn = flat(replace(simulation, cells=one_cell, frames={"intervals": ends})).data
-    names = {kind: {trace.name for trace in drawn if trace.meta == (kind,)} for kind in ("iso", "bounds")}
-    assert not names["iso"]
-    assert not names["bounds"]
+    lines, bounds = ([one for one in banded.data if one.meta == (kind,)] for kind in ("iso", "bounds"))
+    levels = {trace.contours.start for trace in lines}
+    assert levels == {trace.contours.start for trace in bounds}, "a dotted line is of a level that has a line"
+    for level in levels:
+        low, high = (one.z for one in bounds if one.contours.start == level)
+        assert (low < lines[0].z).all()
+        assert (lines[0].z < high).all()
 
 
 def test_too_few_test_manoeuvres_give_no_band(simulation):
@@ -311,3 +211,175 @@ def test_too_few_test_manoeuvres_give_no_band(simulation):
     blank = replace(simulation, frames={"intervals": means.assign(low=np.nan, high=np.nan)})
     assert not [trace for trace in flat(blank).data if trace.meta == ("bounds",)]
     assert "95 % interval" not in error_map(blank).how
+
+
+def test_levels_are_round_and_inside_the_values():
+    values = np.random.default_rng(1).uniform(0.5, 14.0, (7, 5))
+    levels = nice_levels(values, 5)
+    assert 3 <= len(levels) <= 5
+    assert all(values.min() < level < values.max() and f"{level:.0e}"[0] in "12357" for level in levels)
+    assert nice_levels(np.full((4, 4), np.nan), 5) == []
+
+
+def test_smoothing_keeps_a_level_and_gaps_and_small_grids():
+    values = np.full((20, 8), 3.0)
+    values[4, 2] = np.nan
+    smooth = smoothed(values, (2.0, 1.0))
+    assert np.isnan(smooth[4, 2])
+    np.testing.assert_allclose(smooth[np.isfinite(smooth)], 3.0)
+    few = np.exp(np.random.default_rng(0).normal(size=(5, 3)))
+    np.testing.assert_allclose(smoothed(few, (2.0, 1.0)), few)
+    rough = np.exp(np.random.default_rng(0).normal(size=(30, 3)))
+    assert np.log(smoothed(rough, (2.0, 1.0))).std() < 0.6 * np.log(rough).std()
+
+
+LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+
+def traces(figure: Figure, view: str) -> dict[str, list]:
+    """Traces of a view by name."""
+    by_name: dict[str, list] = {}
+    for trace in views(figure)[view][0].data:
+        by_name.setdefault(trace.name, []).append(trace)
+    return by_name
+
+
+@pytest.mark.parametrize(("view", "column", "floor"), [("0-0", "H", 5.01), ("1-0", "H_90", 11.2), ("2-1", "rms", 6.3)])
+def test_lines_are_means_over_seeds(simulation, view, column, floor):
+    drawn = traces(gain(simulation), view)
+    cells = simulation.cells
+    for model in cells.model.unique():
+        (line,) = drawn[model]
+        expected = [cells[(cells.model == model) & cells.N_D.eq(size)][column].mean() for size in (10, 30, 100)]
+        assert list(line.x) == [10, 30, 100]
+        np.testing.assert_allclose(line.y, expected, rtol=1e-6)
+        (points,) = drawn[f"{model}, seed"]
+        np.testing.assert_allclose(sorted(points.y), sorted(cells[cells.model == model][column]), rtol=1e-6)
+    np.testing.assert_allclose(drawn["constant u, v, r"][0].y, floor, rtol=1e-6)
+
+
+def test_a_failed_size_leaves_a_gap(simulation):
+    cells = simulation.cells.copy()
+    failed = (cells.model == "high-1") & (cells.N_D == 30)
+    cells.loc[failed, ["H", "H_90", "rms"]] = np.nan
+    cells.loc[failed, "status"] = "diverged"
+    figure = gain(replace(simulation, cells=cells))
+    (line,) = traces(figure, "0-0")["high-1"]
+    assert list(np.isfinite(line.y)) == [True, False, True]
+    assert line.connectgaps is False
+    assert "Not plotted: high-1 at N_D = 30 (diverged)" in figure.how
+
+
+def test_a_seed_that_failed_is_distinguished_from_a_cell_that_failed(simulation):
+    cells = simulation.cells.copy()
+    failed = cells.model.eq("high-1") & cells.N_D.eq(30) & cells.seed.eq(1)
+    cells.loc[failed, ["H", "H_90", "rms"]] = np.nan
+    cells.loc[failed, "status"] = "diverged"
+    assert "high-1 at N_D = 30 (diverged, 1 of 2 seeds)" in gain(replace(simulation, cells=cells)).how
+
+
+def test_a_logarithmic_axis_is_offered(simulation):
+    figure = gain(simulation)
+    kinds = [views(figure)[view][0].layout.yaxis.type for view in ("0-0", "0-1")]
+    assert kinds == [None, "log"]
+    ticks = views(figure)["0-1"][0].layout.yaxis
+    powers = [re.sub(r"^10(?=\D|[⁰-⁹¹²³])", "1 × 10", word) for word in ticks.ticktext]
+    written = [float(word.replace(" × 10", "e").translate(LOWERED)) for word in powers]
+    assert written == list(ticks.tickvals)
+
+
+def test_of_many_models_some_have_a_line(simulation):
+    """41 lines are not told apart; those drawn are spread over A, with the best in validation and the rival."""
+    mine = [frame[frame.model.eq("high-1")] for frame in (simulation.models, simulation.cells)]
+    names = [f"f{k:02d}" for k in range(41)]
+    many = [pd.concat([one.assign(model=n, family=n, A=1.0 + k) for k, n in enumerate(names)]) for one in mine]
+    pure = [frame[frame.model.eq("no physics")] for frame in (simulation.models, simulation.cells)]
+    models, cells = (pd.concat(pair, ignore_index=True) for pair in zip(many, pure, strict=True))
+    figure = gain(replace(simulation, models=models, cells=cells, best="f02"))
+    drawn = [name for name in traces(figure, "0-0") if name.startswith("f") and "seed" not in name]
+    assert len(drawn) == 13
+    assert {"f00", "f02", "f40"} <= set(drawn)
+    assert {chip.key for chip in figure.chips} == {*(f"model:{name}" for name in drawn), "model:no physics", "naive"}
+    words = (
+        "Of 41 models with physics, 13 have a line: some spread over A and the best in validation; the others are in"
+    )
+    assert words in figure.how
+    assert "have a line" not in gain(simulation).how
+
+
+def test_errors_far_apart_begin_on_a_logarithmic_axis(simulation):
+    cells = simulation.cells
+    far = cells.assign(H=cells.H.where(cells.model.ne("no physics"), 50.0))
+    starts = [gain(replace(simulation, cells=one)).controls[1].start for one in (cells, far)]
+    assert starts == [0, 1]
+
+
+def test_takeaway_speaks_of_the_best_in_validation_and_its_rival(simulation):
+    cells = simulation.cells
+    means = cells[cells.N_D == 10].groupby("model").H.mean()
+    text = gain(simulation).takeaway
+    assert f'At N_D = 10, nominal has H = {means["nominal"]:.2f} m and "no physics" has H = ' in text
+    assert f"has H = {means['no physics']:.2f} m; at N_D = 100, " in text
+    assert text.endswith("nominal is the best in validation.")
+
+
+def test_data_driven_is_thick_ink_and_accuracy_is_ordered_colour(simulation):
+    drawn = {name: lines[0] for name, lines in traces(gain(simulation), "0-0").items()}
+    assert drawn["no physics"].line.color == "var(--ink)"
+    assert drawn["no physics"].line.width > drawn["nominal"].line.width
+    models = ["nominal", "moderate-1", "moderate-2", "moderate-3", "high-1", "high-2"]
+    levels = [int(drawn[name].line.color.removeprefix("var(--scale-").rstrip(")")) for name in models]
+    assert levels == sorted(levels)
+    assert levels[0] == 0
+    assert levels[-1] == 23
+
+
+def test_one_size_is_a_dumbbell(full_scale):
+    figure = gain(full_scale)
+    drawn = traces(figure, "0")
+    (bar,), (before,), (after,) = (drawn[name] for name in ("inaccurate", "physics alone", "with compensation"))
+    np.testing.assert_allclose(bar.x, [5.2, 2.05], rtol=1e-6)
+    row = int(bar.y[0])
+    assert (before.x[row], after.x[row]) == pytest.approx((5.2, 2.05))
+    assert before.marker.symbol == "circle-open"
+    assert after.marker.symbol == "circle"
+    assert figure.takeaway == (
+        "accurate (Gunnerus, 28.9 m), best in validation, has H = 0.94 m; compensation improves 2 of 2 physics models; "
+        '"no physics" has H = 4.30 m; constant u, v, r 5.01 m.'
+    )
+
+
+def test_without_a_result_of_physics_nothing_is_counted(full_scale):
+    cells = full_scale.cells.copy()
+    lost = cells.family.ne("none")
+    cells.loc[lost, ["H", "H_90", "rms"]] = np.nan
+    cells.loc[lost, "status"] = "failed"
+    text = gain(replace(full_scale, cells=cells, best="")).takeaway
+    assert text.startswith('No physics model has a result with data; "no physics" has H = 4.30 m;')
+
+
+def test_a_failed_model_keeps_its_physics_and_shows_no_result(full_scale):
+    figure = gain(full_scale)
+    plot = views(figure)["0"][0]
+    drawn = [t for t in plot.data if t.name.startswith("bare hull")]
+    assert [np.isfinite(np.asarray(t.x)).tolist() for t in drawn] == [[True, False]]
+    (before, after) = (t for t in plot.data if t.name in ("physics alone", "with compensation"))
+    assert (np.isfinite(before.x).sum(), np.isfinite(after.x).sum()) == (3, 3)
+    (text,) = (a.text for a in plot.layout.annotations if "bare hull" in a.text)
+    assert "6.40 m → no result" in text
+    assert "<script>" not in text
+
+
+def test_why_nothing_is_drawn_is_named(simulation):
+    """Where nothing learns, it was said that there were no rows."""
+    physics = simulation.cells[simulation.cells.family.ne("none")]
+    alike = physics.assign(H=physics.A, status="ok")
+    still = replace(simulation, cells=alike, alone=set(alike.model))
+    moving = replace(still, cells=alike.assign(H=alike.A + alike.N_D))  # as of physics that each cell identifies
+    reasons = {"it needs rows of cells": replace(simulation, cells=physics[:0]), "no method learns from data": still}
+    for reason, content in reasons.items():
+        assert gain(content) is None
+        assert gain_lack(content).startswith(reason)
+    for content in (simulation, moving):
+        assert gain(content) is not None
+        assert gain_lack(content) == ""

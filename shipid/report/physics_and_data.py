@@ -1,0 +1,547 @@
+"""What physics and data buy: the map H(A, N_D), and H over N_D, a line per model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Sequence
+from statistics import fmean
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_in
+from shipid.report.figure import (
+    CLEAR,
+    INK,
+    MUTED,
+    NAIVE,
+    Chip,
+    Control,
+    Figure,
+    Scale,
+    Trace,
+    axis,
+    colour_level,
+    escaped,
+    even_places,
+    line,
+    log_axis,
+    plot,
+    row_name,
+    spread_apart,
+)
+from shipid.report.section import Section
+from shipid.report.selection import (
+    FEW_MODELS,
+    accuracy_range,
+    data_driven,
+    in_words,
+    left_out,
+    model_chips,
+    nothing_learns,
+    overview,
+    same_physics,
+    spread,
+    styles,
+    trained,
+)
+from shipid.report.wording import CONSTANT, counted, listed, metres, number, shortened
+
+HEIGHT, THICK = 580, 26  # of the map and at most of a cell [px]
+MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
+NAME_HEIGHT = 13  # of a row [px]
+INSIDE = HEIGHT - MARGIN["t"] - MARGIN["b"]
+MOST_LEVELS = 5
+NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
+FEWEST = 6.0  # times these: rows or columns that are enough to average, else the bell reaches over all of them
+NICE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # digits that a level may have
+TICKS = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
+SHORT, LONG = 12, 28  # characters of a name beside a row, and above one
+DUMBBELL = 46  # height of a model where there is one N_D [px]
+MOST_LINES, FAR = 12, 30.0  # models with physics that have a line; H by the least H that needs a logarithmic axis
+STATISTICS = {  # of the position error -> its columns in the cells, the models and constant u, v, r
+    "mean": ("H", "A", "mean"),
+    "90th percentile": ("H_90", "A_90", "p90"),
+    "root mean square": ("rms", "A_rms", "rms"),
+}
+HOW_MEASURED = (
+    "Position error over all predicted points of all windows of all test manoeuvres: its mean is H (15), of the "
+    "physics alone A (14). Where a cell was trained with several seeds, {seeds}. The dashed line is constant u, v, r: "
+    "surge, sway and yaw rate stay as they are at the instant of prediction, the least that any model must beat."
+)
+
+
+class CellMap(NamedTuple):
+    """What a map shows.
+
+    rows : model, family, A [m], y (square root of A; models without A above), short (name beside the row), by A.
+    cells : model, N_D, family, A, y, low and high (reach below and above y), H [m], worse (not below that without
+        physics), words (of the hover box).
+    """
+
+    rows: pd.DataFrame
+    cells: pd.DataFrame
+
+
+def error_map(content: ReportContent) -> Figure | None:
+    """H over A and N_D; None where `map_lack` says why not, or H is A: nothing learns."""
+    shown = map_of_cells(content)
+    if shown is None or nothing_learns(content):
+        return None
+    rows, cells = shown
+    lines, bounded = _isolines(shown, content.frame("intervals"))
+    many = [f"{FEWEST * width:.0f}" for width in NEIGHBOURS]
+    lined = f" Lines of equal error follow H [m], averaged over neighbouring models where there are {many[0]} or more, "
+    lined += f"and over neighbouring N_D where there are {many[1]} or more. No line is drawn beside a cell without a "
+    lined += "result."
+    if bounded:
+        lined += " Dotted: the same lines through the ends of the 95 % interval of H over test manoeuvres. Between the "
+        lined += "two dotted lines of a level the data do not say on which side of the level H lies; one that is "
+        lined += "missing lies beyond the cells."
+    return Figure(
+        id="map",
+        title="Physics and data: the map",
+        takeaway=_takeaway_map(shown) + _method_of_map(content, rows),
+        how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
+        + (f" Hatched: H is not below that of {_rival(rows)} at the same N_D." if cells.worse.any() else "")
+        + (lined if lines else "")
+        + left_out(content)
+        + _not_on_map(content)
+        + unplotted(content),
+        alternative=f"Cells of the position error H for {counted(len(rows), 'model')} by A and N_D. The numbers are in "
+        "the table of cells.",
+        height=HEIGHT,
+        draw=lambda: [draw_map(shown, lines)],
+        chips=([Chip("iso", "lines of equal H", INK, width=1.5)] if lines else [])
+        + ([Chip("bounds", "ends of the 95 % interval", INK, "dot", 1.5)] if bounded else []),
+        scale=Scale("position error, mean, H [m]", float(cells.H.min()), float(cells.H.max()), "heat"),
+    )
+
+
+def map_lack(content: ReportContent) -> str:
+    """What a map needs that the content does not have, as the end of a sentence; empty where it can be drawn."""
+    cells = content.cells
+    physics = cells[cells.family.ne(DATA_DRIVEN)].groupby("model").A.first()
+    needs = {
+        "rows of cells": not cells.empty,
+        "two N_D or more": cells.N_D.nunique() > 1,
+        "two models with physics or more": len(physics) > 1,
+        "the column A [m], a number for two models with physics or more": physics.notna().sum() > 1,
+        "cells with a result": not trained(content).merge(_rows_of_map(content)[["model"]]).empty,
+    }
+    return next((f"it needs {name}" for name, there in needs.items() if not there), "")
+
+
+def map_of_cells(content: ReportContent) -> CellMap | None:
+    """What the map shows; None where `map_lack` says why not."""
+    if map_lack(content):
+        return None
+    rows = _rows_of_map(content)
+    half = np.minimum(np.diff(rows.y) / 2, THICK / 2 * 1.04 * rows.y.max() / INSIDE)  # way to the next row
+    rows = rows.assign(low=np.insert(half, 0, half[0]), high=np.append(half, half[-1]))
+    cells = content.cells[["model", "N_D"]].drop_duplicates().merge(rows.drop(columns="short"))
+    cells = cells.merge(trained(content)[["model", "N_D", "H"]], how="left")
+    learned = cells.N_D.map(cells[cells.model.eq(data_driven(content) or "")].set_index("N_D").H)
+    worse = cells.family.ne(DATA_DRIVEN) & cells.H.ge(learned)
+    groups = {key: mine.to_dict("records") for key, mine in content.cells.groupby(["model", "N_D"])}
+    words = [
+        _cell_words(groups[row.model, row.N_D], row, learned[row.Index] if worse[row.Index] else None)
+        for row in rows_in(cells)
+    ]
+    return CellMap(rows, cells.assign(worse=worse, words=words))
+
+
+def _rows_of_map(content: ReportContent) -> pd.DataFrame:
+    """The models of the cells as `CellMap.rows`.
+
+    Of several methods on the same physics, which have one place, the first: the one judged, where it is among them.
+    """
+    frame = overview(content)
+    frame = frame[~same_physics(frame)].reset_index(drop=True)
+    top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
+    strips = top * (1.05 + 0.06 * frame.A.isna().cumsum())
+    parts = [str(name).partition(" + ") for name in frame.model]
+    alike = len({method for _, _, method in parts}) == 1
+    short = [foundation for foundation, _, _ in parts] if alike else frame.model
+    return frame.assign(y=np.sqrt(frame.A).where(frame.A.notna(), strips), short=short)
+
+
+def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any, learned: float | None) -> str:
+    """Return the lines of the hover box of one model and N_D, of which there are some cells."""
+    good = sorted((one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])), key=lambda one: one["H"])
+    accuracy = f"A {metres(row.A)}, " if math.isfinite(row.A) else ""
+    lines = [f"<b>{escaped(row.model)}</b>, {accuracy}N_D = {row.N_D}"]
+    if not good:
+        first = cells[0]
+        return "<br>".join([*lines, escaped(f"{first['status']}: {first['sentence']}".rstrip(": "))])
+    best, worst = good[0], good[-1]
+    lines.append(f"H {metres(row.H)}, H_90 {metres(fmean(one['H_90'] for one in good))}")
+    if len(cells) > 1:
+        lines.append(f"{number(best['H'])} to {metres(worst['H'])} over {counted(len(good), 'seed')}")
+    if len(good) < len(cells):
+        lines.append(f"{len(cells) - len(good)} of {counted(len(cells), 'seed')} gave no result")
+    if learned is not None:
+        lines.append(f"no better than no physics, {metres(learned)}")
+    return "<br>".join([*lines, escaped(best["hyperparameters"])] if best.get("hyperparameters") else lines)
+
+
+def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> go.Figure:
+    """Draw cells at A and N_D, hatched or crossed where they are of no use, under lines of equal H."""
+    rows, cells = shown
+    top, counts = float(rows.y.max()) * 1.04, np.unique(cells.N_D)
+    # Most of the way to the nearer neighbour, but no cell much wider than another.
+    gaps = np.diff(counts)
+    nearest = np.minimum(np.append(gaps, gaps[-1]), np.insert(gaps, 0, gaps[0]))
+    widths = dict(zip(counts.tolist(), 0.86 * np.minimum(nearest, 1.5 * gaps.min()), strict=True))
+    good, bad = cells[cells.H.notna()], cells[cells.H.isna()]
+    span = float(good.H.min()), float(good.H.max())
+    shades = [f"var(--heat-{colour_level(value, span)})" for value in good.H]
+    box = {"marker": {"color": shades, "line": {"width": 0.5, "color": MUTED}}, "customdata": list(good.words)}
+    lattice = {"shape": "/", "fgcolor": "#000000", "size": 8, "solidity": 0.16}
+    hatched = {"marker": {"color": CLEAR, "line": {"width": 1.2, "color": INK}, "pattern": lattice}}
+    cross = {"symbol": "x-thin", "size": 8, "line": {"width": 2, "color": "var(--bad)"}}
+    traces: list[Trace] = [
+        {**_boxes(good, widths), **box, "hovertemplate": "%{customdata}<extra></extra>"},
+        {**_boxes(good[good.worse], widths), **hatched, "hoverinfo": "skip"},
+        line("no result", bad.N_D, bad.y, [], mode="markers", marker=cross, hover=list(bad.words)),
+    ]
+    ends = [counts[0] - 0.75 * widths[counts[0]], counts[-1] + 0.75 * widths[counts[-1]]]
+    x = axis("manoeuvres, N_D [1]", tickvals=counts.tolist(), range=ends, showgrid=False)
+    y = axis("error of the physics alone, A [m]", range=[0, top], **_ticks_of_map(rows))
+    edge = (rows.y[rows.A.notna()].max() + rows.y[rows.A.isna()].min()) / 2
+    rule = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": edge, "y1": edge}
+    rules = [{**rule, "line": {"color": MUTED, "width": 1, "dash": "dot"}}] * bool(rows.A.isna().any())
+    above = {f"{side}axis2": {"overlaying": side, "matches": side, "visible": False} for side in "xy" if lines}
+    more = {"annotations": _names_of_rows(rows, top), "margin": MARGIN, "shapes": rules, **above}
+    return plot([*traces, *lines], x, y, barmode="overlay", **more)
+
+
+def _boxes(cells: pd.DataFrame, widths: dict[int, float]) -> Trace:
+    """Bars around each cell."""
+    size = {"y": (cells.low + cells.high).round(4), "width": cells.N_D.map(widths)}
+    columns = {"x": cells.N_D, "base": (cells.y - cells.low).round(4), **size}
+    return {"type": "bar", **{name: values.tolist() for name, values in columns.items()}}
+
+
+def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
+    """Names of the models with an A, right of their cells; of more than have room there, some at even distances.
+
+    A few always have their names, even where their cells cover each other.
+    """
+    known = rows[rows.A.notna()].reset_index(drop=True)
+    room = 1 + int(np.ptp(known.y) / top * INSIDE / NAME_HEIGHT)
+    some = even_places(len(known), max(room, FEW_MODELS))
+    heights = spread_apart(known.y[some].tolist(), NAME_HEIGHT / INSIDE * top, float(known.y.max()))
+    place = {"xref": "paper", "x": 1, "xanchor": "left", "xshift": 4, "showarrow": False}
+    return [
+        {**place, "y": height, "text": escaped(shortened(name, SHORT)), "font": {"size": 11, "color": INK}}
+        for height, name in zip(heights, known.short[some], strict=True)
+    ]
+
+
+def _ticks_of_map(rows: pd.DataFrame) -> dict[str, list[Any]]:
+    """Ticks of A where the rows are, far enough apart to read; a row without A has its name there."""
+    largest, strips = float(rows.A.max()), rows[rows.A.isna()]
+    decade = math.floor(math.log10(max(largest, 1e-6)))
+    scale = decade - 1 if decade < 0 else max(decade - 3, 0)  # a model in a basin errs by centimetres
+    values = [0.0]
+    for tick in (float(f"{tick}e{scale}") for tick in TICKS):
+        apart = all(abs(math.sqrt(tick) - math.sqrt(other)) > 0.06 * rows.y.max() for other in values)
+        values += [tick] * (tick <= largest and apart)
+    names = [escaped(shortened(name, SHORT)) for name in strips.short]
+    return {"tickvals": [*np.sqrt(values), *strips.y], "ticktext": [*(f"{value:g}" for value in values), *names]}
+
+
+def _isolines(shown: CellMap, ends: pd.DataFrame) -> tuple[list[Trace], bool]:
+    """Lines of equal H through the models with physics, and whether there are those of the ends of its intervals.
+
+    ends : model, N_D, low, high [m]; may be empty.
+    """
+    physics, ends = shown.rows[shown.rows.A.notna() & shown.rows.family.ne(DATA_DRIVEN)], ends.dropna()
+
+    def grid(frame: pd.DataFrame, column: str) -> Floats:
+        table = frame.pivot(index="model", columns="N_D", values=column)
+        return smoothed(table.reindex(index=physics.model, columns=np.unique(shown.cells.N_D)).to_numpy(), NEIGHBOURS)
+
+    mean = grid(shown.cells[shown.cells.model.isin(physics.model)], "H")
+    base = {"type": "contour", "x": np.unique(shown.cells.N_D).tolist(), "y": physics.y.tolist(), "hoverinfo": "skip"}
+    base |= {"showscale": False, "autocontour": False, "xaxis": "x2", "yaxis": "y2"}  # Plotly draws bars over contours
+    inks = {"rim": {"color": "var(--page)", "width": 4}, "iso": {"color": INK, "width": 1.5}}
+    inks |= {"low": {"color": INK, "width": 1.2, "dash": "dot"}, "high": {"color": INK, "width": 1.2, "dash": "dot"}}
+    heights = {"rim": mean, "iso": mean, **({side: grid(ends, side) for side in ("low", "high")} if len(ends) else {})}
+    traces = []
+    for (kind, z), level in [(item, level) for item in heights.items() for level in nice_levels(mean, MOST_LEVELS)]:
+        label = {"showlabels": kind == "iso", "labelfont": {"size": 12, "color": INK, "shadow": "auto"}}
+        lines = {"start": level, "end": level, "size": level, "coloring": "none", **label}
+        keys = ["bounds"] if kind in ends else ["iso"]
+        traces.append({**base, "z": z, "contours": lines, "line": {**inks[kind], "smoothing": 0}, "meta": keys})
+    return traces, len(ends) > 0 and len(traces) > 0
+
+
+def nice_levels(values: Floats, most: int) -> list[float]:
+    """At most `most` round levels inside the middle three fifths of the finite values."""
+    finite = values[np.isfinite(values) & (values > 0)]
+    if finite.size < 4:
+        return []
+    low, high = np.quantile(finite, [0.2, 0.8])
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    inside = [digit * 10.0**decade for decade in decades for digit in NICE if low < digit * 10.0**decade < high]
+    return [inside[i] for i in even_places(len(inside), most)] if inside else []
+
+
+def smoothed(values: Floats, radius: tuple[float, float]) -> Floats:
+    """Positive values (m, n), each the geometric mean of its neighbours under a bell of `radius` rows and columns.
+
+    Values that are not finite stay so and have no weight. A grid with fewer rows or columns than six radii is not
+    smoothed along them.
+    """
+    finite = np.isfinite(values) & (values > 0)
+    total, weight = np.where(finite, np.log(np.where(finite, values, 1.0)), 0.0), finite.astype(float)
+    for side, width in enumerate(radius):
+        count = values.shape[side]
+        if count >= FEWEST * width:
+            bell = np.exp(-((np.subtract.outer(np.arange(count), np.arange(count)) / width) ** 2) / 2)
+            total, weight = (np.moveaxis(np.tensordot(bell, part, (1, side)), 0, side) for part in (total, weight))
+    return np.where(finite, np.exp(total / np.where(weight > 0, weight, 1.0)), np.nan)
+
+
+def _method_of_map(content: ReportContent, rows: pd.DataFrame) -> str:
+    """Sentence on the method of the cells on the map, where other methods are not on it; empty if all are."""
+    if not (_not_on_map(content) or left_out(content)):
+        return ""
+    drawn = content.cells[content.cells.model.isin(rows.model[rows.family.ne(DATA_DRIVEN)])]
+    names = sorted({str(name) for name in drawn.method}) if "method" in drawn else []
+    return f" Of several methods, {listed(names) if names else 'the first'} is drawn."
+
+
+def _not_on_map(content: ReportContent) -> str:
+    """Sentence on the methods whose place on the map another has; empty if there are none."""
+    names = list(overview(content).loc[same_physics, "model"])
+    return f" Not on the map, where another method has their place: {listed(names, 6)}." if names else ""
+
+
+def _rival(rows: pd.DataFrame) -> str:
+    """The model without physics that others are compared with: by name where there are several."""
+    return next(iter(rows.model[rows.family == DATA_DRIVEN]), NO_PHYSICS)
+
+
+def ends_of_map(cells: pd.DataFrame) -> tuple[str, str]:
+    """The least and the greatest H, each with its model and N_D."""
+    ends = rows_in(cells.loc[[cells.H.idxmin(), cells.H.idxmax()]])
+    least, greatest = (f"{metres(row.H)} ({row.model}, N_D = {row.N_D})" for row in ends)
+    return least, greatest
+
+
+def _takeaway_map(shown: CellMap) -> str:
+    """Where H is lowest and highest, and up to which A physics helped at every N_D."""
+    good, rival = shown.cells[shown.cells.H.notna()], _rival(shown.rows)
+    text = "H runs from {} to {}".format(*ends_of_map(good))
+    pure = good.family.eq(DATA_DRIVEN)
+    physics = good[~pure & good.N_D.isin(good.N_D[pure])]
+    if physics.empty:
+        return f"{text}."
+    if not physics.worse.any():
+        return f"{text}; H is below that of {rival} in all {counted(len(physics), 'cell')} with physics."
+    limit, bad = float(physics.A[physics.worse].min()), int(physics.worse.sum())
+    text += f"; in {bad} of {counted(len(physics), 'cell')} with physics H is not below that of {rival}"
+    return text + (f", none of them below A = {metres(limit)}." if physics.A.lt(limit).any() else ".")
+
+
+def unplotted(content: ReportContent) -> str:
+    """Sentence naming the cells that gave no result; empty if all did."""
+    names, by = [], ["model", "N_D"]
+    every = content.cells.groupby(by, sort=False).size().to_dict()
+    bad = content.cells[content.cells.status.ne("ok") | content.cells.H.isna()]
+    for (model, size), failed in bad.groupby(by, sort=False):
+        count = every[model, size]
+        share = f", {len(failed)} of {count} seeds" if len(failed) < count else ""
+        names.append(f"{model} at N_D = {size} ({failed.status.iloc[0]}{share})")
+    return f" Not plotted: {listed(names, 6)}; reasons in the table of cells." if names else ""
+
+
+def gain(content: ReportContent) -> Figure | None:
+    """H over N_D, or the dumbbell A -> H when the study has a single N_D; None where `gain_lack` says why not."""
+    if gain_lack(content):
+        return None
+    means = trained(content).merge(overview(content)[["model"]])
+    return _gain_over_size(content, means) if content.cells.N_D.nunique() > 1 else _gain_at_one_size(content, means)
+
+
+def gain_lack(content: ReportContent) -> str:
+    """Why there is nothing to draw, as the end of a sentence; empty where it can be drawn."""
+    if content.cells.empty:
+        return "it needs rows of cells"
+    # The H of identified physics may differ from one cell to another.
+    if nothing_learns(content) and not (content.cells.groupby("model").H.nunique() > 1).any():
+        return "no method learns from data, so that every H is the A of its physics, whatever N_D"
+    return ""
+
+
+def _gain_over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
+    looks, span, (order, drawn) = styles(content), accuracy_range(content), _models_with_line(content)
+    heights = means.H[means.model.isin(order) & means.H.gt(0)]
+    accuracy = content.cells.groupby("model").A.first()
+    words = {name: f"{name}, A {metres(accuracy[name])}" for name in order if np.isfinite(accuracy[name])}
+    return Figure(
+        id="gain",
+        title="What another manoeuvre buys",
+        takeaway=_takeaway_sizes(content, means),
+        how=HOW_MEASURED.format(seeds="the line joins their means and the pale points are the seeds")
+        + (" Colour is A; the" if span else " The")
+        + " marker is the family; N_D counts manoeuvres to train and to validate."
+        + left_out(content)
+        + drawn
+        + unplotted(content),
+        alternative=f"Lines of the position error over the number of manoeuvres for {counted(len(order), 'model')}. "
+        "The numbers are in the table of cells.",
+        height=460 if len(order) <= 10 else 560,
+        draw=lambda statistic, kind: [_draw_sizes(content, means, order, statistic, kind == "logarithmic")],
+        controls=[
+            Control("Position error", list(STATISTICS)),
+            Control("Axis", ["linear", "logarithmic"], int(len(heights) > 0 and heights.max() > FAR * heights.min())),
+        ],
+        chips=[*model_chips(order, looks, words), Chip("naive", CONSTANT, NAIVE, "dash")],
+        scale=Scale("error of the physics alone, A [m]", *span) if span else None,
+    )
+
+
+def _models_with_line(content: ReportContent) -> tuple[list[str], str]:
+    """Models that have a line, by A, and a sentence on those that have none: of many some, or no line is told apart."""
+    frame = overview(content)
+    pure = frame.family.eq(DATA_DRIVEN)
+    physics = [str(name) for name in frame.model[~pure]]
+    kept = {*spread(physics, MOST_LINES), content.best, *frame.model[pure]}
+    order = [str(name) for name in frame.model if name in kept]
+    few = len(order) - int(pure.sum())
+    if few == len(physics):
+        return order, ""
+    words = f" Of {len(physics)} models with physics, {few} have a line: some spread over A"
+    words += " and the best in validation" if content.best else ""
+    return order, f"{words}; the others are in the map and in the table of cells."
+
+
+def _draw_sizes(
+    content: ReportContent, means: pd.DataFrame, order: Sequence[str], statistic: str, logarithmic: bool
+) -> go.Figure:
+    """Lines over N_D; what has no physics first: it must not cover the others."""
+    column, looks, sizes = STATISTICS[statistic][0], styles(content), sorted(content.cells.N_D.unique())
+    ended = content.cells[content.cells.status.eq("ok")]
+    traces = []
+    for name in (name for name in reversed(order) if means.model.eq(name).any()):
+        look, keys, seeds = looks[name], [f"model:{name}"], ended[ended.model.eq(name)]
+        marker = {"symbol": look.symbol, "size": 8, "color": look.colour}
+        # A size whose cells all failed stays NaN: the line has a gap there.
+        heights = means[means.model.eq(name)].set_index("N_D")[column].reindex(sizes)
+        ink = {"color": look.colour, "width": look.width}
+        traces.append(line(name, sizes, heights, keys, mode="lines+markers", line=ink, marker=marker))
+        if seeds.seed.nunique() > 1:
+            faint: Trace = {"mode": "markers", "marker": {**marker, "size": 5}, "opacity": 0.4}
+            traces.append(line(f"{name}, seed", seeds.N_D, seeds[column], keys, **faint))
+    traces.append(_floor(content, statistic, [sizes[0], sizes[-1]]))
+    title = f"position error, {statistic} [m]"
+    x = axis("manoeuvres, N_D [1]", tickvals=[int(size) for size in sizes])
+    return plot(traces, x, log_axis(title) if logarithmic else axis(title, rangemode="tozero"))
+
+
+def _floor(content: ReportContent, statistic: str, ends: Sequence[float]) -> Trace:
+    """Dashed line of constant u, v, r from one end to the other."""
+    level = content.naive[STATISTICS[statistic][2]]
+    ink = {"color": NAIVE, "dash": "dash", "width": 1.5}
+    return line(CONSTANT, ends, [level] * 2, ["naive"], line=ink, hover=f"{CONSTANT}: {metres(level)}")
+
+
+def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
+    if means.empty:
+        return "No cell gave a result."
+    parts = []
+    for size in (means.N_D.min(), means.N_D.max()):
+        mine = means[means.N_D.eq(size)].set_index("model").H
+        named = [name for name in (content.best, data_driven(content)) if name and name in mine.index]
+        known = " and ".join(f"{in_words(name)} has H = {metres(mine[name])}" for name in named)
+        parts.append(f"t N_D = {size}, {known or f'H runs from {metres(mine.min())} to {metres(mine.max())}'}")
+    best = f" {content.best} is the best in validation." if content.best else ""
+    return f"A{parts[0]}; a{parts[1]}.{best}"
+
+
+def _gain_at_one_size(content: ReportContent, means: pd.DataFrame) -> Figure:
+    names = [str(name) for name in overview(content).model]
+    names = list(means.set_index("model").H.reindex(names).sort_values(na_position="last").index)
+    return Figure(
+        id="gain",
+        title="What compensation buys",
+        takeaway=_takeaway_one_size(content, means),
+        how="Open marker: the physics alone; filled: with the compensator trained on N_D = "
+        f"{content.cells.N_D.iloc[0]} manoeuvres. "
+        + HOW_MEASURED.format(seeds="the filled marker is their mean and the pale points are the seeds")
+        + left_out(content)
+        + unplotted(content),
+        alternative=f"Position error before and after compensation for {counted(len(names), 'model')}. "
+        "The numbers are in the tables of models and cells.",
+        height=DUMBBELL * len(names) + 90,
+        draw=lambda statistic: [_draw_dumbbells(content, means, statistic, names)],
+        controls=[Control("Position error", list(STATISTICS))],
+        chips=[
+            Chip("before", "physics alone", INK, "none", symbol="circle-open"),
+            Chip("after", "with compensation (or no physics)", INK, "none", symbol="circle"),
+            Chip("naive", CONSTANT, NAIVE, "dash"),
+        ],
+    )
+
+
+def _draw_dumbbells(content: ReportContent, means: pd.DataFrame, statistic: str, names: list[str]) -> go.Figure:
+    """A row for each model: the physics alone, with compensation, and a bar between them."""
+    column, alone, _ = STATISTICS[statistic]
+    old = content.models.set_index("model")[alone].reindex(names).to_numpy(dtype=float)
+    new = means.set_index("model")[column].reindex(names).to_numpy(dtype=float)
+    colours = [styles(content)[name].colour for name in names]
+    seeds = content.cells[content.cells.status.eq("ok") & content.cells.model.isin(names)]
+    seeds = seeds[seeds.groupby("model").H.transform("size") > 1]
+    at = {name: row for row, name in enumerate(names)}
+    places = [at[name] for name in seeds.model]
+    floor = _floor(content, statistic, [len(names) - 0.4, -0.6])
+    traces = [floor | {"x": floor["y"], "y": floor["x"]}]
+    traces += [
+        line(name, [old[i], new[i]], [i, i], ["before", "after"], line={"color": colours[i], "width": 3}, hover="")
+        for i, name in enumerate(names)
+    ]
+    for key, what, values, lines, symbol, size in (
+        ("before", "physics alone", old, range(len(names)), "circle-open", 13),
+        ("after", "with compensation, seed", seeds[column].to_numpy(dtype=float), places, "circle", 7),
+        ("after", "with compensation", new, range(len(names)), "circle", 13),
+    ):
+        ink = [colours[i] for i in lines]
+        marker = {"symbol": symbol, "size": size, "color": ink, "line": {"width": 2, "color": ink}}
+        words = [f"{escaped(names[i])}, {what}: {metres(value)}" for i, value in zip(lines, values, strict=True)]
+        shade = 0.4 if size == 7 else 1.0
+        traces.append(line(what, values, lines, [key], mode="markers", marker=marker, hover=words, opacity=shade))
+    texts = []
+    for row, name in enumerate(names):
+        numbers = " → ".join(metres(value) for value in (old[row], new[row]) if np.isfinite(value))
+        numbers += "" if np.isfinite(new[row]) else " → no result"
+        texts.append(row_name(row, f"<b>{escaped(shortened(name, LONG))}</b>  {numbers}"))
+    x = axis(f"position error, {statistic} [m]", rangemode="tozero")
+    y = axis("", range=[len(names) - 0.4, -0.75], showticklabels=False, showgrid=False)
+    return plot(traces, x, y, annotations=texts, margin={"l": 8, "r": 12, "t": 4, "b": 44})
+
+
+def _takeaway_one_size(content: ReportContent, means: pd.DataFrame) -> str:
+    after = means.set_index("model").H
+    if after.empty:
+        return "No cell gave a result."
+    before = content.models.set_index("model").A.reindex(after.index).dropna()
+    better, best, pure = before.index[after[before.index] < before], content.best, data_driven(content)
+    text = f"{best}, best in validation, has H = {metres(after[best])}; c" if best in after.index else "C"
+    text += f"ompensation improves {len(better)} of {counted(len(before), 'physics model')}"
+    text = "No physics model has a result with data" if before.empty else text
+    text += f"; {in_words(pure)} has H = {metres(after[pure])}" if pure and pure in after.index else ""
+    return f"{text}; {CONSTANT} {metres(content.naive['mean'])}."
+
+
+RESULTS = Section(
+    "What physics and data buy",
+    draw=lambda content: (error_map(content), gain(content)),
+    needs=("cells",),
+    anchors=("map", "gain"),
+)
